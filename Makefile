@@ -1,0 +1,128 @@
+# Each target is enough on its own on a fresh Debian 12: it installs the Debian packages it needs (as root or through
+# sudo, only where they are missing), makes .venv and builds. `make help` lists the targets.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.SUFFIXES:
+MAKEFLAGS += --no-builtin-rules
+
+PYTHON ?= python3
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check -q
+
+JOBS := $(shell nproc)
+export CMAKE_BUILD_PARALLEL_LEVEL := $(JOBS)
+ifneq ($(shell command -v ccache),)
+export CMAKE_CXX_COMPILER_LAUNCHER := ccache
+endif
+
+BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libsundials-dev python3-dev python3-venv
+TEST_PACKAGES := $(BUILD_PACKAGES) doctest-dev clang-format clang-tidy
+
+CPP_HEADERS := $(shell find cpp -name '*.hpp')
+CORE_SOURCES := $(shell find cpp/src -name '*.cpp')
+CPP_FILES := $(shell find cpp bindings tests/cpp -name '*.[ch]pp')
+# Folders too: their time changes when a file comes or goes.
+PACKAGE_INPUTS := CMakeLists.txt cmake $(shell find cpp/include cpp/src bindings python \
+                    -name __pycache__ -prune -o -print)
+TIDY_STAMPS := $(CORE_SOURCES:%=build/tidy/%.ok)
+
+.PHONY: help demo test lint bench stubs format clean \
+        build-packages test-packages package dev tidy release sanitize stub-check
+
+help:
+	@echo 'make demo    build, convert a first program and a real one of some thousand lines; results in demo-output/'
+	@echo 'make test    everything that must hold: lint, C++ tests plain and with sanitizers, Python tests'
+	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy'
+	@echo 'make bench   measure, with LinuxCNC rs274 as the independent interpreter'
+	@echo 'make stubs   write python/shapegcode/_core.pyi anew from the built module'
+	@echo 'make format  lay out the C++ and Python sources as lint wants them'
+	@echo 'make clean   remove everything that was built or downloaded'
+
+# --- What people ask for ----------------------------------------------------------------------------------------------
+demo: package
+	$(BIN)/shapegcode demo path
+	mkdir -p demo-output
+	$(BIN)/shapegcode convert tests/golden/programs/PARALLEL.NC -m vx500 \
+	  -o demo-output/PARALLEL.NC --plots demo-output --json demo-output/PARALLEL.json
+
+# One after the other, so that the output reads from top to bottom and ends with pytest's own closing line.
+test:
+	$(MAKE) lint
+	$(MAKE) release
+	$(MAKE) sanitize
+	$(MAKE) stub-check
+	$(BIN)/python -m pytest
+
+lint: test-packages dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy --strict python/shapegcode
+	clang-format --dry-run -Werror $(CPP_FILES)
+	$(MAKE) -j$(JOBS) tidy
+	@echo 'lint: nothing to complain about'
+
+bench: package dev
+	tests/tools/fetch_rs274.sh
+	$(BIN)/python tests/benchmarks/run.py
+
+stubs: package dev
+	$(BIN)/pybind11-stubgen shapegcode._core --output-dir python --exit-code
+
+format: test-packages dev
+	clang-format -i $(CPP_FILES)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean:
+	rm -rf build .venv .cache .mypy_cache .pytest_cache .ruff_cache .hypothesis demo-output
+
+# --- Steps ------------------------------------------------------------------------------------------------------------
+build-packages:
+	@tests/tools/debian_packages.sh $(BUILD_PACKAGES)
+
+test-packages:
+	@tests/tools/debian_packages.sh $(TEST_PACKAGES)
+
+.venv/.runtime: pyproject.toml tests/tools/requirements.py | build-packages
+	@$(PYTHON) -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo '$(PYTHON) must be Python 3.11 or newer, with venv; name another one with PYTHON=...' >&2; exit 1; }
+	[ -x $(BIN)/python ] || $(PYTHON) -m venv .venv
+	$(PIP) install -r <($(PYTHON) tests/tools/requirements.py build runtime)
+	touch $@
+
+.venv/.dev: .venv/.runtime
+	$(PIP) install -r <($(PYTHON) tests/tools/requirements.py dev)
+	touch $@
+
+# The build folder stays, so that a change costs only what depends on it.
+.venv/.package: .venv/.runtime $(PACKAGE_INPUTS)
+	$(PIP) install --no-build-isolation --no-deps --config-settings=build-dir=build/wheel \
+	  --config-settings=cmake.define.SHAPEGCODE_WARNINGS_AS_ERRORS=ON .
+	touch $@
+
+dev: .venv/.dev
+
+package: .venv/.package
+
+release sanitize: test-packages
+	cmake --preset $@
+	cmake --build --preset $@
+	ctest --preset $@
+
+stub-check: package dev
+	$(BIN)/python -m mypy.stubtest --mypy-config-file pyproject.toml shapegcode._core
+
+build/release/compile_commands.json: CMakeLists.txt CMakePresets.json $(CORE_SOURCES) | test-packages
+	cmake --preset release
+	touch $@
+
+# The compile commands are GCC's: clang-tidy need not know all its warnings.
+build/tidy/%.ok: % $(CPP_HEADERS) .clang-tidy build/release/compile_commands.json
+	clang-tidy -p build/release --quiet --extra-arg=-Wno-unknown-warning-option $<
+	@mkdir -p $(@D)
+	@touch $@
+
+tidy: $(TIDY_STAMPS)

@@ -1,0 +1,17 @@
+#include <pybind11/pybind11.h>
+
+#include "register.hpp"
+
+PYBIND11_MODULE(_core, module) {
+  using namespace shapegcode::bindings;
+  module.doc() = "Compiled core of shapegcode: program text, motion, filters, shapers, plant and metrology.";
+  module.attr("__version__") = SHAPEGCODE_VERSION;
+  register_errors(module);
+  register_shaping(module);
+  register_filter(module);
+  register_path(module);
+  register_motion(module);
+  register_gcode(module);
+  register_emission(module);
+  register_simulation(module);
+}

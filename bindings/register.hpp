@@ -1,0 +1,18 @@
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+// register_shaping keeps the global namespace of its own file.
+void register_shaping(pybind11::module_& module);
+
+namespace shapegcode::bindings {
+
+void register_errors(pybind11::module_& module);
+void register_filter(pybind11::module_& module);
+void register_path(pybind11::module_& module);
+void register_gcode(pybind11::module_& module);
+void register_motion(pybind11::module_& module);
+void register_emission(pybind11::module_& module);
+void register_simulation(pybind11::module_& module);
+
+}  // namespace shapegcode::bindings

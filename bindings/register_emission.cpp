@@ -1,0 +1,127 @@
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <utility>
+
+#include "arrays.hpp"
+#include "register.hpp"
+#include "shapegcode/emission/block_fit.hpp"
+#include "shapegcode/emission/block_writer.hpp"
+#include "shapegcode/emission/shaped_command.hpp"
+
+namespace py = pybind11;
+
+namespace shapegcode::bindings {
+namespace {
+
+struct FittedBlocks {
+  std::vector<FittedBlock> blocks;
+};
+
+}  // namespace
+
+void register_emission(py::module_& module) {
+  py::class_<ShapingOptions>(module, "ShapingOptions", "How a region is turned into a shaped command on the block grid.")
+      .def(py::init<>())
+      .def_readwrite("limits", &ShapingOptions::limits, "Limits of the look-ahead.")
+      .def_readwrite("block_period_s", &ShapingOptions::block_period_s, "s.")
+      .def_readwrite("interpolation_period_s", &ShapingOptions::interpolation_period_s, "s.")
+      .def_readwrite("plunge_axis_angle_rad", &ShapingOptions::plunge_axis_angle_rad,
+                     "How far a side of a corner may lean from Z and still count as plunge, rad.")
+      .def_readwrite("plunge_corner_angle_rad", &ShapingOptions::plunge_corner_angle_rad,
+                     "Least change of direction of such a corner, rad.")
+      .def_readwrite("rest_at_stop_s", &ShapingOptions::rest_at_stop_s, "Pause at a forced stop, s.");
+
+  py::class_<ShapedCommand, std::shared_ptr<ShapedCommand>>(module, "ShapedCommand",
+                                                            "A shaped command on the block grid.")
+      .def_property_readonly(
+          "grid_mm", [](const std::shared_ptr<ShapedCommand>& self) { return view(self->grid_mm, py::cast(self)); },
+          "(n+1, 3) positions at k*T_B, mm, read-only view.")
+      .def_property_readonly(
+          "middle_mm", [](const std::shared_ptr<ShapedCommand>& self) { return view(self->middle_mm, py::cast(self)); },
+          "(n, 3) positions half a period later, mm, read-only view.")
+      .def_property_readonly(
+          "arc_normal", [](const ShapedCommand& self) { return self.arc_normal; },
+          "Per period the axis across an arc's plane, or -1.")
+      .def_readonly("run_ends", &ShapedCommand::run_ends, "Periods at which the command is at rest.")
+      .def_readonly("segment_periods", &ShapedCommand::segment_periods,
+                    "Per marked segment the period in which its begin is reached.");
+
+  module.def(
+      "shape_path",
+      [](const std::shared_ptr<Path>& path, const Fir& shaper, const std::vector<std::uint32_t>& marked,
+         const ShapingOptions& options) {
+        const py::gil_scoped_release release;
+        return std::make_shared<ShapedCommand>(shape_path(path, shaper, marked, options));
+      },
+      py::arg("path"), py::arg("shaper"), py::arg("marked_segments"), py::arg("options"),
+      "Split at forced stops, plan, sample on half the block grid and shape. `shaper` has its taps in whole block "
+      "periods. Raises ArgumentError if the block period is no multiple of the interpolation period.");
+
+  py::class_<FitOptions>(module, "FitOptions", "Grid on which blocks are fitted.")
+      .def(py::init<>())
+      .def_readwrite("increment_mm", &FitOptions::increment_mm, "Least increment of the words, mm.")
+      .def_readwrite("block_period_s", &FitOptions::block_period_s, "s.")
+      .def_readwrite("interpolation_period_s", &FitOptions::interpolation_period_s, "s.")
+      .def_readwrite("feed_unit_mm_per_s", &FitOptions::feed_unit_mm_per_s, "One step of the last F digit, mm/s.")
+      .def_readwrite("minimum_feed", &FitOptions::minimum_feed, "In feed units.")
+      .def_readwrite("merge_tolerance_increments", &FitOptions::merge_tolerance_increments,
+                     "Deviation of merged blocks per axis, least increments.")
+      .def_readwrite("arc_min_chord_mm", &FitOptions::arc_min_chord_mm, "Shorter pieces are lines, mm.");
+
+  py::class_<FittedBlocks, std::shared_ptr<FittedBlocks>>(module, "FittedBlocks", "Blocks ready to be written.")
+      .def("__len__", [](const FittedBlocks& self) { return self.blocks.size(); })
+      .def_property_readonly(
+          "periods",
+          [](const FittedBlocks& self) {
+            py::array_t<std::uint32_t> out(static_cast<py::ssize_t>(self.blocks.size()));
+            auto* to = out.mutable_data();
+            for (const FittedBlock& block : self.blocks) {
+              *to++ = block.periods;
+            }
+            return out;
+          },
+          "Whole block periods that each lasts, (n,).");
+
+  module.def(
+      "fit_blocks",
+      [](const ShapedCommand& command, const std::vector<std::uint32_t>& breaks, const FitOptions& options) {
+        const py::gil_scoped_release release;
+        auto fitted = std::make_shared<FittedBlocks>();
+        fitted->blocks = fit_blocks(command.grid_mm, command.middle_mm, command.arc_normal, breaks, options);
+        return fitted;
+      },
+      py::arg("command"), py::arg("breaks"), py::arg("options"),
+      "Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. "
+      "Raises ArgumentError on a position outside +-99999.999 mm.");
+
+  py::class_<BlockMark>(module, "BlockMark", "An N word or comment to be written before the block that begins there.")
+      .def(py::init([](std::uint32_t period, std::int32_t n_number, std::string comment) {
+             return BlockMark{period, n_number, std::move(comment)};
+           }),
+           py::arg("period"), py::arg("n_number") = -1, py::arg("comment") = "");
+
+  py::class_<WriterOptions>(module, "WriterOptions", "How fitted blocks are written.")
+      .def(py::init<>())
+      .def_readwrite("position_decimals", &WriterOptions::position_decimals, "Digits behind the point.")
+      .def_readwrite("feed_decimals", &WriterOptions::feed_decimals, "Digits behind the point.")
+      .def_readwrite("incremental", &WriterOptions::incremental, "G91 words.")
+      .def_readwrite("plane", &WriterOptions::plane, "Plane active before the first block.")
+      .def_readwrite("line_end", &WriterOptions::line_end, "Line end.");
+
+  module.def(
+      "write_blocks",
+      [](const FittedBlocks& fitted, const std::array<std::int64_t, axis_count>& start,
+         const std::vector<BlockMark>& marks, const WriterOptions& options) {
+        std::string text;
+        {
+          const py::gil_scoped_release release;
+          text = write_blocks(fitted.blocks, start, marks, options);
+        }
+        return py::bytes(text);
+      },
+      py::arg("blocks"), py::arg("start"), py::arg("marks"), py::arg("options"),
+      "Text of fitted blocks (bytes); `start` in increments.");
+}
+
+}  // namespace shapegcode::bindings

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "shapegcode/samples.hpp"
+
+namespace shapegcode {
+
+/// The one filter type: weights on the sample grid that add up to one. An acceleration filter is a moving average, an
+/// input shaper a few unequal taps; a cascade of both is a list of Fir.
+class Fir {
+ public:
+  /// Taps at whole-sample delays, ascending, first >= 0. Throws Error(argument) on an empty list, unequal lengths, a
+  /// negative or unsorted delay, a value that is not finite, or a sum that differs from 1 by more than 1e-9.
+  Fir(std::vector<int> delays, std::vector<double> taps);
+  /// Equal weights over `length` >= 1 samples; costs the same for any length. Throws Error(argument) on length < 1.
+  [[nodiscard]] static Fir moving_average(int length);
+
+  [[nodiscard]] const std::vector<int>& delays() const noexcept { return delays_; }
+  [[nodiscard]] const std::vector<double>& taps() const noexcept { return taps_; }
+  [[nodiscard]] bool is_moving_average() const noexcept { return moving_average_; }
+  /// Largest delay in samples: how much longer the output moves than the input.
+  [[nodiscard]] int duration_samples() const noexcept;
+  /// First moment of the taps in samples: the mean delay.
+  [[nodiscard]] double mean_samples() const noexcept;
+  /// Second central moment of the taps in samples^2: the contour cost (spec: dR/R = variance*(v/R)^2/2).
+  [[nodiscard]] double variance_samples2() const noexcept;
+
+  /// Batch form of one axis: input held at its first value before and at its last value after.
+  /// out.size() must be in.size() + duration_samples(). Bit-identical to FirStream. `in` and `out` must not overlap.
+  /// Throws Error(argument) on an empty input or a wrong output size.
+  void apply(std::span<const double> in, std::span<double> out) const;
+  /// All axes; the result has duration_samples() more rows. Throws Error(argument) on an input without rows.
+  [[nodiscard]] Samples apply(const Samples& in) const;
+  /// All axes into the caller's memory, column-major: `in` holds in_rows x n_axes values, `out` receives
+  /// (in_rows + duration_samples()) x n_axes. Throws Error(argument) on in_rows < 1 or n_axes < 0.
+  void apply(const double* in, Eigen::Index in_rows, int n_axes, double* out) const;
+
+ private:
+  std::vector<int> delays_;
+  std::vector<double> taps_;
+  bool moving_average_ = false;
+};
+
+/// Real-time form: one sample of every axis per step; no allocation, no exception, bounded work.
+/// A value that is not finite stays in a moving average's sum until the next reset.
+class FirStream {
+ public:
+  /// At rest at zero. Throws Error(argument) on n_axes < 1.
+  FirStream(Fir fir, int n_axes);
+  /// Rest at `position` (n_axes values).
+  void reset(std::span<const double> position) noexcept;
+  /// Filters in place: n_axes values.
+  void step(std::span<double> position) noexcept;
+  [[nodiscard]] const Fir& fir() const noexcept { return fir_; }
+
+ private:
+  Fir fir_;
+  int n_axes_ = 0;
+  std::vector<double> ring_;  // one row of n_axes values per sample; the number of rows is a power of two
+  std::size_t row_mask_ = 0;
+  std::size_t row_ = 0;                  // samples since reset; its low bits are the row of the next sample
+  std::vector<double> sum_, sum_error_;  // moving average only: running sum of each axis and what its rounding lost
+};
+
+}  // namespace shapegcode

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace shapegcode {
+
+/// One word of a block: an address letter and its number.
+struct Word {
+  double value = 0.0;
+  std::uint32_t column = 0;  ///< of the letter, from 1
+  char letter = 0;           ///< upper case
+  bool has_point = false;
+  std::uint8_t digits = 0;  ///< digits written, leading zeros not counted
+};
+
+/// What one line of program text holds. Views point into the text handed to `scan_block`.
+struct Block {
+  static constexpr std::size_t max_words = 40;
+  std::array<Word, max_words> words;
+  std::size_t word_count = 0;
+  std::string_view comment;  ///< from the first '(' to the last ')', with the parentheses; empty if none
+  bool optional_skip = false;
+
+  [[nodiscard]] const Word* begin() const noexcept { return words.data(); }
+  [[nodiscard]] const Word* end() const noexcept { return words.data() + word_count; }
+};
+
+/// Splits one line (without its line end) into words. `line` counts from 1 and goes into errors.
+/// Throws Error(program) with line and column on: a byte that is no program character, a letter without a number, a
+/// comment that does not close, more than 40 words, more than 8 digits in a number, a custom macro statement, a
+/// decimal point in an address that takes whole numbers, a line longer than `max_length` characters.
+void scan_block(std::string_view text, std::uint32_t line, std::size_t max_length, Block& block);
+
+}  // namespace shapegcode

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "shapegcode/path/segment.hpp"
+
+namespace shapegcode {
+
+/// When a block's successor starts.
+enum class BlockEnd : std::uint8_t {
+  ceil,   ///< on the next interpolation tick (paper 004)
+  carry,  ///< at once: the remainder of a period is carried over
+};
+
+/// A controller without look-ahead: every block runs at its feed for its whole length, the next one follows at once. The
+/// acceleration filter comes after it (a moving average: block overlap). Real-time form.
+class BlockPlayer {
+ public:
+  /// `override_ratio` scales every feed. Throws Error(argument) on period or ratio <= 0, or a segment without feed.
+  BlockPlayer(std::span<const Segment> blocks, double period_s, BlockEnd block_end, double override_ratio = 1.0);
+
+  /// Next set-point, the start first; false once the end was given.
+  bool step(Vector3& position) noexcept;
+  /// Block on which the set-point last given lies.
+  [[nodiscard]] std::size_t block() const noexcept { return block_; }
+  /// Duration of one block: a whole number of periods under `ceil`.
+  [[nodiscard]] double block_duration_s(const Segment& segment) const noexcept;
+
+ private:
+  void open_block() noexcept;
+
+  std::span<const Segment> blocks_;
+  double period_s_;
+  double ratio_;
+  BlockEnd block_end_;
+  std::size_t block_ = 0;
+  double elapsed_s_ = 0.0;   // since the open block began
+  double duration_s_ = 0.0;  // of the open block
+  bool started_ = false;
+  bool finished_ = false;
+};
+
+/// Sum of block durations in s.
+[[nodiscard]] double play_duration_s(std::span<const Segment> blocks, double period_s, BlockEnd block_end,
+                                     double override_ratio = 1.0);
+
+}  // namespace shapegcode

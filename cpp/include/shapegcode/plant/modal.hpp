@@ -1,0 +1,86 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "shapegcode/mode.hpp"
+#include "shapegcode/samples.hpp"
+
+namespace shapegcode {
+
+/// Base-excited modes per axis: d'' + 2*zeta*omega*d' + omega^2*d = -x'' and response u = x + sum(participation*d).
+using AxisModes = std::array<std::vector<Mode>, axis_count>;
+
+/// Propagates the modes exactly (matrix exponential) for a command that is linear between set-points, as a servo's
+/// set-points are (first-order hold). Real-time safe after construction: no allocation, no exception, bounded work.
+/// Spec section 3 and 6: u'' + 2*zeta*omega*u' + omega^2*u = 2*zeta*omega*x' + omega^2*x.
+class ModalPlant {
+ public:
+  /// Throws Error(argument) on period <= 0 or an invalid mode.
+  ModalPlant(AxisModes modes, double period_s);
+  /// At rest at `position`; peak() restarts from zero.
+  void reset(const Vector3& position) noexcept;
+  /// Next set-point; returns the response at that instant.
+  Vector3 step(const Vector3& command) noexcept;
+  /// Deflection u - x at the last set-point.
+  [[nodiscard]] Vector3 deflection() const noexcept { return deflection_; }
+  /// Largest |deflection| per axis since the last reset() or reset_peak(), between set-points too: evaluated at most
+  /// 1/20 period of the axis' fastest mode apart (at most 1024 times per set-point) and refined where the deflection
+  /// turns, so that it is right to about 1e-4 of itself.
+  [[nodiscard]] Vector3 peak() const noexcept { return peak_; }
+  /// peak() restarts from the present deflection.
+  void reset_peak() noexcept { peak_ = deflection_.cwiseAbs(); }
+  /// Largest |deflection| per axis that follows, if the command rests from now on (continuous time, not only at
+  /// samples; searched over the time in which the slowest mode of the axis makes `n_periods` swings, in steps of 1/64
+  /// period of the fastest; ends early when no larger one can follow, and after 1e6 steps). The stop itself counts: the
+  /// command's last velocity falls to zero at the last set-point. Throws Error(argument) on n_periods < 1.
+  [[nodiscard]] Vector3 residual_peak(int n_periods = 5) const;
+
+ private:
+  /// (d, d')(t+h) = matrix * (d, d')(t) of a free mode.
+  struct Transition {
+    double dd = 1.0, dv = 0.0, vd = 0.0, vv = 1.0;
+  };
+  struct State {
+    Transition over_period;
+    double participation = 1.0;
+    double decay_rate = 0.0;       // 1/s: zeta*omega
+    double damped_period_s = 0.0;  // over 2 pi
+    double deflection = 0.0;       // mm
+    double velocity = 0.0;         // mm/s, of the deflection
+
+    void propagate() noexcept {
+      const double next = over_period.dd * deflection + over_period.dv * velocity;
+      velocity = over_period.vd * deflection + over_period.vv * velocity;
+      deflection = next;
+    }
+    /// No later deflection of the free mode exceeds this share of the response.
+    [[nodiscard]] double reachable() const noexcept;
+  };
+  /// Deflection of an axis and its rate, all modes together.
+  struct Motion {
+    double deflection = 0.0;
+    double rate = 0.0;
+  };
+  [[nodiscard]] static Transition transition(const Mode& mode, double time_s);
+  /// `peak_` over the period that now begins, looked at between its ends; called only where it may grow.
+  void look_between(std::size_t axis) noexcept;
+  /// Largest |deflection| between two instants `time_s` apart, with the turning point found by the secant of the rate.
+  [[nodiscard]] static double largest_between(const Motion& from, const Motion& to, double time_s) noexcept;
+
+  AxisModes modes_;
+  double period_s_;
+  double rate_hz_;
+  std::array<std::size_t, axis_count + 1> first_{};  // states_ of axis a: first_[a] up to first_[a+1]
+  std::vector<State> states_;
+  std::array<int, axis_count> substeps_{};           // per period and axis
+  std::array<std::size_t, axis_count> first_sub_{};  // where an axis' sub-step matrices begin
+  std::vector<Transition> sub_;                      // times participation; axis, end of sub-step, mode
+  Vector3 command_ = Vector3::Zero();
+  Vector3 command_velocity_ = Vector3::Zero();
+  Vector3 deflection_ = Vector3::Zero();
+  Vector3 peak_ = Vector3::Zero();
+};
+
+}  // namespace shapegcode

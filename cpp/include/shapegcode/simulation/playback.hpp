@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "shapegcode/filter/fir.hpp"
+#include "shapegcode/metrology/contour.hpp"
+#include "shapegcode/motion/block_player.hpp"
+#include "shapegcode/motion/speed_profile.hpp"
+#include "shapegcode/path/path.hpp"
+#include "shapegcode/plant/modal.hpp"
+
+namespace shapegcode {
+
+/// What a run of set-points is measured with.
+struct PlaybackOptions {
+  double period_s = 0.001;
+  std::vector<Fir> axis_filters;  ///< after the set-points, in order (acceleration after interpolation)
+  AxisModes modes;
+  bool measure_contour = true;  ///< deviation of command and response and orbit errors
+  /// Keep at most so many samples of command and response for pictures (0: none); longer runs keep their beginning.
+  std::size_t record_samples = 0;
+};
+
+/// Figures of one run from rest to rest. Deviations in mm against the programmed path.
+struct PlaybackFigures {
+  double duration_s = 0.0;  ///< until the set-points rest, after every filter
+  Vector3 residual_mm = Vector3::Zero();  ///< largest |response - command| from that instant on
+  Vector3 peak_mm = Vector3::Zero();      ///< largest |response - command| before it
+  Vector3 peak_acceleration_mm_per_s2 = Vector3::Zero();  ///< of the command, second difference
+  DeviationStats command;
+  DeviationStats response;
+  std::vector<double> orbit_error_percent;  ///< per arc of the path, of the command
+  Vector3 end_mm = Vector3::Zero();
+  Samples recorded_command;
+  Samples recorded_response;
+};
+
+/// Plays a path under a speed profile (a controller with look-ahead) through filters and plant. Streams: memory does not
+/// grow with the length of the run.
+[[nodiscard]] PlaybackFigures play_path(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
+                                        const PlaybackOptions& options);
+
+/// Plays blocks at their feed (a controller without look-ahead), measured against the programmed `path`.
+[[nodiscard]] PlaybackFigures play_blocks(std::span<const Segment> blocks, const Path& path, BlockEnd block_end,
+                                          double override_ratio, const PlaybackOptions& options);
+
+/// Any set-points, (n, 3), measured against the programmed `path` (empty: no contour figures).
+[[nodiscard]] PlaybackFigures play_samples(const Samples& samples, const Path& path, const PlaybackOptions& options);
+
+/// Blocks that a controller with look-ahead would run slower than programmed: per-axis speed step at a border over the corner
+/// limit, feed over an axis limit.
+struct LookAheadLimits {
+  Vector3 corner_speed_difference_mm_per_s;
+  Vector3 max_feed_mm_per_s;
+};
+[[nodiscard]] std::size_t count_slowed_blocks(std::span<const Segment> blocks, const LookAheadLimits& limits);
+
+}  // namespace shapegcode

@@ -1,0 +1,307 @@
+#include "shapegcode/emission/block_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+namespace {
+
+constexpr double largest_position_mm = 99999.999;
+constexpr double largest_radius_mm = 99999.999;
+// Ticks by which a block may miss a whole tick and still count as ending on it (rounding of doubles only).
+constexpr double tick_tolerance = 1e-7;
+// How far a line is tried beyond its last good end before it is settled: keeps the fit linear in the program's length.
+constexpr std::uint32_t line_patience = 2048;
+
+using Position = std::array<std::int64_t, axis_count>;
+
+// An arc through two end points with a radius, as a controller builds it from R.
+struct ChordArc {
+  double chord = 0.0;
+  double radius = 0.0;
+  double sweep = 0.0;  // > 0
+  Eigen::Vector2d along;
+  Eigen::Vector2d left;  // unit, left of the chord
+  Eigen::Vector2d start;
+  double bulge_side = 0.0;  // +1: the arc bulges to the left of the chord
+
+  [[nodiscard]] Eigen::Vector2d at(double fraction) const {
+    const double angle = sweep * (fraction - 0.5);
+    const double forward = radius * std::sin(angle) + 0.5 * chord;
+    const double bulge = radius * (std::cos(angle) - std::cos(0.5 * sweep));
+    return start + forward * along + bulge_side * bulge * left;
+  }
+};
+
+class Fitter {
+ public:
+  Fitter(const Eigen::Ref<const Eigen::MatrixXd>& grid, const Eigen::Ref<const Eigen::MatrixXd>& middle,
+         std::span<const std::int8_t> arc_normal, std::span<const std::uint32_t> breaks, const FitOptions& options)
+      : grid_(grid),
+        middle_(middle),
+        arc_normal_(arc_normal),
+        breaks_(breaks),
+        options_(options),
+        periods_(static_cast<std::uint32_t>(middle.rows())),
+        ticks_per_period_(std::lround(options.block_period_s / options.interpolation_period_s)) {}
+
+  std::vector<FittedBlock> run() {
+    std::vector<FittedBlock> blocks;
+    position_ = rounded(0);
+    std::uint32_t k = 0;
+    while (k < periods_) {
+      const std::uint32_t limit = next_break(k);
+      std::optional<FittedBlock> block;
+      if (bends(k)) {
+        block = fit_arc(k, limit);
+      }
+      if (!block) {
+        block = fit_line(k, limit);
+      }
+      if (!block) {
+        break;  // rest to the end
+      }
+      k = block->first_period + block->periods;
+      position_ = block->end;
+      blocks.push_back(*block);
+    }
+    return blocks;
+  }
+
+ private:
+  [[nodiscard]] Position rounded(std::uint32_t k) const {
+    Position result;
+    for (int i = 0; i < axis_count; ++i) {
+      result[static_cast<std::size_t>(i)] = std::llround(grid_(k, i) / options_.increment_mm);
+    }
+    return result;
+  }
+
+  [[nodiscard]] Vector3 to_mm(const Position& p) const {
+    return Vector3(static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])) *
+           options_.increment_mm;
+  }
+
+  std::uint32_t next_break(std::uint32_t k) {
+    while (break_ < breaks_.size() && breaks_[break_] <= k) {
+      ++break_;
+    }
+    return break_ < breaks_.size() ? std::min(breaks_[break_], periods_) : periods_;
+  }
+
+  // Deviation of the path's middle from the chord within one period, in the plane of the arc it follows.
+  [[nodiscard]] Eigen::Vector2d bump(std::uint32_t k, int normal) const {
+    const int a = (normal + 1) % 3;
+    const int b = (normal + 2) % 3;
+    return {middle_(k, a) - 0.5 * (grid_(k, a) + grid_(k + 1, a)), middle_(k, b) - 0.5 * (grid_(k, b) + grid_(k + 1, b))};
+  }
+
+  [[nodiscard]] bool bends(std::uint32_t k) const {
+    const int normal = arc_normal_[k];
+    return normal >= 0 && bump(k, normal).norm() > 0.5 * options_.increment_mm;
+  }
+
+  // F that makes the block last `periods`, rounded up; nullopt if no F of this resolution gives the right ticks.
+  [[nodiscard]] std::optional<std::int64_t> feed(double length_mm, std::uint32_t periods) const {
+    const double duration = static_cast<double>(periods) * options_.block_period_s;
+    const double exact = length_mm / duration / options_.feed_unit_mm_per_s;
+    // An F that is exact to within rounding stays; all others go up.
+    auto value = static_cast<std::int64_t>(std::ceil(exact * (1.0 - 1e-12)));
+    value = std::max(value, options_.minimum_feed);
+    const double ticks = length_mm / (static_cast<double>(value) * options_.feed_unit_mm_per_s) /
+                         options_.interpolation_period_s;
+    if (std::ceil(ticks - tick_tolerance) != static_cast<double>(periods * ticks_per_period_)) {
+      return std::nullopt;
+    }
+    return value;
+  }
+
+  [[nodiscard]] std::int64_t nearest_feed(double length_mm, std::uint32_t periods) const {
+    const double exact = length_mm / (static_cast<double>(periods) * options_.block_period_s) / options_.feed_unit_mm_per_s;
+    return std::max(options_.minimum_feed, static_cast<std::int64_t>(std::ceil(exact)));
+  }
+
+  // Longest line from period k that stays within the merge tolerance of every sample (an opening cone per axis).
+  std::optional<FittedBlock> fit_line(std::uint32_t k, std::uint32_t limit) {
+    const double tolerance = options_.merge_tolerance_increments + 1e-6;
+    std::array<double, axis_count> lowest;
+    std::array<double, axis_count> highest;
+    lowest.fill(-std::numeric_limits<double>::infinity());
+    highest.fill(std::numeric_limits<double>::infinity());
+    std::optional<FittedBlock> best;
+    for (std::uint32_t j = k + 1; j <= periods_; ++j) {
+      if (best && (j > limit || bends(j - 1) || j - k > best->periods + line_patience)) {
+        break;
+      }
+      const double steps = j - k;
+      const Position end = rounded(j);
+      bool inside = true;
+      bool open = true;
+      for (std::size_t i = 0; i < axis_count; ++i) {
+        const double offset =
+            grid_(j, static_cast<Eigen::Index>(i)) / options_.increment_mm - static_cast<double>(position_[i]);
+        const double slope = static_cast<double>(end[i] - position_[i]) / steps;
+        // The end itself is off by its own rounding, at most half an increment, and need not obey the cone.
+        inside = inside && slope >= lowest[i] && slope <= highest[i];
+        lowest[i] = std::max(lowest[i], (offset - tolerance) / steps);
+        highest[i] = std::min(highest[i], (offset + tolerance) / steps);
+        open = open && lowest[i] <= highest[i];
+      }
+      if (end != position_ && (inside || !best)) {
+        const double length = (to_mm(end) - to_mm(position_)).norm();
+        const auto f = feed(length, j - k);
+        if (f || !best) {
+          best = FittedBlock{end, 0, f ? *f : nearest_feed(length, j - k), k, j - k, BlockKind::line, 2};
+        }
+      }
+      if (best && !open) {
+        break;
+      }
+    }
+    return best;
+  }
+
+  [[nodiscard]] std::optional<ChordArc> chord_arc(const Position& from, const Position& to, int normal,
+                                                  const Eigen::Vector2d& middle) const {
+    const int a = (normal + 1) % 3;
+    const int b = (normal + 2) % 3;
+    const Vector3 p = to_mm(from);
+    const Vector3 q = to_mm(to);
+    ChordArc arc;
+    arc.start = {p[a], p[b]};
+    const Eigen::Vector2d chord(q[a] - p[a], q[b] - p[b]);
+    arc.chord = chord.norm();
+    if (arc.chord < options_.arc_min_chord_mm) {
+      return std::nullopt;
+    }
+    arc.along = chord / arc.chord;
+    arc.left = {-arc.along.y(), arc.along.x()};
+    const double height = (middle - (arc.start + 0.5 * chord)).dot(arc.left);
+    if (std::abs(height) < 0.25 * options_.increment_mm) {
+      return std::nullopt;
+    }
+    const double radius = (0.25 * arc.chord * arc.chord + height * height) / (2.0 * std::abs(height));
+    arc.radius = std::round(radius / options_.increment_mm) * options_.increment_mm;
+    if (arc.radius > largest_radius_mm || 0.5 * arc.chord >= arc.radius) {
+      return std::nullopt;
+    }
+    arc.sweep = 2.0 * std::asin(0.5 * arc.chord / arc.radius);
+    arc.bulge_side = height > 0.0 ? 1.0 : -1.0;
+    if (arc.sweep > options_.max_sweep_rad) {
+      return std::nullopt;
+    }
+    return arc;
+  }
+
+  // An arc over periods k ... j, if it follows every sample between; a single period needs no such check.
+  [[nodiscard]] std::optional<FittedBlock> arc_over(std::uint32_t k, std::uint32_t j, int normal) const {
+    const int a = (normal + 1) % 3;
+    const int b = (normal + 2) % 3;
+    const std::uint32_t m = j - k;
+    const Position end = rounded(j);
+    Eigen::Vector2d middle;
+    if (m % 2 == 1) {
+      middle = {middle_(k + m / 2, a), middle_(k + m / 2, b)};
+    } else {
+      middle = {grid_(k + m / 2, a), grid_(k + m / 2, b)};
+    }
+    // The chord is rounded, the middle is not: move the middle with the chord's own rounding.
+    const Vector3 p = to_mm(position_);
+    const Vector3 q = to_mm(end);
+    middle += 0.5 * Eigen::Vector2d(p[a] - grid_(k, a) + q[a] - grid_(j, a), p[b] - grid_(k, b) + q[b] - grid_(j, b));
+    const auto arc = chord_arc(position_, end, normal, middle);
+    if (!arc) {
+      return std::nullopt;
+    }
+    if (m > 1) {
+      const double tolerance = (options_.merge_tolerance_increments + 0.25) * options_.increment_mm;
+      for (std::uint32_t i = 1; i < m; ++i) {
+        const double fraction = static_cast<double>(i) / m;
+        const Eigen::Vector2d at = arc->at(fraction);
+        const double along_normal = p[normal] + (q[normal] - p[normal]) * fraction;
+        if (std::abs(at.x() - grid_(k + i, a)) > tolerance || std::abs(at.y() - grid_(k + i, b)) > tolerance ||
+            std::abs(along_normal - grid_(k + i, normal)) > tolerance) {
+          return std::nullopt;
+        }
+      }
+    }
+    const double length = std::hypot(arc->radius * arc->sweep, q[normal] - p[normal]);
+    const auto f = feed(length, m);
+    if (!f && m > 1) {
+      return std::nullopt;
+    }
+    // Counter-clockwise turns left, so its path bulges to the right of the chord.
+    const BlockKind kind = arc->bulge_side < 0.0 ? BlockKind::counter_clockwise : BlockKind::clockwise;
+    return FittedBlock{end,
+                       std::llround(arc->radius / options_.increment_mm),
+                       f ? *f : nearest_feed(length, m),
+                       k,
+                       m,
+                       kind,
+                       static_cast<std::uint8_t>(normal)};
+  }
+
+  // Longest arc from period k, found by doubling and halving steps.
+  std::optional<FittedBlock> fit_arc(std::uint32_t k, std::uint32_t limit) {
+    const int normal = arc_normal_[k];
+    std::uint32_t last = k + 1;
+    while (last < limit && arc_normal_[last] == normal && bends(last)) {
+      ++last;
+      if (last - k >= 4096) {
+        break;
+      }
+    }
+    auto best = arc_over(k, k + 1, normal);
+    if (!best) {
+      return best;
+    }
+    std::uint32_t reached = 1;
+    for (std::uint32_t step = 1; step > 0;) {
+      const std::uint32_t trial = reached + step;
+      std::optional<FittedBlock> longer;
+      if (k + trial <= last) {
+        longer = arc_over(k, k + trial, normal);
+      }
+      if (longer) {
+        best = longer;
+        reached = trial;
+        step *= 2;
+      } else {
+        step /= 2;
+      }
+    }
+    return best;
+  }
+
+  Eigen::Ref<const Eigen::MatrixXd> grid_;
+  Eigen::Ref<const Eigen::MatrixXd> middle_;
+  std::span<const std::int8_t> arc_normal_;
+  std::span<const std::uint32_t> breaks_;
+  const FitOptions& options_;
+  std::uint32_t periods_;
+  std::int64_t ticks_per_period_;
+  Position position_{};
+  std::size_t break_ = 0;
+};
+
+}  // namespace
+
+std::vector<FittedBlock> fit_blocks(const Eigen::Ref<const Eigen::MatrixXd>& grid_mm,
+                                    const Eigen::Ref<const Eigen::MatrixXd>& middle_mm,
+                                    std::span<const std::int8_t> arc_normal, std::span<const std::uint32_t> breaks,
+                                    const FitOptions& options) {
+  if (grid_mm.cols() != axis_count || middle_mm.cols() != axis_count || grid_mm.rows() != middle_mm.rows() + 1 ||
+      static_cast<Eigen::Index>(arc_normal.size()) != middle_mm.rows()) {
+    throw Error(ErrorKind::argument, "fit_blocks needs n+1 grid rows, n middle rows and n plane entries of 3 axes");
+  }
+  if (!grid_mm.allFinite() || grid_mm.cwiseAbs().maxCoeff() > largest_position_mm) {
+    throw Error(ErrorKind::argument, "a position is not finite or outside +-99999.999 mm");
+  }
+  return Fitter(grid_mm, middle_mm, arc_normal, breaks, options).run();
+}
+
+}  // namespace shapegcode

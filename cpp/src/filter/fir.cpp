@@ -1,0 +1,300 @@
+#include "shapegcode/filter/fir.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "shapegcode/error.hpp"
+
+#ifdef __FAST_MATH__
+#error "fir.cpp needs IEEE arithmetic: -ffast-math would remove the compensation of the running sum"
+#endif
+
+namespace shapegcode {
+namespace {
+
+using Eigen::Index;
+
+constexpr int taps_per_pass = 8;
+constexpr Index block_rows = 1024;  // 8 kB of output: stays in the first-level cache between passes
+
+/// Sum of the last `length` samples, free of drift: every rounding of `sum` is caught exactly (two-sum) in `error`.
+struct RunningSum {
+  double sum = 0.0;
+  double error = 0.0;
+
+  void start(double value, double length) noexcept {
+    sum = value * length;
+    error = std::fma(value, length, -sum);
+  }
+  void replace(double newest, double oldest) noexcept {
+    const double change = newest - oldest;
+    const double seen_newest = change + oldest;
+    const double change_error = (newest - seen_newest) - (oldest - (seen_newest - change));
+    const double total = sum + change;
+    const double seen_change = total - sum;
+    const double total_error = (sum - (total - seen_change)) + (change - seen_change);
+    error += total_error + change_error;
+    sum = total;
+  }
+  /// Keeps `error` below the last digit of `sum`; batch and stream call it after the same samples.
+  void normalise() noexcept {
+    const double total = sum + error;
+    error -= total - sum;
+    sum = total;
+  }
+  [[nodiscard]] double mean(double length) const noexcept { return (sum + error) / length; }
+};
+
+/// out[i] (+)= sum of taps[k] * in[i - delays[k]], left to right, for begin <= i < end. One store per output.
+template <int n_taps, bool accumulate>
+void weigh(const double* in, const int* delays, const double* taps, double* __restrict out, Index begin, Index end) {
+  std::array<const double*, n_taps> x{};
+  std::array<double, n_taps> a{};
+  for (std::size_t k = 0; k < n_taps; ++k) {
+    x[k] = in + begin - delays[k];
+    a[k] = taps[k];
+  }
+  double* __restrict y = out + begin;
+  const Index count = end - begin;
+  for (Index i = 0; i < count; ++i) {
+    double sum = 0.0;
+    if constexpr (accumulate) {
+      sum = y[i] + a[0] * x[0][i];
+    } else {
+      sum = a[0] * x[0][i];
+    }
+    for (std::size_t k = 1; k < n_taps; ++k) sum += a[k] * x[k][i];
+    y[i] = sum;
+  }
+}
+
+using WeighFunction = void (*)(const double*, const int*, const double*, double* __restrict, Index, Index);
+
+template <bool accumulate>
+constexpr std::array<WeighFunction, taps_per_pass> weigh_table{
+    weigh<1, accumulate>, weigh<2, accumulate>, weigh<3, accumulate>, weigh<4, accumulate>,
+    weigh<5, accumulate>, weigh<6, accumulate>, weigh<7, accumulate>, weigh<8, accumulate>};
+
+/// Samples whose delayed inputs all exist.
+void weigh_interior(const double* in, const std::vector<int>& delays, const std::vector<double>& taps, double* out,
+                    Index begin, Index end) {
+  const auto n_taps = taps.size();
+  const auto first = std::min<std::size_t>(n_taps, taps_per_pass);
+  if (first == n_taps) {
+    weigh_table<false>[first - 1](in, delays.data(), taps.data(), out, begin, end);
+    return;
+  }
+  for (Index block = begin; block < end; block += block_rows) {
+    const Index block_end = std::min(block + block_rows, end);
+    weigh_table<false>[first - 1](in, delays.data(), taps.data(), out, block, block_end);
+    for (std::size_t k = first; k < n_taps; k += taps_per_pass) {
+      const auto pass = std::min<std::size_t>(n_taps - k, taps_per_pass);
+      weigh_table<true>[pass - 1](in, &delays[k], &taps[k], out, block, block_end);
+    }
+  }
+}
+
+/// Samples near the ends, where the input is held.
+void weigh_boundary(const double* in, Index rows, const std::vector<int>& delays, const std::vector<double>& taps,
+                    double* out, Index begin, Index end) {
+  for (Index i = begin; i < end; ++i) {
+    const auto delayed = [&](std::size_t k) { return in[std::clamp<Index>(i - delays[k], 0, rows - 1)]; };
+    double sum = taps[0] * delayed(0);
+    for (std::size_t k = 1; k < taps.size(); ++k) sum += taps[k] * delayed(k);
+    out[i] = sum;
+  }
+}
+
+void weigh_column(const double* in, Index rows, const std::vector<int>& delays, const std::vector<double>& taps,
+                  double* out) {
+  const Index duration = delays.back();
+  const Index interior_begin = std::min(duration, rows);
+  weigh_boundary(in, rows, delays, taps, out, 0, interior_begin);
+  weigh_interior(in, delays, taps, out, interior_begin, rows);
+  weigh_boundary(in, rows, delays, taps, out, rows, rows + duration);
+}
+
+void average_column(const double* in, Index rows, Index length, double* out) {
+  const Index out_rows = rows + length - 1;
+  const auto divisor = static_cast<double>(length);
+  RunningSum running;
+  running.start(in[0], divisor);
+  for (Index block = 0; block < out_rows; block += block_rows) {
+    const Index block_end = std::min(block + block_rows, out_rows);
+    for (Index begin = block; begin < block_end;) {
+      // Up to the next point at which one of the two inputs stops or starts to be held.
+      Index end = block_end;
+      if (begin < length) end = std::min(end, length);
+      if (begin < rows) end = std::min(end, rows);
+      const bool ended = begin >= rows;
+      const bool started = begin >= length;
+      const double* newest = ended ? in + rows - 1 : in + begin;
+      const double* oldest = started ? in + begin - length : in;
+      const Index newest_stride = ended ? 0 : 1;
+      const Index oldest_stride = started ? 1 : 0;
+      for (Index i = begin; i < end; ++i, newest += newest_stride, oldest += oldest_stride) {
+        running.replace(*newest, *oldest);
+        out[i] = running.mean(divisor);
+      }
+      begin = end;
+    }
+    if (block_end - block == block_rows) running.normalise();
+  }
+}
+
+}  // namespace
+
+Fir::Fir(std::vector<int> delays, std::vector<double> taps) : delays_(std::move(delays)), taps_(std::move(taps)) {
+  if (taps_.empty()) throw Error(ErrorKind::argument, "filter without taps");
+  if (delays_.size() != taps_.size()) {
+    throw Error(ErrorKind::argument, "filter with " + std::to_string(delays_.size()) + " delays but " +
+                                         std::to_string(taps_.size()) + " taps");
+  }
+  if (delays_.front() < 0) {
+    throw Error(ErrorKind::argument, "filter delay " + std::to_string(delays_.front()) + " is negative");
+  }
+  double sum = 0.0;
+  for (std::size_t k = 0; k < taps_.size(); ++k) {
+    if (k > 0 && delays_[k] <= delays_[k - 1]) {
+      throw Error(ErrorKind::argument, "filter delays must ascend: " + std::to_string(delays_[k]) + " follows " +
+                                           std::to_string(delays_[k - 1]));
+    }
+    if (!std::isfinite(taps_[k])) {
+      throw Error(ErrorKind::argument, "filter tap " + std::to_string(k) + " is not finite");
+    }
+    sum += taps_[k];
+  }
+  if (!(std::abs(sum - 1.0) <= 1e-9)) {
+    throw Error(ErrorKind::argument,
+                "filter taps add up to 1 + " + std::to_string((sum - 1.0) * 1e9) + "e-9, limit 1 +- 1e-9");
+  }
+}
+
+Fir Fir::moving_average(int length) {
+  if (length < 1) {
+    throw Error(ErrorKind::argument, "moving average over " + std::to_string(length) + " samples, at least 1 needed");
+  }
+  std::vector<int> delays(static_cast<std::size_t>(length));
+  for (std::size_t k = 0; k < delays.size(); ++k) delays[k] = static_cast<int>(k);
+  Fir fir(std::move(delays), std::vector<double>(static_cast<std::size_t>(length), 1.0 / length));
+  fir.moving_average_ = true;
+  return fir;
+}
+
+int Fir::duration_samples() const noexcept { return delays_.back(); }
+
+double Fir::mean_samples() const noexcept {
+  if (moving_average_) return 0.5 * duration_samples();
+  double mean = 0.0;
+  for (std::size_t k = 0; k < taps_.size(); ++k) mean += taps_[k] * delays_[k];
+  return mean;
+}
+
+double Fir::variance_samples2() const noexcept {
+  if (moving_average_) {
+    const double length = duration_samples() + 1.0;
+    return (length * length - 1.0) / 12.0;
+  }
+  const double mean = mean_samples();
+  double variance = 0.0;
+  for (std::size_t k = 0; k < taps_.size(); ++k) variance += taps_[k] * (delays_[k] - mean) * (delays_[k] - mean);
+  return variance;
+}
+
+void Fir::apply(std::span<const double> in, std::span<double> out) const {
+  const auto expected = in.size() + static_cast<std::size_t>(duration_samples());
+  if (out.size() != expected) {
+    throw Error(ErrorKind::argument, "filter output has " + std::to_string(out.size()) + " samples, " +
+                                         std::to_string(expected) + " needed");
+  }
+  apply(in.data(), static_cast<Index>(in.size()), 1, out.data());
+}
+
+Samples Fir::apply(const Samples& in) const {
+  Samples out;
+  out.period_s = in.period_s;
+  out.positions_mm.resize(in.positions_mm.rows() + duration_samples(), in.positions_mm.cols());
+  apply(in.positions_mm.data(), in.positions_mm.rows(), static_cast<int>(in.positions_mm.cols()),
+        out.positions_mm.data());
+  return out;
+}
+
+void Fir::apply(const double* in, Index in_rows, int n_axes, double* out) const {
+  if (in_rows < 1) throw Error(ErrorKind::argument, "filter input has no samples: there is no value to hold");
+  if (n_axes < 0) throw Error(ErrorKind::argument, "filter input has " + std::to_string(n_axes) + " axes");
+  const Index out_rows = in_rows + duration_samples();
+  for (int axis = 0; axis < n_axes; ++axis) {
+    const double* column_in = in + axis * in_rows;
+    double* column_out = out + axis * out_rows;
+    if (moving_average_) {
+      average_column(column_in, in_rows, duration_samples() + 1, column_out);
+    } else {
+      weigh_column(column_in, in_rows, delays_, taps_, column_out);
+    }
+  }
+}
+
+FirStream::FirStream(Fir fir, int n_axes) : fir_(std::move(fir)), n_axes_(n_axes) {
+  if (n_axes < 1) {
+    throw Error(ErrorKind::argument, "filter stream of " + std::to_string(n_axes) + " axes, at least 1 needed");
+  }
+  // A moving average also needs the sample that leaves it: one more than the largest delay, beside the newest.
+  const auto rows = std::bit_ceil(static_cast<std::size_t>(fir_.duration_samples()) + 2);
+  const auto axes = static_cast<std::size_t>(n_axes);
+  row_mask_ = rows - 1;
+  ring_.resize(rows * axes);
+  sum_.resize(axes);
+  sum_error_.resize(axes);
+  const std::vector<double> zero(axes, 0.0);
+  reset(zero);
+}
+
+void FirStream::reset(std::span<const double> position) noexcept {
+  const auto axes = static_cast<std::size_t>(n_axes_);
+  row_ = 0;
+  for (std::size_t at = 0; at < ring_.size(); at += axes) {
+    for (std::size_t axis = 0; axis < axes; ++axis) ring_[at + axis] = position[axis];
+  }
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    RunningSum running;
+    running.start(position[axis], static_cast<double>(fir_.duration_samples() + 1));
+    sum_[axis] = running.sum;
+    sum_error_[axis] = running.error;
+  }
+}
+
+void FirStream::step(std::span<double> position) noexcept {
+  const auto axes = static_cast<std::size_t>(n_axes_);
+  double* const newest = &ring_[(row_ & row_mask_) * axes];
+  for (std::size_t axis = 0; axis < axes; ++axis) newest[axis] = position[axis];
+  if (fir_.is_moving_average()) {
+    const auto length = static_cast<std::size_t>(fir_.duration_samples()) + 1;
+    const double* const oldest = &ring_[((row_ - length) & row_mask_) * axes];
+    const bool block_ends = (row_ + 1) % static_cast<std::size_t>(block_rows) == 0;
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      RunningSum running{sum_[axis], sum_error_[axis]};
+      running.replace(newest[axis], oldest[axis]);
+      position[axis] = running.mean(static_cast<double>(length));
+      if (block_ends) running.normalise();
+      sum_[axis] = running.sum;
+      sum_error_[axis] = running.error;
+    }
+  } else {
+    const std::vector<int>& delays = fir_.delays();
+    const std::vector<double>& taps = fir_.taps();
+    for (std::size_t k = 0; k < taps.size(); ++k) {
+      const double* const delayed = &ring_[((row_ - static_cast<std::size_t>(delays[k])) & row_mask_) * axes];
+      for (std::size_t axis = 0; axis < axes; ++axis) {
+        const double share = taps[k] * delayed[axis];
+        position[axis] = k == 0 ? share : position[axis] + share;
+      }
+    }
+  }
+  ++row_;
+}
+
+}  // namespace shapegcode

@@ -1,0 +1,64 @@
+// Private to gcode: the words of one block sorted by address, and its G codes by modal group.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "shapegcode/gcode/lexer.hpp"
+
+namespace shapegcode::detail {
+
+/// Modal groups of the M-series controllers; `none` marks one-shot codes.
+enum class Group : std::uint8_t {
+  none = 0,
+  motion = 1,
+  plane = 2,
+  distance = 3,
+  feed_mode = 5,
+  units = 6,
+  compensation = 7,
+  length_offset = 8,
+  cycle = 9,
+  cycle_return = 10,
+  coordinates = 14,
+  exact_stop = 15,
+  foreign = 20,   ///< switches a mode that this reader passes through untouched
+  harmless = 21,  ///< no effect on position or path
+  unknown_position = 22,
+  refused = 23,
+  invalid = 24,
+};
+
+/// Group of a G code given in tenths (G54.1 = 541).
+[[nodiscard]] Group group_of(int g_tenths) noexcept;
+
+struct BlockWords {
+  std::uint32_t present = 0;  ///< bit (letter - 'A')
+  std::array<const Word*, 26> by_letter;
+  std::array<int, 12> g_tenths;
+  std::array<std::uint32_t, 12> g_column;
+  int g_count = 0;
+  bool has_m = false;
+  std::array<int, 6> m_codes;
+  int m_count = 0;
+  const Word* corner = nullptr;  ///< ,R or ,C
+
+  [[nodiscard]] bool has(char letter) const noexcept { return (present >> (letter - 'A')) & 1U; }
+  [[nodiscard]] bool has_any(std::uint32_t mask) const noexcept { return (present & mask) != 0; }
+  [[nodiscard]] const Word& operator[](char letter) const noexcept {
+    return *by_letter[static_cast<std::size_t>(letter - 'A')];
+  }
+};
+
+constexpr std::uint32_t letter_mask(const char* letters) {
+  std::uint32_t mask = 0;
+  for (; *letters != '\0'; ++letters) {
+    mask |= 1U << (*letters - 'A');
+  }
+  return mask;
+}
+
+/// Sorts the words. Throws Error(program) on an address given twice (G and M may repeat), too many G or M codes.
+void sort_words(const Block& block, std::uint32_t line, BlockWords& words);
+
+}  // namespace shapegcode::detail

@@ -1,0 +1,61 @@
+#include "shapegcode/gcode/canned_cycle.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace shapegcode {
+namespace {
+
+// Clearance to which a peck returns before it feeds on (parameter 5114/5115; the value on a given machine is not known).
+constexpr double peck_clearance_mm = 0.5;
+constexpr int max_pecks = 10'000;
+
+}  // namespace
+
+Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, double feed_mm_per_s, std::uint32_t line,
+                     std::vector<OtherMove>& moves) {
+  const auto go = [&](double level, bool rapid) {
+    Vector3 target = position;
+    target[axis] = level;
+    OtherMove move{make_line(position, target, rapid ? 0.0 : feed_mm_per_s, line), 0.0};
+    if (rapid) {
+      move.segment.kind = SegmentKind::rapid;
+    }
+    if (move.segment.length_mm > 0.0) {
+      moves.push_back(move);
+    }
+    position = target;
+  };
+  const auto wait = [&] {
+    if (cycle.dwell_s > 0.0) {
+      moves.push_back(OtherMove{make_line(position, position, 0.0, line), cycle.dwell_s});
+    }
+  };
+  go(cycle.r_mm, true);
+  const double depth = std::abs(cycle.r_mm - cycle.bottom_mm);
+  const double down = cycle.bottom_mm < cycle.r_mm ? -1.0 : 1.0;
+  const bool pecks = (cycle.code == 73 || cycle.code == 83) && cycle.peck_mm > 0.0;
+  if (pecks) {
+    const int count = static_cast<int>(std::min<double>(max_pecks, std::ceil(depth / cycle.peck_mm)));
+    for (int i = 1; i <= count; ++i) {
+      const double reached = std::min(depth, i * cycle.peck_mm);
+      go(cycle.r_mm + down * reached, false);
+      if (i < count) {
+        const double back = cycle.code == 83 ? 0.0 : std::max(0.0, reached - peck_clearance_mm);
+        go(cycle.r_mm + down * back, true);
+        go(cycle.r_mm + down * std::max(0.0, reached - peck_clearance_mm), true);
+      }
+    }
+  } else {
+    go(cycle.bottom_mm, false);
+  }
+  wait();
+  const bool feeds_out = cycle.code == 74 || cycle.code == 84 || cycle.code == 85 || cycle.code == 89;
+  go(cycle.r_mm, !feeds_out);
+  if (!cycle.return_to_r) {
+    go(cycle.initial_mm, true);
+  }
+  return position;
+}
+
+}  // namespace shapegcode

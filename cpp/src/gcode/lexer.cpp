@@ -1,0 +1,192 @@
+#include "shapegcode/gcode/lexer.hpp"
+
+#include <string>
+
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+namespace {
+
+constexpr int max_digits = 8;  // FANUC alarm 003: eight digits, point not counted
+
+constexpr std::array<double, 19> powers_of_ten = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8, 1e9,
+                                                  1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18};
+
+bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
+
+char upper(char c) noexcept { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; }
+
+bool is_letter(char c) noexcept { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
+
+bool takes_whole_numbers(char letter) noexcept {
+  switch (letter) {
+    case 'M':
+    case 'S':
+    case 'T':
+    case 'N':
+    case 'O':
+    case 'H':
+    case 'D':
+    case 'L':
+      return true;
+    default:
+      return false;
+  }
+}
+
+[[noreturn]] void fail(const std::string& message, std::uint32_t line, std::size_t index) {
+  throw Error(ErrorKind::program, message, line, static_cast<std::uint32_t>(index + 1));
+}
+
+std::string quoted(char c) {
+  if (c >= ' ' && c <= '~') {
+    return std::string("'") + c + "'";
+  }
+  constexpr const char* hex = "0123456789ABCDEF";
+  const auto byte = static_cast<unsigned char>(c);
+  return std::string("byte 0x") + hex[byte >> 4] + hex[byte & 15];
+}
+
+// A letter run such as GOTO or WHILE is a macro statement, not a word without a number.
+[[noreturn]] void fail_at_letter(std::string_view text, std::size_t i, std::uint32_t line) {
+  std::string run;
+  for (std::size_t k = i; k < text.size() && is_letter(text[k]); ++k) {
+    run += upper(text[k]);
+  }
+  for (const char* keyword : {"IF", "THEN", "GOTO", "WHILE", "DO", "END", "POPEN", "DPRNT", "PCLOS", "BPRNT"}) {
+    if (run.starts_with(keyword) && run.size() > 1) {
+      fail("custom macro statement '" + run + "' is not supported yet", line, i);
+    }
+  }
+  fail("address " + std::string(1, upper(text[i])) + " has no number", line, i);
+}
+
+// Reads the number behind a letter; i stands on its first character and ends behind it.
+void scan_number(std::string_view text, std::uint32_t line, std::size_t& i, std::size_t letter_at, Word& word) {
+  const std::size_t n = text.size();
+  while (i < n && (text[i] == ' ' || text[i] == '\t')) {
+    ++i;
+  }
+  bool negative = false;
+  if (i < n && (text[i] == '-' || text[i] == '+')) {
+    negative = text[i] == '-';
+    ++i;
+  }
+  std::uint64_t mantissa = 0;
+  unsigned decimals = 0;
+  unsigned significant = 0;
+  unsigned seen = 0;
+  for (; i < n; ++i) {
+    const char c = text[i];
+    if (is_digit(c)) {
+      ++seen;
+      if (mantissa != 0 || c != '0') {
+        ++significant;
+      }
+      if (significant <= 17) {
+        mantissa = mantissa * 10 + static_cast<unsigned>(c - '0');
+        if (word.has_point) {
+          ++decimals;
+        }
+      }
+    } else if (c == '.' && !word.has_point) {
+      word.has_point = true;
+    } else {
+      break;
+    }
+  }
+  if (seen == 0) {
+    if (i < n && (text[i] == '#' || text[i] == '[')) {
+      fail("custom macro expression '" + std::string(1, word.letter) + std::string(1, text[i]) +
+               "' is not supported yet",
+           line, letter_at);
+    }
+    fail_at_letter(text, letter_at, line);
+  }
+  if (significant > max_digits) {
+    fail("too many digits in address " + std::string(1, word.letter) + ": " + std::to_string(significant) +
+             " (limit " + std::to_string(max_digits) + ")",
+         line, letter_at);
+  }
+  if (word.has_point && takes_whole_numbers(word.letter)) {
+    fail("decimal point in address " + std::string(1, word.letter) + ", which takes whole numbers", line, letter_at);
+  }
+  if (decimals >= powers_of_ten.size()) {
+    decimals = static_cast<unsigned>(powers_of_ten.size()) - 1;
+  }
+  // A mantissa of 8 digits over an exact power of ten is the correctly rounded decimal.
+  const double magnitude = static_cast<double>(mantissa) / powers_of_ten[decimals];
+  word.value = negative ? -magnitude : magnitude;
+  word.digits = static_cast<std::uint8_t>(significant);
+}
+
+}  // namespace
+
+void scan_block(std::string_view text, std::uint32_t line, std::size_t max_length, Block& block) {
+  block.word_count = 0;
+  block.comment = {};
+  block.optional_skip = false;
+  const std::size_t n = text.size();
+  if (n > max_length) {
+    fail("line of " + std::to_string(n) + " characters (limit " + std::to_string(max_length) + ")", line, max_length);
+  }
+  std::size_t i = 0;
+  while (i < n) {
+    const char c = text[i];
+    if (is_letter(c)) {
+      if (block.word_count == Block::max_words) {
+        fail("more than " + std::to_string(Block::max_words) + " words in a block", line, i);
+      }
+      const std::size_t letter_at = i;
+      Word& word = block.words[block.word_count];
+      word = Word{};
+      word.letter = upper(c);
+      word.column = static_cast<std::uint32_t>(i + 1);
+      ++i;
+      scan_number(text, line, i, letter_at, word);
+      ++block.word_count;
+    } else if (c == ' ' || c == '\t' || c == '\r' || c == ';') {
+      ++i;
+    } else if (c == '(') {
+      const std::size_t close = text.find(')', i);
+      if (close == std::string_view::npos) {
+        fail("comment does not close: '(' without ')'", line, i);
+      }
+      const char* first = block.comment.empty() ? text.data() + i : block.comment.data();
+      block.comment = std::string_view(first, static_cast<std::size_t>(text.data() + close + 1 - first));
+      if (block.comment.find('\0') != std::string_view::npos) {
+        fail("byte 0x00 in a comment: this is no program text", line, i);
+      }
+      i = close + 1;
+    } else if (c == '/') {
+      if (block.word_count > 1 || (block.word_count == 1 && block.words[0].letter != 'N')) {
+        fail("'/' inside a block: only a block skip at its start is supported", line, i);
+      }
+      block.optional_skip = true;
+      ++i;
+      if (i < n && is_digit(text[i])) {  // /1 ... /9
+        ++i;
+      }
+    } else if (c == '#' || c == '[' || c == ']' || c == '=') {
+      fail("custom macro statement ('" + std::string(1, c) + "') is not supported yet", line, i);
+    } else if (c == ',') {
+      // ",R" ",C" corner words: read as a word of their own so that they can be named.
+      if (i + 1 < n && is_letter(text[i + 1]) && block.word_count < Block::max_words) {
+        const std::size_t letter_at = i + 1;
+        Word& word = block.words[block.word_count];
+        word = Word{};
+        word.letter = upper(text[letter_at]) == 'R' ? '<' : '>';
+        word.column = static_cast<std::uint32_t>(i + 1);
+        i += 2;
+        scan_number(text, line, i, letter_at, word);
+        ++block.word_count;
+      } else {
+        fail("',' without R or C", line, i);
+      }
+    } else {
+      fail(quoted(c) + " is no program character", line, i);
+    }
+  }
+}
+
+}  // namespace shapegcode

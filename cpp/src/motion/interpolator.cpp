@@ -1,0 +1,60 @@
+#include "shapegcode/motion/interpolator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+namespace {
+
+int smoothing_length(const SpeedProfile& profile, double period_s) {
+  if (!(period_s > 0.0)) {
+    throw Error(ErrorKind::argument, "interpolation period is " + std::to_string(period_s) + " s, must be > 0");
+  }
+  return std::max(1, static_cast<int>(std::lround(profile.jerk_time_s() / period_s)));
+}
+
+}  // namespace
+
+Interpolator::Interpolator(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
+                           double period_s)
+    : path_(std::move(path)),
+      profile_(std::move(profile)),
+      smoothing_(Fir::moving_average(smoothing_length(*profile_, period_s)), 1),
+      period_s_(period_s) {
+  const double rest = 0.0;
+  smoothing_.reset({&rest, 1});
+  // A ramp that ends on a tick to within rounding ends there.
+  const auto ramps = static_cast<std::size_t>(std::ceil(profile_->ramp_duration_s() / period_s - 1e-9));
+  sample_count_ = ramps + 1 + static_cast<std::size_t>(smoothing_.fir().duration_samples());
+}
+
+bool Interpolator::step(Vector3& position) noexcept {
+  const bool moving = index_ < sample_count_;
+  if (moving) {
+    double distance = profile_->distance_mm(static_cast<double>(index_) * period_s_, phase_cursor_);
+    ++index_;
+    // The last set-point is the end itself, whatever the running sum rounds to.
+    smoothing_.step({&distance, 1});
+    distance_mm_ = index_ == sample_count_ ? path_->length_mm() : distance;
+  }
+  position = path_->point(distance_mm_, path_cursor_);
+  return moving;
+}
+
+Samples interpolate(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile, double period_s) {
+  Interpolator interpolator(std::move(path), std::move(profile), period_s);
+  Samples samples;
+  samples.period_s = period_s;
+  samples.positions_mm.resize(static_cast<Eigen::Index>(interpolator.sample_count()), axis_count);
+  Vector3 position;
+  for (Eigen::Index row = 0; interpolator.step(position); ++row) {
+    samples.positions_mm.row(row) = position;
+  }
+  return samples;
+}
+
+}  // namespace shapegcode

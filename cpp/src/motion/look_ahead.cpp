@@ -1,0 +1,374 @@
+#include "shapegcode/motion/look_ahead.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+namespace {
+
+// A stretch of path with one speed limit and one acceleration.
+struct Piece {
+  double length = 0.0;
+  double limit = 0.0;
+  double acceleration = 0.0;
+  double start_speed = 0.0;
+};
+
+void require_positive(double value, const char* name) {
+  if (!(value > 0.0)) {
+    throw Error(ErrorKind::argument, std::string(name) + " is " + std::to_string(value) + ", must be > 0");
+  }
+}
+
+// Largest share of each axis in the tangent; an arc may point along any direction of its plane.
+Vector3 axis_share(const Segment& segment) noexcept {
+  if (segment.kind != SegmentKind::arc) {
+    return tangent_at(segment, 0.0).cwiseAbs();
+  }
+  Vector3 share = Vector3::Ones();
+  share[segment.normal] =
+      segment.length_mm > 0.0
+          ? std::abs(segment.end_mm[segment.normal] - segment.start_mm[segment.normal]) / segment.length_mm
+          : 0.0;
+  return share;
+}
+
+double tangential_limit(const Vector3& share, const Vector3& limit) noexcept {
+  double result = MotionLimits::none;
+  for (int i = 0; i < axis_count; ++i) {
+    if (share[i] > 0.0) {
+      result = std::min(result, limit[i] / share[i]);
+    }
+  }
+  return result;
+}
+
+// In-plane axes of an arc share their acceleration between the turn and the change of speed.
+double arc_centripetal_limit(const Segment& segment, const MotionLimits& limits) noexcept {
+  double limit = limits.centripetal_acceleration_mm_per_s2;
+  for (int i = 0; i < axis_count; ++i) {
+    if (i != segment.normal) {
+      limit = std::min(limit, 0.9 * limits.max_acceleration_mm_per_s2[i]);
+    }
+  }
+  return limit;
+}
+
+double segment_acceleration(const Segment& segment, double speed_limit, const MotionLimits& limits) noexcept {
+  double axes = tangential_limit(axis_share(segment), limits.max_acceleration_mm_per_s2);
+  if (segment.kind == SegmentKind::arc && std::isfinite(axes)) {
+    const double turning = speed_limit * speed_limit * curvature(segment);
+    axes = std::sqrt(std::max(0.19 * axes * axes, axes * axes - turning * turning));
+  }
+  if (limits.law == AccelerationLaw::constant_time) {
+    return std::min(axes, segment.feed_mm_per_s / limits.time_constant_s);
+  }
+  return axes;
+}
+
+double polyline_curvature(const Segment& before, const Segment& after, double angle) noexcept {
+  const double reach = 0.5 * (before.length_mm + after.length_mm);
+  return reach > 0.0 ? angle / reach : 0.0;
+}
+
+double curvature_speed(double curvature_per_mm, const MotionLimits& limits, double centripetal) noexcept {
+  if (curvature_per_mm <= 0.0) {
+    return MotionLimits::none;
+  }
+  double speed = std::sqrt(centripetal / curvature_per_mm);
+  if (limits.filter_variance_s2 > 0.0) {
+    // spec section 0: radial error = variance * v^2 * curvature / 2
+    speed = std::min(speed, std::sqrt(2.0 * limits.contour_tolerance_mm /
+                                      (limits.filter_variance_s2 * curvature_per_mm)));
+  }
+  return speed;
+}
+
+double jerk_time(const MotionLimits& limits, double acceleration) {
+  const double jerk = limits.max_jerk_mm_per_s3.minCoeff();
+  const double from_jerk = std::isfinite(jerk) && std::isfinite(acceleration) ? acceleration / jerk : 0.0;
+  return std::max(limits.jerk_time_s, from_jerk);
+}
+
+// A slow stretch that reaches over a junction into the faster neighbour.
+struct Zone {
+  double limit = MotionLimits::none;
+  double reach = 0.0;
+};
+
+void extend(Zone& zone, double limit, double reach) {
+  if (zone.reach <= 0.0) {
+    zone = {limit, reach};
+  } else {
+    zone = {std::min(zone.limit, limit), std::max(zone.reach, reach)};
+  }
+}
+
+std::vector<Piece> make_pieces(const Path& path, const MotionLimits& limits, const std::vector<double>& speed,
+                               const std::vector<double>& corner, double jerk_s) {
+  const std::size_t n = path.size();
+  std::vector<Piece> pieces;
+  pieces.reserve(n);
+  if (jerk_s <= 0.0) {
+    for (std::size_t i = 0; i < n; ++i) {
+      pieces.push_back({path[i].length_mm, speed[i], segment_acceleration(path[i], speed[i], limits), 0.0});
+    }
+    return pieces;
+  }
+  std::vector<Zone> at_start(n);
+  std::vector<Zone> at_end(n);
+  const auto sweep = [&](std::size_t from, std::size_t into, double corner_limit, Zone carry, std::vector<Zone>& zones) {
+    const double limit = std::min(corner_limit, speed[from]);
+    if (limit < speed[into]) {
+      extend(carry, limit, 0.5 * limit * jerk_s);
+    }
+    zones[into] = carry;
+    const double left = carry.reach - path[into].length_mm;
+    return left > 0.0 ? Zone{carry.limit, left} : Zone{};
+  };
+  Zone carry;
+  for (std::size_t i = 1; i < n; ++i) {
+    carry = sweep(i - 1, i, corner[i], carry, at_start);
+  }
+  carry = Zone{};
+  for (std::size_t i = n - 1; i > 0; --i) {
+    carry = sweep(i, i - 1, corner[i], carry, at_end);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const double length = path[i].length_mm;
+    const double head = std::min(at_start[i].reach, length);
+    const double tail = std::max(length - at_end[i].reach, 0.0);
+    double marks[4] = {0.0, std::min(head, tail), std::max(head, tail), length};
+    for (int k = 0; k < 3; ++k) {
+      const double middle = 0.5 * (marks[k] + marks[k + 1]);
+      if (marks[k + 1] <= marks[k]) {
+        continue;
+      }
+      double limit = speed[i];
+      if (middle < head) {
+        limit = std::min(limit, at_start[i].limit);
+      }
+      if (middle > tail) {
+        limit = std::min(limit, at_end[i].limit);
+      }
+      pieces.push_back({marks[k + 1] - marks[k], limit, segment_acceleration(path[i], limit, limits), 0.0});
+    }
+  }
+  return pieces;
+}
+
+// Boundary speeds by a forward and a backward pass in v^2.
+void pass_speeds(std::vector<Piece>& pieces, const std::vector<double>& boundary) {
+  const std::size_t n = pieces.size();
+  double speed = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    speed = std::min({speed, boundary[i], pieces[i].limit});
+    pieces[i].start_speed = speed;
+    speed = std::min(pieces[i].limit, std::sqrt(speed * speed + 2.0 * pieces[i].acceleration * pieces[i].length));
+  }
+  speed = 0.0;
+  for (std::size_t i = n; i-- > 0;) {
+    speed = std::min(pieces[i].limit, std::sqrt(speed * speed + 2.0 * pieces[i].acceleration * pieces[i].length));
+    pieces[i].start_speed = std::min(pieces[i].start_speed, speed);
+    speed = pieces[i].start_speed;
+  }
+}
+
+class PhaseList {
+ public:
+  // A ramp or a steady stretch from v0 to v1 over `distance`; joined to its predecessor where nothing changes.
+  void add(double v0, double v1, double distance) {
+    if (distance <= 0.0 || v0 + v1 <= 0.0) {
+      return;
+    }
+    const double duration = 2.0 * distance / (v0 + v1);
+    const double acceleration = (v1 - v0) / duration;
+    if (!phases.empty()) {
+      SpeedPhase& last = phases.back();
+      const double scale = std::max(std::abs(last.acceleration_mm_per_s2), std::abs(acceleration));
+      if (std::abs(last.acceleration_mm_per_s2 - acceleration) <= 1e-9 * scale || scale == 0.0) {
+        last.duration_s += duration;
+        length += distance;
+        return;
+      }
+    }
+    phases.push_back({0.0, duration, length, v0, acceleration});
+    length += distance;
+  }
+  std::vector<SpeedPhase> phases;
+  double length = 0.0;
+};
+
+void piece_phases(const Piece& piece, double end_speed, PhaseList& list) {
+  const double v0 = piece.start_speed;
+  const double v1 = end_speed;
+  const double a = piece.acceleration;
+  if (!std::isfinite(a)) {
+    list.add(piece.limit, piece.limit, piece.length);
+    return;
+  }
+  const double peak_squared = a * piece.length + 0.5 * (v0 * v0 + v1 * v1);
+  const double peak = std::max({v0, v1, std::min(piece.limit, std::sqrt(peak_squared))});
+  double up = (peak * peak - v0 * v0) / (2.0 * a);
+  double down = (peak * peak - v1 * v1) / (2.0 * a);
+  if (up + down > piece.length) {  // rounding only
+    const double scale = piece.length / (up + down);
+    up *= scale;
+    down *= scale;
+  }
+  list.add(v0, peak, up);
+  const double steady = piece.length - up - down;
+  // Dust of rounding would become a phase of its own.
+  if (steady > 1e-12 * (1.0 + list.length)) {
+    list.add(peak, peak, steady);
+  }
+  list.add(peak, v1, down);
+}
+
+// Constant-time law: a ramp that is shorter than the time constant is stretched into the steady stretch at its fast end.
+std::vector<SpeedPhase> stretch_ramps(const std::vector<SpeedPhase>& phases, double length, double time_constant_s) {
+  const std::size_t n = phases.size();
+  const auto end_speed = [&](std::size_t i) {
+    return phases[i].speed_mm_per_s + phases[i].acceleration_mm_per_s2 * phases[i].duration_s;
+  };
+  const auto distance = [&](std::size_t i) {
+    return (i + 1 < n ? phases[i + 1].distance_mm : length) - phases[i].distance_mm;
+  };
+  std::vector<double> extra(n, 0.0);   // distance a ramp takes from its steady neighbour
+  std::vector<double> wanted(n, 0.0);  // what the ramps on both sides ask of a steady stretch
+  const auto steady = [&](std::size_t i) { return phases[i].acceleration_mm_per_s2 == 0.0; };
+  const auto fast_neighbour = [&](std::size_t i) {
+    const std::size_t k = phases[i].acceleration_mm_per_s2 > 0.0 ? i + 1 : i - 1;
+    return k < n && steady(k) ? k : n;
+  };
+  for (std::size_t i = 0; i < n; ++i) {
+    if (steady(i) || phases[i].duration_s >= time_constant_s || fast_neighbour(i) == n) {
+      continue;
+    }
+    const double mean = 0.5 * (phases[i].speed_mm_per_s + end_speed(i));
+    extra[i] = mean * (time_constant_s - phases[i].duration_s);
+    wanted[fast_neighbour(i)] += extra[i];
+  }
+  PhaseList list;
+  list.phases.reserve(n);
+  std::vector<double> granted(n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (extra[i] > 0.0) {
+      const std::size_t k = fast_neighbour(i);
+      const double share = std::min(1.0, distance(k) / wanted[k]);
+      extra[i] *= share;
+      granted[k] += extra[i];
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const double d = steady(i) ? distance(i) - granted[i] : distance(i) + extra[i];
+    list.add(phases[i].speed_mm_per_s, steady(i) ? phases[i].speed_mm_per_s : end_speed(i), d);
+  }
+  return std::move(list.phases);
+}
+
+}  // namespace
+
+double segment_speed_limit(const Segment& segment, const MotionLimits& limits) noexcept {
+  double speed = segment.feed_mm_per_s;
+  if (segment.kind == SegmentKind::arc) {
+    speed *= limits.arc_feed_ratio;
+    speed = std::min(speed, curvature_speed(curvature(segment), limits, arc_centripetal_limit(segment, limits)));
+  }
+  return std::min(speed, tangential_limit(axis_share(segment), limits.max_feed_mm_per_s));
+}
+
+double corner_speed_limit(const Segment& before, const Segment& after, const MotionLimits& limits) noexcept {
+  const Vector3 change = tangent_at(after, 0.0) - tangent_at(before, before.length_mm);
+  const double size = change.norm();
+  // A tangent junction to within what the least increment lets a program say (1 um over 1 mm).
+  if (size < 1e-6) {
+    return MotionLimits::none;
+  }
+  double speed = tangential_limit(change.cwiseAbs(), limits.corner_speed_difference_mm_per_s);
+  const double angle = 2.0 * std::asin(std::min(1.0, 0.5 * size));
+  speed = std::min(speed, curvature_speed(polyline_curvature(before, after, angle), limits,
+                                          limits.centripetal_acceleration_mm_per_s2));
+  if (limits.filter_mean_deviation_s > 0.0) {
+    speed = std::min(speed, 2.0 * limits.contour_tolerance_mm / (size * limits.filter_mean_deviation_s));
+  }
+  return speed;
+}
+
+SpeedProfile plan_speed(const Path& path, const MotionLimits& limits) {
+  require_positive(limits.time_constant_s, "acceleration time constant (s)");
+  require_positive(limits.arc_feed_ratio, "arc feed ratio");
+  require_positive(limits.contour_tolerance_mm, "contour tolerance (mm)");
+  require_positive(limits.centripetal_acceleration_mm_per_s2, "centripetal acceleration (mm/s2)");
+  for (int i = 0; i < axis_count; ++i) {
+    require_positive(limits.max_feed_mm_per_s[i], "axis feed limit (mm/s)");
+    require_positive(limits.max_acceleration_mm_per_s2[i], "axis acceleration limit (mm/s2)");
+    require_positive(limits.max_jerk_mm_per_s3[i], "axis jerk limit (mm/s3)");
+    require_positive(limits.corner_speed_difference_mm_per_s[i], "corner speed difference (mm/s)");
+  }
+  const std::size_t n = path.size();
+  if (n == 0 || path.length_mm() <= 0.0) {
+    return SpeedProfile({}, path.length_mm(), 0.0);
+  }
+  std::vector<double> speed(n);
+  std::vector<double> corner(n + 1, MotionLimits::none);
+  double fastest_acceleration = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    speed[i] = segment_speed_limit(path[i], limits);
+    if (!(speed[i] > 0.0) || !std::isfinite(speed[i])) {
+      throw Error(ErrorKind::argument, "segment without a feed greater than zero", path[i].line);
+    }
+    if (i > 0) {
+      corner[i] = corner_speed_limit(path[i - 1], path[i], limits);
+    }
+    fastest_acceleration = std::max(fastest_acceleration, segment_acceleration(path[i], speed[i], limits));
+  }
+  const double jerk_s = jerk_time(limits, fastest_acceleration);
+  std::vector<Piece> pieces = make_pieces(path, limits, speed, corner, jerk_s);
+  // With a jerk time the corner limits are already limits of the pieces around the corner.
+  std::vector<double> boundary = jerk_s > 0.0 ? std::vector<double>(pieces.size() + 1, MotionLimits::none) : corner;
+  if (jerk_s > 0.0) {
+    std::size_t k = 0;
+    double distance = 0.0;
+    for (std::size_t i = 1; i < n; ++i) {
+      while (k < pieces.size() && distance + 0.5 * pieces[k].length < path.distance_mm(i)) {
+        distance += pieces[k].length;
+        ++k;
+      }
+      if (k < pieces.size()) {
+        boundary[k] = std::min(boundary[k], corner[i]);
+      }
+    }
+  }
+  pass_speeds(pieces, boundary);
+  PhaseList list;
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    piece_phases(pieces[i], i + 1 < pieces.size() ? pieces[i + 1].start_speed : 0.0, list);
+  }
+  if (limits.law == AccelerationLaw::constant_time) {
+    list.phases = stretch_ramps(list.phases, list.length, limits.time_constant_s);
+  }
+  return SpeedProfile(std::move(list.phases), path.length_mm(), jerk_s);
+}
+
+std::vector<std::size_t> forced_stops(const std::vector<Segment>& segments, double axis_angle_rad,
+                                      double corner_angle_rad) {
+  const double along = std::cos(axis_angle_rad);
+  const double turned = std::cos(corner_angle_rad);
+  std::vector<std::size_t> stops;
+  for (std::size_t i = 1; i < segments.size(); ++i) {
+    const Vector3 before = tangent_at(segments[i - 1], segments[i - 1].length_mm);
+    const Vector3 after = tangent_at(segments[i], 0.0);
+    const bool plunges = std::abs(before[2]) >= along || std::abs(after[2]) >= along;
+    if (segments[i - 1].stop_at_end || (plunges && before.dot(after) <= turned)) {
+      stops.push_back(i);
+    }
+  }
+  return stops;
+}
+
+}  // namespace shapegcode

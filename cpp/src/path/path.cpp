@@ -1,0 +1,50 @@
+#include "shapegcode/path/path.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+
+Path::Path(std::vector<Segment> segments) : segments_(std::move(segments)) {
+  distance_mm_.reserve(segments_.size() + 1);
+  double distance = 0.0;
+  distance_mm_.push_back(distance);
+  for (std::size_t i = 0; i < segments_.size(); ++i) {
+    const Segment& segment = segments_[i];
+    if (!std::isfinite(segment.length_mm) || !segment.start_mm.allFinite() || !segment.end_mm.allFinite()) {
+      throw Error(ErrorKind::argument, "path segment " + std::to_string(i) + " has a coordinate that is not finite",
+                  segment.line);
+    }
+    if (i > 0) {
+      const double gap = (segment.start_mm - segments_[i - 1].end_mm).norm();
+      if (gap > 1e-6) {
+        throw Error(ErrorKind::argument,
+                    "path segment " + std::to_string(i) + " starts " + std::to_string(gap) +
+                        " mm from the end of its predecessor (limit 0.000001 mm)",
+                    segment.line);
+      }
+    }
+    distance += segment.length_mm;
+    distance_mm_.push_back(distance);
+  }
+}
+
+Vector3 Path::point(double s_mm, std::size_t& cursor) const noexcept {
+  if (segments_.empty()) {
+    return Vector3::Zero();
+  }
+  cursor = std::min(cursor, segments_.size() - 1);
+  while (cursor > 0 && s_mm < distance_mm_[cursor]) {
+    --cursor;
+  }
+  while (cursor + 1 < segments_.size() && s_mm >= distance_mm_[cursor + 1]) {
+    ++cursor;
+  }
+  return point_at(segments_[cursor], s_mm - distance_mm_[cursor]);
+}
+
+}  // namespace shapegcode

@@ -1,0 +1,175 @@
+#include "shapegcode/path/segment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+namespace {
+
+constexpr double two_pi = 2.0 * std::numbers::pi;
+
+struct PlaneAxes {
+  int first;
+  int second;
+};
+
+PlaneAxes plane_axes(int normal) noexcept { return {(normal + 1) % 3, (normal + 2) % 3}; }
+
+double pitch_mm_per_rad(const Segment& segment) noexcept {
+  const int n = segment.normal;
+  return (segment.end_mm[n] - segment.start_mm[n]) / std::abs(segment.sweep_rad);
+}
+
+double mean_radius(const Segment& segment) noexcept {
+  return 0.5 * (segment.start_radius_mm + segment.end_radius_mm);
+}
+
+Vector3 arc_point(const Segment& segment, double fraction) noexcept {
+  const auto [a, b] = plane_axes(segment.normal);
+  const double radius =
+      segment.start_radius_mm + (segment.end_radius_mm - segment.start_radius_mm) * fraction;
+  const double angle = segment.start_angle_rad + segment.sweep_rad * fraction;
+  Vector3 p;
+  p[a] = segment.centre_mm[a] + radius * std::cos(angle);
+  p[b] = segment.centre_mm[b] + radius * std::sin(angle);
+  const int n = segment.normal;
+  p[n] = segment.start_mm[n] + (segment.end_mm[n] - segment.start_mm[n]) * fraction;
+  return p;
+}
+
+Nearest nearest_on_line(const Segment& segment, const Vector3& p) noexcept {
+  if (segment.length_mm <= 0.0) {
+    return {(p - segment.start_mm).norm(), 0.0};
+  }
+  const Vector3 along = segment.end_mm - segment.start_mm;
+  const double fraction =
+      std::clamp((p - segment.start_mm).dot(along) / along.squaredNorm(), 0.0, 1.0);
+  const Vector3 foot = segment.start_mm + fraction * along;
+  return {(p - foot).norm(), fraction * segment.length_mm};
+}
+
+// The in-plane angle gives the foot on a flat arc; on a helix the turn is chosen by height, then one Newton step on the
+// true distance corrects for the pitch.
+Nearest nearest_on_arc(const Segment& segment, const Vector3& p) noexcept {
+  const auto [a, b] = plane_axes(segment.normal);
+  const int n = segment.normal;
+  const double angle = std::atan2(p[b] - segment.centre_mm[b], p[a] - segment.centre_mm[a]);
+  const double sense = segment.sweep_rad < 0.0 ? -1.0 : 1.0;
+  const double sweep = std::abs(segment.sweep_rad);
+  double turn = std::remainder(sense * (angle - segment.start_angle_rad), two_pi);  // in [-pi, pi]
+  const double pitch = pitch_mm_per_rad(segment);
+  const double radius = mean_radius(segment);
+  Nearest best{std::numeric_limits<double>::infinity(), 0.0};
+  const auto consider = [&](double theta) {
+    const double fraction = std::clamp(theta / sweep, 0.0, 1.0);
+    const double distance = (p - arc_point(segment, fraction)).norm();
+    if (distance < best.distance_mm) {
+      best = {distance, fraction * segment.length_mm};
+    }
+  };
+  const auto corrected = [&](double theta) {
+    // d/dtheta of the squared distance, linearised at theta.
+    const double height_gap = p[n] - (segment.start_mm[n] + pitch * theta);
+    return theta + height_gap * pitch / (radius * radius + pitch * pitch);
+  };
+  const double turns = std::floor(sweep / two_pi) + 1.0;
+  if (pitch == 0.0 || turns <= 1.0) {
+    for (double theta : {turn, turn + two_pi}) {
+      consider(corrected(theta));
+    }
+  } else {
+    const double by_height = (p[n] - segment.start_mm[n]) / pitch;
+    const double base = turn + two_pi * std::round((by_height - turn) / two_pi);
+    for (double theta : {base - two_pi, base, base + two_pi}) {
+      consider(corrected(theta));
+    }
+  }
+  consider(0.0);
+  consider(sweep);
+  return best;
+}
+
+}  // namespace
+
+Segment make_line(const Vector3& start, const Vector3& end, double feed_mm_per_s, std::uint32_t line) {
+  Segment segment;
+  segment.kind = SegmentKind::line;
+  segment.start_mm = start;
+  segment.end_mm = end;
+  segment.length_mm = (end - start).norm();
+  segment.feed_mm_per_s = feed_mm_per_s;
+  segment.line = line;
+  return segment;
+}
+
+Segment make_arc(const Vector3& start, const Vector3& end, const Vector3& centre, double sweep_rad, int normal,
+                 double feed_mm_per_s, std::uint32_t line) {
+  const auto [a, b] = plane_axes(normal);
+  Segment segment = make_line(start, end, feed_mm_per_s, line);
+  segment.kind = SegmentKind::arc;
+  segment.normal = static_cast<std::uint8_t>(normal);
+  segment.centre_mm = centre;
+  segment.sweep_rad = sweep_rad;
+  segment.start_radius_mm = std::hypot(start[a] - centre[a], start[b] - centre[b]);
+  segment.end_radius_mm = std::hypot(end[a] - centre[a], end[b] - centre[b]);
+  if (!(segment.start_radius_mm > 0.0) || !(segment.end_radius_mm > 0.0) || sweep_rad == 0.0) {
+    throw Error(ErrorKind::argument, "an arc needs a radius and a sweep greater than zero", line);
+  }
+  segment.start_angle_rad = std::atan2(start[b] - centre[b], start[a] - centre[a]);
+  const double travel = std::abs(sweep_rad) * mean_radius(segment);
+  segment.length_mm = std::hypot(travel, end[normal] - start[normal]);
+  return segment;
+}
+
+Vector3 point_at(const Segment& segment, double s_mm) noexcept {
+  if (segment.length_mm <= 0.0) {
+    return segment.start_mm;
+  }
+  // The end is returned to the last bit: no rounding of cosines may move a programmed point.
+  if (s_mm >= segment.length_mm) {
+    return segment.end_mm;
+  }
+  const double fraction = std::max(s_mm, 0.0) / segment.length_mm;
+  if (segment.kind == SegmentKind::arc) {
+    return arc_point(segment, fraction);
+  }
+  return segment.start_mm + fraction * (segment.end_mm - segment.start_mm);
+}
+
+Vector3 tangent_at(const Segment& segment, double s_mm) noexcept {
+  if (segment.length_mm <= 0.0) {
+    return Vector3::Zero();
+  }
+  if (segment.kind != SegmentKind::arc) {
+    return (segment.end_mm - segment.start_mm) / segment.length_mm;
+  }
+  const auto [a, b] = plane_axes(segment.normal);
+  const double fraction = std::clamp(s_mm / segment.length_mm, 0.0, 1.0);
+  const double angle = segment.start_angle_rad + segment.sweep_rad * fraction;
+  const double radial_step = segment.end_radius_mm - segment.start_radius_mm;
+  const double radius = segment.start_radius_mm + radial_step * fraction;
+  Vector3 tangent;
+  tangent[a] = -radius * segment.sweep_rad * std::sin(angle) + radial_step * std::cos(angle);
+  tangent[b] = radius * segment.sweep_rad * std::cos(angle) + radial_step * std::sin(angle);
+  tangent[segment.normal] = segment.end_mm[segment.normal] - segment.start_mm[segment.normal];
+  return tangent.normalized();
+}
+
+double curvature(const Segment& segment) noexcept {
+  if (segment.kind != SegmentKind::arc) {
+    return 0.0;
+  }
+  const double radius = mean_radius(segment);
+  const double pitch = pitch_mm_per_rad(segment);
+  return radius / (radius * radius + pitch * pitch);
+}
+
+Nearest nearest_on(const Segment& segment, const Vector3& p) noexcept {
+  return segment.kind == SegmentKind::arc ? nearest_on_arc(segment, p) : nearest_on_line(segment, p);
+}
+
+}  // namespace shapegcode

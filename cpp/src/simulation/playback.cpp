@@ -1,0 +1,177 @@
+#include "shapegcode/simulation/playback.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "shapegcode/metrology/orbit.hpp"
+#include "shapegcode/motion/interpolator.hpp"
+
+namespace shapegcode {
+namespace {
+
+constexpr double recorded_decay_s = 0.25;
+
+// Everything that hangs on one stream of set-points.
+class Recorder {
+ public:
+  Recorder(const Path& path, const PlaybackOptions& options)
+      : options_(options),
+        plant_(options.modes, options.period_s),
+        tracks_contour_(options.measure_contour && path.length_mm() > 0.0),
+        command_tracker_(path),
+        response_tracker_(path),
+        orbit_(path) {
+    for (const Fir& fir : options.axis_filters) {
+      filters_.emplace_back(fir, axis_count);
+      tail_ += fir.duration_samples();
+    }
+  }
+
+  void add(Vector3 setpoint) {
+    if (count_ == 0) {
+      for (FirStream& filter : filters_) {
+        filter.reset({setpoint.data(), axis_count});
+      }
+      plant_.reset(setpoint);
+      last_ = setpoint;
+      before_last_ = setpoint;
+    }
+    for (FirStream& filter : filters_) {
+      filter.step({setpoint.data(), axis_count});
+    }
+    const Vector3& command = setpoint;
+    const bool moves = (command - last_).cwiseAbs().maxCoeff() > 0.0;
+    if (moves) {
+      last_moving_ = count_;
+    } else if (last_moving_ + 1 == count_) {
+      at_rest_plant_ = plant_;  // as it stood when the set-points came to rest; overwritten if they move on
+    }
+    const Vector3 response = plant_.step(command);
+    acceleration_ = acceleration_.cwiseMax((command - 2.0 * last_ + before_last_).cwiseAbs());
+    before_last_ = last_;
+    last_ = command;
+    if (tracks_contour_) {
+      figures_.command.add(command_tracker_.step(command));
+      orbit_.step(command, command_tracker_.segment());
+      figures_.response.add(response_tracker_.step(response));
+    }
+    record(command, response);
+    ++count_;
+  }
+
+  PlaybackFigures finish(const Vector3& end) {
+    for (int i = 0; i < tail_; ++i) {
+      add(end);
+    }
+    if (last_moving_ + 1 == count_) {
+      at_rest_plant_ = plant_;
+    }
+    figures_.duration_s = static_cast<double>(last_moving_) * options_.period_s;
+    figures_.peak_mm = at_rest_plant_.peak();
+    figures_.residual_mm = at_rest_plant_.residual_peak();
+    figures_.peak_acceleration_mm_per_s2 = acceleration_ / (options_.period_s * options_.period_s);
+    figures_.end_mm = last_;
+    if (tracks_contour_) {
+      figures_.orbit_error_percent = orbit_.percent();
+    }
+    // A picture of the decay needs what comes after the stop.
+    const auto decay = static_cast<std::size_t>(recorded_decay_s / options_.period_s);
+    for (std::size_t i = 0; options_.record_samples > 0 && i < decay; ++i) {
+      record(last_, plant_.step(last_));
+    }
+    figures_.recorded_command = pack(commands_);
+    figures_.recorded_response = pack(responses_);
+    return std::move(figures_);
+  }
+
+ private:
+  void record(const Vector3& command, const Vector3& response) {
+    if (commands_.size() < options_.record_samples) {
+      commands_.push_back(command);
+      responses_.push_back(response);
+    }
+  }
+
+  [[nodiscard]] Samples pack(const std::vector<Vector3>& rows) const {
+    Samples samples;
+    samples.period_s = options_.period_s;
+    samples.positions_mm.resize(static_cast<Eigen::Index>(rows.size()), axis_count);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      samples.positions_mm.row(static_cast<Eigen::Index>(i)) = rows[i];
+    }
+    return samples;
+  }
+
+  const PlaybackOptions& options_;
+  std::vector<FirStream> filters_;
+  ModalPlant plant_;
+  ModalPlant at_rest_plant_ = plant_;
+  bool tracks_contour_;
+  ContourTracker command_tracker_;
+  ContourTracker response_tracker_;
+  OrbitError orbit_;
+  PlaybackFigures figures_;
+  Vector3 last_ = Vector3::Zero();
+  Vector3 before_last_ = Vector3::Zero();
+  Vector3 acceleration_ = Vector3::Zero();
+  std::vector<Vector3> commands_;
+  std::vector<Vector3> responses_;
+  std::size_t count_ = 0;
+  std::size_t last_moving_ = 0;
+  int tail_ = 0;
+};
+
+template <class Step>
+PlaybackFigures play(const Path& path, const PlaybackOptions& options, Step&& step) {
+  Recorder recorder(path, options);
+  Vector3 position = Vector3::Zero();
+  while (step(position)) {
+    recorder.add(position);
+  }
+  return recorder.finish(position);
+}
+
+}  // namespace
+
+PlaybackFigures play_path(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
+                          const PlaybackOptions& options) {
+  Interpolator interpolator(path, std::move(profile), options.period_s);
+  return play(*path, options, [&](Vector3& position) { return interpolator.step(position); });
+}
+
+PlaybackFigures play_blocks(std::span<const Segment> blocks, const Path& path, BlockEnd block_end,
+                            double override_ratio, const PlaybackOptions& options) {
+  BlockPlayer player(blocks, options.period_s, block_end, override_ratio);
+  return play(path, options, [&](Vector3& position) { return player.step(position); });
+}
+
+PlaybackFigures play_samples(const Samples& samples, const Path& path, const PlaybackOptions& options) {
+  Eigen::Index row = 0;
+  return play(path, options, [&](Vector3& position) {
+    if (samples.positions_mm.rows() > 0) {
+      position = samples.positions_mm.row(std::min(row, samples.positions_mm.rows() - 1));
+    }
+    return row++ < samples.positions_mm.rows();
+  });
+}
+
+std::size_t count_slowed_blocks(std::span<const Segment> blocks, const LookAheadLimits& limits) {
+  std::size_t slowed = 0;
+  Vector3 speed_before = Vector3::Zero();
+  for (const Segment& block : blocks) {
+    if (block.length_mm <= 0.0) {
+      continue;
+    }
+    const Vector3 speed_in = tangent_at(block, 0.0) * block.feed_mm_per_s;
+    const Vector3 step = (speed_in - speed_before).cwiseAbs();
+    const bool over = ((step.array() > limits.corner_speed_difference_mm_per_s.array()) ||
+                       (speed_in.cwiseAbs().array() > limits.max_feed_mm_per_s.array()))
+                          .any();
+    slowed += over ? 1U : 0U;
+    speed_before = tangent_at(block, block.length_mm) * block.feed_mm_per_s;
+  }
+  return slowed;
+}
+
+}  // namespace shapegcode

@@ -1,0 +1,304 @@
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "shapegcode/error.hpp"
+#include "shapegcode/metrology/contour.hpp"
+
+using shapegcode::ContourTracker;
+using shapegcode::DeviationStats;
+using shapegcode::make_arc;
+using shapegcode::make_line;
+using shapegcode::Path;
+using shapegcode::Segment;
+using shapegcode::Vector3;
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+Path polyline(const std::vector<Vector3>& points) {
+  std::vector<Segment> segments;
+  for (std::size_t i = 1; i < points.size(); ++i) segments.push_back(make_line(points[i - 1], points[i], 100.0));
+  return Path(segments);
+}
+
+/// Left of the path by `left`, above it by `up`, at `s`.
+Vector3 beside(const Path& path, double s, double left, double up, std::size_t& cursor) {
+  const Vector3 p = path.point(s, cursor);
+  const Vector3 t = tangent_at(path[cursor], s - path.distance_mm(cursor));
+  const double horizontal = std::hypot(t[0], t[1]);
+  Vector3 normal = Vector3::Zero();
+  if (horizontal > 0.0) normal = Vector3(-t[1], t[0], 0.0) / horizontal;
+  return p + left * normal + up * Vector3::UnitZ();
+}
+
+double nearest_of_all(const Path& path, const Vector3& p) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Segment& segment : path.segments()) nearest = std::min(nearest, nearest_on(segment, p).distance_mm);
+  return nearest;
+}
+
+/// Walks the path at a constant offset in equal steps; the largest error of the reported deviation.
+double worst_on_offset_walk(const Path& path, double step, double left, double up, double expected) {
+  ContourTracker tracker(path);
+  std::size_t cursor = 0;
+  double worst = 0.0;
+  for (double s = 0.0; s <= path.length_mm(); s += step) {
+    worst = std::max(worst, std::abs(tracker.step(beside(path, s, left, up, cursor)) - expected));
+  }
+  CHECK(tracker.segment() + 1 >= path.size() - 1);
+  return worst;
+}
+
+}  // namespace
+
+TEST_CASE("contour: statistics") {
+  DeviationStats stats;
+  CHECK(stats.rms_mm() == 0.0);
+  for (const double value : {1.0, -3.0, 2.0}) stats.add(value);
+  CHECK(stats.max_abs_mm == 3.0);
+  CHECK(stats.most_positive_mm == 2.0);
+  CHECK(stats.most_negative_mm == -3.0);
+  CHECK(stats.count == 3);
+  CHECK(stats.rms_mm() == doctest::Approx(std::sqrt(14.0 / 3.0)));
+}
+
+TEST_CASE("contour: refuses an empty path, ignores what is not finite") {
+  CHECK_THROWS_AS(ContourTracker{Path()}, shapegcode::Error);
+  ContourTracker tracker(polyline({{0, 0, 0}, {10, 0, 0}}));
+  CHECK(tracker.step({0.1, 0.5, 0}) == doctest::Approx(0.5));
+  CHECK(std::isnan(tracker.step({std::numeric_limits<double>::quiet_NaN(), 0, 0})));
+  CHECK(tracker.step({0.2, -0.5, 0}) == doctest::Approx(-0.5));
+  CHECK(tracker.s_mm() == doctest::Approx(0.2));
+}
+
+TEST_CASE("contour: sign on lines") {
+  const auto one = [](const Vector3& end, const Vector3& p) {
+    ContourTracker tracker(polyline({{0, 0, 0}, end}));
+    return tracker.step(p);
+  };
+  CHECK(one({10, 0, 0}, {0.1, 0.01, 0}) == doctest::Approx(0.01));    // left
+  CHECK(one({10, 0, 0}, {0.1, -0.01, 0}) == doctest::Approx(-0.01));  // right
+  CHECK(one({-10, 0, 0}, {-0.1, 0.01, 0}) == doctest::Approx(-0.01));
+  CHECK(one({10, 0, 0}, {0.1, 0, 0.01}) == doctest::Approx(0.01));  // above
+  CHECK(one({10, 0, 0}, {0.1, 0, -0.01}) == doctest::Approx(-0.01));
+  CHECK(one({10, 0, 0}, {0.1, 3e-3, -4e-3}) == doctest::Approx(5e-3));  // the side decides
+  CHECK(one({0, 0, 10}, {0.003, 0.004, 0.1}) == doctest::Approx(0.005));
+  CHECK(one({0, 0, 10}, {0.0, 0.0, -0.2}) == doctest::Approx(-0.2));
+  CHECK(one({10, 0, 0}, {0.1, 0, 0}) == 0.0);
+}
+
+TEST_CASE("contour: constant offset along lines, circles, helices, in every plane and sense") {
+  for (const double side : {0.02, -0.02}) {
+    CHECK(worst_on_offset_walk(polyline({{0, 0, 0}, {30, 10, 0}, {60, 20, 0}}), 0.1, side, 0, side) < 1e-9);
+    CHECK(worst_on_offset_walk(polyline({{0, 0, 0}, {30, 10, 5}}), 0.1, side, 0, side) < 1e-9);
+    for (const double turns : {0.25, 0.9, 1.0, 3.0}) {
+      for (const double sense : {1.0, -1.0}) {
+        for (const double climb : {0.0, 5.0}) {
+          CAPTURE(side);
+          CAPTURE(turns);
+          CAPTURE(sense);
+          CAPTURE(climb);
+          const double sweep = sense * turns * 2.0 * pi;
+          const Vector3 start(10, 0, 0);
+          const Vector3 end(10.0 * std::cos(sweep), 10.0 * std::sin(sweep), climb);
+          const Path path({make_arc(start, end, Vector3::Zero(), sweep, 2, 50.0)});
+          CHECK(worst_on_offset_walk(path, 0.05, side, 0, side) < 1e-6);
+          if (climb == 0.0) CHECK(worst_on_offset_walk(path, 0.05, 0, side, side) < 1e-9);
+        }
+      }
+    }
+  }
+  // XZ and YZ planes: a radial offset lies in the plane and has no XY side except by its X or Y part; the size counts.
+  for (const int normal : {0, 1}) {
+    const int a = (normal + 1) % 3;
+    const int b = (normal + 2) % 3;
+    Vector3 start = Vector3::Zero();
+    start[a] = 10.0;
+    const Path path({make_arc(start, start, Vector3::Zero(), 2.0 * pi, normal, 50.0)});
+    ContourTracker tracker(path);
+    for (double angle = 0.0; angle < 2.0 * pi; angle += 0.01) {
+      Vector3 p = Vector3::Zero();
+      p[a] = 10.03 * std::cos(angle);
+      p[b] = 10.03 * std::sin(angle);
+      CHECK(std::abs(tracker.step(p)) == doctest::Approx(0.03));
+    }
+    CHECK(tracker.s_mm() == doctest::Approx(20.0 * pi).epsilon(2e-3));
+  }
+}
+
+TEST_CASE("contour: radii that differ at both ends make a spiral") {
+  const Vector3 end(0, 10.01, 0);
+  const Path path({make_arc({10, 0, 0}, end, Vector3::Zero(), 0.5 * pi, 2, 50.0)});
+  ContourTracker tracker(path);
+  for (double fraction = 0.0; fraction <= 1.0; fraction += 0.01) {
+    CHECK(std::abs(tracker.step(point_at(path[0], fraction * path.length_mm()))) < 1e-9);
+  }
+}
+
+TEST_CASE("contour: a full circle between lead-in and lead-out is neither skipped nor taken twice") {
+  const Path path({make_line({0, 0, 0}, {10, 0, 0}, 50), make_arc({10, 0, 0}, {10, 0, 0}, {10, 5, 0}, 2 * pi, 2, 50),
+                   make_line({10, 0, 0}, {20, 0, 0}, 50)});
+  for (const double left : {0.0, 0.01, -0.01}) {
+    ContourTracker tracker(path);
+    std::size_t cursor = 0;
+    double previous = 0.0;
+    for (double s = 0.0; s <= path.length_mm(); s += 0.05) {
+      CHECK(std::abs(tracker.step(beside(path, s, left, 0, cursor)) - left) < 1e-4);
+      CHECK(tracker.s_mm() >= previous - 1e-3);
+      CHECK(std::abs(tracker.s_mm() - s) < 0.05);
+      previous = tracker.s_mm();
+    }
+    CHECK(tracker.segment() == 2);
+  }
+}
+
+TEST_CASE("contour: rounding a corner inside, overshooting it outside") {
+  for (const double turn_deg : {30.0, 90.0, 150.0, 179.0}) {
+    for (const double side : {1.0, -1.0}) {
+      const double turn = side * turn_deg * pi / 180.0;
+      const Vector3 corner(50, 0, 0);
+      const Vector3 out(std::cos(turn), std::sin(turn), 0);
+      const Path path = polyline({{0, 0, 0}, corner, corner + 50.0 * out});
+      // Inside: a moving average of the position rounds the corner.
+      ContourTracker tracker(path);
+      std::size_t cursor_a = 0;
+      double last_deviation = 0.0;
+      for (double s = 0.0; s <= 99.0; s += 0.1) {
+        Vector3 p = Vector3::Zero();
+        for (int k = 0; k < 10; ++k) p += 0.1 * path.point(std::max(0.0, s - 0.1 * k), cursor_a);
+        last_deviation = tracker.step(p);
+        CHECK(std::abs(last_deviation) == doctest::Approx(nearest_of_all(path, p)).epsilon(1e-6));
+        CHECK(last_deviation * side > -1e-9);
+      }
+      CHECK(tracker.segment() == 1);
+      // Outside: past the corner by .3 mm, then across to the second leg.
+      ContourTracker outside(path);
+      std::size_t cursor_b = 0;
+      for (double s = 0.0; s < 50.0; s += 0.1) outside.step(path.point(s, cursor_b));
+      for (double f = 0.0; f <= 1.0; f += 0.1) {
+        const Vector3 p = corner + Vector3(0.3 * (1.0 - f), -side * 0.2, 0) + f * 0.1 * out;
+        const double deviation = outside.step(p);
+        CHECK(std::abs(deviation) == doctest::Approx(nearest_of_all(path, p)).epsilon(1e-6));
+        if (turn_deg < 100.0) CHECK(deviation * side <= 0.0);
+      }
+    }
+  }
+}
+
+TEST_CASE("contour: a path that turns back on itself is followed there and back") {
+  // Out 50 mm, back on the same line, then away to the side: the turn is rounded off by the filter, so that the point
+  // never reaches the tip.
+  const Path path = polyline({{0, 0, 0}, {50, 0, 0}, {0, 0, 0}, {0, 30, 0}});
+  ContourTracker tracker(path);
+  std::size_t cursor = 0;
+  double worst = 0.0;
+  double s_mid_return = 0.0;
+  for (double s = 0.0; s <= 131.0; s += 0.1) {
+    Vector3 p = Vector3::Zero();
+    for (int k = 0; k < 10; ++k) p += 0.1 * path.point(std::clamp(s - 0.1 * k, 0.0, 130.0), cursor);
+    const double deviation = std::abs(tracker.step(p));
+    worst = std::max(worst, std::abs(deviation - nearest_of_all(path, p)));
+    if (std::abs(s - 75.0) < 0.05) s_mid_return = tracker.s_mm();
+  }
+  CHECK(worst < 1e-6);
+  CHECK(std::abs(s_mid_return - 75.0) < 1.0);
+  CHECK(tracker.segment() == 2);
+  CHECK(tracker.s_mm() == doctest::Approx(130.0).epsilon(1e-3));
+}
+
+TEST_CASE("contour: two laps of a circle drawn with short lines are two laps") {
+  for (const int pieces : {24, 360, 6000}) {
+    std::vector<Vector3> points;
+    for (int i = 0; i <= 2 * pieces; ++i) {
+      const double angle = 2.0 * pi * i / pieces;
+      points.emplace_back(20.0 * std::cos(angle), 20.0 * std::sin(angle), 0.0);
+    }
+    const Path path = polyline(points);
+    ContourTracker tracker(path);
+    std::size_t cursor = 0;
+    double worst = 0.0;
+    for (double s = 0.0; s <= path.length_mm(); s += 0.13) {
+      tracker.step(beside(path, s, 0.02, 0, cursor));
+      worst = std::max(worst, std::abs(tracker.s_mm() - s));
+    }
+    CAPTURE(pieces);
+    CHECK(worst < 0.2);
+  }
+}
+
+TEST_CASE("contour: random polylines of 1 um to 100 mm pieces under vibration, against a search of the whole path") {
+  std::mt19937_64 generator(7);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  for (int trial = 0; trial < 20; ++trial) {
+    // Turns of less than a quarter, climbing in Y on the whole, so that the path does not come near itself.
+    std::vector<Vector3> points{Vector3::Zero()};
+    for (int i = 0; i < 200; ++i) {
+      const double length = std::pow(10.0, -3.0 + 5.0 * unit(generator));
+      const double heading = pi / 2 + 0.6 * (2.0 * unit(generator) - 1.0);
+      points.push_back(points.back() + length * Vector3(std::cos(heading), std::sin(heading), 0.1 * unit(generator)));
+    }
+    const Path path = polyline(points);
+    ContourTracker tracker(path);
+    std::size_t cursor = 0;
+    double worst = 0.0;
+    const double step = 0.2 * unit(generator) + 0.01;
+    for (double s = 0.0; s <= path.length_mm(); s += step) {
+      const Vector3 p =
+          path.point(s, cursor) + 0.03 * Vector3(std::sin(1.7 * s), std::cos(2.9 * s), 0.1 * std::sin(0.3 * s));
+      worst = std::max(worst, std::abs(std::abs(tracker.step(p)) - nearest_of_all(path, p)));
+      if (s > 300.0) break;
+    }
+    CAPTURE(trial);
+    CHECK(worst < 1e-8);
+  }
+}
+
+TEST_CASE("contour: a close parallel pass does not steal the point") {
+  // Pocket rows 40 um apart, the point swinging by 15 um.
+  std::vector<Vector3> points;
+  for (int row = 0; row < 10; ++row) {
+    const double y = 0.04 * row;
+    points.emplace_back(row % 2 == 0 ? 0.0 : 30.0, y, 0.0);
+    points.emplace_back(row % 2 == 0 ? 30.0 : 0.0, y, 0.0);
+  }
+  const Path path = polyline(points);
+  ContourTracker tracker(path);
+  std::size_t cursor = 0;
+  double worst = 0.0;
+  for (double s = 0.0; s <= path.length_mm(); s += 0.1) {
+    tracker.step(path.point(s, cursor) + Vector3(0.0, 0.015 * std::sin(0.9 * s), 0.0));
+    worst = std::max(worst, std::abs(tracker.s_mm() - s));
+  }
+  CHECK(worst < 0.1);
+}
+
+TEST_CASE("contour: a lost track is found again") {
+  // The point skips a detour of 200 mm that the path makes.
+  const Path path = polyline({{0, 0, 0}, {50, 0, 0}, {50, 100, 0}, {50.5, 100, 0}, {50.5, 0, 0}, {120, 0, 0}});
+  ContourTracker tracker(path);
+  double deviation = 0.0;
+  for (double x = 0.0; x <= 110.0; x += 0.1) deviation = tracker.step({x, 0, 0});
+  CHECK(std::abs(deviation) < 1e-9);
+  CHECK(tracker.segment() == 4);
+  // A jump far ahead in one sample is within that sample's window.
+  ContourTracker jump(path);
+  CHECK(jump.step({50, 60, 0}) == doctest::Approx(0.0));
+}
+
+TEST_CASE("contour: pieces without length do no harm") {
+  const Path path = polyline({{0, 0, 0}, {0, 0, 0}, {10, 0, 0}, {10, 0, 0}, {10, 10, 0}, {10, 10, 0}});
+  CHECK(worst_on_offset_walk(polyline({{0, 0, 0}, {0, 0, 0}, {10, 0, 0}}), 0.1, 0.01, 0, 0.01) < 1e-9);
+  ContourTracker tracker(path);
+  CHECK(tracker.step({0.0, 0.1, 0}) == doctest::Approx(0.1));
+  for (double x = 0.0; x <= 10.2; x += 0.1) tracker.step({x, -0.1, 0});
+  CHECK(tracker.step({10.1, -0.1, 0}) == doctest::Approx(-0.1 * std::sqrt(2.0)));
+  for (double y = 0.0; y <= 10.0; y += 0.1) tracker.step({10.1, y, 0});
+  CHECK(tracker.step({10.1, 10.0, 0}) == doctest::Approx(-0.1));
+}

@@ -1,0 +1,16 @@
+"""What every Python test shares."""
+
+from __future__ import annotations
+
+import os
+
+import hypothesis
+
+# Figures are files here; no display is looked for.
+os.environ["MPLBACKEND"] = "Agg"
+
+# The same examples in every run, so that a red run is the fault of its commit. Look for new counterexamples with
+# `pytest --hypothesis-profile=search`.
+hypothesis.settings.register_profile("gate", derandomize=True, deadline=None)
+hypothesis.settings.register_profile("search", deadline=None, max_examples=2000)
+hypothesis.settings.load_profile("gate")

@@ -1,0 +1,209 @@
+"""The rules of the house: who may use whom, what is loaded when, what every public name must say."""
+
+from __future__ import annotations
+
+import ast
+import importlib.metadata
+import inspect
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+CPP = ROOT / "cpp"
+PACKAGE = ROOT / "python" / "shapegcode"
+
+# Folder of cpp/ → the other folders whose headers it may include. Headers at the top (error.hpp, samples.hpp,
+# mode.hpp) are everybody's, and include only each other.
+ALLOWED_FOLDERS: dict[str, set[str]] = {
+    "": set(),
+    "gcode": {"path"},
+    "path": set(),
+    "motion": {"path", "filter"},
+    "filter": set(),
+    "shaping": {"filter"},
+    "plant": {"filter"},
+    "metrology": {"path"},
+    "milling": {"path"},
+    "identification": {"filter"},
+}
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"]+)[>"]', re.MULTILINE)
+
+
+def cpp_files(*folders: str) -> list[Path]:
+    return sorted(
+        file for folder in folders for file in (CPP / folder).rglob("*") if file.suffix in {".hpp", ".cpp", ".h"}
+    )
+
+
+def includes(file: Path) -> list[tuple[str, str]]:
+    """(bracket, name) of every include line."""
+    return INCLUDE.findall(file.read_text(encoding="utf-8"))
+
+
+def own_folder(file: Path) -> str:
+    """`gcode` for cpp/src/gcode/lexer.cpp and for its header, empty for what lies at the top."""
+    base = CPP / "src" if file.is_relative_to(CPP / "src") else CPP / "include" / "shapegcode"
+    parent = file.relative_to(base).parent
+    return "" if parent == Path() else parent.parts[0]
+
+
+def included_folder(file: Path, name: str) -> str:
+    """The folder an own include points into; a name without a folder is a private header beside the file."""
+    parts = Path(name.removeprefix("shapegcode/")).parts
+    if name.startswith("shapegcode/"):
+        return parts[0] if len(parts) > 1 else ""
+    return parts[0] if len(parts) > 1 else own_folder(file)
+
+
+def test_there_are_sources_to_check() -> None:
+    assert len(cpp_files("include", "src")) > 20
+    assert (PACKAGE / "cli").is_dir()
+
+
+def test_cpp_knows_nothing_of_python() -> None:
+    offenders = [
+        f"{file.relative_to(ROOT)} includes {name}"
+        for file in cpp_files("")
+        for _, name in includes(file)
+        if name.startswith("pybind11") or Path(name).name == "Python.h"
+    ]
+    assert offenders == []
+
+
+def test_only_the_ode_solver_knows_sundials() -> None:
+    heads = ("sundials", "cvode", "nvector", "sunmatrix", "sunlinsol", "sunnonlinsol", "arkode", "ida", "kinsol")
+    users = {
+        file.relative_to(ROOT).as_posix()
+        for file in cpp_files("")
+        for _, name in includes(file)
+        if "/" in name and name.split("/")[0] in heads
+    }
+    assert users == {"cpp/src/plant/ode.cpp"}
+
+
+def test_cpp_folders_use_only_whom_they_may() -> None:
+    offenders = []
+    for file in cpp_files("include", "src"):
+        folder = own_folder(file)
+        assert folder in ALLOWED_FOLDERS, f"{file.relative_to(ROOT)}: say in ALLOWED_FOLDERS whom {folder} may use"
+        allowed = ALLOWED_FOLDERS[folder] | {folder, ""}
+        offenders += [
+            f"{file.relative_to(ROOT)} includes {name}"
+            for bracket, name in includes(file)
+            if bracket == '"' and included_folder(file, name) not in allowed
+        ]
+    assert offenders == []
+
+
+def test_every_public_header_includes_own_headers_by_full_name() -> None:
+    offenders = [
+        f"{file.relative_to(ROOT)} includes {name}"
+        for file in cpp_files("include")
+        for bracket, name in includes(file)
+        if bracket == '"' and not name.startswith("shapegcode/")
+    ]
+    assert offenders == []
+
+
+def imported_modules(file: Path) -> set[str]:
+    """Top-level packages a Python file imports, anywhere in it; TYPE_CHECKING blocks count too."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), filename=str(file))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            found.add(node.module.split(".")[0])
+    return found
+
+
+def test_only_plotting_imports_matplotlib() -> None:
+    users = {
+        file.relative_to(PACKAGE).as_posix()
+        for file in PACKAGE.rglob("*.py")
+        if "matplotlib" in imported_modules(file)
+    }
+    assert users == {"plotting.py"}
+
+
+def loaded_after(statement: str) -> set[str]:
+    """The top-level modules that a fresh interpreter has loaded after the statement."""
+    code = f"import sys\n{statement}\nprint('\\n'.join(sorted({{name.split('.')[0] for name in sys.modules}})))"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    return set(run.stdout.split())
+
+
+HEAVY = {"numpy", "scipy", "matplotlib", "pydantic"}
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "import shapegcode.cli",
+        # What `shapegcode --help` does; its text goes to stderr here, so that only the modules are on stdout.
+        "import contextlib, shapegcode.cli\n"
+        "sys.argv = ['shapegcode', '--help']\n"
+        "with contextlib.redirect_stdout(sys.stderr), contextlib.suppress(SystemExit):\n"
+        "    shapegcode.cli.main()",
+    ],
+    ids=["import", "help"],
+)
+def test_the_command_line_starts_light(statement: str) -> None:
+    assert loaded_after(statement) & HEAVY == set()
+
+
+def test_plotting_is_loaded_only_when_used() -> None:
+    assert "matplotlib" not in loaded_after("import shapegcode")
+
+
+def test_versions_agree() -> None:
+    pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    cmake = re.search(r"project\(shapegcode VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))
+    assert cmake is not None
+    assert cmake[1] == pyproject
+    assert importlib.metadata.version("shapegcode") == pyproject, "installed package is stale"
+
+
+def test_no_test_skips_silently() -> None:
+    words = re.compile(r"importorskip|pytest\.skip|mark\.skip")
+    skipping = {
+        file.name
+        for file in Path(__file__).parent.rglob("*.py")
+        if file != Path(__file__) and words.search(file.read_text(encoding="utf-8"))
+    }
+    assert skipping == set()
+
+
+def says_something(name: str, doc: str | None) -> bool:
+    """Whether a docstring holds more than the signatures that pybind11 puts there."""
+    signature = re.compile(rf"(\d+\. )?{re.escape(name)}\(.*\)( -> .*)?|Overloaded function\.")
+    return any(line.strip() and not signature.fullmatch(line.strip()) for line in (doc or "").splitlines())
+
+
+def test_every_public_name_of_the_extension_is_documented() -> None:
+    from shapegcode import _core
+
+    silent = []
+    for name, value in vars(_core).items():
+        if name.startswith("_") or inspect.ismodule(value):
+            continue
+        if inspect.isclass(value):
+            if not says_something(name, value.__doc__):
+                silent.append(name)
+            members = {} if issubclass(value, BaseException) else vars(value)
+            silent += [
+                f"{name}.{member_name}"
+                for member_name, member in members.items()
+                if not member_name.startswith("_")
+                and (callable(member) or isinstance(member, property | staticmethod))
+                and not isinstance(member, value)  # the values of an enumeration
+                and not says_something(member_name, member.__doc__)
+            ]
+        elif callable(value) and not says_something(name, value.__doc__):
+            silent.append(name)
+    assert silent == []

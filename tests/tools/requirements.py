@@ -1,0 +1,14 @@
+"""Prints requirements of pyproject.toml, one per line: `requirements.py [build] [runtime] [dev]`."""
+
+import sys
+import tomllib
+from pathlib import Path
+
+project = tomllib.loads((Path(__file__).resolve().parents[2] / "pyproject.toml").read_text(encoding="utf-8"))
+groups = {
+    "build": project["build-system"]["requires"],
+    "runtime": project["project"]["dependencies"],
+    "dev": project["dependency-groups"]["dev"],
+}
+for name in sys.argv[1:]:
+    print(*groups[name], sep="\n")
