@@ -107,21 +107,22 @@ void register_emission(py::module_& module) {
       .def_readwrite("feed_decimals", &WriterOptions::feed_decimals, "Digits behind the point.")
       .def_readwrite("incremental", &WriterOptions::incremental, "G91 words.")
       .def_readwrite("plane", &WriterOptions::plane, "Plane active before the first block.")
+      .def_readwrite("exact_stop_at_end", &WriterOptions::exact_stop_at_end, "G09 on the last block.")
       .def_readwrite("line_end", &WriterOptions::line_end, "Line end.");
 
   module.def(
       "write_blocks",
       [](const FittedBlocks& fitted, const std::array<std::int64_t, axis_count>& start,
          const std::vector<BlockMark>& marks, const WriterOptions& options) {
-        std::string text;
+        WrittenBlocks written;
         {
           const py::gil_scoped_release release;
-          text = write_blocks(fitted.blocks, start, marks, options);
+          written = write_blocks(fitted.blocks, start, marks, options);
         }
-        return py::bytes(text);
+        return std::make_tuple(py::bytes(written.text), written.motion, written.plane);
       },
       py::arg("blocks"), py::arg("start"), py::arg("marks"), py::arg("options"),
-      "Text of fitted blocks (bytes); `start` in increments.");
+      "(text as bytes, motion code, plane) of fitted blocks; `start` in increments.");
 }
 
 }  // namespace shapegcode::bindings

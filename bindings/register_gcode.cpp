@@ -81,7 +81,8 @@ void register_gcode(py::module_& module) {
       .def_readwrite("unknown_after_tool_change", &ReaderOptions::unknown_after_tool_change,
                      "Axes whose position is not known after M06.")
       .def_readwrite("work_offsets_mm", &ReaderOptions::work_offsets_mm, "G54 ... G59, mm; empty: not known.")
-      .def_readwrite("power_on", &ReaderOptions::power_on, "Modal state before the first block.");
+      .def_readwrite("power_on", &ReaderOptions::power_on, "Modal state before the first block.")
+      .def_readwrite("probe_lines", &ReaderOptions::probe_lines, "Ascending lines behind which the state is kept.");
 
   py::class_<RegionNote>(module, "RegionNote", "An N word or a comment inside a region.")
       .def_readonly("segment", &RegionNote::segment, "Index of the segment before which it stood.")
@@ -130,6 +131,9 @@ void register_gcode(py::module_& module) {
           },
           "(line, message) pairs.")
       .def_readonly("final_state", &Program::final_state, "Modal state at the end.")
+      .def_property_readonly(
+          "probed", [](const Program& self) { return self.probed; },
+          "Modal state behind each of ReaderOptions.probe_lines.")
       .def(
           "cutting_path",
           [](const Program& self, std::uint32_t first, std::uint32_t last) {

@@ -102,6 +102,16 @@ void register_path(py::module_& module) {
           "end_mm",
           [](const Path& self) { return self.size() > 0 ? self[self.size() - 1].end_mm : Vector3(Vector3::Zero()); },
           "End, shape (3,), mm.")
+      .def_property_readonly(
+          "largest_sweep_rad",
+          [](const Path& self) {
+            double largest = 0.0;
+            for (const Segment& segment : self.segments()) {
+              largest = std::max(largest, std::abs(segment.sweep_rad));
+            }
+            return largest;
+          },
+          "Largest sweep of any arc, rad; 0 without arcs.")
       .def("polyline", &polyline, py::arg("step_rad") = 0.05,
            "Points along the path, (n, 3), mm: segment ends, arcs in steps of `step_rad`.");
 }

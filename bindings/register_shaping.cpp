@@ -135,7 +135,8 @@ Source: spec 2; paper 002, eq. 8.)")
            [](const Shaper& self) {
              return "Shaper(times_s=" + repr(self.times_s) + ", amplitudes=" + repr(self.amplitudes) + ")";
            })
-      .def("__eq__", [](const Shaper& self, const Shaper& other) { return self == other; }, py::is_operator())
+      .def(
+          "__eq__", [](const Shaper& self, const Shaper& other) { return self == other; }, py::is_operator())
       .def(py::pickle([](const Shaper& self) { return py::make_tuple(self.times_s, self.amplitudes); },
                       [](const py::tuple& state) {
                         return shapegcode::make_shaper(state[0].cast<std::vector<double>>(),

@@ -356,8 +356,9 @@ class Shaping(_Table):
         "feed in arcs as a share of the programmed feed, reached before the arc begins; 1: no reduction",
         unit="1", default=1.0)
     plunge_angle_deg: Annotated[_NonNegative, Field(le=90)] = _key(
-        "a cutting move steeper than this against the XY plane is a plunge: it keeps its programmed feed and "
-        "is not shaped", unit="degrees", default=15.0)
+        "a cutting move that leans from the tool axis Z by no more than this is a plunge or retract: the tool "
+        "comes to rest where it meets a move across, because a shaper must not mix the two",
+        unit="degrees", default=15.0)
 
 
 class Tolerance(_Table):
@@ -407,6 +408,11 @@ class KeyValue:
     info: KeyInfo
     value: str
     origin: Literal["file", "default"]
+
+    @property
+    def assumed(self) -> bool:
+        """True where the value is a default that is an assumption."""
+        return self.origin == "default" and self.info.assumed
 
 
 class Machine(_Table):
@@ -855,9 +861,9 @@ def key_documentation() -> str:
         "",
         f"Built-in machines, usable by name in place of a file: {builtin}.",
         "",
-        "A default marked **assumed** is not known for real controllers in general: look it up or measure it.",
-        "The FANUC column names the parameter that corresponds to a key; numbers differ between series, so check",
-        "your manual.",
+        "A default marked **assumed** is not known for real controllers in general: look it up or measure",
+        "it. The FANUC column names the parameter that corresponds to a key; numbers differ between series,",
+        "so check your manual.",
     ]
     for table, meaning, infos in _documented(Machine, ""):
         lines += ["", f"## {_heading(table)}", ""]

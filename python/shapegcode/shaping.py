@@ -1,8 +1,8 @@
 """Shaper designs on a sample grid that need an optimiser, and the choice of the block period.
 
-A shaper survives being written as blocks only if its taps lie on the block grid and its zeros are exact there (spec 2
-and 4). The shortest exact design is a polynomial (:func:`shapegcode._core.grid_polynomial`), but its taps may be
-wild; :func:`shortest_non_negative` spends a few more taps on a design that never reverses, and
+A shaper survives being written as blocks only if its taps lie on the block grid and its zeros are exact there
+(spec 2 and 4). The shortest exact design is a polynomial (:func:`shapegcode._core.grid_polynomial`), but its
+taps may be wild; :func:`shortest_non_negative` spends a few more taps on a design that never reverses, and
 :func:`choose_block_period` compares block periods, because they decide how long that takes.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog, nnls
 
-from shapegcode._core import ArgumentError, DesignError, Mode, Shaper, ShapegcodeError, grid_polynomial
+from shapegcode._core import ArgumentError, DesignError, Mode, ShapegcodeError, Shaper, grid_polynomial
 
 __all__ = ["BlockPeriodCandidate", "BlockPeriodChoice", "choose_block_period", "shortest_non_negative"]
 
@@ -58,11 +58,11 @@ class BlockPeriodChoice(NamedTuple):
 def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s: float = 0.25) -> Shaper:
     """Shortest shaper with non-negative taps on a grid that cancels every mode exactly there.
 
-    The number of periods is the smallest for which the conditions (sum 1, both parts of each mode's sum zero) have a
-    non-negative solution. Among the solutions of that duration the one with the least second central moment, the
-    contour cost, is taken: exactly, not only against a fixed centre. Modes that ask for the same thing on this grid
-    (equal ones, or aliases of one another) count once. The taps of the optimiser are solved again in full precision
-    and checked.
+    The number of periods is the smallest for which the conditions (sum 1, both parts of each mode's sum zero)
+    have a non-negative solution. Among the solutions of that duration the one with the least second central
+    moment, the contour cost, is taken: exactly, not only against a fixed centre. Modes that ask for the same
+    thing on this grid (equal ones, or aliases of one another) count once. The taps of the optimiser are
+    solved again in full precision and checked.
 
     Args:
         modes: Modes to cancel, at least one; one above the grid's Nyquist frequency is fine.
@@ -70,8 +70,8 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
         max_duration_s: Longest duration in s that is tried, above 0.
 
     Returns:
-        The shaper: times are multiples of `period_s`, amplitudes above 0, ``residual_ratio`` of every mode at most
-        1e-10 (about 1e-16 as a rule).
+        The shaper: times are multiples of `period_s`, amplitudes above 0, ``residual_ratio`` of every mode at
+        most 1e-10 (about 1e-16 as a rule).
 
     Raises:
         ArgumentError: No mode, or a period or duration that is not finite and positive.
@@ -100,9 +100,9 @@ def choose_block_period(
 ) -> BlockPeriodChoice:
     """Block period on which the shortest non-negative shaper is shortest.
 
-    Every whole multiple of the interpolation period from the controller's block time up to `max_block_period_s` is
-    tried. The shortest duration wins; among durations within 2 % of it the longest period does, because it writes the
-    fewest blocks.
+    Every whole multiple of the interpolation period from the controller's block time up to
+    `max_block_period_s` is tried. The shortest duration wins; among durations within 2 % of it the longest
+    period does, because it writes the fewest blocks.
 
     Args:
         modes: Modes to cancel, at least one.
@@ -115,8 +115,8 @@ def choose_block_period(
         The period, its shaper, and the table of all candidates for the report.
 
     Raises:
-        ArgumentError: No mode, a time outside its range, or no multiple of the interpolation period in the range.
-        DesignError: No candidate has a non-negative shaper within `max_duration_s`.
+        ArgumentError: No mode, a time outside its range, or no multiple of the interpolation period in the
+        range. DesignError: No candidate has a non-negative shaper within `max_duration_s`.
 
     Source: this project (spec 2: the block period is a design choice; spec 4).
     """
@@ -132,8 +132,9 @@ def choose_block_period(
     most = math.floor(max_block_period_s / interpolation_period_s + _ON_GRID)
     if fewest > most:
         raise ArgumentError(
-            f"no block period between the block time of {_ms(block_time_s)} and the limit of {_ms(max_block_period_s)} "
-            f"is a multiple of the interpolation period of {_ms(interpolation_period_s)}"
+            f"no block period between the block time of {_ms(block_time_s)} and the limit of "
+            f"{_ms(max_block_period_s)} is a multiple of the interpolation period of "
+            f"{_ms(interpolation_period_s)}"
         )
     candidates = tuple(
         _candidate(modes, multiple * interpolation_period_s, max_duration_s)
@@ -142,12 +143,14 @@ def choose_block_period(
     designs = [(each.period_s, each.shaper) for each in candidates if each.shaper is not None]
     if not designs:
         raise DesignError(
-            f"no block period from {_ms(candidates[0].period_s)} to {_ms(candidates[-1].period_s)} in steps of "
-            f"{_ms(interpolation_period_s)} has a non-negative shaper within {_ms(max_duration_s)} for modes "
-            f"{_names(modes)}; the first says: {candidates[0].refusal}"
+            f"no block period from {_ms(candidates[0].period_s)} to {_ms(candidates[-1].period_s)} in steps "
+            f"of {_ms(interpolation_period_s)} has a non-negative shaper within {_ms(max_duration_s)} for "
+            f"modes {_names(modes)}; the first says: {candidates[0].refusal}"
         )
     limit = (1.0 + _SAME_DURATION) * min(shaper.duration_s for _, shaper in designs)
-    period_s, shaper = max((each for each in designs if each[1].duration_s <= limit), key=lambda each: each[0])
+    period_s, shaper = max(
+        (each for each in designs if each[1].duration_s <= limit), key=lambda each: each[0]
+    )
     return BlockPeriodChoice(period_s, shaper, candidates)
 
 
@@ -169,8 +172,8 @@ def _check_modes_and_times(modes: Sequence[Mode], **times_s: float) -> None:
 def _conditions(modes: Sequence[Mode], period_s: float, last: int) -> tuple[FloatArray, FloatArray]:
     """Matrix and right-hand side of the equality conditions on the taps at 0, 1 ... `last` periods.
 
-    The modes' rows (each mode's residual sum, which decay keeps at most 1) are replaced by an orthonormal basis of
-    their span: near-equal modes then cost no precision, and equal ones no row.
+    The modes' rows (each mode's residual sum, which decay keeps at most 1) are replaced by an orthonormal
+    basis of their span: near-equal modes then cost no precision, and equal ones no row.
     """
     steps = np.arange(last + 1)
     poles = np.array([mode.pole for mode in modes])
@@ -185,7 +188,8 @@ def _conditions(modes: Sequence[Mode], period_s: float, last: int) -> tuple[Floa
 def _non_negative_solution(modes: Sequence[Mode], period_s: float, last: int) -> FloatArray | None:
     """Taps at 0 ... `last` periods that satisfy every condition, or None.
 
-    Lawson and Hanson's active-set method answers to rounding, where a linear program answers to its tolerance.
+    Lawson and Hanson's active-set method answers to rounding, where a linear program answers to its
+    tolerance.
     """
     matrix, right = _conditions(modes, period_s, last)
     try:
@@ -248,8 +252,8 @@ def _vertices(modes: Sequence[Mode], period_s: float, last: int) -> Iterator[Flo
 def _lower_hull(matrix: FloatArray, right: FloatArray, moments: FloatArray) -> list[FloatArray]:
     """Vertices of the lower edge of what the first two moments of the feasible taps can be.
 
-    The second central moment is concave in the taps, so no single linear program minimises it; but it is least at one
-    of these vertices, and each of them is a linear program.
+    The second central moment is concave in the taps, so no single linear program minimises it; but it is
+    least at one of these vertices, and each of them is a linear program.
     """
     leftmost = _vertex(matrix, right, moments[0])
     rightmost = _vertex(matrix, right, -moments[0])
@@ -272,17 +276,17 @@ def _lower_hull(matrix: FloatArray, right: FloatArray, moments: FloatArray) -> l
 
 
 def _polished(vertex: FloatArray, modes: Sequence[Mode], period_s: float) -> Shaper | None:
-    """The vertex solved again to rounding on its own taps, or None if that is not a valid non-negative design."""
+    """The vertex solved again to rounding on its own taps, or None if that is no non-negative design."""
     matrix, right = _conditions(modes, period_s, len(vertex) - 1)
     for threshold in _SUPPORT_THRESHOLDS:
         support = np.flatnonzero(vertex > threshold)
         columns = matrix[:, support]
         taps = vertex[support]
-        for _ in range(3):  # the second step removes what the first one's rounding left, the third nothing as a rule
+        for _ in range(3):  # the second removes what the first one's rounding left, the third nothing
             taps = taps + np.linalg.lstsq(columns, right - columns @ taps, rcond=1e-14)[0]
         if not (np.all(taps > 0.0) and abs(taps.sum() - 1.0) <= RESIDUAL_LIMIT):
             continue
-        shaper = Shaper((support - support[0]) * period_s, taps / taps.sum())
+        shaper = Shaper(((support - support[0]) * period_s).tolist(), (taps / taps.sum()).tolist())
         if max(shaper.residual_ratio(mode) for mode in modes) <= RESIDUAL_LIMIT:
             return shaper
     return None
@@ -291,12 +295,14 @@ def _polished(vertex: FloatArray, modes: Sequence[Mode], period_s: float) -> Sha
 def _none_exists(modes: Sequence[Mode], period_s: float, max_duration_s: float) -> str:
     try:
         polynomial = grid_polynomial(modes, period_s)
-        what_exists = f"the shortest polynomial lasts {_ms(polynomial.duration_s)} with sum|a| {polynomial.abs_sum:.4g}"
+        what_exists = (
+            f"the shortest polynomial lasts {_ms(polynomial.duration_s)} with sum|a| {polynomial.abs_sum:.4g}"
+        )
     except ShapegcodeError as error:
         what_exists = f"nor is there a polynomial: {error}"
     return (
-        f"no non-negative design within {_ms(max_duration_s)} on a {_ms(period_s)} grid for modes {_names(modes)}; "
-        f"{what_exists}; try another period"
+        f"no non-negative design within {_ms(max_duration_s)} on a {_ms(period_s)} grid for modes "
+        f"{_names(modes)}; {what_exists}; try another period"
     )
 
 

@@ -9,7 +9,7 @@ import hypothesis
 # Figures are files here; no display is looked for.
 os.environ["MPLBACKEND"] = "Agg"
 
-# The same examples in every run, so that a red run is the fault of its commit. Look for new counterexamples with
+# The same examples in every run, so that a red run is the fault of its commit. To look for new ones:
 # `pytest --hypothesis-profile=search`.
 hypothesis.settings.register_profile("gate", derandomize=True, deadline=None)
 hypothesis.settings.register_profile("search", deadline=None, max_examples=2000)

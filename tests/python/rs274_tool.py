@@ -12,7 +12,7 @@ _ROOT = Path(__file__).resolve().parents[2]
 
 @functools.cache
 def _linuxcnc_folder() -> Path:
-    """The unpacked LinuxCNC packages, fetched when they are missing. A missing rs274 is an error, never a skip."""
+    """The unpacked LinuxCNC packages, fetched when missing. Without rs274 a test fails, it does not skip."""
     fetch = subprocess.run(
         [_ROOT / "tests" / "tools" / "fetch_rs274.sh"], capture_output=True, text=True, check=False
     )

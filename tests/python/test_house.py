@@ -24,6 +24,7 @@ ALLOWED_FOLDERS: dict[str, set[str]] = {
     "gcode": {"path"},
     "path": set(),
     "motion": {"path", "filter"},
+    "emission": {"path", "filter", "motion", "gcode"},
     "filter": set(),
     "shaping": {"filter"},
     "plant": {"filter"},
@@ -36,7 +37,10 @@ INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"]+)[>"]', re.MULTIL
 
 def cpp_files(*folders: str) -> list[Path]:
     return sorted(
-        file for folder in folders for file in (CPP / folder).rglob("*") if file.suffix in {".hpp", ".cpp", ".h"}
+        file
+        for folder in folders
+        for file in (CPP / folder).rglob("*")
+        if file.suffix in {".hpp", ".cpp", ".h"}
     )
 
 
@@ -76,7 +80,7 @@ def test_cpp_knows_nothing_of_python() -> None:
 
 
 def test_only_the_ode_solver_knows_sundials() -> None:
-    heads = ("sundials", "cvode", "nvector", "sunmatrix", "sunlinsol", "sunnonlinsol", "arkode", "ida", "kinsol")
+    heads = {"sundials", "cvode", "nvector", "sunmatrix", "sunlinsol", "sunnonlinsol", "arkode", "ida"}
     users = {
         file.relative_to(ROOT).as_posix()
         for file in cpp_files("")
@@ -90,7 +94,9 @@ def test_cpp_folders_use_only_whom_they_may() -> None:
     offenders = []
     for file in cpp_files("include", "src"):
         folder = own_folder(file)
-        assert folder in ALLOWED_FOLDERS, f"{file.relative_to(ROOT)}: say in ALLOWED_FOLDERS whom {folder} may use"
+        assert folder in ALLOWED_FOLDERS, (
+            f"{file.relative_to(ROOT)}: say in ALLOWED_FOLDERS whom {folder} may use"
+        )
         allowed = ALLOWED_FOLDERS[folder] | {folder, ""}
         offenders += [
             f"{file.relative_to(ROOT)} includes {name}"
@@ -132,7 +138,7 @@ def test_only_plotting_imports_matplotlib() -> None:
 
 def loaded_after(statement: str) -> set[str]:
     """The top-level modules that a fresh interpreter has loaded after the statement."""
-    code = f"import sys\n{statement}\nprint('\\n'.join(sorted({{name.split('.')[0] for name in sys.modules}})))"
+    code = f"import sys\n{statement}\nprint(*(name.split('.')[0] for name in sys.modules))"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     return set(run.stdout.split())
@@ -163,7 +169,9 @@ def test_plotting_is_loaded_only_when_used() -> None:
 
 def test_versions_agree() -> None:
     pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
-    cmake = re.search(r"project\(shapegcode VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))
+    cmake = re.search(
+        r"project\(shapegcode VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
+    )
     assert cmake is not None
     assert cmake[1] == pyproject
     assert importlib.metadata.version("shapegcode") == pyproject, "installed package is stale"
@@ -201,7 +209,9 @@ def test_every_public_name_of_the_extension_is_documented() -> None:
                 for member_name, member in members.items()
                 if not member_name.startswith("_")
                 and (callable(member) or isinstance(member, property | staticmethod))
-                and not isinstance(member, value)  # the values of an enumeration
+                # of an enumeration: its values, and what pybind11 gives each of them
+                and not isinstance(member, value)
+                and not (hasattr(value, "__members__") and member_name in {"name", "value"})
                 and not says_something(member_name, member.__doc__)
             ]
         elif callable(value) and not says_something(name, value.__doc__):

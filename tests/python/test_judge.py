@@ -411,6 +411,8 @@ def test_modes_per_axis() -> None:
     both = residual_um(points, [None, Mode(46, 0.02), [(46.0, 0.02), Mode(131, 0.02, share=0.0)]], 1e-3)
     assert both[0] == 0 and both[1] == both[2] > 0
     assert residual_um(points[:1], [None] * 3, 1e-3).tolist() == [0, 0, 0]
+    with pytest.raises(ValueError, match="damping ratio"):
+        residual_um(points, [(46.0, 1.0)] * 3, 1e-3)
 
 
 def test_a_table_on_a_circle_swings_outwards() -> None:
@@ -625,6 +627,7 @@ def test_lines_outside_the_ranges_stay() -> None:
     first = BASE.split("\n").index("N20 X20. F6000.") + 1
     found = verify_conversion(BASE, GOOD, [(first, first + 4)])
     assert found and all("outside the shaped ranges" in c or "before a region" in c for c in found)
+    assert any("outside every region" in c for c in verify_conversion(BASE, GOOD, []))
 
 
 def test_drift_from_an_unknown_origin_is_compared() -> None:

@@ -25,6 +25,7 @@ from shapegcode._core import (
     minimal_two_mode,
     zv,
 )
+
 from shapegcode.shaping import choose_block_period, shortest_non_negative
 
 PAPER_MODES = (Mode(46.0, 0.02), Mode(131.0, 0.02))
@@ -32,11 +33,12 @@ PERIODS_S = (0.001, 0.002, 0.004, 0.005, 0.008)
 LIMIT = 1e-10
 
 
-def residual(times_s: NDArray[np.float64], amplitudes: NDArray[np.float64], f_hz: float, zeta: float) -> float:
+def left_of(shaper: Shaper, mode: Mode) -> float:
     """V of spec 2, written out."""
-    omega = 2.0 * np.pi * f_hz
-    phase = np.exp(1j * omega * math.sqrt(1.0 - zeta**2) * times_s)
-    return float(abs(np.exp(-zeta * omega * times_s[-1]) * np.sum(amplitudes * np.exp(zeta * omega * times_s) * phase)))
+    omega, zeta = 2.0 * np.pi * mode.frequency_hz, mode.damping_ratio
+    t = shaper.times_s
+    terms = shaper.amplitudes * np.exp(zeta * omega * t) * np.exp(1j * omega * math.sqrt(1.0 - zeta**2) * t)
+    return float(np.exp(-zeta * omega * t[-1]) * abs(np.sum(terms)))
 
 
 def simulated_residual(shaper: Shaper, mode: Mode) -> float:
@@ -50,7 +52,8 @@ def simulated_residual(shaper: Shaper, mode: Mode) -> float:
         now = time
 
     def swing(initial: NDArray[np.float64]) -> float:
-        return max(abs((expm(matrix * t) @ initial)[0]) for t in np.linspace(0.0, 1.0 / mode.frequency_hz, 25))
+        instants = np.linspace(0.0, 1.0 / mode.frequency_hz, 25)
+        return float(np.abs([(expm(matrix * t) @ initial)[0] for t in instants]).max())
 
     return swing(state) / swing(np.array([0.0, 1.0]))
 
@@ -66,11 +69,19 @@ def is_feasible(modes: Sequence[Mode], period_s: float, last: int) -> bool:
         rows += [term.real, term.imag]
     right = np.zeros(len(rows))
     right[0] = 1.0
-    tight = {"primal_feasibility_tolerance": 1e-10}
-    return bool(linprog(np.zeros(last + 1), A_eq=np.array(rows), b_eq=right, options=tight).status == 0)
+    return bool(
+        linprog(
+            np.zeros(last + 1),
+            A_eq=np.array(rows),
+            b_eq=right,
+            options={"primal_feasibility_tolerance": 1e-10},
+            method="highs-ds",
+        ).status
+        == 0
+    )
 
 
-# --- the classes --------------------------------------------------------------------------------------------------
+# --- the classes --------------------------------------------------------------------------------------------
 
 
 def test_mode_states_its_values_and_refuses_others() -> None:
@@ -83,7 +94,15 @@ def test_mode_states_its_values_and_refuses_others() -> None:
     assert repr(mode) == "Mode(frequency_hz=46.0, damping_ratio=0.02, participation=1.0)"
     omega = 2.0 * np.pi * 46.0
     assert mode.pole == pytest.approx(complex(-0.02 * omega, omega * math.sqrt(1.0 - 0.02**2)), rel=1e-14)
-    for bad in [(0.0, 0.1), (-1.0, 0.1), (math.nan, 0.1), (1.0, 1.0), (1.0, -0.1), (1.0, math.nan), (1.0, 0.1, math.inf)]:
+    for bad in [
+        (0.0, 0.1),
+        (-1.0, 0.1),
+        (math.nan, 0.1),
+        (1.0, 1.0),
+        (1.0, -0.1),
+        (1.0, math.nan),
+        (1.0, 0.1, math.inf),
+    ]:
         with pytest.raises(ArgumentError):
             Mode(*bad)
 
@@ -95,7 +114,8 @@ def test_shaper_states_its_moments_and_cannot_be_changed() -> None:
     assert shaper.variance_s2 == pytest.approx(0.75 * 0.0625 - 0.25 - shaper.mean_s**2, rel=1e-13)
     assert shaper.abs_sum == 1.5
     assert shaper.has_negative
-    assert shaper == Shaper(np.array([0.0, 0.25, 1.0]), (0.5, 0.75, -0.25))
+    assert shaper == Shaper(list(np.array([0.0, 0.25, 1.0])), (0.5, 0.75, -0.25))
+    assert shaper == Shaper(shaper.times_s, shaper.amplitudes)  # type: ignore[arg-type]
     assert shaper != zv(PAPER_MODES[0])
     assert pickle.loads(pickle.dumps(shaper)) == shaper
     assert repr(shaper) == "Shaper(times_s=[0.0, 0.25, 1.0], amplitudes=[0.5, 0.75, -0.25])"
@@ -124,21 +144,23 @@ def test_shaper_refuses_what_is_none(times_s: list[float], amplitudes: list[floa
         Shaper(times_s, amplitudes)
 
 
-# --- designs of the core --------------------------------------------------------------------------------------------
+# --- designs of the core ------------------------------------------------------------------------------------
 
 
 @given(
-    st.floats(1.0, 200.0), st.floats(0.0, 0.5), st.floats(1.0, 200.0), st.floats(0.0, 0.5), st.floats(0.0, 0.5)
+    st.floats(1.0, 200.0),
+    st.floats(0.0, 0.5),
+    st.floats(1.0, 200.0),
+    st.floats(0.0, 0.5),
+    st.floats(0.0, 0.5),
 )
 def test_residual_ratio_is_the_formula(f: float, zeta: float, g: float, eta: float, off: float) -> None:
     shaper = convolve(zv(Mode(f, zeta)), zv(Mode(g, eta)))
     for frequency, damping in [(f, zeta), (g, eta)]:
-        assert residual(shaper.times_s, shaper.amplitudes, frequency, damping) < 1e-12
+        assert left_of(shaper, Mode(frequency, damping)) < 1e-12
         assert shaper.residual_ratio(Mode(frequency, damping)) < 1e-12
     away = Mode(f * (1.0 + off), zeta)
-    assert shaper.residual_ratio(away) == pytest.approx(
-        residual(shaper.times_s, shaper.amplitudes, away.frequency_hz, zeta), abs=1e-12
-    )
+    assert shaper.residual_ratio(away) == pytest.approx(left_of(shaper, away), abs=1e-12)
 
 
 def test_convolved_zv_of_the_paper_lasts_625_ms() -> None:
@@ -150,7 +172,7 @@ def test_convolved_zv_of_the_paper_lasts_625_ms() -> None:
 
 
 def brute_force(first: Mode, second: Mode, max_duration_s: float, points: int) -> list[tuple[float, float]]:
-    """Times of all minimal shapers with sum|a| <= 10: local minima of the least singular value on a fine grid."""
+    """Times of all minimal shapers with sum|a| <= 10: minima of the least singular value on a grid."""
     poles = np.array([first.pole, second.pole])
     rate = float(np.abs(poles).max())
     grid = np.linspace(0.0, 1.001 * max_duration_s, points + 1)[1:]
@@ -181,7 +203,9 @@ def brute_force(first: Mode, second: Mode, max_duration_s: float, points: int) -
     for i, j in minima:
         matrix = np.vstack([terms(grid[i : i + 1], grid[j : j + 1])[0], np.ones(3)])
         start = np.linalg.lstsq(matrix, np.eye(5)[4], rcond=None)[0]
-        x = least_squares(equations, np.append(rate * grid[[i, j]], start), xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+        x = least_squares(
+            equations, np.append(rate * grid[[i, j]], start), xtol=1e-15, ftol=1e-15, gtol=1e-15
+        ).x
         t2, t3 = float(x[0] / rate), float(x[1] / rate)
         if (
             np.abs(equations(x)).max() < 1e-10
@@ -212,7 +236,7 @@ def test_minimal_two_mode_finds_what_brute_force_finds(
     np.testing.assert_allclose([each.times_s[1:] for each in shapers], expected, rtol=1e-8)
     for shaper in shapers:
         for mode in (first, second):
-            assert residual(shaper.times_s, shaper.amplitudes, mode.frequency_hz, mode.damping_ratio) < 1e-13
+            assert left_of(shaper, mode) < 1e-13
 
 
 def test_shortest_minimal_shaper_of_the_machine() -> None:
@@ -225,19 +249,22 @@ def test_grid_polynomial_reference_and_refusal() -> None:
     shaper = grid_polynomial(PAPER_MODES, 0.005)
     np.testing.assert_allclose(shaper.times_s, np.arange(5) * 0.005)
     np.testing.assert_allclose(shaper.amplitudes, [0.20394, 0.16162, 0.31387, 0.15731, 0.16327], atol=5e-6)
-    with pytest.raises(DesignError, match="mode 200 Hz cannot be cancelled on a 5 ms grid: z = 1.000"):
+    with pytest.raises(DesignError, match=r"mode 200 Hz cannot be cancelled on a 5 ms grid: z = 1\.000"):
         grid_polynomial([Mode(200.0, 0.0)], 0.005)
 
 
-# --- shortest non-negative ------------------------------------------------------------------------------------------
+# --- shortest non-negative ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("period_s", "duration_s"), list(zip(PERIODS_S, (0.012, 0.012, 0.016, 0.02, 0.096), strict=True)))
+@pytest.mark.parametrize(
+    ("period_s", "duration_s"),
+    [(0.001, 0.012), (0.002, 0.012), (0.004, 0.016), (0.005, 0.02), (0.008, 0.096)],
+)
 def test_shortest_non_negative_durations_of_the_machine(period_s: float, duration_s: float) -> None:
     shaper = shortest_non_negative(PAPER_MODES, period_s)
     assert shaper.duration_s == pytest.approx(duration_s, rel=1e-12)
     for mode in PAPER_MODES:
-        assert residual(shaper.times_s, shaper.amplitudes, mode.frequency_hz, mode.damping_ratio) < 1e-14
+        assert left_of(shaper, mode) < 1e-14
         assert simulated_residual(shaper, mode) < 1e-12
 
 
@@ -246,8 +273,19 @@ def test_shortest_non_negative_is_the_polynomial_at_5_ms() -> None:
     np.testing.assert_allclose(shaper.amplitudes, grid_polynomial(PAPER_MODES, 0.005).amplitudes, rtol=1e-12)
 
 
+def test_without_the_active_set_solver_the_linear_program_decides(monkeypatch: pytest.MonkeyPatch) -> None:
+    def cycles(*_: object) -> None:
+        raise RuntimeError("Maximum number of iterations reached.")
+
+    expected = shortest_non_negative(PAPER_MODES, 0.004)
+    monkeypatch.setattr("shapegcode.shaping.nnls", cycles)
+    shaper = shortest_non_negative(PAPER_MODES, 0.004)
+    np.testing.assert_allclose(shaper.times_s, expected.times_s)
+    np.testing.assert_allclose(shaper.amplitudes, expected.amplitudes, rtol=1e-12)
+
+
 def test_least_contour_cost_among_the_shortest() -> None:
-    """At 4 taps of freedom the second central moment is below that of every vertex of random linear objectives."""
+    """The second central moment is at most that of every vertex that some linear objective selects."""
     modes, period_s = (Mode(20.0, 0.01),), 0.001
     shaper = shortest_non_negative(modes, period_s)
     last = round(shaper.duration_s / period_s)
@@ -259,21 +297,22 @@ def test_least_contour_cost_among_the_shortest() -> None:
     centres = np.linspace(0.0, t[-1], 40)
     costs = [(t - centre) ** 2 for centre in centres] + list(rng.normal(size=(40, last + 1)))
     for cost in costs:
-        taps = linprog(cost / np.abs(cost).max(), A_eq=rows, b_eq=right).x
+        taps = np.asarray(linprog(cost / np.abs(cost).max(), A_eq=rows, b_eq=right).x, dtype=np.float64)
         assert taps @ t**2 - (taps @ t) ** 2 >= shaper.variance_s2 - 1e-12
 
 
 def test_equal_aliased_and_near_equal_modes() -> None:
     one = shortest_non_negative([PAPER_MODES[0]], 0.005)
     assert shortest_non_negative([PAPER_MODES[0]] * 3, 0.005).duration_s == one.duration_s
-    alias = [Mode(46.0, 0.0), Mode(154.0, 0.0), Mode(246.0, 0.0)]  # the same z on a 5 ms grid, one of them conjugate
-    assert shortest_non_negative(alias, 0.005).duration_s == shortest_non_negative(alias[:1], 0.005).duration_s
+    alias = [Mode(46.0, 0.0), Mode(154.0, 0.0), Mode(246.0, 0.0)]  # one z on a 5 ms grid, or its conjugate
+    one = shortest_non_negative(alias[:1], 0.005)
+    assert shortest_non_negative(alias, 0.005).duration_s == one.duration_s
     for distance in (1e-9, 1e-6, 1e-4, 1e-2):
         modes = [Mode(46.0, 0.02), Mode(46.0 * (1.0 + distance), 0.02)]
         for period_s in PERIODS_S:
             shaper = shortest_non_negative(modes, period_s)
             for mode in modes:
-                assert residual(shaper.times_s, shaper.amplitudes, mode.frequency_hz, mode.damping_ratio) < LIMIT
+                assert left_of(shaper, mode) < LIMIT
 
 
 def test_refusals_say_what_there_is() -> None:
@@ -283,7 +322,7 @@ def test_refusals_say_what_there_is() -> None:
         "no non-negative design within 90 ms on a 8 ms grid for modes 46 Hz (zeta 0.02), 131 Hz (zeta 0.02); "
         "the shortest polynomial lasts 32 ms with sum|a| 10.34; try another period"
     )
-    with pytest.raises(DesignError, match="nor is there a polynomial: mode 200 Hz cannot be cancelled on a 5 ms grid"):
+    with pytest.raises(DesignError, match="nor is there a polynomial: mode 200 Hz cannot be cancelled on"):
         shortest_non_negative([Mode(200.0, 0.0)], 0.005)
     with pytest.raises(ArgumentError, match="0 given"):
         shortest_non_negative([], 0.005)
@@ -295,13 +334,13 @@ def test_refusals_say_what_there_is() -> None:
 
 
 def test_acceptance_200_random_pairs() -> None:
-    """Each design leaves at most 1e-10, or there is none within 250 ms; sampled: none is shorter, none was missed."""
+    """Each design leaves at most 1e-10 and none is shorter, or there is none within 250 ms."""
     rng = np.random.default_rng(20250)
     designs, refusals, worst = 0, 0, 0.0
     for pair in range(200):
-        modes = [Mode(float(f), float(zeta)) for f, zeta in zip(rng.uniform(15, 150, 2), rng.uniform(0, 0.05, 2), strict=True)]
+        frequencies_hz, ratios = rng.uniform(15.0, 150.0, 2).tolist(), rng.uniform(0.0, 0.05, 2).tolist()
+        modes = [Mode(f, zeta) for f, zeta in zip(frequencies_hz, ratios, strict=True)]
         for period_s in PERIODS_S:
-            sampled = (pair + round(period_s * 1e3)) % 10 == 0
             try:
                 shaper = shortest_non_negative(modes, period_s)
             except DesignError as error:
@@ -315,13 +354,10 @@ def test_acceptance_200_random_pairs() -> None:
             assert shaper.amplitudes.min() > 0.0
             assert shaper.amplitudes.sum() == pytest.approx(1.0, abs=1e-14)
             assert shaper.duration_s <= 0.25 + 1e-12
-            left = [
-                residual(shaper.times_s, shaper.amplitudes, mode.frequency_hz, mode.damping_ratio) for mode in modes
-            ]
-            worst = max(worst, *left)
-            if sampled:
+            assert not is_feasible(modes, period_s, round(steps[-1]) - 1)
+            worst = max(worst, *(left_of(shaper, mode) for mode in modes))
+            if pair % 10 == 0:
                 assert max(simulated_residual(shaper, mode) for mode in modes) < LIMIT
-                assert not is_feasible(modes, period_s, round(steps[-1]) - 1)
     assert worst <= LIMIT
     assert designs + refusals == 1000
     assert designs > 900
@@ -339,11 +375,11 @@ def test_any_number_of_modes(values: list[tuple[float, float]], period_s: float)
         shaper = shortest_non_negative(modes, period_s)
     except DesignError:
         assume(False)
-    for f, zeta in values:
-        assert residual(shaper.times_s, shaper.amplitudes, f, zeta) <= LIMIT
+    for mode in modes:
+        assert left_of(shaper, mode) <= LIMIT
 
 
-# --- choice of the block period -------------------------------------------------------------------------------------
+# --- choice of the block period -----------------------------------------------------------------------------
 
 
 def test_block_period_of_the_machine_is_5_ms() -> None:
@@ -351,18 +387,20 @@ def test_block_period_of_the_machine_is_5_ms() -> None:
     assert choice.period_s == pytest.approx(0.005, rel=1e-12)
     assert choice.shaper.duration_s == pytest.approx(0.02, rel=1e-12)
     assert [round(each.period_s * 1e3) for each in choice.candidates] == list(range(5, 21))
-    durations = {round(each.period_s * 1e3): each.shaper.duration_s for each in choice.candidates if each.shaper}
-    assert durations[8] == pytest.approx(0.096)
+    at_8_ms = choice.candidates[3].shaper
+    assert at_8_ms is not None
+    assert at_8_ms.duration_s == pytest.approx(0.096)
 
 
 def test_equal_durations_go_to_the_longer_block_period() -> None:
     choice = choose_block_period(PAPER_MODES, 0.001, 0.0, max_block_period_s=0.004)
-    assert {round(each.shaper.duration_s, 6) for each in choice.candidates[:2] if each.shaper} == {0.012}
-    assert choice.period_s == pytest.approx(0.002 if choice.candidates[2].shaper != choice.shaper else 0.003)
+    durations_s = [each.shaper.duration_s for each in choice.candidates if each.shaper]
+    assert durations_s == pytest.approx([0.012, 0.012, 0.015, 0.016])
+    assert choice.period_s == 0.002
 
 
 def test_choice_without_a_design_or_a_candidate() -> None:
-    with pytest.raises(DesignError, match=r"no block period from 5 ms to 8 ms in steps of 1 ms .* within 15 ms"):
+    with pytest.raises(DesignError, match=r"no block period from 5 ms to 8 ms .* within 15 ms"):
         choose_block_period(PAPER_MODES, 0.001, 0.005, max_block_period_s=0.008, max_duration_s=0.015)
     choice = choose_block_period(PAPER_MODES, 0.001, 0.005, max_block_period_s=0.008, max_duration_s=0.06)
     refused = choice.candidates[3]

@@ -16,6 +16,7 @@ constexpr double largest_radius_mm = 99999.999;
 constexpr double tick_tolerance = 1e-7;
 // How far a line is tried beyond its last good end before it is settled: keeps the fit linear in the program's length.
 constexpr std::uint32_t line_patience = 2048;
+constexpr std::uint32_t longest_arc_periods = 65536;
 
 using Position = std::array<std::int64_t, axis_count>;
 
@@ -55,15 +56,14 @@ class Fitter {
     std::uint32_t k = 0;
     while (k < periods_) {
       const std::uint32_t limit = next_break(k);
-      std::optional<FittedBlock> block;
-      if (bends(k)) {
-        block = fit_arc(k, limit);
-      }
-      if (!block) {
-        block = fit_line(k, limit);
-      }
+      std::optional<FittedBlock> block = fit_line(k, limit);
       if (!block) {
         break;  // rest to the end
+      }
+      if (arc_normal_[k] >= 0) {
+        if (const auto arc = fit_arc(k, limit, bends(k) ? 1 : block->periods + 1)) {
+          block = arc;
+        }
       }
       k = block->first_period + block->periods;
       position_ = block->end;
@@ -245,33 +245,27 @@ class Fitter {
                        static_cast<std::uint8_t>(normal)};
   }
 
-  // Longest arc from period k, found by doubling and halving steps.
-  std::optional<FittedBlock> fit_arc(std::uint32_t k, std::uint32_t limit) {
+  // Longest arc of at least `least` periods from period k, found by doubling and halving steps. A piece too short to show
+  // its curvature is no arc by itself but may be part of one.
+  std::optional<FittedBlock> fit_arc(std::uint32_t k, std::uint32_t limit, std::uint32_t least) {
     const int normal = arc_normal_[k];
-    std::uint32_t last = k + 1;
-    while (last < limit && arc_normal_[last] == normal && bends(last)) {
+    std::uint32_t last = k;
+    while (last < limit && arc_normal_[last] == normal && last - k < longest_arc_periods) {
       ++last;
-      if (last - k >= 4096) {
-        break;
-      }
     }
-    auto best = arc_over(k, k + 1, normal);
-    if (!best) {
-      return best;
-    }
-    std::uint32_t reached = 1;
-    for (std::uint32_t step = 1; step > 0;) {
+    std::optional<FittedBlock> best;
+    std::uint32_t reached = 0;
+    for (std::uint32_t step = least; step > 0 && k + least <= last;) {
       const std::uint32_t trial = reached + step;
-      std::optional<FittedBlock> longer;
-      if (k + trial <= last) {
-        longer = arc_over(k, k + trial, normal);
-      }
+      const auto longer = k + trial <= last ? arc_over(k, k + trial, normal) : std::nullopt;
       if (longer) {
         best = longer;
         reached = trial;
         step *= 2;
+      } else if (!best && step < 4 * least && !bends(k)) {
+        step *= 2;  // still too short to bend
       } else {
-        step /= 2;
+        step = best ? step / 2 : 0;
       }
     }
     return best;

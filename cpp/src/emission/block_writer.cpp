@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 #include "shapegcode/gcode/number_format.hpp"
 
@@ -12,7 +13,7 @@ int plane_code(std::uint8_t normal) noexcept { return normal == 2 ? 17 : normal 
 
 }  // namespace
 
-std::string write_blocks(std::span<const FittedBlock> blocks, std::array<std::int64_t, axis_count> start,
+WrittenBlocks write_blocks(std::span<const FittedBlock> blocks, std::array<std::int64_t, axis_count> start,
                          std::span<const BlockMark> marks, const WriterOptions& options) {
   std::string text;
   text.reserve(blocks.size() * 26 + 64);
@@ -40,6 +41,9 @@ std::string write_blocks(std::span<const FittedBlock> blocks, std::array<std::in
         break;
       }
       ++mark;
+    }
+    if (options.exact_stop_at_end && &block == &blocks.back()) {
+      text += "G09";
     }
     if (block.kind != BlockKind::line && plane != plane_code(block.normal)) {
       plane = plane_code(block.normal);
@@ -77,7 +81,7 @@ std::string write_blocks(std::span<const FittedBlock> blocks, std::array<std::in
       text += options.line_end;
     }
   }
-  return text;
+  return {std::move(text), motion, plane};
 }
 
 }  // namespace shapegcode

@@ -172,6 +172,14 @@ Program Interpreter::run() {
   const char* data = program_.text.data();
   line_number_ = first_body_line_ - 1;
   std::size_t begin = body_begin_;
+  const auto& probes = options_.probe_lines;
+  program_.probed.reserve(probes.size());
+  const auto probe = [&](std::uint32_t line_done) {
+    while (program_.probed.size() < probes.size() && probes[program_.probed.size()] <= line_done) {
+      program_.probed.push_back(state_);
+    }
+  };
+  probe(line_number_);
   while (begin < body_end_) {
     const void* hit = std::memchr(data + begin, '\n', body_end_ - begin);
     const std::size_t next =
@@ -184,6 +192,7 @@ Program Interpreter::run() {
     if (!ended_) {
       line(std::string_view(data + begin, stop - begin), begin, next);
     }
+    probe(line_number_);
     begin = next;
   }
   close_region();
@@ -197,6 +206,7 @@ Program Interpreter::run() {
     warn("the program has no '%' lines; a control that reads it over a line or from a tape needs them");
   }
   program_.final_state = state_;
+  program_.probed.resize(probes.size(), state_);
   return std::move(program_);
 }
 

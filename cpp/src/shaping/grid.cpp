@@ -56,10 +56,10 @@ std::vector<double> multiply(const std::vector<double>& a, const std::vector<dou
 
 [[noreturn]] void refuse_root(const Mode& mode, double period_s, const GridRoot& root) {
   std::ostringstream message;
-  message << "mode " << mode.frequency_hz << " Hz cannot be cancelled on a " << period_s * 1e3 << " ms grid: z = " << std::fixed
-          << std::setprecision(3) << root.z.real() << std::showpos << root.z.imag() << std::noshowpos << "j lies "
-          << std::scientific << std::setprecision(1) << std::abs(root.one_minus_z) << " from +1, limit "
-          << std::defaultfloat << grid_least_distance_from_one << "; choose another block period";
+  message << "mode " << mode.frequency_hz << " Hz cannot be cancelled on a " << period_s * 1e3
+          << " ms grid: z = " << std::fixed << std::setprecision(3) << root.z.real() << std::showpos << root.z.imag()
+          << std::noshowpos << "j lies " << std::scientific << std::setprecision(1) << std::abs(root.one_minus_z)
+          << " from +1, limit " << std::defaultfloat << grid_least_distance_from_one << "; choose another block period";
   throw Error(ErrorKind::design, message.str());
 }
 
@@ -99,9 +99,9 @@ Shaper grid_polynomial(std::span<const Mode> modes, double period_s) {
     const double residual = residual_ratio(shaper, mode);
     if (!(residual <= grid_largest_residual)) {
       std::ostringstream message;
-      message << "the polynomial of " << modes.size() << " modes on a " << period_s * 1e3 << " ms grid has sum |a| = "
-              << abs_sum(shaper) << ", so that rounding leaves " << residual << " of mode " << mode.frequency_hz
-              << " Hz, limit " << grid_largest_residual << "; choose a longer period";
+      message << "the polynomial of " << modes.size() << " modes on a " << period_s * 1e3
+              << " ms grid has sum |a| = " << abs_sum(shaper) << ", so that rounding leaves " << residual << " of mode "
+              << mode.frequency_hz << " Hz, limit " << grid_largest_residual << "; choose a longer period";
       throw Error(ErrorKind::design, message.str());
     }
   }

@@ -25,14 +25,14 @@ namespace shapegcode {
 
 namespace {
 
-constexpr double same_pole = 1e-6;               // relative
-constexpr double most_periods = 100.0;           // of the faster mode within the duration: bounds time and memory
-constexpr double duration_slack = 1e-9;          // relative: 0.8 s found as 0.8 (1 + 1e-16) is within 0.8 s
-constexpr double first_box = 1.0 / 16.0;         // half width of the first boxes in periods of the faster mode
-constexpr int halvings = 5;                      // of a box that cannot be discarded
-constexpr double same_solution = 1e-5;           // periods of the faster mode between two solutions
-constexpr double small_tap = 1e-4;               // amplitude below which the shaper is tried without the tap
-constexpr double largest_residual = 1e-13;       // of an accepted solution
+constexpr double same_pole = 1e-6;          // relative
+constexpr double most_periods = 100.0;      // of the faster mode within the duration: bounds time and memory
+constexpr double duration_slack = 1e-9;     // relative: 0.8 s found as 0.8 (1 + 1e-16) is within 0.8 s
+constexpr double first_box = 1.0 / 16.0;    // half width of the first boxes in periods of the faster mode
+constexpr int halvings = 5;                 // of a box that cannot be discarded
+constexpr double same_solution = 1e-5;      // periods of the faster mode between two solutions
+constexpr double small_tap = 1e-4;          // amplitude below which the shaper is tried without the tap
+constexpr double largest_residual = 1e-13;  // of an accepted solution
 constexpr int newton_steps = 40;
 
 using Vector2 = Eigen::Vector2d;
@@ -62,7 +62,8 @@ NullVector null_vector(const std::complex<double>& s, double t2, double t3) {
 
 class TwoModeSearch {
  public:
-  TwoModeSearch(const std::complex<double>& s1, const std::complex<double>& s2, double max_duration_s, double max_abs_sum)
+  TwoModeSearch(const std::complex<double>& s1, const std::complex<double>& s2, double max_duration_s,
+                double max_abs_sum)
       : poles_{s1, s2},
         omega_(std::max(std::abs(s1), std::abs(s2))),
         max_duration_s_(max_duration_s * (1.0 + duration_slack)),
@@ -89,7 +90,7 @@ class TwoModeSearch {
     const double f1 = poles_[0].imag() / (2.0 * std::numbers::pi);
     const double f2 = poles_[1].imag() / (2.0 * std::numbers::pi);
     for (const double rate : {f1 + f2, std::abs(f2 - f1)}) {
-      const int last = static_cast<int>(max_duration_s_ * rate + 0.5);
+      const int last = static_cast<int>(std::ceil(max_duration_s_ * rate));
       for (int k3 = 2; k3 <= last; ++k3) {
         for (int k2 = 1; k2 < k3; ++k2) {
           starts_.emplace_back(k2 / rate, k3 / rate);
@@ -181,8 +182,8 @@ class TwoModeSearch {
              std::pair(std::round(b.y() / cell), std::round(b.x() / cell));
     };
     std::ranges::stable_sort(starts_, order);
-    const auto [first, last] =
-        std::ranges::unique(starts_, [&order](const Vector2& a, const Vector2& b) { return !order(a, b) && !order(b, a); });
+    const auto [first, last] = std::ranges::unique(
+        starts_, [&order](const Vector2& a, const Vector2& b) { return !order(a, b) && !order(b, a); });
     starts_.erase(first, last);
     return std::move(starts_);
   }
@@ -290,11 +291,13 @@ class TwoModeSearch {
     const double first = 1.0;
     const double second = sign * std::exp(s.real() * time);
     const double sum = first + second;
-    if (std::abs(time - gap) > 1e-3 * period() || time <= 0.0 || std::abs(sum) * max_abs_sum_ < first + std::abs(second)) {
+    if (std::abs(time - gap) > 1e-3 * period() || time <= 0.0 ||
+        std::abs(sum) * max_abs_sum_ < first + std::abs(second)) {
       return std::nullopt;
     }
     for (const std::complex<double>& each : poles_) {
-      const std::complex<double> left = first * std::exp(each.real() * time) + second * std::polar(1.0, each.imag() * time);
+      const std::complex<double> left =
+          first * std::exp(each.real() * time) + second * std::polar(1.0, each.imag() * time);
       if (std::abs(left / sum) > largest_residual) {
         return std::nullopt;
       }
@@ -306,7 +309,8 @@ class TwoModeSearch {
   void keep(Shaper&& shaper) {
     const double same = same_solution * period();
     const auto known = std::ranges::find_if(solutions_, [&shaper, same](const Shaper& other) {
-      return std::ranges::equal(shaper.times_s, other.times_s, [same](double a, double b) { return std::abs(a - b) <= same; });
+      return std::ranges::equal(shaper.times_s, other.times_s,
+                                [same](double a, double b) { return std::abs(a - b) <= same; });
     });
     const auto squares = [](const Shaper& each) {
       return std::inner_product(each.amplitudes.begin(), each.amplitudes.end(), each.amplitudes.begin(), 0.0);
@@ -342,8 +346,8 @@ void check_range(const Mode& first, const Mode& second, double max_duration_s, d
   message.precision(12);
   if (std::abs(s1 - s2) <= same_pole * omega) {
     message << "modes " << first.frequency_hz << " Hz and " << second.frequency_hz
-            << " Hz are the same: their poles differ by " << std::abs(s1 - s2) / omega << " of their size, limit " << same_pole
-            << "; use a shaper of one mode";
+            << " Hz are the same: their poles differ by " << std::abs(s1 - s2) / omega << " of their size, limit "
+            << same_pole << "; use a shaper of one mode";
   } else if (!std::isfinite(max_duration_s) || max_duration_s <= 0.0 ||
              max_duration_s * omega > most_periods * 2.0 * std::numbers::pi) {
     message << "the largest duration is positive and at most " << most_periods << " periods of the faster mode ("

@@ -39,12 +39,13 @@ Shaper make_shaper(std::vector<double> times_s, std::vector<double> amplitudes) 
   }
   for (std::size_t k = 0; k < times_s.size(); ++k) {
     if (!std::isfinite(times_s[k]) || !std::isfinite(amplitudes[k])) {
-      message << "tap " << k + 1 << " of the shaper is not finite: time " << times_s[k] << " s, amplitude " << amplitudes[k];
+      message << "tap " << k + 1 << " of the shaper is not finite: time " << times_s[k] << " s, amplitude "
+              << amplitudes[k];
       reject(message);
     }
     if (k > 0 && times_s[k] <= times_s[k - 1]) {
-      message << "the times of a shaper ascend: tap " << k + 1 << " at " << times_s[k] << " s follows " << times_s[k - 1]
-              << " s";
+      message << "the times of a shaper ascend: tap " << k + 1 << " at " << times_s[k] << " s follows "
+              << times_s[k - 1] << " s";
       reject(message);
     }
   }
@@ -68,8 +69,9 @@ double mean_s(const Shaper& shaper) {
 
 double variance_s2(const Shaper& shaper) {
   const double mean = mean_s(shaper);
-  return std::inner_product(shaper.times_s.begin(), shaper.times_s.end(), shaper.amplitudes.begin(), 0.0, std::plus<>{},
-                            [mean](double time, double amplitude) { return amplitude * (time - mean) * (time - mean); });
+  return std::inner_product(
+      shaper.times_s.begin(), shaper.times_s.end(), shaper.amplitudes.begin(), 0.0, std::plus<>{},
+      [mean](double time, double amplitude) { return amplitude * (time - mean) * (time - mean); });
 }
 
 bool has_negative(const Shaper& shaper) {
@@ -105,12 +107,13 @@ Fir to_fir(const Shaper& shaper, double period_s) {
     const double multiple = std::round(time / period_s);
     const double offset = time - multiple * period_s;
     if (!(std::abs(offset) <= grid_tolerance * std::max(time, period_s))) {
-      message << "the shaper's tap at " << time * 1e3 << " ms is not on the grid of " << period_s * 1e3 << " ms: it lies "
-              << offset * 1e3 << " ms from the nearest multiple; design the shaper on this grid";
+      message << "the shaper's tap at " << time * 1e3 << " ms is not on the grid of " << period_s * 1e3
+              << " ms: it lies " << offset * 1e3 << " ms from the nearest multiple; design the shaper on this grid";
       throw Error(ErrorKind::design, message.str());
     }
     if (multiple > static_cast<double>(std::numeric_limits<int>::max())) {
-      message << "the shaper's tap at " << time << " s is " << multiple << " periods of " << period_s << " s late: too many";
+      message << "the shaper's tap at " << time << " s is " << multiple << " periods of " << period_s
+              << " s late: too many";
       reject(message);
     }
     delays.push_back(static_cast<int>(multiple));

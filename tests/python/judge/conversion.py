@@ -167,7 +167,7 @@ class _Verdict:
     # ---- gaps ----------------------------------------------------------------------------------------------
 
     def gap(self, ours: Gap, theirs: Gap) -> None:
-        if not ours.run:
+        if not ours.run or not any(self.is_shaped(r) for r in ours.run):
             if ours.texts != theirs.texts:
                 self.differing_text(ours, theirs)
             return
@@ -186,6 +186,10 @@ class _Verdict:
         self.emitted_moves(ours, middle)
         self.exact_stops(ours, theirs)
         self.contour(ours, theirs)
+
+    def is_shaped(self, record: LineRecord) -> bool:
+        """Whether the converter says, or may be taken to say, that it shaped this line."""
+        return self.ranges is None or any(a <= record.number <= b for a, b in self.ranges)
 
     def differing_text(self, ours: Gap, theirs: Gap) -> None:
         for a, b in zip(ours.lines, theirs.lines, strict=False):
@@ -230,7 +234,7 @@ class _Verdict:
         texts = [r.text for r in middle]
         at = 0
         for record in ours.run:
-            shaped = self.ranges is None or any(a <= record.number <= b for a, b in self.ranges)
+            shaped = self.is_shaped(record)
             if shaped and not is_comment(record):
                 continue
             try:

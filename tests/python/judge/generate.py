@@ -275,7 +275,7 @@ def programs(
     planes: tuple[str, ...] = ("G17", "G18", "G19"),
     cycles: bool = True,
 ) -> str:
-    """A complete program: frame, tool, contours (lines, arcs by R and I J K, circles, helices), cycles, end."""
+    """A complete program: frame, tool, contours (lines, arcs, circles, helices), cycles, end."""
     use_inch = draw(st.booleans()) if inch is None else inch
     w = _Writer(increment_mm=INCH_MM * 1e-4 if use_inch else 1e-3)
     w.spaced, w.padded = draw(st.booleans()), draw(st.booleans())

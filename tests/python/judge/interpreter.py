@@ -199,7 +199,7 @@ def canonical_g(number: str) -> str:
 
 
 def initial_state() -> dict[str, Any]:
-    """The modal state a control is assumed to wake up in. `drift` is the travel since an axis became unknown."""
+    """The modal state a control wakes up in. `drift` is the travel since an axis became unknown."""
     return {
         "motion": "G00",
         "plane": "G17",

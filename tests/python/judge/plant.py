@@ -58,8 +58,10 @@ def relative_motion(command: Vector, mode: Mode, step_s: float) -> Vector:
     """Response − command of one mode for a command (n,) that is linear between steps and starts from rest."""
     w, z = 2.0 * math.pi * mode.frequency_hz, mode.damping_ratio
     # e = u − x obeys e'' + 2ζω e' + ω² e = −x''. For an x that is linear between steps the exact (first-order
-    # hold) transfer function is −(z − 1)²/h · r sin φ/ω_d / (z² − 2 r cos φ z + r²), r = exp(−ζωh), φ = ω_d
-    # h.
+    # hold) transfer function is −(z − 1)²/h · r sin φ/ω_d / (z² − 2 r cos φ z + r²), r = exp(−ζωh),
+    # φ = ω_d h.
+    if not (w > 0.0 and 0.0 <= z < 1.0):
+        raise ValueError(f"a mode needs a frequency > 0 and 0 ≤ damping ratio < 1, not {mode}")
     wd = w * math.sqrt(1.0 - z * z)
     r, phi = math.exp(-z * w * step_s), wd * step_s
     numerator = -r * math.sin(phi) / (wd * step_s) * np.array([1.0, -2.0, 1.0])

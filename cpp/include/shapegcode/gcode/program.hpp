@@ -22,6 +22,7 @@ struct ReaderOptions {
   std::array<bool, axis_count> unknown_after_tool_change = {true, true, true};
   std::vector<std::array<double, axis_count>> work_offsets_mm;  ///< G54 ... G59, empty if not known
   ModalState power_on;                    ///< state at the first block
+  std::vector<std::uint32_t> probe_lines;  ///< ascending lines behind which the modal state is kept (Program::probed)
 };
 
 /// Something to tell the user about one place of the text.
@@ -71,6 +72,7 @@ struct Program {
   std::vector<OtherMove> other_moves;
   std::vector<Finding> warnings;
   ModalState final_state;
+  std::vector<ModalState> probed;  ///< state behind each of ReaderOptions::probe_lines
 };
 
 }  // namespace shapegcode

@@ -14,7 +14,8 @@ namespace shapegcode {
 [[nodiscard]] Shaper zv(const Mode& mode);
 
 /// The two shapers in series: cancels what either cancels and lasts as long as both together. Taps whose times agree
-/// within 1e-12 of the duration are merged. Throws Error(argument) if either is not a valid shaper. Source: paper 002, eq. 3.
+/// within 1e-12 of the duration are merged. Throws Error(argument) if either is not a valid shaper. Source: paper 002,
+/// eq. 3.
 [[nodiscard]] Shaper convolve(const Shaper& first, const Shaper& second);
 
 /// Convolved ZV of one or more modes, the conventional multi-mode shaper: 2^n taps. Throws Error(argument) if `modes`

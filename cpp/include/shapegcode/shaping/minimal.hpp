@@ -15,8 +15,8 @@ namespace shapegcode {
 /// Complete by construction: the plane of (t2, t3) is cut into boxes, a box is discarded only where a bound on its
 /// derivatives proves that it holds no solution, and Newton starts from every box that is left; residual_ratio of both
 /// modes is below 1e-13 (about 1e-16 as a rule). Where a tap comes out as zero (undamped modes at an odd ratio such as
-/// 1:3, which one ZV cancels) the shaper is returned without it; where the amplitudes at given times are not unique, the
-/// ones with the smallest sum of squares are.
+/// 1:3, which one ZV cancels) the shaper is returned without it; where the amplitudes at given times are not unique,
+/// the ones with the smallest sum of squares are.
 ///
 /// Throws Error(argument) as `pole` does, if the poles lie within 1e-6 of one another (relative; use `zv`), if
 /// `max_duration_s` is not finite and positive or exceeds 100 periods of the faster mode, or if `max_abs_sum` is not

@@ -1,0 +1,181 @@
+"""The ``shapegcode`` command.
+
+One module of this package per command, imported only when that command runs, so that ``shapegcode --help``
+answers at once. A command's module offers two functions:
+
+* ``add_arguments(parser: argparse.ArgumentParser) -> None`` declares its arguments,
+* ``run(args: argparse.Namespace) -> int`` does the work and returns the exit code.
+
+Such a module imports NumPy, the core and everything else that is slow inside ``run``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import errno
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+__all__ = ["COMMANDS", "Command", "ExitCode", "main"]
+
+
+class ExitCode:
+    """Exit codes of the command, the same for every sub-command."""
+
+    OK = 0
+    """Done, and within tolerance."""
+    OUT_OF_TOLERANCE = 1
+    """Done, but the result misses its tolerance."""
+    BAD_INPUT = 2
+    """Not done: wrong arguments, a bad program or machine file, a file that cannot be read or written."""
+    INTERRUPTED = 130
+    """Stopped by the user (Ctrl-C)."""
+    BROKEN_PIPE = 141
+    """The reader of standard output went away."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """One sub-command.
+
+    Attributes:
+        name: what the user types; also the name of its module in ``shapegcode.cli``.
+        help: one line for ``shapegcode --help``.
+    """
+
+    name: str
+    help: str
+
+    @property
+    def module(self) -> str:
+        """Full name of the module that implements it."""
+        return f"{__name__}.{self.name}"
+
+
+COMMANDS: tuple[Command, ...] = (
+    Command("convert", "convert a CNC program into an input-shaped FANUC program, and check the result"),
+    Command("simulate", "play a program on the machine's model: cycle time, vibration, contour error"),
+    Command("machine", "write or explain a machine file"),
+    Command("demo", "convert an example program for an example machine, with pictures"),
+)
+"""Every sub-command, in the order of the help text. A new one needs a row here and a module of its name."""
+
+
+class _Version(argparse.Action):
+    """``--version``; looks the version up only when asked."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from importlib import metadata
+
+        try:
+            version = metadata.version("shapegcode")
+        except metadata.PackageNotFoundError:
+            version = "(not installed)"
+        print(f"shapegcode {version}")
+        parser.exit(ExitCode.OK)
+
+
+def _build_parser(selected: str | None) -> argparse.ArgumentParser:
+    """The parser with the arguments of the selected command; the others stay names with a help line."""
+    debug = argparse.ArgumentParser(add_help=False)
+    debug.add_argument("--debug", action="store_true", default=argparse.SUPPRESS,
+                       help="show the traceback of an error")
+    parser = argparse.ArgumentParser(
+        prog="shapegcode", parents=[debug],
+        description="Converts CNC programs into input-shaped FANUC programs that vibrate less.",
+        epilog="exit codes: 0 done and within tolerance; 1 done but out of tolerance; 2 bad input. "
+               "`shapegcode COMMAND --help` explains a command.")
+    parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, title="commands")
+    for command in COMMANDS:
+        sub = commands.add_parser(command.name, help=command.help, parents=[debug],
+                                  description=f"{command.help[:1].upper()}{command.help[1:]}.")
+        if command.name == selected:
+            module = importlib.import_module(command.module)
+            module.add_arguments(sub)
+            sub.set_defaults(run=module.run)
+    return parser
+
+
+def _expected(error: Exception) -> bool:
+    """True for errors of the input or the file system, whose message is all that the user needs.
+
+    A class can only be the error's if its module is loaded: so nothing is imported to find out.
+    """
+    if isinstance(error, OSError):
+        return True
+    families = (("shapegcode._core", "ShapegcodeError"), ("shapegcode.machine", "MachineError"))
+    for module, name in families:
+        family = getattr(sys.modules.get(module), name, None)
+        if isinstance(family, type) and isinstance(error, family):
+            return True
+    return isinstance(error, ModuleNotFoundError) and error.name == "matplotlib"
+
+
+def _message(error: Exception) -> str:
+    """The error in words; for a file the path, the reason, and which folder is missing."""
+    if isinstance(error, ModuleNotFoundError):
+        return f"pictures need {error.name}, which is not installed"
+    if not isinstance(error, OSError):
+        # One line per problem, each with the command's name, so that each can be read alone.
+        return str(error).replace("\n", "\nshapegcode: ") or type(error).__name__
+    if error.filename is None:
+        return error.strerror or str(error) or type(error).__name__
+    path = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else str(error.filename)
+    reason = error.strerror or type(error).__name__
+    if error.errno == errno.ENOENT:
+        folder = Path(path).parent
+        reason = "no such file" if folder.is_dir() else f"the folder {folder} does not exist"
+    return f"{path}: {reason}"
+
+
+def _run(argv: list[str]) -> int:
+    selected = next((word for word in argv if not word.startswith("-")), None)
+    args = _build_parser(selected).parse_args(argv)
+    try:
+        return int(args.run(args))
+    finally:
+        # A full disk behind a redirected output shows only here.
+        sys.stdout.flush()
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit code (see :class:`ExitCode`).
+
+    Args:
+        argv: the arguments without the program's name; None: those of the process.
+
+    Raises:
+        Exception: with ``--debug``, the error as it is; without it, only what is a defect of shapegcode.
+    """
+    words = list(sys.argv[1:] if argv is None else argv)
+    try:
+        return _run(words)
+    except SystemExit as stop:
+        # argparse ends the process itself: 0 after --help, 2 after a wrong argument.
+        return stop.code if isinstance(stop.code, int) else ExitCode.BAD_INPUT
+    except KeyboardInterrupt:
+        print("shapegcode: stopped", file=sys.stderr)
+        return ExitCode.INTERRUPTED
+    except BrokenPipeError:
+        # Python flushes standard output once more when it ends: give it somewhere to go.
+        _discard_output()
+        return ExitCode.BROKEN_PIPE
+    except Exception as error:
+        if "--debug" in words or not _expected(error):
+            raise
+        print(f"shapegcode: {_message(error)}", file=sys.stderr)
+        if isinstance(error, OSError) and error.errno == errno.ENOSPC:
+            _discard_output()
+        return ExitCode.BAD_INPUT
+
+
+def _discard_output() -> None:
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,174 @@
+"""What every command shares: consoles, a progress bar, JSON, and files that are complete or absent."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import errno
+import json
+import os
+import stat
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+__all__ = [
+    "ProgressBar",
+    "add_json_argument",
+    "output_console",
+    "print_before_after",
+    "progress",
+    "write_json",
+    "write_text",
+]
+
+_PIPE_WIDTH = 120
+_PROGRESS_DELAY_S = 1.0
+
+
+def add_json_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--json FILE``; the value is ``args.json``, None where it is not given."""
+    parser.add_argument("--json", metavar="FILE", default=None,
+                        help="write the result as JSON to FILE; - for standard output and nothing else there")
+
+
+def output_console(json_target: str | None = None, *, file: TextIO | None = None) -> Console:
+    """Console for tables and text on standard output; silent where the JSON goes there (``--json -``)."""
+    from rich.console import Console
+
+    stream = file or sys.stdout
+    # A pipe has no width: rich would take 80 characters and break the tables.
+    width = None if stream.isatty() or "COLUMNS" in os.environ else _PIPE_WIDTH
+    return Console(file=stream, width=width, quiet=json_target == "-", highlight=False, soft_wrap=False)
+
+
+def print_before_after(report: Mapping[str, Any], json_target: str | None = None) -> None:
+    """Print the table original / emitted of a conversion's report, its warnings and the one next step."""
+    from shapegcode.report import before_after_table, next_step
+
+    console = output_console(json_target)
+    console.print(before_after_table(report))
+    for warning in report.get("warnings", ()):
+        console.print(f"warning: {warning}", markup=False)
+    console.print(f"next: {next_step(report)}", markup=False)
+
+
+def write_json(data: object, target: str | Path) -> None:
+    """Write *data* as stable JSON: sorted keys, two spaces, one newline at the end; ``-`` is standard output.
+
+    Raises:
+        ValueError: a number in it is NaN or infinite.
+        OSError: the file cannot be written; what was there before stays.
+    """
+    text = json.dumps(data, sort_keys=True, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    if target == "-":
+        sys.stdout.write(text)
+    else:
+        write_text(target, text)
+
+
+def write_text(path: str | Path, text: str, *, overwrite: bool = True, newline: str = "") -> None:
+    """Write a UTF-8 file so that it is either complete or as it was before.
+
+    Args:
+        path: the file; a symbolic link is followed; a device or pipe is written to directly.
+        text: its content, written with the line ends that it has.
+        overwrite: False: an existing file is an error, even if it appears at the last moment.
+        newline: as for :func:`open`; "" writes the line ends as they are.
+
+    Raises:
+        FileExistsError: the file exists and *overwrite* is False.
+        OSError: with the name of *path* and the reason, for example a full disk or a missing folder.
+    """
+    target = Path(os.path.realpath(path))
+    try:
+        if not overwrite:
+            _write_new(target, text, newline)
+        elif target.exists() and not stat.S_ISREG(target.stat().st_mode):
+            with open(target, "w", encoding="utf-8", newline=newline) as stream:
+                stream.write(text)
+        else:
+            _replace(target, text, newline)
+    except OSError as error:
+        # A failed write() does not name the file, and a temporary file's name would mislead.
+        raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+
+
+def _write_new(target: Path, text: str, newline: str) -> None:
+    with open(target, "x", encoding="utf-8", newline=newline) as stream:
+        try:
+            stream.write(text)
+            stream.flush()
+        except BaseException:
+            target.unlink(missing_ok=True)
+            raise
+
+
+def _replace(target: Path, text: str, newline: str) -> None:
+    mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    try:
+        with open(temporary, "x", encoding="utf-8", newline=newline) as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        if mode is not None:
+            temporary.chmod(mode)
+        os.replace(temporary, target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+class ProgressBar:
+    """A bar on standard error that shows itself only when the work takes longer than a second."""
+
+    def __init__(self, description: str, *, enabled: bool) -> None:
+        """Start the clock; nothing is shown yet."""
+        self._description = description
+        self._enabled = enabled
+        self._began = time.monotonic()
+        self._bar: Progress | None = None
+        self._task: TaskID | None = None
+
+    def update(self, fraction: float) -> None:
+        """Tell how much of the work is done, 0 to 1; cheap enough for every step of a loop."""
+        if not self._enabled:
+            return
+        if self._bar is None:
+            if time.monotonic() - self._began < _PROGRESS_DELAY_S:
+                return
+            self._open()
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, completed=min(max(fraction, 0.0), 1.0))
+
+    def close(self) -> None:
+        """Remove the bar from the screen."""
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+
+    def _open(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self._bar = Progress(TextColumn("{task.description}", markup=False), BarColumn(),
+                             TimeRemainingColumn(), console=Console(stderr=True), transient=True)
+        self._task = self._bar.add_task(self._description, total=1.0)
+        self._bar.start()
+
+
+@contextlib.contextmanager
+def progress(description: str, json_target: str | None = None) -> Iterator[ProgressBar]:
+    """A progress bar for the block; off if standard error is no terminal or JSON goes to standard output."""
+    bar = ProgressBar(description, enabled=sys.stderr.isatty() and json_target != "-")
+    try:
+        yield bar
+    finally:
+        bar.close()

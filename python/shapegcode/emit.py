@@ -1,0 +1,198 @@
+"""From a cutting region to the text of its shaped blocks: the lines around them and the places of marks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.program import MM_PER_INCH, Program
+
+_DEGREE = math.pi / 180.0
+_PLUNGE_CORNER_DEG = 45.0
+
+
+@dataclass(frozen=True)
+class Grid:
+    """On what a conversion is written: block period and the shaper on it.
+
+    Attributes:
+        block_period_s: T_B.
+        shaper: the design, times on the block grid.
+        fir: the same in whole block periods.
+    """
+
+    block_period_s: float
+    shaper: _core.Shaper
+    fir: _core.Fir
+
+
+@dataclass(frozen=True)
+class EmittedRegion:
+    """The text that replaces a region.
+
+    Attributes:
+        text: whole lines.
+        blocks: shaped blocks in it, without the lines around them.
+    """
+
+    text: bytes
+    blocks: int
+
+
+def make_grid(block_period_s: float, shaper: _core.Shaper) -> Grid:
+    """Grid of a shaper whose times are whole block periods."""
+    delays = [round(t / block_period_s) for t in shaper.times_s]
+    return Grid(block_period_s, shaper, _core.Fir(delays, list(shaper.amplitudes)))
+
+
+def motion_limits(
+    machine: Machine, *, arc_feed_ratio: float = 1.0, grid: Grid | None = None, contour_tolerance_um: float = math.inf
+) -> _core.MotionLimits:
+    """Look-ahead limits of a machine; with a grid also those that keep the shaped command within a tolerance.
+
+    Args:
+        machine: whose limits.
+        arc_feed_ratio: feed on arcs relative to the programmed one.
+        grid: what follows the look-ahead; its spread limits the speed at corners and on arcs.
+        contour_tolerance_um: deviation allowed to it, µm.
+    """
+    limits = _core.MotionLimits()
+    controller = machine.controller
+    axes = machine.axes.as_tuple()
+    limits.law = getattr(_core.AccelerationLaw, controller.law)
+    # A ramp of one tick stands for "no ramp": zero time has no acceleration.
+    limits.time_constant_s = max(controller.time_constant_s, controller.interpolation_period_s)
+    limits.jerk_time_s = controller.bell_time_s
+    limits.max_feed_mm_per_s = [axis.max_feed_mm_per_min / 60.0 for axis in axes]
+    limits.max_acceleration_mm_per_s2 = [axis.max_acceleration_mm_s2 for axis in axes]
+    limits.max_jerk_mm_per_s3 = [math.inf if axis.max_jerk_mm_s3 is None else axis.max_jerk_mm_s3 for axis in axes]
+    # 0 means a stop at every corner; the planner wants a speed, and this one is a stop to every purpose.
+    limits.corner_speed_difference_mm_per_s = [
+        max(value / 60.0, 1e-3) for value in controller.corner_speed_difference_mm_per_min.as_tuple()
+    ]
+    limits.centripetal_acceleration_mm_per_s2 = controller.centripetal_acceleration_mm_s2
+    limits.arc_feed_ratio = arc_feed_ratio
+    if grid is not None:
+        own = controller.shaped_time_constant_s
+        limits.filter_variance_s2 = grid.shaper.variance_s2 + own * own / 12.0
+        limits.filter_mean_deviation_s = _mean_deviation_s(grid.shaper) + own / 4.0
+        limits.contour_tolerance_mm = contour_tolerance_um * 1e-3
+    return limits
+
+
+def emit_region(program: Program, region: _core.Region, machine: Machine, grid: Grid, limits: _core.MotionLimits) -> EmittedRegion:
+    """Shape one region and write it.
+
+    The text begins with `emission.prologue` and a full safe line and ends with the modal state of the original.
+    """
+    options = _core.ShapingOptions()
+    options.limits = limits
+    options.block_period_s = grid.block_period_s
+    options.interpolation_period_s = machine.controller.interpolation_period_s
+    options.plunge_axis_angle_rad = machine.shaping.plunge_angle_deg * _DEGREE
+    options.plunge_corner_angle_rad = _PLUNGE_CORNER_DEG * _DEGREE
+    options.rest_at_stop_s = machine.controller.shaped_time_constant_s
+    notes = region.notes
+    command = _core.shape_path(region.path, grid.fir, [note.segment for note in notes], options)
+
+    inch = region.exit.units == 20
+    unit = MM_PER_INCH if inch else 1.0
+    increment = (machine.controller.least_increment_inch if inch else machine.controller.least_increment_mm) * unit
+    feed_decimals = machine.controller.feed_decimals_inch if inch else machine.controller.feed_decimals_mm
+    fit = _core.FitOptions()
+    fit.increment_mm = increment
+    fit.block_period_s = grid.block_period_s
+    fit.interpolation_period_s = machine.controller.interpolation_period_s
+    fit.feed_unit_mm_per_s = 10.0**-feed_decimals * unit / 60.0
+    fit.minimum_feed = max(1, math.ceil(machine.controller.minimum_feed_mm_per_min / unit * 10**feed_decimals - 1e-9))
+    fit.merge_tolerance_increments = machine.emission.merge_tolerance_increments
+    fit.arc_min_chord_mm = machine.emission.arc_min_chord_mm
+
+    line_end = program.core.line_end
+    marks: list[_core.BlockMark] = []
+    breaks = set(command.run_ends)
+    first_number = -1
+    for note, period in zip(notes, command.segment_periods, strict=True):
+        number = note.n_number
+        if note.segment == 0 and first_number < 0 <= number:
+            first_number, number = number, -1
+        comment = program.core.slice(note.comment_offset, note.comment_offset + note.comment_length)
+        if number >= 0 or comment:
+            marks.append(_core.BlockMark(period, number, comment.decode("latin-1")))
+            breaks.add(period)
+    fitted = _core.fit_blocks(command, sorted(breaks), fit)
+
+    writer = _core.WriterOptions()
+    writer.position_decimals = -round(math.log10(increment / unit))
+    writer.feed_decimals = feed_decimals
+    writer.incremental = region.incremental
+    writer.plane = region.entry.plane
+    writer.exact_stop_at_end = region.exact_stop_at_end
+    writer.line_end = line_end
+    start = [round(float(x) / increment) for x in command.grid_mm[0]]
+    text, motion, plane = _core.write_blocks(fitted, start, marks, writer)
+
+    head = [*machine.emission.prologue]
+    head.append(_safe_line(region, start, writer.position_decimals, first_number))
+    if machine.emission.prefill_dwell_s > 0.0:
+        head.append(f"G04P{round(machine.emission.prefill_dwell_s * 1e3)}")
+    tail = [_restore_line(region, motion, plane), *machine.emission.epilogue]
+    end = line_end.encode()
+    lines = b"".join(line.encode("latin-1") + end for line in head)
+    return EmittedRegion(
+        lines + text + b"".join(line.encode("latin-1") + end for line in tail), len(fitted)
+    )
+
+
+def decimal(value: float, decimals: int) -> str:
+    """A number in FANUC's decimal notation: always with a point, no trailing zeros."""
+    text = f"{value:.{decimals}f}".rstrip("0") if decimals else f"{value:.0f}."
+    return "0." if text in {"-0.", "0."} else text
+
+
+def feed_word(feed: float) -> str:
+    """F with a point, and with a digit behind it below 10, so that it is never a one-digit feed code."""
+    text = decimal(feed, 4)
+    return f"F{text}0" if feed < 10.0 and text.endswith(".") else f"F{text}"
+
+
+def _mean_deviation_s(shaper: _core.Shaper) -> float:
+    mean = shaper.mean_s
+    return float(sum(abs(a) * abs(t - mean) for t, a in zip(shaper.times_s, shaper.amplitudes, strict=True)))
+
+
+def _safe_line(region: _core.Region, start: list[int], decimals: int, number: int) -> str:
+    entry = region.entry
+    words = [f"N{number}"] if number >= 0 else []
+    words += [f"G{entry.plane}", "G91" if region.incremental else "G90", "G94", "G40", "G64", "G01"]
+    if not region.incremental:
+        known = entry.known
+        words += [
+            f"{letter}{decimal(value * 10.0**-decimals, decimals)}"
+            for letter, value, is_known in zip("XYZ", start, known, strict=True)
+            if is_known
+        ]
+    # In G93 the modal F is no speed; the first block brings its own.
+    unit = MM_PER_INCH if entry.units == 20 else 1.0
+    words.append(feed_word(max(0.0001, region.path[0].feed_mm_per_s * 60.0 / unit)))
+    return "".join(words)
+
+
+def _restore_line(region: _core.Region, motion: int, plane: int) -> str:
+    """Words that give the modal state of the original's last block back, behind the shaped blocks."""
+    state = region.exit
+    words = []
+    if state.motion != motion:
+        words.append(f"G0{state.motion}")
+    if state.plane != plane:
+        words.append(f"G{state.plane}")
+    if state.distance != (91 if region.incremental else 90):
+        words.append(f"G{state.distance}")
+    if state.feed_mode != 94:
+        words.append(f"G{state.feed_mode}")
+    if state.exact_stop != 64:
+        words.append(f"G{state.exact_stop}")
+    words.append(feed_word(state.feed))
+    return "".join(words)

@@ -1,0 +1,253 @@
+"""The verdict of a conversion: traces for the pictures, and the table of original against emitted.
+
+The report itself is a plain dictionary, the JSON that ``--json`` writes. Its keys::
+
+    cycle_time_s, cutting_time_s              {original, emitted}
+    residual_vibration_um, peak_vibration_um  {original: {x, y, z}, emitted: {x, y, z}}
+    contour_error_um                          {command | response: {original | emitted: {max, rms}}}
+    orbit_error_percent                       one number per arc
+    block_period_s, bytes_emitted             numbers
+    shaper                                    {times_s, amplitudes}
+    blocks                                    {read, emitted}
+    override_residual                         [{override, residual_um: {x, y, z}}]
+    within_tolerance                          true or false
+    regions                                   [{lines: [first, last], misses: [text]}] and more, not shown here
+    warnings                                  list of texts
+
+``override`` is a ratio (0.9 = 90 %). A key that does not apply may be left out or be null; its row then is
+left out too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+__all__ = ["Row", "Trace", "before_after_rows", "before_after_table", "next_step"]
+
+# Rounding in sums of increments stays far below this, a least increment far above.
+_STILL_MM = 1e-9
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Command and response of one program, played on the machine's model.
+
+    Attributes:
+        label: name in legends, for example "original" or "emitted".
+        period_s: time between two samples.
+        command_mm: set-points of the axes after every filter, shape (n, 3).
+        response_mm: position of the table at the same instants, shape (n, 3).
+
+    Raises:
+        ValueError: a wrong shape, fewer than two samples, a value that is not finite, or a period that is not
+            positive.
+    """
+
+    label: str
+    period_s: float
+    command_mm: FloatArray
+    response_mm: FloatArray
+
+    def __post_init__(self) -> None:
+        """Check the arrays and keep read-only views of them."""
+        if not (np.isfinite(self.period_s) and self.period_s > 0):
+            raise ValueError(f"trace {self.label}: period_s = {self.period_s}: must be finite and above 0")
+        for name in ("command_mm", "response_mm"):
+            values = np.asarray(getattr(self, name), dtype=np.float64).view()
+            if values.ndim != 2 or values.shape[1] != 3 or len(values) < 2:
+                raise ValueError(f"trace {self.label}: {name} has shape {values.shape}: not (n, 3), n > 1")
+            if not np.isfinite(values).all():
+                raise ValueError(f"trace {self.label}: {name} has values that are not finite")
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
+        if self.command_mm.shape != self.response_mm.shape:
+            raise ValueError(f"trace {self.label}: {len(self.command_mm)} samples of the command, "
+                             f"{len(self.response_mm)} of the response: must be equal")
+
+    @property
+    def times_s(self) -> FloatArray:
+        """Time of each sample from the first one, shape (n,)."""
+        return np.arange(len(self.command_mm), dtype=np.float64) * self.period_s
+
+    @property
+    def departure_s(self) -> float:
+        """Instant of the last sample before the set-points begin to move; 0 if they never do."""
+        moved = (np.abs(self.command_mm - self.command_mm[0]) > _STILL_MM).any(axis=1)
+        return float(max(int(moved.argmax()) - 1, 0)) * self.period_s
+
+    @property
+    def deflection_mm(self) -> FloatArray:
+        """Response minus command, shape (n, 3)."""
+        return self.response_mm - self.command_mm
+
+    @property
+    def rest_s(self) -> float:
+        """Instant at which the set-points have come to rest for good: first sample at the final position."""
+        moved = np.flatnonzero((np.abs(self.command_mm - self.command_mm[-1]) > _STILL_MM).any(axis=1))
+        return float(moved[-1] + 1) * self.period_s if len(moved) else 0.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table: a figure of both programs, or of the emitted one alone.
+
+    Attributes:
+        figure: what it is.
+        unit: its unit.
+        original: figure of the original program, None where there is none.
+        emitted: figure of the emitted program.
+        decimals: digits after the point.
+        section: True where a new group of figures begins.
+    """
+
+    figure: str
+    unit: str
+    original: float | None
+    emitted: float
+    decimals: int = 1
+    section: bool = False
+
+    @property
+    def change_percent(self) -> float | None:
+        """Change from original to emitted; None where there is nothing to compare or the original is zero."""
+        if self.original is None or self.original == 0:
+            return None
+        return (self.emitted - self.original) / abs(self.original) * 100
+
+
+def _pair(value: object, *keys: str) -> tuple[float, float] | None:
+    """Original and emitted of a figure; None where the report has not both."""
+    if not isinstance(value, Mapping):
+        return None
+    found: list[float] = []
+    for side in ("original", "emitted"):
+        item: Any = value.get(side)
+        for key in keys:
+            item = item.get(key) if isinstance(item, Mapping) else None
+        if item is None:
+            return None
+        found.append(float(item))
+    return found[0], found[1]
+
+
+def before_after_rows(report: Mapping[str, Any]) -> Iterator[Row]:
+    """The figures of a report in the order in which they are read: time, vibration, contour, program."""
+    for key, name in (("cycle_time_s", "cycle time"), ("cutting_time_s", "cutting time")):
+        pair = _pair(report.get(key))
+        if pair is not None:
+            yield Row(name, "s", *pair, decimals=3)
+
+    vibrations = (("residual_vibration_um", "residual vibration"), ("peak_vibration_um", "peak vibration"))
+    for key, name in vibrations:
+        section = True
+        for axis in "xyz":
+            pair = _pair(report.get(key), axis)
+            if pair is not None and any(pair):
+                yield Row(f"{name} {axis.upper()}", "µm", *pair, section=section)
+                section = False
+
+    section = True
+    contour = report.get("contour_error_um") or {}
+    contours = (("command", "contour error of the command"), ("response", "contour error of the table"))
+    for key, name in contours:
+        for statistic, suffix in (("max", "largest"), ("rms", "RMS")):
+            pair = _pair(contour.get(key), statistic)
+            if pair is not None:
+                yield Row(f"{name}, {suffix}", "µm", *pair, section=section)
+                section = False
+
+    orbit = report.get("orbit_error_percent") or []
+    if orbit:
+        name = "orbit error" if len(orbit) == 1 else f"largest orbit error of {len(orbit)} arcs"
+        yield Row(name, "%", None, max(orbit, key=abs), decimals=4, section=True)
+
+    yield from _program_rows(report)
+
+
+def _program_rows(report: Mapping[str, Any]) -> Iterator[Row]:
+    """Figures of the emitted program and its shaper, and its residual vibration at other feed overrides."""
+    rows: list[tuple[str, str, float | None, float, int]] = []
+    blocks = report.get("blocks")
+    if blocks:
+        rows.append(("blocks", "", float(blocks["read"]), float(blocks["emitted"]), 0))
+    if report.get("bytes_emitted") is not None:
+        rows.append(("size of the program", "bytes", None, float(report["bytes_emitted"]), 0))
+    if report.get("block_period_s") is not None:
+        rows.append(("block period", "ms", None, report["block_period_s"] * 1e3, 3))
+    times = (report.get("shaper") or {}).get("times_s")
+    if times:
+        rows.append(("duration of the shaper", "ms", None, (times[-1] - times[0]) * 1e3, 3))
+    for number, (name, unit, original, emitted, decimals) in enumerate(rows):
+        yield Row(name, unit, original, emitted, decimals, section=number == 0)
+
+    section = True
+    for entry in report.get("override_residual") or []:
+        for axis in "xyz":
+            value = entry["residual_um"].get(axis)
+            original = (((report.get("residual_vibration_um") or {}).get("original") or {}).get(axis))
+            if value is not None and (value or original):
+                name = f"residual vibration {axis.upper()} at {entry['override'] * 100:g} % override"
+                yield Row(name, "µm", None, float(value), section=section)
+                section = False
+
+
+def _number(value: float, decimals: int) -> str:
+    return f"{value:.{decimals}f}"
+
+
+def _change(row: Row) -> str:
+    change = row.change_percent
+    if change is None:
+        return "" if row.original is None or row.emitted == row.original else "from 0"
+    return "0 %" if abs(change) < 0.05 else f"{change:+.1f} %"
+
+
+def before_after_table(report: Mapping[str, Any]) -> Table:
+    """The report as a rich table: figure, unit, original, emitted, change; the verdict is its caption."""
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(show_edge=False, pad_edge=False, caption_justify="left")
+    table.add_column("figure")
+    table.add_column("unit")
+    for heading in ("original", "emitted", "change"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for row in before_after_rows(report):
+        if row.section:
+            table.add_section()
+        original = "" if row.original is None else _number(row.original, row.decimals)
+        cells = (row.figure, row.unit, original, _number(row.emitted, row.decimals), _change(row))
+        table.add_row(*(Text(cell) for cell in cells))
+    if "within_tolerance" in report:
+        good = bool(report["within_tolerance"])
+        table.caption = Text("within tolerance" if good else "OUT OF TOLERANCE",
+                             style="bold green" if good else "bold red")
+    return table
+
+
+def next_step(report: Mapping[str, Any]) -> str:
+    """The one thing to do next, in one sentence."""
+    if report.get("within_tolerance", True):
+        if report.get("warnings"):
+            return "settle the warnings, then run the emitted program above the workpiece, without a tool."
+        return "run the emitted program above the workpiece, without a tool, at 100 % feed override."
+    missed = next(iter(_misses(report)), "it misses its tolerance")
+    return f"do not run it ({missed}): lower the feed there, and convert again."
+
+
+def _misses(report: Mapping[str, Any]) -> Iterator[str]:
+    """Every tolerance that a region misses, with the lines of the original program."""
+    for region in report.get("regions") or []:
+        first, last = region["lines"]
+        for miss in region.get("misses") or []:
+            yield f"lines {first} to {last}: {miss}"

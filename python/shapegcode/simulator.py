@@ -1,0 +1,122 @@
+"""A program played on the machine's model, without changing it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.program import Program
+from shapegcode.verify import deviation_um, largest_um, other_time_s, play_emitted, play_original
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RegionRun:
+    """One cutting region played.
+
+    Attributes:
+        first_line: of the program, from 1.
+        last_line: inclusive.
+        period_s: time between two samples.
+        command_mm: set-points after every filter, (n, 3); the decay after the stop included.
+        response_mm: the table at the same instants, (n, 3).
+        path_mm: the programmed path as a polyline, (m, 3).
+        figures: what the core measured.
+    """
+
+    first_line: int
+    last_line: int
+    period_s: float
+    command_mm: FloatArray
+    response_mm: FloatArray
+    path_mm: FloatArray
+    figures: _core.PlaybackFigures
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A program played region by region.
+
+    Attributes:
+        regions: in order; their arrays hold at most `record_samples` samples.
+        report: `cycle_time_s`, `cutting_time_s`, `residual_vibration_um`, `peak_vibration_um`, `contour_error_um`
+            (command, response), `orbit_error_percent`, `regions`, `warnings`.
+    """
+
+    regions: tuple[RegionRun, ...]
+    report: dict[str, Any]
+
+
+def simulate(
+    program: Program,
+    machine: Machine,
+    *,
+    shaped: bool = False,
+    record_samples: int = 200_000,
+    on_progress: Callable[[int, int], None] = lambda _done, _total: None,
+) -> Simulation:
+    """Play a program through the controller's model and the plant.
+
+    Args:
+        program: what to play.
+        machine: controller and modes.
+        shaped: the program was emitted by shapegcode: blocks are played at their feed, without look-ahead and with
+            `controller.shaped_time_constant_s`.
+        record_samples: samples of command and response kept per region, at most; 0: figures only.
+        on_progress: called with regions done and regions in all.
+
+    Raises:
+        ArgumentError: a limit of the machine is not usable.
+    """
+    rule = getattr(_core.BlockEnd, machine.controller.block_end)
+    runs = []
+    for done, region in enumerate(program.regions, start=1):
+        path = region.path
+        if shaped:
+            figures = play_emitted(path, path, machine, rule, record_samples=record_samples)
+        else:
+            figures = play_original(path, machine, record_samples=record_samples)
+        runs.append(
+            RegionRun(
+                region.first_line,
+                region.last_line,
+                machine.controller.interpolation_period_s,
+                figures.recorded_command,
+                figures.recorded_response,
+                path.polyline() if record_samples else np.zeros((0, 3)),
+                figures,
+            )
+        )
+        on_progress(done, len(program.regions))
+    played = [run.figures for run in runs]
+    cutting = sum(figures.duration_s for figures in played)
+    report = {
+        "program": program.source,
+        "machine": machine.name,
+        "cycle_time_s": cutting + other_time_s(program.core.other_moves, machine),
+        "cutting_time_s": cutting,
+        "residual_vibration_um": largest_um(figures.residual_mm for figures in played),
+        "peak_vibration_um": largest_um(figures.peak_mm for figures in played),
+        "contour_error_um": {
+            "command": deviation_um(figures.command for figures in played),
+            "response": deviation_um(figures.response for figures in played),
+        },
+        "orbit_error_percent": [error for figures in played for error in figures.orbit_error_percent],
+        "regions": [
+            {
+                "lines": [run.first_line, run.last_line],
+                "time_s": run.figures.duration_s,
+                "residual_vibration_um": largest_um([run.figures.residual_mm]),
+            }
+            for run in runs
+        ],
+        "warnings": program.warnings,
+    }
+    return Simulation(tuple(runs), report)

@@ -1,0 +1,336 @@
+"""The round trip: the emitted text is read back, played as the controller would, and measured.
+
+Nothing here looks at what the converter meant to write; the figures are those of the text.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.emit import motion_limits
+from shapegcode.machine import Machine
+from shapegcode.program import MM_PER_INCH, Program
+
+OVERRIDES = (0.8, 0.9, 1.1, 1.2)
+_BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
+_LARGEST_SWEEP_RAD = math.pi / 2
+_STATE_FIELDS = (
+    "motion", "plane", "distance", "feed_mode", "units", "compensation", "length_offset",
+    "cycle", "cycle_return", "coordinate_system", "exact_stop", "feed",
+)  # fmt: skip
+
+Vector = npt.NDArray[np.float64]
+Step = Callable[[int], None]
+
+
+class RoundTripError(_core.ShapegcodeError):
+    """The emitted text does not say what it should: a defect of shapegcode, never of the input. Nothing is written."""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A region and where its shaped blocks stand in the emitted text.
+
+    Attributes:
+        region: of the original program.
+        first_line: first emitted line, from 1.
+        last_line: last emitted line.
+    """
+
+    region: _core.Region
+    first_line: int
+    last_line: int
+
+
+@dataclass(frozen=True)
+class RegionFigures:
+    """One region played: as programmed, and as emitted under both rules of block end.
+
+    Attributes:
+        original: the programmed path under the controller's own motion.
+        emitted: the emitted blocks, one entry per rule (ceil, carry).
+        overrides: residual of the emitted blocks per feed override, mm, (3,).
+        slowed_blocks: emitted blocks that the controller's look-ahead limits would slow.
+    """
+
+    original: _core.PlaybackFigures
+    emitted: tuple[_core.PlaybackFigures, ...]
+    overrides: tuple[Vector, ...]
+    slowed_blocks: int
+
+
+def axis_modes(machine: Machine) -> list[list[_core.Mode]]:
+    """Modes of X, Y, Z for the core."""
+    return [
+        [_core.Mode(mode.frequency_hz, mode.damping_ratio, mode.participation) for mode in axis.modes]
+        for axis in machine.axes.as_tuple()
+    ]
+
+
+def playback_options(machine: Machine, *, time_constant_s: float = 0.0) -> _core.PlaybackOptions:
+    """Plant and interpolation period of a machine, with an acceleration filter after interpolation."""
+    options = _core.PlaybackOptions()
+    period = machine.controller.interpolation_period_s
+    options.period_s = period
+    options.modes = axis_modes(machine)
+    options.axis_filters = [
+        _core.Fir.moving_average(round(length / period))
+        for length in (time_constant_s,)
+        if round(length / period) > 1
+    ]
+    return options
+
+
+def play_original(path: _core.Path, machine: Machine, *, record_samples: int = 0) -> _core.PlaybackFigures:
+    """A programmed path as the controller plays an ordinary program."""
+    controller = machine.controller
+    if controller.motion == "look_ahead":
+        options = playback_options(machine)
+        options.record_samples = record_samples
+        return _core.play_path(path, _core.plan_speed(path, motion_limits(machine)), options)
+    options = playback_options(machine, time_constant_s=controller.time_constant_s)
+    if controller.bell_time_s > 0.0:
+        options.axis_filters = [
+            *options.axis_filters,
+            _core.Fir.moving_average(max(1, round(controller.bell_time_s / controller.interpolation_period_s))),
+        ]
+    options.record_samples = record_samples
+    return _core.play_blocks(path, path, getattr(_core.BlockEnd, controller.block_end), 1.0, options)
+
+
+def play_emitted(
+    blocks: _core.Path,
+    path: _core.Path,
+    machine: Machine,
+    block_end: _core.BlockEnd,
+    *,
+    override: float = 1.0,
+    contour: bool = True,
+    record_samples: int = 0,
+) -> _core.PlaybackFigures:
+    """Emitted blocks as the controller plays them, measured against the programmed path."""
+    options = playback_options(machine, time_constant_s=machine.controller.shaped_time_constant_s)
+    options.measure_contour = contour
+    options.record_samples = record_samples
+    return _core.play_blocks(blocks, path, block_end, override, options)
+
+
+def read_back(text: bytes, placed: Sequence[Placed], original: Program, machine: Machine) -> Program:
+    """Read the emitted text and hold it against the original: end points, modal state at every border, sweeps.
+
+    Raises:
+        RoundTripError: something differs; the message names the line and both values.
+    """
+    probes = [line for place in placed for line in (place.first_line - 1, place.last_line)]
+    emitted = Program.from_text(text, machine, source="emitted program", emitted=True, probe_lines=probes)
+    states = emitted.core.probed
+    for index, place in enumerate(placed):
+        _compare_states(states[2 * index], place.region.entry, place.first_line - 1, place.region.incremental)
+        _compare_states(states[2 * index + 1], place.region.exit, place.last_line, place.region.incremental)
+        blocks = emitted.core.cutting_path(place.first_line, place.last_line)
+        _compare_ends(blocks, place, machine)
+        if blocks.largest_sweep_rad >= _LARGEST_SWEEP_RAD:
+            raise RoundTripError(
+                f"emitted arc between lines {place.first_line} and {place.last_line} sweeps "
+                f"{math.degrees(blocks.largest_sweep_rad):.1f} degrees (limit 90)"
+            )
+    return emitted
+
+
+def measure(
+    emitted: Program, placed: Sequence[Placed], machine: Machine, on_step: Step = lambda _: None
+) -> list[RegionFigures]:
+    """Play every region, original and emitted, on all cores.
+
+    Args:
+        emitted: the program read back.
+        placed: the regions and their places in it.
+        machine: controller model and plant.
+        on_step: called with the number of regions done.
+    """
+    controller_rule = getattr(_core.BlockEnd, machine.controller.block_end)
+    corner = [value / 60.0 for value in machine.controller.corner_speed_difference_mm_per_min.as_tuple()]
+    feeds = [axis.max_feed_mm_per_min / 60.0 for axis in machine.axes.as_tuple()]
+    results: list[RegionFigures] = []
+    with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
+        for done, place in enumerate(placed, start=1):
+            path = place.region.path
+            blocks = emitted.core.cutting_path(place.first_line, place.last_line)
+            slow = [pool.submit(play_original, path, machine)]
+            slow += [pool.submit(play_emitted, blocks, path, machine, rule) for rule in _BLOCK_ENDS]
+            overrides = [
+                pool.submit(play_emitted, blocks, path, machine, controller_rule, override=ratio, contour=False)
+                for ratio in OVERRIDES
+            ]
+            slowed = _core.count_slowed_blocks(blocks, corner, feeds)
+            original, *played = (task.result() for task in slow)
+            results.append(
+                RegionFigures(
+                    original, tuple(played), tuple(task.result().residual_mm for task in overrides), slowed
+                )
+            )
+            on_step(done)
+    return results
+
+
+def other_time_s(moves: Iterable[tuple[_core.Segment, float]], machine: Machine) -> float:
+    """Time of everything between the regions: rapids with in-position wait, dwells, kept feed moves.
+
+    Rapids after paper 004, eq. 7-16: T = ceil(l/(F_r T_I)) T_I + A_R, a short one 2 sqrt(l/a); moves of which an axis'
+    position is not known count with what is known of them.
+    """
+    controller = machine.controller
+    tick = controller.interpolation_period_s
+    rapids = np.array([axis.rapid_mm_per_min / 60.0 for axis in machine.axes.as_tuple()])
+    waits = np.array(controller.in_position_s.as_tuple())
+    ramp = controller.rapid_time_constant_s
+    total = 0.0
+    for segment, dwell_s in moves:
+        if dwell_s > 0.0:
+            total += dwell_s
+            continue
+        length = segment.length_mm
+        if segment.kind != _core.SegmentKind.rapid:
+            total += math.ceil(length / segment.feed_mm_per_s / tick) * tick + controller.time_constant_s
+            continue
+        travel = np.abs(segment.end_mm - segment.start_mm)
+        axes_time = travel / rapids
+        rate = length / axes_time.max()
+        if controller.rapid_path == "non_linear":
+            length = float(travel[axes_time.argmax()])
+            rate = float(rapids[axes_time.argmax()])
+        if length >= rate * ramp:
+            moving = math.ceil(length / rate / tick) * tick + ramp
+        else:
+            moving = 2.0 * math.ceil(math.sqrt(length * ramp / rate) / tick) * tick
+        total += moving + controller.rapid_bell_time_s + float(waits[travel > 0.0].max())
+    return total
+
+
+def summarise(figures: Sequence[RegionFigures], placed: Sequence[Placed], machine: Machine) -> dict[str, Any]:
+    """The figures of all regions as the stable keys of the report; the emitted ones are the worse of both rules."""
+    emitted = [run for region in figures for run in region.emitted]
+    originals = [region.original for region in figures]
+    return {
+        "residual_vibration_um": {
+            "original": largest_um(run.residual_mm for run in originals),
+            "emitted": largest_um(run.residual_mm for run in emitted),
+        },
+        "peak_vibration_um": {
+            "original": largest_um(run.peak_mm for run in originals),
+            "emitted": largest_um(run.peak_mm for run in emitted),
+        },
+        "contour_error_um": {
+            "command": {
+                "original": deviation_um(run.command for run in originals),
+                "emitted": deviation_um(run.command for run in emitted),
+            },
+            "response": {
+                "original": deviation_um(run.response for run in originals),
+                "emitted": deviation_um(run.response for run in emitted),
+            },
+        },
+        "orbit_error_percent": [
+            max(pair)
+            for region in figures
+            for pair in zip(*(run.orbit_error_percent for run in region.emitted), strict=True)
+        ],
+        "override_residual": [
+            {"override": ratio, "residual_um": largest_um(region.overrides[k] for region in figures)}
+            for k, ratio in enumerate(OVERRIDES)
+        ],
+        "slowed_blocks": sum(region.slowed_blocks for region in figures),
+        "regions": [
+            _region_summary(region, place, machine) for region, place in zip(figures, placed, strict=True)
+        ],
+    }
+
+
+def _region_summary(figures: RegionFigures, place: Placed, machine: Machine) -> dict[str, Any]:
+    tolerance = machine.tolerance
+    misses = []
+    before = figures.original.residual_mm * 1e3
+    after = np.max([run.residual_mm for run in figures.emitted], axis=0) * 1e3
+    for axis, was, now in zip("XYZ", before, after, strict=True):
+        limit = max(tolerance.residual_ratio * was, tolerance.residual_floor_um)
+        if now > limit:
+            misses.append(f"residual vibration {axis} {now:.2f} um, limit {limit:.2f} um")
+    contour = max(run.command.max_abs_mm for run in figures.emitted) * 1e3
+    if contour > tolerance.contour_um:
+        misses.append(f"contour error of the command {contour:.1f} um, limit {tolerance.contour_um:.1f} um")
+    return {
+        "lines": [place.region.first_line, place.region.last_line],
+        "emitted_lines": [place.first_line, place.last_line],
+        "time_s": {
+            "original": figures.original.duration_s,
+            "emitted": max(run.duration_s for run in figures.emitted),
+        },
+        "residual_vibration_um": {"original": _xyz(before), "emitted": _xyz(after)},
+        "contour_error_um": contour,
+        "misses": misses,
+    }
+
+
+def _compare_states(emitted: _core.ModalState, original: _core.ModalState, line: int, incremental: bool) -> None:
+    for field in _STATE_FIELDS:
+        was, now = getattr(original, field), getattr(emitted, field)
+        if was != now and not (field == "feed" and original.feed_mode == 93):
+            raise RoundTripError(f"emitted line {line}: modal {field} is {now}, the original has {was}")
+    if original.known != emitted.known:
+        raise RoundTripError(f"emitted line {line}: known axes {emitted.known}, the original has {original.known}")
+    if incremental:
+        return
+    limit = _end_tolerance_mm(original.units)
+    for axis, known, was, now in zip("XYZ", original.known, original.position_mm, emitted.position_mm, strict=True):
+        if known and abs(was - now) > limit:
+            raise RoundTripError(f"emitted line {line}: {axis} is at {now:.6f} mm, the original at {was:.6f} mm")
+
+
+def _compare_ends(blocks: _core.Path, place: Placed, machine: Machine) -> None:
+    path = place.region.path
+    travel = path.end_mm - path.start_mm
+    gap = float(np.abs((blocks.end_mm - blocks.start_mm) - travel).max())
+    # Start and end are rounded to the increment, each once.
+    limit = 2.0 * _end_tolerance_mm(place.region.exit.units)
+    if gap > limit:
+        raise RoundTripError(
+            f"shaped blocks of lines {place.region.first_line} to {place.region.last_line} end {gap * 1e3:.2f} um off "
+            f"(limit {limit * 1e3:.2f} um)"
+        )
+
+
+def _end_tolerance_mm(units: int) -> float:
+    # Half an increment: a program may carry more digits than the controller resolves.
+    return (0.5e-3 if units == 21 else 0.5e-4 * MM_PER_INCH) + 1e-9
+
+
+def _xyz(values: Iterable[float]) -> dict[str, float]:
+    return {axis: float(value) for axis, value in zip("xyz", values, strict=True)}
+
+
+def largest_um(vectors: Iterable[Vector]) -> dict[str, float]:
+    """Largest of each axis, mm to µm."""
+    rows = list(vectors)
+    return _xyz(np.max(rows, axis=0) * 1e3 if rows else np.zeros(3))
+
+
+def deviation_um(stats: Iterable[_core.DeviationStats]) -> dict[str, float]:
+    """Largest magnitude, RMS over all samples and largest on either side of the path, µm."""
+    rows = list(stats)
+    count = sum(row.count for row in rows)
+    squares = sum(row.sum_of_squares_mm2 for row in rows)
+    return {
+        "max": max((row.max_abs_mm for row in rows), default=0.0) * 1e3,
+        "rms": math.sqrt(squares / count) * 1e3 if count else 0.0,
+        "left": max((row.most_positive_mm for row in rows), default=0.0) * 1e3,
+        "right": -min((row.most_negative_mm for row in rows), default=0.0) * 1e3,
+    }

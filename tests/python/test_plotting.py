@@ -1,0 +1,230 @@
+"""Pictures and the before/after table: complete files, honest curves, the right figures."""
+
+from __future__ import annotations
+
+import io
+import time
+from itertools import pairwise
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from rich.console import Console
+
+from shapegcode.plotting import _foot_points, plot_feed, plot_path, plot_vibration, thin_min_max
+from shapegcode.report import Trace, before_after_rows, before_after_table, next_step
+
+FloatArray = npt.NDArray[np.float64]
+
+REPORT = {
+    "cycle_time_s": {"original": 0.6, "emitted": 0.63},
+    "cutting_time_s": {"original": 0.4, "emitted": 0.42},
+    "residual_vibration_um": {"original": {"x": 16.7, "y": 8.4, "z": 0.0}, "emitted": {"x": 0.9, "y": 0.4, "z": 0.0}},
+    "peak_vibration_um": {"original": {"x": 90, "y": 11, "z": 0}, "emitted": {"x": 47, "y": 5.5, "z": 0}},
+    "contour_error_um": {
+        "command": {"original": {"max": 0.0, "rms": 0.0}, "emitted": {"max": 4.2, "rms": 1.1}},
+        "response": {"original": {"max": 42.0, "rms": 14.0}, "emitted": {"max": 5.2, "rms": 2.0}},
+    },
+    "orbit_error_percent": [0.0061, -0.3],
+    "block_period_s": 0.005,
+    "shaper": {"times_s": [0, 0.005, 0.02], "amplitudes": [0.3, 0.4, 0.3]},
+    "blocks": {"read": 16, "emitted": 71},
+    "bytes_emitted": 2100,
+    "override_residual": [{"override": 0.9, "residual_um": {"x": 1.1, "y": 0.6, "z": 0.0}}],
+    "within_tolerance": True,
+    "warnings": [],
+}
+
+
+def quarter(points: int) -> FloatArray:
+    """Polyline of a line along X, 20 mm, and a quarter circle of 20 mm."""
+    angle = np.linspace(0, np.pi / 2, points)
+    arc = np.stack([20 + 20 * np.sin(angle), 20 - 20 * np.cos(angle), np.zeros_like(angle)], axis=1)
+    return np.concatenate([[[0.0, 0.0, 0.0]], arc])
+
+
+def traces(samples: int = 900) -> list[Trace]:
+    """A command along the quarter, at rest for the last third, with a decaying swing of the table."""
+    s = np.minimum(np.linspace(0, 1.5, samples), 1)[:, None]
+    path = quarter(400)
+    at = s[:, 0] * (len(path) - 1)
+    command = np.stack([np.interp(at, np.arange(len(path)), path[:, axis]) for axis in range(3)], axis=1)
+    t = np.arange(samples) * 1e-3
+    swing = np.zeros_like(command)
+    swing[:, 0] = 0.02 * np.sin(2 * np.pi * 46 * t)
+    return [Trace("original", 1e-3, command, command + swing), Trace("emitted", 1e-3, command, command + swing / 10)]
+
+
+@pytest.mark.parametrize("ending", ["png", "svg"])
+def test_pictures_are_complete_and_the_same_every_time(tmp_path: Path, ending: str) -> None:
+    for name, draw in (("path", lambda f: plot_path(f, quarter(200), traces())),
+                       ("feed", lambda f: plot_feed(f, traces())),
+                       ("vibration", lambda f: plot_vibration(f, traces()))):
+        first, second = tmp_path / f"{name}1.{ending}", tmp_path / f"{name}2.{ending}"
+        draw(first)
+        draw(second)
+        assert first.read_bytes() == second.read_bytes()
+        if ending == "png":
+            assert first.read_bytes().startswith(b"\x89PNG")
+        else:
+            ElementTree.parse(first)
+
+
+def svg_text(file: Path) -> str:
+    return " ".join("".join(node.itertext()) for node in ElementTree.parse(file).iter() if node.tag.endswith("text"))
+
+
+def test_pictures_carry_units_and_figures(tmp_path: Path) -> None:
+    factor = plot_path(tmp_path / "path.svg", quarter(500), traces())
+    text = svg_text(tmp_path / "path.svg")
+    assert f"×{factor:g}" in text
+    for part in ("X in mm", "Y in mm", "programmed path", "original, largest 20.0 µm", "of deviation"):
+        assert part in text
+    plot_vibration(tmp_path / "v.svg", traces())
+    text = svg_text(tmp_path / "v.svg")
+    for part in ("in µm", "time in s", "original, residual 20.0 µm", "emitted, residual 2.0 µm"):
+        assert part in text
+    plot_feed(tmp_path / "f.svg", traces())
+    text = svg_text(tmp_path / "f.svg")
+    assert "in mm/min" in text and "Z speed" not in text
+
+
+def test_given_magnification_and_plane_are_used(tmp_path: Path) -> None:
+    assert plot_path(tmp_path / "p.svg", quarter(50), traces(), magnification=123, plane="ZX") == 123
+    assert "Z in mm" in svg_text(tmp_path / "p.svg")
+
+
+@pytest.mark.parametrize("magnification", [0, -1, float("nan"), float("inf")])
+def test_bad_magnification(tmp_path: Path, magnification: float) -> None:
+    with pytest.raises(ValueError, match="magnification"):
+        plot_path(tmp_path / "p.png", quarter(50), traces(), magnification=magnification)
+
+
+def test_bad_pictures_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"\.png, \.svg"):
+        plot_feed(tmp_path / "p.jpeg", traces())
+    with pytest.raises(ValueError, match="no trace"):
+        plot_feed(tmp_path / "p.png", [])
+    with pytest.raises(ValueError, match="outside the trace"):
+        plot_vibration(tmp_path / "p.png", traces(), rest_s={"original": 99})
+    with pytest.raises(ValueError, match="programmed_mm"):
+        plot_path(tmp_path / "p.png", np.zeros((4, 2)), traces())
+    with pytest.raises(FileNotFoundError):
+        plot_feed(tmp_path / "no" / "p.png", traces())
+    assert not list(tmp_path.iterdir())
+
+
+def test_machine_at_rest_gives_a_picture(tmp_path: Path) -> None:
+    still = [Trace("original", 1e-3, np.zeros((5, 3)), np.zeros((5, 3)))]
+    assert plot_path(tmp_path / "p.png", np.zeros((2, 3)), still) == 1
+    plot_feed(tmp_path / "f.png", still)
+    plot_vibration(tmp_path / "v.png", still)
+
+
+def test_thinning_keeps_extremes_ends_and_order() -> None:
+    rng = np.random.default_rng(1)
+    t = np.arange(100_000.0)
+    v = rng.normal(size=t.size)
+    v[54_321], v[77_777] = 50, -60
+    thin_t, thin_v = thin_min_max(t, v, 1000)
+    assert len(thin_t) <= 1002
+    assert thin_v.max() == 50 and thin_v.min() == -60
+    assert thin_t[0] == 0 and thin_t[-1] == t[-1]
+    assert (np.diff(thin_t) > 0).all()
+    assert (v[thin_t.astype(int)] == thin_v).all()
+    short_t, short_v = thin_min_max(t[:10], v[:10], 1000)
+    assert len(short_t) == len(short_v) == 10
+
+
+def test_foot_points_lie_on_the_polyline_and_nowhere_is_nearer() -> None:
+    rng = np.random.default_rng(2)
+    polyline = quarter(40)
+    points = rng.uniform(-5, 45, size=(200, 3))
+    feet = _foot_points(points, polyline)
+    fine = np.concatenate([np.linspace(a, b, 200) for a, b in pairwise(polyline)])
+    nearest = np.linalg.norm(points[:, None] - fine, axis=2).min(axis=1)
+    distance = np.linalg.norm(points - feet, axis=1)
+    assert (distance <= nearest + 1e-9).all()
+    assert (distance >= nearest - 0.06).all()
+    on_path = _foot_points(polyline, polyline)
+    assert np.abs(on_path - polyline).max() < 1e-9
+
+
+def test_foot_points_far_from_the_origin_keep_a_hundredth_of_a_micrometre() -> None:
+    shift = np.array([90_000.0, -90_000.0, 500.0])
+    polyline = quarter(40)
+    points = polyline[1:-1] + np.array([0, 0, 0.001])
+    feet = _foot_points(points + shift, polyline + shift)
+    assert np.abs(np.linalg.norm(points + shift - feet, axis=1) - 0.001).max() < 1e-5
+
+
+def test_long_programs_are_drawn_in_seconds(tmp_path: Path) -> None:
+    began = time.perf_counter()
+    long = traces(300_000)
+    plot_path(tmp_path / "p.png", quarter(20_000), long)
+    plot_feed(tmp_path / "f.png", long)
+    plot_vibration(tmp_path / "v.svg", long)
+    assert time.perf_counter() - began < 20
+    assert (tmp_path / "v.svg").stat().st_size < 2_000_000
+
+
+def test_trace_checks_its_arrays() -> None:
+    good = np.zeros((4, 3))
+    with pytest.raises(ValueError, match="period_s = 0"):
+        Trace("a", 0, good, good)
+    with pytest.raises(ValueError, match=r"shape \(3, 4\)"):
+        Trace("a", 1e-3, good, good.T)
+    with pytest.raises(ValueError, match="not finite"):
+        Trace("a", 1e-3, good, good * np.nan)
+    with pytest.raises(ValueError, match="4 samples of the command, 3 of the response"):
+        Trace("a", 1e-3, good, good[:3])
+    with pytest.raises(ValueError, match="read-only"):
+        Trace("a", 1e-3, good, good).command_mm[0, 0] = 1
+    good[0, 0] = 1  # the caller's own array stays writable
+
+
+def test_trace_knows_when_the_command_moves() -> None:
+    command = np.zeros((10, 3))
+    command[3:, 1] = 1
+    command[6:, 1] = 2
+    command[8, 1] += 1e-12  # rounding is not motion
+    trace = Trace("a", 0.5, command, command)
+    assert trace.departure_s == 1.0
+    assert trace.rest_s == 3.0
+    still = Trace("a", 0.5, np.zeros((3, 3)), np.zeros((3, 3)))
+    assert still.departure_s == still.rest_s == 0
+
+
+def test_table_sets_original_against_emitted() -> None:
+    rows = {row.figure: row for row in before_after_rows(REPORT)}
+    assert rows["cycle time"].change_percent == pytest.approx(5)
+    assert rows["residual vibration X"].change_percent == pytest.approx(-94.61, abs=0.01)
+    assert "residual vibration Z" not in rows
+    assert rows["contour error of the command, largest"].change_percent is None
+    assert rows["largest orbit error of 2 arcs"].emitted == -0.3
+    assert rows["duration of the shaper"].emitted == pytest.approx(20)
+    assert rows["residual vibration X at 90 % override"].emitted == 1.1
+
+    stream = io.StringIO()
+    Console(file=stream, width=100).print(before_after_table(REPORT))
+    text = stream.getvalue()
+    for part in ("+5.0 %", "-94.6 %", "µm", "from 0", "within tolerance"):
+        assert part in text
+
+
+def test_table_leaves_out_what_the_report_does_not_have() -> None:
+    assert [row.figure for row in before_after_rows({"cycle_time_s": {"original": 0, "emitted": 1}})] == ["cycle time"]
+    empty = {"orbit_error_percent": None, "shaper": None, "override_residual": None, "blocks": None,
+             "residual_vibration_um": {"original": None, "emitted": None}}
+    assert list(before_after_rows(empty)) == []
+    before_after_table(empty)
+
+
+def test_next_step_follows_the_verdict() -> None:
+    assert next_step(REPORT).startswith("run the emitted program")
+    assert next_step({**REPORT, "warnings": ["w"]}).startswith("settle the warnings")
+    regions = [{"lines": [3, 9], "misses": []}, {"lines": [12, 20], "misses": ["residual vibration X 9.0 um"]}]
+    bad = next_step({**REPORT, "within_tolerance": False, "regions": regions})
+    assert bad.startswith("do not run it (lines 12 to 20: residual vibration X 9.0 um)")
