@@ -96,10 +96,12 @@ class MachineError(ValueError):
         """Build the message ``file[:line]: key = value: limit``, one line per problem."""
         self.file = file
         self.problems = problems
-        super().__init__("\n".join(
-            f"{file}:{problem.line}: {problem}" if problem.line is not None else f"{file}: {problem}"
-            for problem in problems
-        ))
+        super().__init__(
+            "\n".join(
+                f"{file}:{problem.line}: {problem}" if problem.line is not None else f"{file}: {problem}"
+                for problem in problems
+            )
+        )
 
 
 def _key(meaning: str, *, unit: str = "", fanuc: str = "", assumed: bool = False, **field: Any) -> Any:
@@ -143,15 +145,22 @@ class Mode(_Table):
     """One vibration mode of an axis, excited by the motion of that axis."""
 
     frequency_hz: Annotated[_Positive, Field(le=10_000)] = _key(
-        "natural frequency; from a tap test, or from the decay after a rapid stop", unit="Hz")
+        "natural frequency; from a tap test, or from the decay after a rapid stop", unit="Hz"
+    )
     damping_ratio: Annotated[_NonNegative, Field(lt=1)] = _key(
-        "damping ratio (1 = critically damped)", unit="1")
+        "damping ratio (1 = critically damped)", unit="1"
+    )
     participation: _Positive = _key(
         "share of this mode in the axis's deflection; several modes of one axis need not add up to 1",
-        unit="1", default=1.0)
+        unit="1",
+        default=1.0,
+    )
     frequency_uncertainty_percent: Annotated[_NonNegative, Field(lt=100)] | None = _key(
         "the frequency may be off by this much either way (position of the table, weight of the workpiece); "
-        "left out: not known, and only the nominal frequency is designed for", unit="%", default=None)
+        "left out: not known, and only the nominal frequency is designed for",
+        unit="%",
+        default=None,
+    )
 
 
 class Axis(_Table):
@@ -161,9 +170,11 @@ class Axis(_Table):
     rapid_mm_per_min: _Positive = _key("rapid traverse (G00)", unit="mm/min", fanuc="1420")
     max_acceleration_mm_s2: _Positive = _key("largest acceleration while cutting", unit="mm/s²", fanuc="1660")
     max_jerk_mm_s3: _Positive | None = _key(
-        "largest jerk while cutting; left out: not limited", unit="mm/s³", default=None)
-    modes: tuple[Mode, ...] = _key("vibration modes, one table each; none: the axis is taken as rigid",
-                                   default=())
+        "largest jerk while cutting; left out: not limited", unit="mm/s³", default=None
+    )
+    modes: tuple[Mode, ...] = _key(
+        "vibration modes, one table each; none: the axis is taken as rigid", default=()
+    )
 
 
 class Axes(_Table):
@@ -182,93 +193,164 @@ class Controller(_Table):
     """How the controller turns blocks into set-points, and what it accepts."""
 
     interpolation_period_s: Annotated[_Positive, Field(le=0.1)] = _key(
-        "time between two set-points", unit="s", default=0.001, assumed=True)
+        "time between two set-points", unit="s", default=0.001, assumed=True
+    )
     block_time_s: Annotated[_NonNegative, Field(le=1)] = _key(
-        "shortest time in which the controller can take in a block; emitted blocks are not shorter", unit="s",
-        default=0.005, assumed=True)
+        "shortest time in which the controller can take in a block; emitted blocks are not shorter",
+        unit="s",
+        default=0.005,
+        assumed=True,
+    )
     block_end: Literal["ceil", "carry"] = _key(
         '"ceil": each block starts on a tick of the interpolation; "carry": the remainder of a period is '
-        "carried into the next block. The round trip is judged under both", default="ceil", assumed=True)
+        "carried into the next block. The round trip is judged under both",
+        default="ceil",
+        assumed=True,
+    )
     motion: Literal["look_ahead", "after_interpolation"] = _key(
         'how an ordinary program is played. "look_ahead": the speed is planned along the path before '
         'interpolation; "after_interpolation": each axis is smoothed after interpolation, and cutting blocks '
-        'overlap',
-        default="look_ahead", assumed=True)
+        "overlap",
+        default="look_ahead",
+        assumed=True,
+    )
     law: Literal["constant_time", "jerk_limited"] = _key(
         'speed change before interpolation. "constant_time": it lasts time_constant_s whatever the step; '
-        '"jerk_limited": by the acceleration and jerk of the axes', default="constant_time", assumed=True)
+        '"jerk_limited": by the acceleration and jerk of the axes',
+        default="constant_time",
+        assumed=True,
+    )
     time_constant_s: Annotated[_NonNegative, Field(le=10)] = _key(
         "duration of a speed change (look-ahead, constant time) or length of the moving average (after "
-        "interpolation)", unit="s", fanuc="1622, 1769", default=0.05, assumed=True)
+        "interpolation)",
+        unit="s",
+        fanuc="1622, 1769",
+        default=0.05,
+        assumed=True,
+    )
     bell_time_s: Annotated[_NonNegative, Field(le=10)] = _key(
         "time over which the acceleration itself is built up; length of the second moving average; 0: none",
-        unit="s", fanuc="1772", default=0.0, assumed=True)
+        unit="s",
+        fanuc="1772",
+        default=0.0,
+        assumed=True,
+    )
     corner_speed_difference_mm_per_min: _AxisValues = _key(
         "largest speed step of an axis where two blocks meet; 0: stop at every corner. One number, or "
         "x, y, z",
-        unit="mm/min", fanuc="1783", default=500.0, assumed=True)
+        unit="mm/min",
+        fanuc="1783",
+        default=500.0,
+        assumed=True,
+    )
     centripetal_acceleration_mm_s2: _Positive = _key(
-        "largest acceleration across the path in arcs; it limits the feed there", unit="mm/s²", fanuc="1735",
-        default=1000.0, assumed=True)
+        "largest acceleration across the path in arcs; it limits the feed there",
+        unit="mm/s²",
+        fanuc="1735",
+        default=1000.0,
+        assumed=True,
+    )
     rapid_path: Literal["linear", "non_linear"] = _key(
-        '"linear": a rapid goes straight; "non_linear": each axis travels at its own speed', fanuc="1401#1",
-        default="linear", assumed=True)
+        '"linear": a rapid goes straight; "non_linear": each axis travels at its own speed',
+        fanuc="1401#1",
+        default="linear",
+        assumed=True,
+    )
     rapid_time_constant_s: Annotated[_NonNegative, Field(le=10)] = _key(
-        "time in which a rapid reaches its speed", unit="s", fanuc="1620", default=0.15, assumed=True)
+        "time in which a rapid reaches its speed", unit="s", fanuc="1620", default=0.15, assumed=True
+    )
     rapid_bell_time_s: Annotated[_NonNegative, Field(le=10)] = _key(
-        "time over which the acceleration of a rapid is built up; 0: none", unit="s", fanuc="1621",
-        default=0.0, assumed=True)
+        "time over which the acceleration of a rapid is built up; 0: none",
+        unit="s",
+        fanuc="1621",
+        default=0.0,
+        assumed=True,
+    )
     in_position_s: _AxisValues = _key(
         "wait for the axis to arrive after a rapid or an exact stop; the slowest axis that moved counts. One "
-        "number, or x, y, z", unit="s", default={"x": 0.025, "y": 0.025, "z": 0.12}, assumed=True)
+        "number, or x, y, z",
+        unit="s",
+        default={"x": 0.025, "y": 0.025, "z": 0.12},
+        assumed=True,
+    )
     shaped_time_constant_s: Annotated[_NonNegative, Field(le=10)] = _key(
         "length of the controller's own moving average after interpolation while a shaped program runs (it "
-        "smooths the shaped blocks once more); 0: off", unit="s", fanuc="1622, 1769", default=0.0,
-        assumed=True)
+        "smooths the shaped blocks once more); 0: off",
+        unit="s",
+        fanuc="1622, 1769",
+        default=0.0,
+        assumed=True,
+    )
     program_memory_bytes: Annotated[int, Strict(), Field(gt=0)] = _key(
-        "memory for programs; a larger output gets a warning", unit="bytes", default=262_144, assumed=True)
+        "memory for programs; a larger output gets a warning", unit="bytes", default=262_144, assumed=True
+    )
     dnc_baud: _Count = _key(
-        "speed of the serial line when programs are drip fed; 0: not drip fed", unit="baud", fanuc="0103",
-        default=0)
+        "speed of the serial line when programs are drip fed; 0: not drip fed",
+        unit="baud",
+        fanuc="0103",
+        default=0,
+    )
     dnc_bits_per_character: Annotated[int, Strict(), Field(ge=7, le=12)] = _key(
-        "bits on the serial line for each character, with start, parity and stop bits", unit="bits",
-        default=11, assumed=True)
+        "bits on the serial line for each character, with start, parity and stop bits",
+        unit="bits",
+        default=11,
+        assumed=True,
+    )
     least_increment_mm: Annotated[_Positive, Field(le=0.1)] = _key(
-        "smallest coordinate step in G21", unit="mm", default=0.001)
+        "smallest coordinate step in G21", unit="mm", default=0.001
+    )
     least_increment_inch: Annotated[_Positive, Field(le=0.01)] = _key(
-        "smallest coordinate step in G20", unit="inch", default=0.0001)
+        "smallest coordinate step in G20", unit="inch", default=0.0001
+    )
     arc_radius_tolerance_mm: _Positive = _key(
         "start and end radius of an arc may differ by this much; beyond it the block is an error (alarm "
-        "0020)", unit="mm", fanuc="3410", default=0.01, assumed=True)
+        "0020)",
+        unit="mm",
+        fanuc="3410",
+        default=0.01,
+        assumed=True,
+    )
     calculator_decimal_point: _Bool = _key(
-        "X10 without a decimal point: 10 mm or inch if true, 10 least increments if false", fanuc="3401#0",
-        default=False)
+        "X10 without a decimal point: 10 mm or inch if true, 10 least increments if false",
+        fanuc="3401#0",
+        default=False,
+    )
     feed_decimals_mm: Annotated[int, Strict(), Field(ge=0, le=6)] = _key(
-        "decimals of an F word in mm/min", unit="digits", default=1, assumed=True)
+        "decimals of an F word in mm/min", unit="digits", default=1, assumed=True
+    )
     feed_decimals_inch: Annotated[int, Strict(), Field(ge=0, le=6)] = _key(
-        "decimals of an F word in inch/min", unit="digits", default=2, assumed=True)
+        "decimals of an F word in inch/min", unit="digits", default=2, assumed=True
+    )
     minimum_feed_mm_per_min: _Positive = _key(
-        "smallest feed written in a block", unit="mm/min", default=1.0, assumed=True)
+        "smallest feed written in a block", unit="mm/min", default=1.0, assumed=True
+    )
 
 
 class PowerOn(_Table):
     """Modal state before the first block of a program."""
 
     motion: Literal["G00", "G01", "G02", "G03"] = _key(
-        "kind of motion", fanuc="3402#0", default="G00", assumed=True)
+        "kind of motion", fanuc="3402#0", default="G00", assumed=True
+    )
     plane: Literal["G17", "G18", "G19"] = _key(
-        "plane of arcs", fanuc="3402#1, #2", default="G17", assumed=True)
+        "plane of arcs", fanuc="3402#1, #2", default="G17", assumed=True
+    )
     distance: Literal["G90", "G91"] = _key(
-        "absolute (G90) or incremental (G91) coordinates", fanuc="3402#3", default="G90", assumed=True)
+        "absolute (G90) or incremental (G91) coordinates", fanuc="3402#3", default="G90", assumed=True
+    )
     units: Literal["G20", "G21"] = _key("inch (G20) or mm (G21)", default="G21", assumed=True)
     feed_mode: Literal["G93", "G94", "G95"] = _key(
-        "feed per minute (G94), inverse time (G93) or per revolution (G95)", default="G94", assumed=True)
+        "feed per minute (G94), inverse time (G93) or per revolution (G95)", default="G94", assumed=True
+    )
     path_mode: Literal["G61", "G64"] = _key(
-        "exact stop (G61) or cutting mode (G64)", default="G64", assumed=True)
+        "exact stop (G61) or cutting mode (G64)", default="G64", assumed=True
+    )
     work_offset: Literal["G54", "G55", "G56", "G57", "G58", "G59"] = _key(
-        "work coordinate system", default="G54", assumed=True)
+        "work coordinate system", default="G54", assumed=True
+    )
     cycle_return: Literal["G98", "G99"] = _key(
-        "level to which a drilling cycle returns: initial (G98) or R (G99)", default="G98", assumed=True)
+        "level to which a drilling cycle returns: initial (G98) or R (G99)", default="G98", assumed=True
+    )
 
 
 _OFFSET_NAME = re.compile(r"G5[4-9]|G54\.1P[1-9][0-9]{0,2}")
@@ -279,15 +361,24 @@ class Input(_Table):
 
     arc_centre: Literal["incremental", "absolute"] = _key(
         'I J K of an arc: "incremental" from its start, as FANUC reads them; "absolute" for programs posted '
-        "for other controls", default="incremental")
+        "for other controls",
+        default="incremental",
+    )
     tool_change_unknown_axes: Annotated[str, Strict(), Field(pattern=r"^X?Y?Z?$")] = _key(
         "axes whose position is not known after M06, until they are programmed again; letters of XYZ in this "
-        "order", default="XYZ", assumed=True)
+        "order",
+        default="XYZ",
+        assumed=True,
+    )
     work_offsets: dict[str, tuple[_Float, _Float, _Float]] = _key(
         'work offsets, for programs that use more than one: G54 = [x, y, z]; "G54.1P5" = [x, y, z]; one that '
-        "is left out is zero", unit="mm", default={})
+        "is left out is zero",
+        unit="mm",
+        default={},
+    )
     max_line_length: Annotated[int, Strict(), Field(ge=20, le=100_000)] = _key(
-        "a longer line is an error", unit="characters", default=250, assumed=True)
+        "a longer line is an error", unit="characters", default=250, assumed=True
+    )
 
     @field_validator("work_offsets")
     @classmethod
@@ -295,7 +386,8 @@ class Input(_Table):
         for name in offsets:
             if not _OFFSET_NAME.fullmatch(name):
                 raise ValueError(
-                    f'{name} is no work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"')
+                    f'{name} is no work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"'
+                )
         return offsets
 
 
@@ -307,25 +399,38 @@ class Emission(_Table):
 
     block_period_s: Annotated[_Positive, Field(le=1)] | None = _key(
         "duration of a short block: a whole multiple of controller.interpolation_period_s and not below "
-        "controller.block_time_s; left out: chosen for the shortest shaper", unit="s", default=None)
+        "controller.block_time_s; left out: chosen for the shortest shaper",
+        unit="s",
+        default=None,
+    )
     prologue: tuple[_Text, ...] = _key(
         'lines written before each shaped stretch, for example ["G05.1 Q0"] to switch a look-ahead mode off',
-        default=())
+        default=(),
+    )
     epilogue: tuple[_Text, ...] = _key("lines written after each shaped stretch", default=())
     prefill_dwell_s: Annotated[_NonNegative, Field(le=60)] = _key(
-        "dwell before each shaped stretch, in which the block buffer fills; 0: none", unit="s", default=0.0)
+        "dwell before each shaped stretch, in which the block buffer fills; 0: none", unit="s", default=0.0
+    )
     header: _Bool = _key("write a comment that names the machine, the shaper and the verdict", default=True)
     failed_suffix: Annotated[str, Strict(), Field(min_length=1, pattern=r"^[^/\\\x00-\x1f]+$")] = _key(
         "added to the name of an output that misses its tolerance, so that nobody runs it by mistake",
-        default=".out-of-tolerance")
+        default=".out-of-tolerance",
+    )
     max_line_length: Annotated[int, Strict(), Field(ge=30, le=250)] = _key(
-        "longest line written", unit="characters", default=60, assumed=True)
+        "longest line written", unit="characters", default=60, assumed=True
+    )
     arc_min_chord_mm: _NonNegative = _key(
         "a piece of an arc with a shorter chord is written as a line: rounding could turn it into a full "
-        "circle", unit="mm", default=0.02)
+        "circle",
+        unit="mm",
+        default=0.02,
+    )
     merge_tolerance_increments: _NonNegative = _key(
         "blocks are merged into one where the path and the feed stay within this many least increments; "
-        "0: only where they agree exactly", unit="increments", default=0.5)
+        "0: only where they agree exactly",
+        unit="increments",
+        default=0.5,
+    )
 
     @field_validator("prologue", "epilogue")
     @classmethod
@@ -334,7 +439,8 @@ class Emission(_Table):
             if not _BLOCK_CHARACTERS.fullmatch(line):
                 raise ValueError(
                     f"the line {json.dumps(line)} has a character other than capital letters, digits and "
-                    "signs that a program may hold (no %, no end of line)")
+                    "signs that a program may hold (no %, no end of line)"
+                )
         return lines
 
     @model_validator(mode="after")
@@ -343,7 +449,8 @@ class Emission(_Table):
             if len(line) > self.max_line_length:
                 raise ValueError(
                     f"the line {json.dumps(line)} has {len(line)} characters, emission.max_line_length is "
-                    f"{self.max_line_length}")
+                    f"{self.max_line_length}"
+                )
         return self
 
 
@@ -351,26 +458,36 @@ class Shaping(_Table):
     """What is shaped, and how."""
 
     max_duration_s: Annotated[_Positive, Field(le=10)] = _key(
-        "longest shaper that is accepted", unit="s", default=0.25)
+        "longest shaper that is accepted", unit="s", default=0.25
+    )
     arc_feed_ratio: Annotated[_Positive, Field(le=1)] = _key(
         "feed in arcs as a share of the programmed feed, reached before the arc begins; 1: no reduction",
-        unit="1", default=1.0)
+        unit="1",
+        default=1.0,
+    )
     plunge_angle_deg: Annotated[_NonNegative, Field(le=90)] = _key(
-        "a cutting move that leans from the tool axis Z by no more than this is a plunge or retract: the tool "
-        "comes to rest where it meets a move across, because a shaper must not mix the two",
-        unit="degrees", default=15.0)
+        "a cutting move that leans from the tool axis Z by no more than this is a plunge or retract: the "
+        "tool comes to rest where it meets a move across, because a shaper must not mix the two",
+        unit="degrees",
+        default=15.0,
+    )
 
 
 class Tolerance(_Table):
     """When an emitted program is good: outside these limits the conversion says so and exits with 1."""
 
     contour_um: _Positive = _key(
-        "largest deviation of the emitted command from the programmed path", unit="µm", default=50.0)
+        "largest deviation of the emitted command from the programmed path", unit="µm", default=50.0
+    )
     residual_ratio: Annotated[_NonNegative, Field(le=1)] = _key(
         "residual vibration passes if it is below this share of the original program's, or below "
-        "residual_floor_um", unit="1", default=0.25)
+        "residual_floor_um",
+        unit="1",
+        default=0.25,
+    )
     residual_floor_um: _NonNegative = _key(
-        "residual vibration below this passes whatever the original's was", unit="µm", default=3.0)
+        "residual vibration below this passes whatever the original's was", unit="µm", default=3.0
+    )
 
 
 @dataclass(frozen=True)
@@ -419,7 +536,8 @@ class Machine(_Table):
     """A machine tool and its controller, as a machine file describes them."""
 
     name: Annotated[str, Strict(), Field(min_length=1, max_length=60, pattern=r"^[\x20-\x7e]+$")] = _key(
-        "short name, in plain ASCII because it goes into the header of programs")
+        "short name, in plain ASCII because it goes into the header of programs"
+    )
     description: _Text = _key("what machine this is and where its numbers come from", default="")
     axes: Axes = _key("limits and vibration modes of the axes")
     controller: Controller = _key("how the controller moves the axes and what it accepts", default={})
@@ -437,12 +555,16 @@ class Machine(_Table):
         tick = self.controller.interpolation_period_s
         ratio = period / tick
         if round(ratio) < 1 or not math.isclose(ratio, round(ratio), rel_tol=0, abs_tol=1e-6):
-            raise ValueError(f"emission.block_period_s = {_toml(period)}: must be a whole multiple of "
-                             f"controller.interpolation_period_s = {_toml(tick)}")
+            raise ValueError(
+                f"emission.block_period_s = {_toml(period)}: must be a whole multiple of "
+                f"controller.interpolation_period_s = {_toml(tick)}"
+            )
         shortest = self.controller.block_time_s
         if period < shortest * (1 - 1e-9):
-            raise ValueError(f"emission.block_period_s = {_toml(period)}: must not be below "
-                             f"controller.block_time_s = {_toml(shortest)}")
+            raise ValueError(
+                f"emission.block_period_s = {_toml(period)}: must not be below "
+                f"controller.block_time_s = {_toml(shortest)}"
+            )
         return self
 
     @classmethod
@@ -466,7 +588,7 @@ class Machine(_Table):
         try:
             text = path.read_bytes().decode("utf-8-sig")
         except UnicodeDecodeError as error:
-            line = error.object[:error.start].count(b"\n") + 1
+            line = error.object[: error.start].count(b"\n") + 1
             problem = Problem("", "", f"not UTF-8 text (byte 0x{error.object[error.start]:02x})", line)
             raise MachineError(str(path), (problem,)) from error
         return cls.from_toml(text, str(path))
@@ -482,6 +604,15 @@ class Machine(_Table):
             data = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             raise MachineError(source, (_toml_problem(str(error), text),)) from error
+        return cls.from_data(data, source, text)
+
+    @classmethod
+    def from_data(cls, data: dict[str, Any], source: str = "<data>", text: str = "") -> Machine:
+        """Validate the tables of a machine file; *source* names it in messages, *text* gives them line numbers.
+
+        Raises:
+            MachineError: wrong keys or values; every problem is listed.
+        """
         try:
             return cls.model_validate(data)
         except ValidationError as error:
@@ -491,8 +622,11 @@ class Machine(_Table):
     def builtin_names() -> tuple[str, ...]:
         """Names of the machines that come with shapegcode, sorted."""
         folder = resources.files("shapegcode") / "data"
-        return tuple(sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir()
-                            if entry.name.endswith(".toml")))
+        return tuple(
+            sorted(
+                entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
+            )
+        )
 
     @classmethod
     def builtin_text(cls, name: str) -> str:
@@ -527,7 +661,7 @@ def _toml_problem(message: str, text: str) -> Problem:
     """The place of a TOML syntax error, which tomllib only tells in words."""
     found = re.search(r"\s*\(at line (\d+), column (\d+)\)$", message)
     if found:
-        return Problem("", "", f"{message[:found.start()]} (column {found[2]})", int(found[1]))
+        return Problem("", "", f"{message[: found.start()]} (column {found[2]})", int(found[1]))
     last = text.rstrip().count("\n") + 1
     return Problem("", "", message.replace(" (at end of document)", " (end of file)"), last)
 
@@ -550,8 +684,11 @@ def _toml(value: object) -> str:
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_toml(item) for item in value) + "]"
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{_toml_key(key)} = {_toml(item)}" for key, item in value.items()) + " }" \
-            if value else "{}"
+        return (
+            "{ " + ", ".join(f"{_toml_key(key)} = {_toml(item)}" for key, item in value.items()) + " }"
+            if value
+            else "{}"
+        )
     return str(value)
 
 
@@ -737,8 +874,14 @@ def _info(field: FieldInfo, key: str) -> KeyInfo:
         default = "not set"
     else:
         default = _toml(field.default)
-    return KeyInfo(key=key, unit=facts.get("unit", ""), default=default, meaning=field.description or "",
-                   fanuc=facts.get("fanuc", ""), assumed=bool(facts.get("assumed")))
+    return KeyInfo(
+        key=key,
+        unit=facts.get("unit", ""),
+        default=default,
+        meaning=field.description or "",
+        fanuc=facts.get("fanuc", ""),
+        assumed=bool(facts.get("assumed")),
+    )
 
 
 def _values(table: _Table, prefix: str, given: bool = True) -> Iterator[KeyValue]:
@@ -751,8 +894,11 @@ def _values(table: _Table, prefix: str, given: bool = True) -> Iterator[KeyValue
             for number, mode in enumerate(value, start=1):
                 yield from _values(mode, f"{key}.{number}.", from_file)
         else:
-            yield KeyValue(info=_info(field, key), value="not set" if value is None else _toml(value),
-                           origin="file" if from_file else "default")
+            yield KeyValue(
+                info=_info(field, key),
+                value="not set" if value is None else _toml(value),
+                origin="file" if from_file else "default",
+            )
 
 
 class _TomlWriter:
@@ -764,8 +910,10 @@ class _TomlWriter:
 
     def write(self, machine: Machine) -> str:
         self._lines = []
-        self._comment("Machine file of shapegcode. Keys and defaults: docs/machine.md. A key that is left "
-                      "out has its default; `shapegcode machine show FILE` prints every value.")
+        self._comment(
+            "Machine file of shapegcode. Keys and defaults: docs/machine.md. A key that is left "
+            "out has its default; `shapegcode machine show FILE` prints every value."
+        )
         self._lines.append("")
         self._table(machine, "")
         if self._remarks:
@@ -773,8 +921,14 @@ class _TomlWriter:
         return "\n".join(self._lines).rstrip("\n") + "\n"
 
     def _comment(self, text: str) -> None:
-        self._lines += textwrap.wrap(text, _LINE_WIDTH, initial_indent="# ", subsequent_indent="# ",
-                                     break_long_words=False, break_on_hyphens=False)
+        self._lines += textwrap.wrap(
+            text,
+            _LINE_WIDTH,
+            initial_indent="# ",
+            subsequent_indent="# ",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
 
     def _table(self, table: _Table, prefix: str) -> None:
         """Plain keys first, then the tables below, as TOML asks."""
@@ -815,8 +969,11 @@ class _TomlWriter:
             self._lines.append("")
             self._comment(f"{key}: {field.description}.")
             remark = self._remarks.pop(key, "")
-            self._lines += [f"# [[{key}]]" + (f"  # {remark}" if remark else ""),
-                            "# frequency_hz = ...", "# damping_ratio = ..."]
+            self._lines += [
+                f"# [[{key}]]" + (f"  # {remark}" if remark else ""),
+                "# frequency_hz = ...",
+                "# damping_ratio = ...",
+            ]
         for number, mode in enumerate(modes, start=1):
             self._head(f"[[{key}]]", (Mode.__doc__ or "").rstrip(".") if number == 1 else "")
             self._table(mode, f"{key}.{number}.")
@@ -873,8 +1030,13 @@ def key_documentation() -> str:
         for info in infos:
             name = info.key.removeprefix(f"{table}.")
             default = info.default if info.default in ("required", "not set") else f"`{info.default}`"
-            cells = (f"`{name}`", info.unit or "–", default + (" **assumed**" if info.assumed else ""),
-                     info.fanuc or "–", info.meaning)
+            cells = (
+                f"`{name}`",
+                info.unit or "–",
+                default + (" **assumed**" if info.assumed else ""),
+                info.fanuc or "–",
+                info.meaning,
+            )
             lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_feed", "plot_path", "plot_vibration", "thin_min_max"]
 
 FloatArray = npt.NDArray[np.float64]
+Plane = Literal["XY", "ZX", "YZ"]
 
 _AXIS_NAMES = "XYZ"
 _COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7")
@@ -32,12 +33,13 @@ _GREY = "#8a8a8a"
 _MAX_POINTS = 4000
 _FORMATS = (".png", ".svg")
 _MOVES_MM = 1e-9
-# Point-segment pairs that are looked at together; bounds the memory.
-_CHUNK_CELLS = 2_000_000
+# Pieces of the programmed path among which the nearest one is looked for.
+_PATH_PIECES = 20_000
 
 
-def thin_min_max(times: npt.ArrayLike, values: npt.ArrayLike, max_points: int = _MAX_POINTS
-                 ) -> tuple[FloatArray, FloatArray]:
+def thin_min_max(
+    times: npt.ArrayLike, values: npt.ArrayLike, max_points: int = _MAX_POINTS
+) -> tuple[FloatArray, FloatArray]:
     """Fewer points of a curve that look the same: of each stretch only its smallest and largest value.
 
     Args:
@@ -73,7 +75,7 @@ def plot_path(
     traces: Sequence[Trace],
     *,
     quantity: Literal["response", "command"] = "response",
-    plane: Literal["XY", "ZX", "YZ"] = "XY",
+    plane: Plane = "XY",
     magnification: float | None = None,
 ) -> float:
     """How far, and to which side, does the table leave the programmed path?
@@ -114,13 +116,19 @@ def plot_path(
     across, up = (_AXIS_NAMES.index(name) for name in plane)
     figure = _figure(7.2, 6.4)
     axes = figure.add_subplot()
-    axes.plot(polyline[:, across], polyline[:, up], color=_GREY, linewidth=3, alpha=0.55,
-              label="programmed path")
+    axes.plot(
+        polyline[:, across], polyline[:, up], color=_GREY, linewidth=3, alpha=0.55, label="programmed path"
+    )
     for number, (label, feet, deviation) in enumerate(drawn):
         curve = feet + factor * deviation
         largest_um = 1e3 * float(np.linalg.norm(deviation, axis=1).max())
-        axes.plot(curve[:, across], curve[:, up], color=_colour(number), linewidth=_width(number),
-                  label=f"{label}, largest {largest_um:.1f} µm")
+        axes.plot(
+            curve[:, across],
+            curve[:, up],
+            color=_colour(number),
+            linewidth=_width(number),
+            label=f"{label}, largest {largest_um:.1f} µm",
+        )
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)
     axes.set_xlabel(f"{plane[0]} in mm")
@@ -188,8 +196,10 @@ def plot_vibration(
     instants = [float((rest_s or {}).get(trace.label, trace.rest_s)) for trace in traces]
     for trace, instant in zip(traces, instants, strict=True):
         if not 0 <= instant <= len(trace.command_mm) * trace.period_s:
-            raise ValueError(f"trace {trace.label}: rest at {instant} s is outside the trace, which ends at "
-                             f"{trace.times_s[-1]:.6g} s")
+            raise ValueError(
+                f"trace {trace.label}: rest at {instant} s is outside the trace, which ends at "
+                f"{trace.times_s[-1]:.6g} s"
+            )
     moving = _moving_axes(traces)
     figure = _figure(8.0, 1.6 + 2.2 * len(moving))
     panels = _panels(figure, len(moving))
@@ -242,26 +252,38 @@ def _telling_samples(trace: Trace, quantity: str) -> FloatArray:
 
 def _foot_points(points: FloatArray, polyline: FloatArray) -> FloatArray:
     """Nearest point of the polyline to each point: for drawing; figures come from the core's metrology."""
-    start, along = polyline[:-1], np.diff(polyline, axis=0)
-    squares = np.einsum("ij,ij->i", along, along)
-    keep = squares > 0
-    if not keep.any():
-        return np.broadcast_to(polyline[0], points.shape).copy()
-    start, along, squares = start[keep], along[keep], squares[keep]
-    feet = np.empty_like(points)
-    step = max(1, _CHUNK_CELLS // len(start))
-    for begin in range(0, len(points), step):
-        chunk = points[begin:begin + step]
-        dot = chunk @ along.T - np.einsum("ij,ij->i", start, along)
-        share = np.clip(dot / squares, 0, 1)
-        # |chunk − start − share·along|² without the array of vectors
-        offset2 = (np.einsum("ij,ij->i", chunk, chunk)[:, None] - 2 * chunk @ start.T
-                   + np.einsum("ij,ij->i", start, start))
-        distance2 = offset2 - 2 * share * dot + share**2 * squares
-        best = np.argmin(distance2, axis=1)
-        rows = np.arange(len(chunk))
-        feet[begin:begin + step] = start[best] + share[rows, best][:, None] * along[best]
+    from scipy.spatial import KDTree
+
+    vertices = _refine(polyline)
+    if len(vertices) < 2:
+        return np.broadcast_to(vertices[0], points.shape).copy()
+    nearest = KDTree(vertices).query(points)[1]
+    feet, best = np.empty_like(points), np.full(len(points), np.inf)
+    # The foot lies on one of the two segments that meet in the nearest vertex.
+    for shift in (-1, 0):
+        first = np.clip(nearest + shift, 0, len(vertices) - 2)
+        start, along = vertices[first], vertices[first + 1] - vertices[first]
+        dot = np.einsum("ij,ij->i", points - start, along)
+        share = np.clip(dot / np.einsum("ij,ij->i", along, along), 0, 1)
+        candidate = start + share[:, None] * along
+        distance2 = np.einsum("ij,ij->i", points - candidate, points - candidate)
+        closer = distance2 < best
+        feet[closer], best[closer] = candidate[closer], distance2[closer]
     return feet
+
+
+def _refine(polyline: FloatArray) -> FloatArray:
+    """The polyline without repeated points, its long segments split, so that vertices stand for the path."""
+    lengths = np.linalg.norm(np.diff(polyline, axis=0), axis=1)
+    polyline = polyline[np.concatenate([[True], lengths > 0])]
+    lengths = lengths[lengths > 0]
+    if not len(lengths):
+        return polyline
+    pieces = np.ceil(lengths / (lengths.sum() / _PATH_PIECES)).astype(np.intp)
+    segment = np.repeat(np.arange(len(pieces)), pieces)
+    share = (np.arange(len(segment)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[segment]
+    split = polyline[segment] + share[:, None] * (polyline[segment + 1] - polyline[segment])
+    return np.concatenate([split, polyline[-1:]])
 
 
 def _round_factor(factor: float) -> float:
@@ -304,8 +326,9 @@ def _title(axes: Axes, text: str, *, above_legend: bool = False) -> None:
 
 def _legend_above(panel: Axes) -> None:
     """Legend between the panel and what is above it, where it hides no curve."""
-    panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.2,
-                 fontsize=9)
+    panel.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.2, fontsize=9
+    )
 
 
 def _deviation_scale(axes: Axes, factor: float, largest_mm: float) -> None:

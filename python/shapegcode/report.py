@@ -11,7 +11,7 @@ The report itself is a plain dictionary, the JSON that ``--json`` writes. Its ke
     blocks                                    {read, emitted}
     override_residual                         [{override, residual_um: {x, y, z}}]
     within_tolerance                          true or false
-    regions                                   [{lines: [first, last], misses: [text]}] and more, not shown here
+    regions                                   [{lines: [first, last], misses: [text]}], and more
     warnings                                  list of texts
 
 ``override`` is a ratio (0.9 = 90 %). A key that does not apply may be left out or be null; its row then is
@@ -30,7 +30,7 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     from rich.table import Table
 
-__all__ = ["Row", "Trace", "before_after_rows", "before_after_table", "next_step"]
+__all__ = ["Row", "Trace", "before_after_rows", "before_after_table", "next_step", "simulation_table"]
 
 # Rounding in sums of increments stays far below this, a least increment far above.
 _STILL_MM = 1e-9
@@ -71,8 +71,10 @@ class Trace:
             values.flags.writeable = False
             object.__setattr__(self, name, values)
         if self.command_mm.shape != self.response_mm.shape:
-            raise ValueError(f"trace {self.label}: {len(self.command_mm)} samples of the command, "
-                             f"{len(self.response_mm)} of the response: must be equal")
+            raise ValueError(
+                f"trace {self.label}: {len(self.command_mm)} samples of the command, "
+                f"{len(self.response_mm)} of the response: must be equal"
+            )
 
     @property
     def times_s(self) -> FloatArray:
@@ -119,8 +121,8 @@ class Row:
 
     @property
     def change_percent(self) -> float | None:
-        """Change from original to emitted; None where there is nothing to compare or the original is zero."""
-        if self.original is None or self.original == 0:
+        """Change from original to emitted; None where there is no original or it shows as zero."""
+        if self.original is None or abs(self.original) < 0.5 * 10.0**-self.decimals:
             return None
         return (self.emitted - self.original) / abs(self.original) * 100
 
@@ -194,7 +196,7 @@ def _program_rows(report: Mapping[str, Any]) -> Iterator[Row]:
     for entry in report.get("override_residual") or []:
         for axis in "xyz":
             value = entry["residual_um"].get(axis)
-            original = (((report.get("residual_vibration_um") or {}).get("original") or {}).get(axis))
+            original = ((report.get("residual_vibration_um") or {}).get("original") or {}).get(axis)
             if value is not None and (value or original):
                 name = f"residual vibration {axis.upper()} at {entry['override'] * 100:g} % override"
                 yield Row(name, "µm", None, float(value), section=section)
@@ -230,8 +232,9 @@ def before_after_table(report: Mapping[str, Any]) -> Table:
         table.add_row(*(Text(cell) for cell in cells))
     if "within_tolerance" in report:
         good = bool(report["within_tolerance"])
-        table.caption = Text("within tolerance" if good else "OUT OF TOLERANCE",
-                             style="bold green" if good else "bold red")
+        table.caption = Text(
+            "within tolerance" if good else "OUT OF TOLERANCE", style="bold green" if good else "bold red"
+        )
     return table
 
 
@@ -251,3 +254,24 @@ def _misses(report: Mapping[str, Any]) -> Iterator[str]:
         first, last = region["lines"]
         for miss in region.get("misses") or []:
             yield f"lines {first} to {last}: {miss}"
+
+
+def simulation_table(report: Mapping[str, Any]) -> Table:
+    """Table of a simulation's figures (see :class:`shapegcode.simulator.Simulation`)."""
+    from rich.table import Table
+
+    table = Table(title=f"{report['program']} on {report['machine']}")
+    table.add_column("figure")
+    table.add_column("value", justify="right")
+    table.add_column("unit")
+    table.add_row("cycle time", f"{report['cycle_time_s']:.2f}", "s")
+    table.add_row("of it cutting regions", f"{report['cutting_time_s']:.2f}", "s", end_section=True)
+    for name, key in (("residual vibration", "residual_vibration_um"), ("peak vibration", "peak_vibration_um")):
+        for axis, value in report[key].items():
+            table.add_row(f"{name} {axis.upper()}", f"{value:.2f}", "µm", end_section=axis == "z")
+    for name, deviation in report["contour_error_um"].items():
+        table.add_row(f"contour error of the {name}, largest", f"{deviation['max']:.2f}", "µm")
+        table.add_row(f"contour error of the {name}, RMS", f"{deviation['rms']:.2f}", "µm")
+    if report["orbit_error_percent"]:
+        table.add_row("orbit error, largest", f"{max(report['orbit_error_percent']):.4f}", "%")
+    return table

@@ -27,7 +27,7 @@ class RegionRun:
         period_s: time between two samples.
         command_mm: set-points after every filter, (n, 3); the decay after the stop included.
         response_mm: the table at the same instants, (n, 3).
-        path_mm: the programmed path as a polyline, (m, 3).
+        path: the programmed path.
         figures: what the core measured.
     """
 
@@ -36,7 +36,7 @@ class RegionRun:
     period_s: float
     command_mm: FloatArray
     response_mm: FloatArray
-    path_mm: FloatArray
+    path: _core.Path
     figures: _core.PlaybackFigures
 
 
@@ -90,7 +90,7 @@ def simulate(
                 machine.controller.interpolation_period_s,
                 figures.recorded_command,
                 figures.recorded_response,
-                path.polyline() if record_samples else np.zeros((0, 3)),
+                path,
                 figures,
             )
         )

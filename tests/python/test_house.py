@@ -25,6 +25,7 @@ ALLOWED_FOLDERS: dict[str, set[str]] = {
     "path": set(),
     "motion": {"path", "filter"},
     "emission": {"path", "filter", "motion", "gcode"},
+    "simulation": {"path", "filter", "motion", "plant", "metrology"},
     "filter": set(),
     "shaping": {"filter"},
     "plant": {"filter"},

@@ -55,7 +55,9 @@ def test_minimal_file_gets_the_documented_defaults() -> None:
 
 
 def test_zero_is_a_value_and_not_a_missing_one() -> None:
-    machine = Machine.from_toml(MINIMAL + """
+    machine = Machine.from_toml(
+        MINIMAL
+        + """
 [[axes.x.modes]]
 frequency_hz = 40
 damping_ratio = 0
@@ -64,7 +66,8 @@ time_constant_s = 0
 in_position_s = 0
 [tolerance]
 residual_floor_um = 0
-""")
+"""
+    )
     assert machine.axes.x.modes == (Mode(frequency_hz=40, damping_ratio=0),)
     assert machine.controller.time_constant_s == 0
     assert machine.controller.in_position_s.as_tuple() == (0, 0, 0)
@@ -108,7 +111,9 @@ def test_builtin_file_names_every_key_and_the_origin_of_every_machine_value() ->
 
 
 def test_written_file_loads_back_to_an_equal_machine() -> None:
-    odd = Machine.from_toml(MINIMAL + """
+    odd = Machine.from_toml(
+        MINIMAL
+        + """
 [[axes.y.modes]]
 frequency_hz = 1e-3
 damping_ratio = 0.123456789012345
@@ -118,7 +123,8 @@ work_offsets = { G54 = [1, -2.5, 1e20], "G54.1P48" = [0, 0, 1e-9] }
 [emission]
 prologue = ["G05.1 Q0", ""]
 block_period_s = 0.007
-""".replace('name = "M"', 'name = "a \\"b\\" \\\\ c"'))
+""".replace('name = "M"', 'name = "a \\"b\\" \\\\ c"')
+    )
     described = odd.model_copy(update={"description": 'two\nlines, "quoted", µ, \x7f'})
     for machine in (odd, described, Machine.load("vx500")):
         assert Machine.from_toml(machine.to_toml()) == machine
@@ -134,8 +140,14 @@ def test_remarks_stand_at_their_lines() -> None:
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
-@pytest.mark.parametrize("key", [v.info.key for v in Machine.load("vx500").values()
-                                 if v.value.replace(".", "").isdigit() and "." in v.value])
+@pytest.mark.parametrize(
+    "key",
+    [
+        v.info.key
+        for v in Machine.load("vx500").values()
+        if v.value.replace(".", "").isdigit() and "." in v.value
+    ],
+)
 def test_no_number_may_be_nan_or_infinite(key: str, number: str) -> None:
     data = Machine.load("vx500").model_dump(mode="python")
     *parents, last = key.split(".")
@@ -148,62 +160,121 @@ def test_no_number_may_be_nan_or_infinite(key: str, number: str) -> None:
     assert last in str(caught.value)
 
 
-@pytest.mark.parametrize(("old", "new", "message"), [
-    ("max_feed_mm_per_min = 5000", "max_feed_mm_per_min = -5",
-     "4: axes.x.max_feed_mm_per_min = -5: must be greater than 0 (unit: mm/min)"),
-    ("max_feed_mm_per_min = 5000", "max_feed_mm_per_min = 0",
-     "4: axes.x.max_feed_mm_per_min = 0: must be greater than 0 (unit: mm/min)"),
-    ("max_feed_mm_per_min = 5000", "max_feed_mm_per_min = nan",
-     "4: axes.x.max_feed_mm_per_min = nan: must be a finite number (unit: mm/min)"),
-    ("max_feed_mm_per_min = 5000", 'max_feed_mm_per_min = "5000"',
-     '4: axes.x.max_feed_mm_per_min = "5000": must be a number (unit: mm/min)'),
-    ("max_feed_mm_per_min = 5000", "max_feed = 5000",
-     " axes.x.max_feed_mm_per_min: required, but missing (unit: mm/min)"),
-    ("max_feed_mm_per_min = 5000", "max_feed = 5000",
-     "4: axes.x.max_feed = 5000: unknown key; did you mean max_feed_mm_per_min?"),
-    ('name = "M"', "", " name: required, but missing"),
-    ('name = "M"', 'name = "Fräse"',
-     '2: name = "Fräse": malformed; short name, in plain ASCII because it goes into the header of programs'),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "max_feed_mm_per_min = 5000",
+            "max_feed_mm_per_min = -5",
+            "4: axes.x.max_feed_mm_per_min = -5: must be greater than 0 (unit: mm/min)",
+        ),
+        (
+            "max_feed_mm_per_min = 5000",
+            "max_feed_mm_per_min = 0",
+            "4: axes.x.max_feed_mm_per_min = 0: must be greater than 0 (unit: mm/min)",
+        ),
+        (
+            "max_feed_mm_per_min = 5000",
+            "max_feed_mm_per_min = nan",
+            "4: axes.x.max_feed_mm_per_min = nan: must be a finite number (unit: mm/min)",
+        ),
+        (
+            "max_feed_mm_per_min = 5000",
+            'max_feed_mm_per_min = "5000"',
+            '4: axes.x.max_feed_mm_per_min = "5000": must be a number (unit: mm/min)',
+        ),
+        (
+            "max_feed_mm_per_min = 5000",
+            "max_feed = 5000",
+            " axes.x.max_feed_mm_per_min: required, but missing (unit: mm/min)",
+        ),
+        (
+            "max_feed_mm_per_min = 5000",
+            "max_feed = 5000",
+            "4: axes.x.max_feed = 5000: unknown key; did you mean max_feed_mm_per_min?",
+        ),
+        ('name = "M"', "", " name: required, but missing"),
+        (
+            'name = "M"',
+            'name = "Fräse"',
+            '2: name = "Fräse": malformed; short name, in plain ASCII because it goes into the header of '
+            "programs",
+        ),
+    ],
+)
 def test_message_has_file_line_key_value_and_limit(old: str, new: str, message: str) -> None:
     assert message in problems(MINIMAL.replace(old, new, 1))
 
 
-@pytest.mark.parametrize(("tables", "message"), [
-    ("[[axes.x.modes]]\nfrequency_hz = 46\ndamping_ratio = 1.0\n",
-     "17: axes.x.modes.1.damping_ratio = 1.0: must be less than 1"),
-    ("[[axes.x.modes]]\nfrequency_hz = 46\ndamping_ratio = 0.1\n[[axes.x.modes]]\nfrequency_hz = true\n",
-     "19: axes.x.modes.2.frequency_hz = true: must be a number (unit: Hz)"),
-    ("[controller]\nlaw = 'fast'\n",
-     '16: controller.law = "fast": must be "constant_time" or "jerk_limited"'),
-    ("[controller]\nin_position_s = -1\n", "16: controller.in_position_s = -1: must be 0 or more (unit: s)"),
-    ("[controller]\nin_position_s = {x = 1, y = -1, z = 1}\n",
-     "16: controller.in_position_s.y = -1: must be 0 or more (unit: s)"),
-    ("[controller]\nin_position_s = {x = 1, y = 1}\n",
-     "16: controller.in_position_s.z: required, but missing (unit: s)"),
-    ("[controller]\ninterpolation_period_s = 1\n",
-     "16: controller.interpolation_period_s = 1: must be 0.1 or less (unit: s)"),
-    ("[controller]\nprogram_memory_bytes = 1.5\n",
-     "16: controller.program_memory_bytes = 1.5: must be a whole number (unit: bytes)"),
-    ("[controller]\ncalculator_decimal_point = 1\n",
-     "16: controller.calculator_decimal_point = 1: must be true or false"),
-    ("[input]\nwork_offsets = {G60 = [1, 2, 3]}\n",
-     '16: input.work_offsets: G60 is no work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"'),
-    ("[emission]\nblock_period_s = 0.0125\n",
-     "16: emission.block_period_s = 0.0125: must be a whole multiple of controller.interpolation_period_s = "
-     "0.001"),
-    ("[emission]\nblock_period_s = 0.004\n",
-     "16: emission.block_period_s = 0.004: must not be below controller.block_time_s = 0.005"),
-    ('[emission]\nprologue = ["%"]\n',
-     '16: emission.prologue = ["%"]: the line "%" has a character other than capital letters, digits and '
-     "signs that a program may hold (no %, no end of line)"),
-    ("[emission]\nprologue = ['" + "X" * 61 + "']\n",
-     f'15: emission: the line "{"X" * 61}" has 61 characters, emission.max_line_length is 60'),
-    ('[emission]\nfailed_suffix = "/../x"\n', None),
-    ("[tolerances]\n", "15: tolerances = {}: unknown key; did you mean tolerance?"),
-    ("[controller]\nbogus = 1\n", None),
-    ("axes = 3\n", None),
-])
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        (
+            "[[axes.x.modes]]\nfrequency_hz = 46\ndamping_ratio = 1.0\n",
+            "17: axes.x.modes.1.damping_ratio = 1.0: must be less than 1",
+        ),
+        (
+            "[[axes.x.modes]]\nfrequency_hz = 46\ndamping_ratio = 0.1\n"
+            "[[axes.x.modes]]\nfrequency_hz = true\n",
+            "19: axes.x.modes.2.frequency_hz = true: must be a number (unit: Hz)",
+        ),
+        (
+            "[controller]\nlaw = 'fast'\n",
+            '16: controller.law = "fast": must be "constant_time" or "jerk_limited"',
+        ),
+        (
+            "[controller]\nin_position_s = -1\n",
+            "16: controller.in_position_s = -1: must be 0 or more (unit: s)",
+        ),
+        (
+            "[controller]\nin_position_s = {x = 1, y = -1, z = 1}\n",
+            "16: controller.in_position_s.y = -1: must be 0 or more (unit: s)",
+        ),
+        (
+            "[controller]\nin_position_s = {x = 1, y = 1}\n",
+            "16: controller.in_position_s.z: required, but missing (unit: s)",
+        ),
+        (
+            "[controller]\ninterpolation_period_s = 1\n",
+            "16: controller.interpolation_period_s = 1: must be 0.1 or less (unit: s)",
+        ),
+        (
+            "[controller]\nprogram_memory_bytes = 1.5\n",
+            "16: controller.program_memory_bytes = 1.5: must be a whole number (unit: bytes)",
+        ),
+        (
+            "[controller]\ncalculator_decimal_point = 1\n",
+            "16: controller.calculator_decimal_point = 1: must be true or false",
+        ),
+        (
+            "[input]\nwork_offsets = {G60 = [1, 2, 3]}\n",
+            "16: input.work_offsets: G60 is no work offset; "
+            'names are G54 ... G59 and "G54.1P1" ... "G54.1P999"',
+        ),
+        (
+            "[emission]\nblock_period_s = 0.0125\n",
+            "16: emission.block_period_s = 0.0125: must be a whole multiple of "
+            "controller.interpolation_period_s = 0.001",
+        ),
+        (
+            "[emission]\nblock_period_s = 0.004\n",
+            "16: emission.block_period_s = 0.004: must not be below controller.block_time_s = 0.005",
+        ),
+        (
+            '[emission]\nprologue = ["%"]\n',
+            '16: emission.prologue = ["%"]: the line "%" has a character other than capital letters, '
+            "digits and signs that a program may hold (no %, no end of line)",
+        ),
+        (
+            "[emission]\nprologue = ['" + "X" * 61 + "']\n",
+            f'15: emission: the line "{"X" * 61}" has 61 characters, emission.max_line_length is 60',
+        ),
+        ('[emission]\nfailed_suffix = "/../x"\n', None),
+        ("[tolerances]\n", "15: tolerances = {}: unknown key; did you mean tolerance?"),
+        ("[controller]\nbogus = 1\n", None),
+        ("axes = 3\n", None),
+    ],
+)
 def test_bad_values(tables: str, message: str | None) -> None:
     found = problems(MINIMAL + tables)
     if message is not None:
@@ -213,17 +284,26 @@ def test_bad_values(tables: str, message: str | None) -> None:
 def test_every_problem_is_listed_once() -> None:
     found = problems("[axes.x]\nmax_feed_mm_per_min = -1\nrapid_mm_per_min = inf\n[nonsense]\n")
     assert len(found) == len(set(found))
-    for part in ("name: required", "max_feed_mm_per_min = -1", "rapid_mm_per_min = inf", "axes.y: required",
-                 "axes.z: required", "nonsense"):
+    for part in (
+        "name: required",
+        "max_feed_mm_per_min = -1",
+        "rapid_mm_per_min = inf",
+        "axes.y: required",
+        "axes.z: required",
+        "nonsense",
+    ):
         assert sum(part in line for line in found) == 1, part
 
 
-@pytest.mark.parametrize(("text", "start"), [
-    ("a = 1\n\n[b\n", "3: "),
-    ('name = """', "1: "),
-    ("x = 1\nx = 2\n", "2: "),
-    ("\ufeff", " "),
-])
+@pytest.mark.parametrize(
+    ("text", "start"),
+    [
+        ("a = 1\n\n[b\n", "3: "),
+        ('name = """', "1: "),
+        ("x = 1\nx = 2\n", "2: "),
+        ("\ufeff", " "),
+    ],
+)
 def test_bad_toml_gives_the_line(text: str, start: str, tmp_path: Path) -> None:
     file = tmp_path / "bad.toml"
     file.write_text(text, encoding="utf-8")
@@ -252,8 +332,19 @@ def test_documentation_is_up_to_date() -> None:
 
 
 def test_every_key_has_a_meaning_and_every_dimensioned_key_a_unit_that_agrees_with_its_name() -> None:
-    units = {"_mm_per_min": "mm/min", "_mm_s2": "mm/s²", "_mm_s3": "mm/s³", "_hz": "Hz", "_um": "µm",
-             "_percent": "%", "_deg": "degrees", "_bytes": "bytes", "_s": "s", "_mm": "mm", "_inch": "inch"}
+    units = {
+        "_mm_per_min": "mm/min",
+        "_mm_s2": "mm/s²",
+        "_mm_s3": "mm/s³",
+        "_hz": "Hz",
+        "_um": "µm",
+        "_percent": "%",
+        "_deg": "degrees",
+        "_bytes": "bytes",
+        "_s": "s",
+        "_mm": "mm",
+        "_inch": "inch",
+    }
     for value in Machine.load("vx500").values():
         name, info = value.info.key.rpartition(".")[2], value.info
         assert info.meaning, info.key
@@ -263,7 +354,9 @@ def test_every_key_has_a_meaning_and_every_dimensioned_key_a_unit_that_agrees_wi
 
 
 def test_origin_tells_file_from_default() -> None:
-    values = {v.info.key: v for v in Machine.from_toml(MINIMAL + "[controller]\nblock_time_s = 0.005\n").values()}
+    values = {
+        v.info.key: v for v in Machine.from_toml(MINIMAL + "[controller]\nblock_time_s = 0.005\n").values()
+    }
     assert values["controller.block_time_s"].origin == "file"
     assert not values["controller.block_time_s"].assumed
     assert values["controller.block_end"].origin == "default"
@@ -271,11 +364,12 @@ def test_origin_tells_file_from_default() -> None:
     assert not values["controller.least_increment_mm"].assumed
 
 
-# --- the command -----------------------------------------------------------------------------------------------
+# The command.
 
 
 def test_init_writes_a_file_that_loads_and_never_overwrites(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["machine", "init"]) == 0
     assert Machine.load(tmp_path / "machine.toml") == Machine.load("vx500")
@@ -302,17 +396,27 @@ def test_show_json_is_alone_on_standard_output(capsys: pytest.CaptureFixture[str
     assert capsys.readouterr().out == out
 
 
-@pytest.mark.parametrize(("argv", "parts"), [
-    (["machine", "show", "nothing.toml"], ["nothing.toml: no such file"]),
-    (["machine", "show", "no/such/machine.toml"], ["no/such/machine.toml: the folder no/such does not exist"]),
-    (["machine", "show", "vx600"], ["vx600", "built in: vx500"]),
-    (["machine", "show", "vx500", "--json", "no/x.json"], ["no/x.json: the folder no does not exist"]),
-    (["machine", "init", "-o", "no/x.toml"], ["no/x.toml: the folder no does not exist"]),
-    (["machine", "init", "-o", "/dev/full", "--force"], ["/dev/full: No space left on device"]),
-])
-def test_bad_input_is_one_line_and_exit_2(argv: list[str], parts: list[str], tmp_path: Path,
-                                          monkeypatch: pytest.MonkeyPatch,
-                                          capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("argv", "parts"),
+    [
+        (["machine", "show", "nothing.toml"], ["nothing.toml: no such file"]),
+        (
+            ["machine", "show", "no/such/machine.toml"],
+            ["no/such/machine.toml: the folder no/such does not exist"],
+        ),
+        (["machine", "show", "vx600"], ["vx600", "built in: vx500"]),
+        (["machine", "show", "vx500", "--json", "no/x.json"], ["no/x.json: the folder no does not exist"]),
+        (["machine", "init", "-o", "no/x.toml"], ["no/x.toml: the folder no does not exist"]),
+        (["machine", "init", "-o", "/dev/full", "--force"], ["/dev/full: No space left on device"]),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(
+    argv: list[str],
+    parts: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(argv) == 2
     err = capsys.readouterr().err
@@ -327,14 +431,18 @@ def test_debug_shows_the_traceback(tmp_path: Path) -> None:
         main(["machine", "show", str(tmp_path / "no.toml"), "--debug"])
 
 
-@pytest.mark.parametrize("argv", [[], ["bogus"], ["machine"], ["machine", "show"], ["machine", "show", "a", "b"]])
+@pytest.mark.parametrize(
+    "argv", [[], ["bogus"], ["machine"], ["machine", "show"], ["machine", "show", "a", "b"]]
+)
 def test_wrong_arguments_exit_2(argv: list[str]) -> None:
     assert main(argv) == 2
 
 
 def test_help_names_every_command_and_imports_nothing_heavy() -> None:
-    code = ("import sys; from shapegcode.cli import main; main(['--help']); "
-            "print([m for m in ('matplotlib', 'rich', 'pydantic', 'scipy') if m in sys.modules])")
+    code = (
+        "import sys; from shapegcode.cli import main; main(['--help']); "
+        "print([m for m in ('matplotlib', 'rich', 'pydantic', 'scipy') if m in sys.modules])"
+    )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     for command in COMMANDS:
         assert command.name in run.stdout
@@ -344,7 +452,9 @@ def test_help_names_every_command_and_imports_nothing_heavy() -> None:
 def test_full_disk_behind_standard_output_is_bad_input() -> None:
     code = "import sys; from shapegcode.cli import main; sys.exit(main(['machine', 'show', 'vx500']))"
     with open("/dev/full", "w") as full:
-        run = subprocess.run([sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        run = subprocess.run(
+            [sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
     assert run.returncode == 2
     assert run.stderr == "shapegcode: No space left on device\n"
 

@@ -24,6 +24,8 @@ from typing import Any
 
 __all__ = ["COMMANDS", "Command", "ExitCode", "main"]
 
+_DEBUG = "--debug"
+
 
 class ExitCode:
     """Exit codes of the command, the same for every sub-command."""
@@ -83,19 +85,22 @@ class _Version(argparse.Action):
 
 def _build_parser(selected: str | None) -> argparse.ArgumentParser:
     """The parser with the arguments of the selected command; the others stay names with a help line."""
-    debug = argparse.ArgumentParser(add_help=False)
-    debug.add_argument("--debug", action="store_true", default=argparse.SUPPRESS,
-                       help="show the traceback of an error")
     parser = argparse.ArgumentParser(
-        prog="shapegcode", parents=[debug],
+        prog="shapegcode",
         description="Converts CNC programs into input-shaped FANUC programs that vibrate less.",
         epilog="exit codes: 0 done and within tolerance; 1 done but out of tolerance; 2 bad input. "
-               "`shapegcode COMMAND --help` explains a command.")
+        "`shapegcode COMMAND --help` explains a command.",
+    )
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
+    # Only for the help: main() takes it out, so that it may stand anywhere.
+    parser.add_argument(_DEBUG, action="store_true", help="show the traceback of an error")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, title="commands")
     for command in COMMANDS:
-        sub = commands.add_parser(command.name, help=command.help, parents=[debug],
-                                  description=f"{command.help[:1].upper()}{command.help[1:]}.")
+        sub = commands.add_parser(
+            command.name,
+            help=command.help,
+            description=f"{command.help[:1].upper()}{command.help[1:]}.",
+        )
         if command.name == selected:
             module = importlib.import_module(command.module)
             module.add_arguments(sub)
@@ -156,7 +161,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if argv is None else argv)
     try:
-        return _run(words)
+        return _run([word for word in words if word != _DEBUG])
     except SystemExit as stop:
         # argparse ends the process itself: 0 after --help, 2 after a wrong argument.
         return stop.code if isinstance(stop.code, int) else ExitCode.BAD_INPUT
@@ -168,7 +173,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         _discard_output()
         return ExitCode.BROKEN_PIPE
     except Exception as error:
-        if "--debug" in words or not _expected(error):
+        if _DEBUG in words or not _expected(error):
             raise
         print(f"shapegcode: {_message(error)}", file=sys.stderr)
         if isinstance(error, OSError) and error.errno == errno.ENOSPC:

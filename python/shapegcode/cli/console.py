@@ -24,6 +24,7 @@ __all__ = [
     "output_console",
     "print_before_after",
     "progress",
+    "write_bytes",
     "write_json",
     "write_text",
 ]
@@ -34,8 +35,12 @@ _PROGRESS_DELAY_S = 1.0
 
 def add_json_argument(parser: argparse.ArgumentParser) -> None:
     """Declare ``--json FILE``; the value is ``args.json``, None where it is not given."""
-    parser.add_argument("--json", metavar="FILE", default=None,
-                        help="write the result as JSON to FILE; - for standard output and nothing else there")
+    parser.add_argument(
+        "--json",
+        metavar="FILE",
+        default=None,
+        help="write the result as JSON to FILE; - for standard output and nothing else there",
+    )
 
 
 def output_console(json_target: str | None = None, *, file: TextIO | None = None) -> Console:
@@ -73,49 +78,58 @@ def write_json(data: object, target: str | Path) -> None:
         write_text(target, text)
 
 
-def write_text(path: str | Path, text: str, *, overwrite: bool = True, newline: str = "") -> None:
-    """Write a UTF-8 file so that it is either complete or as it was before.
+def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:
+    """Write a UTF-8 file so that it is either complete or as it was before; line ends as they are.
 
     Args:
         path: the file; a symbolic link is followed; a device or pipe is written to directly.
-        text: its content, written with the line ends that it has.
+        text: its content.
         overwrite: False: an existing file is an error, even if it appears at the last moment.
-        newline: as for :func:`open`; "" writes the line ends as they are.
 
     Raises:
         FileExistsError: the file exists and *overwrite* is False.
         OSError: with the name of *path* and the reason, for example a full disk or a missing folder.
     """
+    write_bytes(path, text.encode(), overwrite=overwrite)
+
+
+def write_bytes(path: str | Path, data: bytes, *, overwrite: bool = True) -> None:
+    """As :func:`write_text`, for bytes.
+
+    Raises:
+        FileExistsError: the file exists and *overwrite* is False.
+        OSError: with the name of *path* and the reason.
+    """
     target = Path(os.path.realpath(path))
     try:
         if not overwrite:
-            _write_new(target, text, newline)
+            _write_new(target, data)
         elif target.exists() and not stat.S_ISREG(target.stat().st_mode):
-            with open(target, "w", encoding="utf-8", newline=newline) as stream:
-                stream.write(text)
+            with open(target, "wb") as stream:
+                stream.write(data)
         else:
-            _replace(target, text, newline)
+            _replace(target, data)
     except OSError as error:
         # A failed write() does not name the file, and a temporary file's name would mislead.
         raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
 
 
-def _write_new(target: Path, text: str, newline: str) -> None:
-    with open(target, "x", encoding="utf-8", newline=newline) as stream:
+def _write_new(target: Path, data: bytes) -> None:
+    with open(target, "xb") as stream:
         try:
-            stream.write(text)
+            stream.write(data)
             stream.flush()
         except BaseException:
             target.unlink(missing_ok=True)
             raise
 
 
-def _replace(target: Path, text: str, newline: str) -> None:
+def _replace(target: Path, data: bytes) -> None:
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
     temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
-        with open(temporary, "x", encoding="utf-8", newline=newline) as stream:
-            stream.write(text)
+        with open(temporary, "xb") as stream:
+            stream.write(data)
             stream.flush()
             os.fsync(stream.fileno())
         if mode is not None:
@@ -158,8 +172,13 @@ class ProgressBar:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-        self._bar = Progress(TextColumn("{task.description}", markup=False), BarColumn(),
-                             TimeRemainingColumn(), console=Console(stderr=True), transient=True)
+        self._bar = Progress(
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
         self._task = self._bar.add_task(self._description, total=1.0)
         self._bar.start()
 

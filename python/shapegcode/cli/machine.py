@@ -18,16 +18,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True, title="actions")
 
     init = actions.add_parser("init", help="write a commented machine file to start from")
-    init.add_argument("name", metavar="NAME", nargs="?", default=_DEFAULT_MACHINE,
-                      help="built-in machine to start from (default: %(default)s)")
-    init.add_argument("-o", "--output", metavar="FILE", default=_DEFAULT_FILE,
-                      help="file to write (default: %(default)s); - for standard output")
+    init.add_argument(
+        "name",
+        metavar="NAME",
+        nargs="?",
+        default=_DEFAULT_MACHINE,
+        help="built-in machine to start from (default: %(default)s)",
+    )
+    init.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        default=_DEFAULT_FILE,
+        help="file to write (default: %(default)s); - for standard output",
+    )
     init.add_argument("--force", action="store_true", help="overwrite an existing file")
 
     show = actions.add_parser(
-        "show", help="print every value with its unit, origin and meaning",
+        "show",
+        help="print every value with its unit, origin and meaning",
         description="Print every value with its unit, meaning and origin: file, default, or "
-                                      "assumed for a default that is an assumption.")
+        "assumed for a default that is an assumption.",
+    )
     show.add_argument("machine", metavar="FILE_OR_NAME", help="machine file, or name of a built-in machine")
     add_json_argument(show)
 
@@ -54,12 +66,15 @@ def _init(args: argparse.Namespace) -> int:
     try:
         write_text(args.output, text, overwrite=args.force)
     except FileExistsError:
-        print(f"shapegcode: {args.output} exists; --force overwrites it, -o FILE writes another one",
-              file=sys.stderr)
+        print(
+            f"shapegcode: {args.output} exists; --force overwrites it, -o FILE writes another one",
+            file=sys.stderr,
+        )
         return ExitCode.BAD_INPUT
     print(f"wrote {args.output}, the values of {args.name}")
-    print("next: put in your machine's limits and vibration modes, then: "
-          f"shapegcode machine show {args.output}")
+    print(
+        f"next: put in your machine's limits and vibration modes, then: shapegcode machine show {args.output}"
+    )
     return ExitCode.OK
 
 
@@ -75,14 +90,29 @@ def _show(args: argparse.Namespace) -> int:
     machine = Machine.load(args.machine)
     values = machine.values()
     if args.json is not None:
-        write_json({
-            "machine": machine.model_dump(mode="json"),
-            "keys": {value.info.key: {"value": value.value, "unit": value.info.unit, "origin": value.origin,
-                                      "meaning": value.info.meaning, "fanuc": value.info.fanuc,
-                                      "assumed": value.assumed} for value in values},
-        }, args.json)
-    table = Table(title=Text(f"{machine.name}: {machine.description}".rstrip(": ")), title_justify="left",
-                  box=SIMPLE_HEAD, pad_edge=False)
+        write_json(
+            {
+                "machine": machine.model_dump(mode="json"),
+                "keys": {
+                    value.info.key: {
+                        "value": value.value,
+                        "unit": value.info.unit,
+                        "origin": value.origin,
+                        "meaning": value.info.meaning,
+                        "fanuc": value.info.fanuc,
+                        "assumed": value.assumed,
+                    }
+                    for value in values
+                },
+            },
+            args.json,
+        )
+    table = Table(
+        title=Text(f"{machine.name}: {machine.description}".rstrip(": ")),
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+    )
     for heading in ("key", "value", "unit", "origin", "meaning"):
         table.add_column(heading, overflow="fold", no_wrap=heading in ("unit", "origin"))
     section = ""

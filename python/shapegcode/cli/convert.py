@@ -1,0 +1,78 @@
+"""``shapegcode convert``: shape a program, write it, and judge what was written."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from shapegcode.cli.console import add_json_argument
+from shapegcode.cli.options import add_machine_argument, load_machine, ratio, seconds
+
+__all__ = ["add_arguments", "run"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.description = (
+        "Rewrites the cutting moves of a program so that they no longer excite the machine's vibration modes, and "
+        "judges the written program by playing it back: vibration, contour error, time. The input is never "
+        "overwritten; a program that misses its tolerance is written beside OUT with another suffix (exit code 1)."
+    )
+    parser.add_argument("input", metavar="IN", help="CNC program")
+    add_machine_argument(parser)
+    parser.add_argument("-o", "--output", metavar="OUT", required=True, help="program to write")
+    parser.add_argument("--arc-feed", metavar="RATIO", type=ratio, default=None,
+                        help="feed on arcs relative to the programmed feed, for example 60%%")
+    parser.add_argument("--block-period", metavar="TIME", type=seconds, default=None,
+                        help="duration of the shortest block, for example 5ms (default: chosen for the modes)")
+    parser.add_argument("--plots", metavar="DIR", default=None,
+                        help="write pictures (PNG and SVG) of the region that vibrates most into this folder")
+    add_json_argument(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Convert one program; see the module.
+
+    Raises:
+        ProgramError, DesignError, MachineError: bad input.
+        OSError: a file cannot be read or written.
+    """
+    from shapegcode.cli import ExitCode
+    from shapegcode.cli.console import output_console, print_before_after, progress, write_bytes, write_json
+    from shapegcode.converter import convert
+    from shapegcode.program import Program
+
+    output = Path(args.output)
+    _refuse_input_as_output(Path(args.input), output)
+    machine = load_machine(args)
+    failed = output.with_name(output.name + machine.emission.failed_suffix)
+    _refuse_input_as_output(Path(args.input), failed)
+    with progress(f"converting {args.input}", args.json) as bar:
+        program = Program.read(args.input, machine)
+        stages = {"shaping": 0.0, "round trip": 0.5}
+        conversion = convert(
+            program,
+            machine,
+            arc_feed_ratio=args.arc_feed,
+            block_period_s=args.block_period,
+            on_progress=lambda stage, done, total: bar.update(stages[stage] + 0.5 * done / total),
+        )
+        target = output if conversion.within_tolerance else failed
+        write_bytes(target, conversion.text)
+        report = {**conversion.report, "output": str(target)}
+        if args.plots is not None:
+            from shapegcode.pictures import write_pictures
+
+            report["plots"] = write_pictures(conversion, machine, args.plots)
+    if args.json is not None:
+        write_json(report, args.json)
+    print_before_after(report, args.json)
+    output_console(args.json).print(f"wrote {target}", markup=False, soft_wrap=True)
+    return ExitCode.OK if conversion.within_tolerance else ExitCode.OUT_OF_TOLERANCE
+
+
+def _refuse_input_as_output(source: Path, target: Path) -> None:
+    from shapegcode._core import ArgumentError
+
+    if target.exists() and source.exists() and target.samefile(source):
+        raise ArgumentError(f"{target} is the input: it is never overwritten, name another output")

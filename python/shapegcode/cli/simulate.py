@@ -1,0 +1,63 @@
+"""``shapegcode simulate``: play a program on the machine's model."""
+
+from __future__ import annotations
+
+import argparse
+
+from shapegcode.cli.console import add_json_argument
+from shapegcode.cli.options import add_machine_argument, load_machine
+
+__all__ = ["add_arguments", "run"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.description = (
+        "Plays the cutting regions of a program through the controller's model and the machine's modes: time, residual "
+        "and peak vibration, contour error of command and response."
+    )
+    parser.add_argument("input", metavar="IN", help="CNC program")
+    add_machine_argument(parser)
+    parser.add_argument("--shaped", action="store_true",
+                        help="IN was written by shapegcode: play its blocks at their feed, without look-ahead")
+    parser.add_argument("--plots", metavar="DIR", default=None,
+                        help="write pictures (PNG and SVG) of the region that vibrates most into this folder")
+    add_json_argument(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Play one program.
+
+    Raises:
+        ProgramError, MachineError: bad input.
+        OSError: a file cannot be read or written.
+    """
+    from shapegcode.cli import ExitCode
+    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.program import Program
+    from shapegcode.report import simulation_table
+    from shapegcode.simulator import simulate
+
+    machine = load_machine(args)
+    with progress(f"playing {args.input}", args.json) as bar:
+        program = Program.read(args.input, machine)
+        simulation = simulate(
+            program,
+            machine,
+            shaped=args.shaped,
+            record_samples=200_000 if args.plots is not None else 0,
+            on_progress=lambda done, total: bar.update(done / total),
+        )
+        report = simulation.report
+        if args.plots is not None:
+            from shapegcode.pictures import write_simulation_pictures
+
+            report = {**report, "plots": write_simulation_pictures(simulation, args.plots)}
+    if args.json is not None:
+        write_json(report, args.json)
+    console = output_console(args.json)
+    console.print(simulation_table(report))
+    for warning in report["warnings"]:
+        console.print(f"warning: {warning}", markup=False)
+    console.print("next: shapegcode convert shapes this program and shows what it gains", markup=False)
+    return ExitCode.OK
