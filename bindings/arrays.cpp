@@ -8,8 +8,8 @@ namespace shapegcode::bindings {
 
 pybind11::array view(const Eigen::MatrixXd& matrix, pybind11::handle base) {
   constexpr auto stride = static_cast<pybind11::ssize_t>(sizeof(double));
-  pybind11::array array(pybind11::dtype::of<double>(), {matrix.rows(), matrix.cols()},
-                        {stride, stride * matrix.rows()}, matrix.data(), base);
+  pybind11::array array(pybind11::dtype::of<double>(), {matrix.rows(), matrix.cols()}, {stride, stride * matrix.rows()},
+                        matrix.data(), base);
   pybind11::detail::array_proxy(array.ptr())->flags &= ~pybind11::detail::npy_api::NPY_ARRAY_WRITEABLE_;
   return array;
 }

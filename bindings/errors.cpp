@@ -56,8 +56,8 @@ void raise(const Error& error) {
 void register_errors(py::module_& module) {
   const py::object exception = py::reinterpret_borrow<py::object>(PyExc_Exception);
   const py::object value_error = py::reinterpret_borrow<py::object>(PyExc_ValueError);
-  const py::object base = py::reinterpret_steal<py::object>(make_type(
-      module, "ShapegcodeError", py::make_tuple(exception), "Base of every error that shapegcode raises."));
+  const py::object base = py::reinterpret_steal<py::object>(
+      make_type(module, "ShapegcodeError", py::make_tuple(exception), "Base of every error that shapegcode raises."));
   base.inc_ref();
   types().program = make_type(module, "ProgramError", py::make_tuple(base),
                               "The CNC program cannot be read; `line` and `column` count from 1, 0 if not known.");
@@ -65,10 +65,10 @@ void register_errors(py::module_& module) {
   module.attr("ProgramError").attr("column") = 0;
   types().design = make_type(module, "DesignError", py::make_tuple(base),
                              "The shaper asked for does not exist, or not on this grid.");
-  types().argument = make_type(module, "ArgumentError", py::make_tuple(base, value_error),
-                               "A value is outside its stated range.");
-  types().numeric = make_type(module, "NumericError", py::make_tuple(base),
-                              "A solver failed; the message carries its flag.");
+  types().argument =
+      make_type(module, "ArgumentError", py::make_tuple(base, value_error), "A value is outside its stated range.");
+  types().numeric =
+      make_type(module, "NumericError", py::make_tuple(base), "A solver failed; the message carries its flag.");
   py::register_exception_translator([](std::exception_ptr pointer) {
     try {
       if (pointer) {

@@ -21,7 +21,8 @@ struct FittedBlocks {
 }  // namespace
 
 void register_emission(py::module_& module) {
-  py::class_<ShapingOptions>(module, "ShapingOptions", "How a region is turned into a shaped command on the block grid.")
+  py::class_<ShapingOptions>(module, "ShapingOptions",
+                             "How a region is turned into a shaped command on the block grid.")
       .def(py::init<>())
       .def_readwrite("limits", &ShapingOptions::limits, "Limits of the look-ahead.")
       .def_readwrite("block_period_s", &ShapingOptions::block_period_s, "s.")

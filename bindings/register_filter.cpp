@@ -22,10 +22,11 @@ py::array_t<double> apply(const Fir& fir, const MatrixArray& samples) {
   const py::ssize_t rows = samples.shape(0);
   const py::ssize_t columns = samples.ndim() == 2 ? samples.shape(1) : 1;
   const py::ssize_t out_rows = rows + fir.duration_samples();
-  py::array_t<double> out = samples.ndim() == 1 ? py::array_t<double>(out_rows)
-                                                : py::array_t<double>({out_rows, columns},
-                                                                      {static_cast<py::ssize_t>(sizeof(double)),
-                                                                       static_cast<py::ssize_t>(sizeof(double)) * out_rows});
+  py::array_t<double> out =
+      samples.ndim() == 1
+          ? py::array_t<double>(out_rows)
+          : py::array_t<double>({out_rows, columns}, {static_cast<py::ssize_t>(sizeof(double)),
+                                                      static_cast<py::ssize_t>(sizeof(double)) * out_rows});
   const double* in = samples.data();
   double* to = out.mutable_data();
   {
@@ -35,7 +36,8 @@ py::array_t<double> apply(const Fir& fir, const MatrixArray& samples) {
   return out;
 }
 
-py::array_t<double> stream_step(FirStream& stream, const py::array_t<double, py::array::forcecast>& position, int n_axes) {
+py::array_t<double> stream_step(FirStream& stream, const py::array_t<double, py::array::forcecast>& position,
+                                int n_axes) {
   if (position.ndim() != 1 || position.shape(0) != n_axes) {
     throw Error(ErrorKind::argument, "position must have the shape (n_axes,)");
   }
@@ -67,7 +69,8 @@ void register_filter(py::module_& module) {
       .def_property_readonly("variance_samples2", &Fir::variance_samples2,
                              "Second central moment in samples squared: the contour cost.")
       .def("apply", &apply, py::arg("samples"),
-           "Filter samples of shape (n,) or (n, n_axes); the result has duration_samples more rows. The input is held at "
+           "Filter samples of shape (n,) or (n, n_axes); the result has duration_samples more rows. The input is held "
+           "at "
            "its first value before and at its last value after. Bit-identical to FirStream. Raises ArgumentError on "
            "another shape.")
       .def("__repr__", [](const Fir& fir) {
@@ -76,8 +79,10 @@ void register_filter(py::module_& module) {
       });
 
   py::class_<PyStream>(module, "FirStream", "Real-time form of Fir: one sample of every axis per step.")
-      .def(py::init([](const Fir& fir, int n_axes) { return PyStream{FirStream(fir, n_axes), n_axes}; }), py::arg("fir"),
-           py::arg("n_axes"), "At rest at zero. Raises ArgumentError on n_axes < 1.")
+      .def(py::init([](const Fir& fir, int n_axes) {
+             return PyStream{FirStream(fir, n_axes), n_axes};
+           }),
+           py::arg("fir"), py::arg("n_axes"), "At rest at zero. Raises ArgumentError on n_axes < 1.")
       .def(
           "reset",
           [](PyStream& self, const std::vector<double>& position) {

@@ -110,7 +110,8 @@ void register_gcode(py::module_& module) {
       .def_property_readonly(
           "text", [](const Program& self) { return py::bytes(self.text); }, "The whole text.")
       .def("slice", &slice, py::arg("begin"), py::arg("end"), "Bytes of the text between two offsets.")
-      .def_property_readonly("size", [](const Program& self) { return self.text.size(); }, "Bytes.")
+      .def_property_readonly(
+          "size", [](const Program& self) { return self.text.size(); }, "Bytes.")
       .def_readonly("line_end", &Program::line_end, "Line end of the text.")
       .def_readonly("line_count", &Program::line_count, "Lines.")
       .def_readonly("block_count", &Program::block_count, "Lines with at least one word.")
@@ -144,7 +145,8 @@ void register_gcode(py::module_& module) {
 
   module.def(
       "read_program",
-      [](std::string text, const ReaderOptions& options) {
+      [](const py::bytes& bytes, const ReaderOptions& options) {
+        auto text = static_cast<std::string>(bytes);
         const py::gil_scoped_release release;
         return std::make_shared<Program>(read_program(std::move(text), options));
       },

@@ -47,7 +47,8 @@ void register_motion(py::module_& module) {
       .def_readwrite("contour_tolerance_mm", &MotionLimits::contour_tolerance_mm,
                      "Deviation allowed to the filter that follows.")
       .def_readwrite("filter_variance_s2", &MotionLimits::filter_variance_s2, "Its second central moment, s^2.")
-      .def_readwrite("filter_mean_deviation_s", &MotionLimits::filter_mean_deviation_s, "Its mean absolute deviation, s.");
+      .def_readwrite("filter_mean_deviation_s", &MotionLimits::filter_mean_deviation_s,
+                     "Its mean absolute deviation, s.");
 
   py::class_<SpeedProfile, std::shared_ptr<SpeedProfile>>(module, "SpeedProfile",
                                                           "Distance along a path as a function of time.")
@@ -65,7 +66,8 @@ void register_motion(py::module_& module) {
       py::arg("path"), py::arg("limits"),
       "Tangential speed profile over a whole path from rest to rest. Raises ArgumentError on a limit that is not > 0.");
 
-  py::class_<Interpolator>(module, "Interpolator", "Set-points of a path, one per interpolation period (real-time form).")
+  py::class_<Interpolator>(module, "Interpolator",
+                           "Set-points of a path, one per interpolation period (real-time form).")
       .def(py::init([](std::shared_ptr<Path> path, std::shared_ptr<SpeedProfile> profile, double period_s) {
              return Interpolator(std::move(path), std::move(profile), period_s);
            }),

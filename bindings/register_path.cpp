@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -25,9 +26,9 @@ py::array polyline(const Path& path, double step_rad) {
     if (points.empty()) {
       points.push_back(segment.start_mm);
     }
-    const int pieces =
-        segment.kind == SegmentKind::arc ? std::max(1, static_cast<int>(std::ceil(std::abs(segment.sweep_rad) / step_rad)))
-                                         : 1;
+    const int pieces = segment.kind == SegmentKind::arc
+                           ? std::max(1, static_cast<int>(std::ceil(std::abs(segment.sweep_rad) / step_rad)))
+                           : 1;
     for (int i = 1; i <= pieces; ++i) {
       points.push_back(point_at(segment, segment.length_mm * i / pieces));
     }
@@ -49,8 +50,7 @@ void register_path(py::module_& module) {
 
   py::class_<Segment>(module, "Segment", "One canonical move in mm.")
       .def_static(
-          "line",
-          [](const Vector3& start, const Vector3& end, double feed) { return make_line(start, end, feed); },
+          "line", [](const Vector3& start, const Vector3& end, double feed) { return make_line(start, end, feed); },
           py::arg("start_mm"), py::arg("end_mm"), py::arg("feed_mm_per_s"), "A straight move.")
       .def_static(
           "arc",
@@ -62,7 +62,8 @@ void register_path(py::module_& module) {
           },
           py::arg("start_mm"), py::arg("end_mm"), py::arg("centre_mm"), py::arg("sweep_rad"), py::arg("feed_mm_per_s"),
           py::arg("normal") = 2,
-          "An arc or helix about the axis `normal` (0 X, 1 Y, 2 Z); `sweep_rad` > 0 turns counter-clockwise seen along it. "
+          "An arc or helix about the axis `normal` (0 X, 1 Y, 2 Z); `sweep_rad` > 0 turns counter-clockwise seen along "
+          "it. "
           "Raises ArgumentError on a zero radius or sweep.")
       .def_readonly("start_mm", &Segment::start_mm, "Start, shape (3,), mm.")
       .def_readonly("end_mm", &Segment::end_mm, "End, shape (3,), mm.")
@@ -74,8 +75,9 @@ void register_path(py::module_& module) {
       .def_readonly("line_number", &Segment::line, "Source line, from 1; 0 if there is none.")
       .def_readonly("kind", &Segment::kind, "Kind of the move.")
       .def_readonly("normal", &Segment::normal, "Axis across the plane of an arc: 0 X, 1 Y, 2 Z.")
-      .def("point_at", [](const Segment& self, double s) { return point_at(self, s); }, py::arg("s_mm"),
-           "Position at a distance from the start, shape (3,), mm.");
+      .def(
+          "point_at", [](const Segment& self, double s) { return point_at(self, s); }, py::arg("s_mm"),
+          "Position at a distance from the start, shape (3,), mm.");
 
   py::class_<Path, std::shared_ptr<Path>>(module, "Path", "A connected run of segments.")
       .def(py::init<std::vector<Segment>>(), py::arg("segments"),
@@ -102,6 +104,16 @@ void register_path(py::module_& module) {
           "end_mm",
           [](const Path& self) { return self.size() > 0 ? self[self.size() - 1].end_mm : Vector3(Vector3::Zero()); },
           "End, shape (3,), mm.")
+      .def_property_readonly(
+          "slowest_feed_mm_per_s",
+          [](const Path& self) {
+            double slowest = std::numeric_limits<double>::infinity();
+            for (const Segment& segment : self.segments()) {
+              slowest = std::min(slowest, segment.feed_mm_per_s);
+            }
+            return slowest;
+          },
+          "Smallest programmed feed, mm/s; infinity for an empty path.")
       .def_property_readonly(
           "largest_sweep_rad",
           [](const Path& self) {

@@ -36,6 +36,8 @@ void register_simulation(py::module_& module) {
       .def_readwrite("axis_filters", &PlaybackOptions::axis_filters, "Filters after the set-points, in order.")
       .def_readwrite("modes", &PlaybackOptions::modes, "Modes of X, Y and Z.")
       .def_readwrite("measure_contour", &PlaybackOptions::measure_contour, "Deviations and orbit errors.")
+      .def_readwrite("last_seconds", &PlaybackOptions::last_seconds,
+                     "Blocks only: play the last so many seconds; 0: all.")
       .def_readwrite("record_samples", &PlaybackOptions::record_samples, "Samples kept for pictures; 0: none.");
 
   py::class_<PlaybackFigures, std::shared_ptr<PlaybackFigures>>(module, "PlaybackFigures",

@@ -16,30 +16,66 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from shapegcode._core import (
         ArgumentError as ArgumentError,
+    )
+    from shapegcode._core import (
         DesignError as DesignError,
+    )
+    from shapegcode._core import (
         Fir as Fir,
+    )
+    from shapegcode._core import (
         FirStream as FirStream,
+    )
+    from shapegcode._core import (
         Mode as Mode,
+    )
+    from shapegcode._core import (
         NumericError as NumericError,
+    )
+    from shapegcode._core import (
         Path as Path,
+    )
+    from shapegcode._core import (
         ProgramError as ProgramError,
+    )
+    from shapegcode._core import (
         Segment as Segment,
+    )
+    from shapegcode._core import (
         ShapegcodeError as ShapegcodeError,
+    )
+    from shapegcode._core import (
         Shaper as Shaper,
+    )
+    from shapegcode._core import (
         __version__ as __version__,
+    )
+    from shapegcode._core import (
         convolved_zv as convolved_zv,
+    )
+    from shapegcode._core import (
         grid_polynomial as grid_polynomial,
+    )
+    from shapegcode._core import (
         minimal_two_mode as minimal_two_mode,
+    )
+    from shapegcode._core import (
         zv as zv,
     )
-    from shapegcode.converter import Conversion as Conversion, choose_grid as choose_grid, convert as convert
-    from shapegcode.machine import Machine as Machine, MachineError as MachineError
+    from shapegcode.converter import Conversion as Conversion
+    from shapegcode.converter import choose_grid as choose_grid
+    from shapegcode.converter import convert as convert
+    from shapegcode.machine import Machine as Machine
+    from shapegcode.machine import MachineError as MachineError
     from shapegcode.program import Program as Program
     from shapegcode.shaping import (
         choose_block_period as choose_block_period,
+    )
+    from shapegcode.shaping import (
         shortest_non_negative as shortest_non_negative,
     )
-    from shapegcode.simulator import Simulation as Simulation, simulate as simulate
+    from shapegcode.simulator import Simulation as Simulation
+    from shapegcode.simulator import simulate as simulate
 
 _HOME = {
     **dict.fromkeys(

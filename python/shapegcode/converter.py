@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +14,7 @@ from shapegcode.emit import Grid, emit_region, make_grid, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.shaping import choose_block_period, shortest_non_negative
-from shapegcode.verify import Placed, axis_modes, measure, other_time_s, read_back, summarise
+from shapegcode.verify import Placed, axis_modes, measure, other_time_s, play_original, read_back, summarise
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
 _COMMENT_WIDTH = 60
@@ -72,7 +74,8 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
         )
     if period < controller.block_time_s * (1 - 1e-9):
         raise _core.ArgumentError(
-            f"block period {period * 1e3:g} ms is below the controller's block time {controller.block_time_s * 1e3:g} ms"
+            f"block period {period * 1e3:g} ms is below the block time {controller.block_time_s * 1e3:g} ms "
+            "(controller.block_time_s)"
         )
     return make_grid(period, shortest_non_negative(modes, period, machine.shaping.max_duration_s))
 
@@ -109,8 +112,43 @@ def convert(
         grid=grid,
         contour_tolerance_um=machine.tolerance.contour_um * _CONTOUR_MARGIN,
     )
+    # The originals are played on the other cores while this one shapes.
+    pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
+    try:
+        originals = [
+            pool.submit(play_original, region.path, machine)
+            for region in program.regions
+            if not _why_kept(region, machine)
+        ]
+        written = _write(program, machine, grid, limits, on_progress)
+        emitted = read_back(written.text, written.placed, machine)
+        figures = measure(
+            emitted, written.placed, originals, machine, pool,
+            lambda done: on_progress("round trip", done, len(written.placed)),
+        )  # fmt: skip
+    finally:
+        pool.shutdown(cancel_futures=True)
+    report = _report(program, machine, grid, written, summarise(figures, written.placed, machine))
+    return Conversion(written.text, report, emitted, tuple(written.placed))
+
+
+@dataclass(frozen=True)
+class _Written:
+    """The emitted text before it is judged."""
+
+    text: bytes
+    placed: list[Placed]
+    blocks: int
+    kept_warnings: list[str]
+    kept_s: float
+
+
+def _write(
+    program: Program, machine: Machine, grid: Grid, limits: _core.MotionLimits, on_progress: Progress
+) -> _Written:
     core = program.core
     regions = program.regions
+    reasons = [_why_kept(region, machine) for region in regions]
     line_end = core.line_end.encode()
     parts: list[bytes] = []
     line = 1
@@ -121,27 +159,56 @@ def convert(
         line += piece.count(b"\n")
 
     put(core.slice(0, core.header_offset))
-    if machine.emission.header and regions:
+    if machine.emission.header and not all(reasons):
         put(b"".join(comment.encode() + line_end for comment in _header(machine, grid)))
     position = core.header_offset
     placed: list[Placed] = []
+    kept: list[str] = []
+    kept_s = 0.0
     blocks = 0
-    for done, region in enumerate(regions, start=1):
+    for done, (region, reason) in enumerate(zip(regions, reasons, strict=True), start=1):
         put(core.slice(position, region.text_begin))
-        shaped = emit_region(program, region, machine, grid, limits)
+        position = region.text_end
+        if reason:
+            kept.append(_keep(program, region, machine, reason))
+            kept_s += play_original(region.path, machine).duration_s
+            put(core.slice(region.text_begin, region.text_end))
+            continue
+        try:
+            shaped = emit_region(program, region, machine, grid, limits)
+        except _core.ArgumentError as error:
+            raise _region_error(program, region, str(error)) from error
         first = line
         put(shaped.text)
         placed.append(Placed(region, first, line - 1))
         blocks += shaped.blocks
-        position = region.text_end
         on_progress("shaping", done, len(regions))
     put(core.slice(position, core.size))
-    text = b"".join(parts)
+    return _Written(b"".join(parts), placed, blocks, kept, kept_s)
 
-    emitted = read_back(text, placed, program, machine)
-    figures = measure(emitted, placed, machine, lambda done: on_progress("round trip", done, len(regions)))
-    report = _report(program, machine, grid, text, blocks, placed, summarise(figures, placed, machine))
-    return Conversion(text, report, emitted, tuple(placed))
+
+def _why_kept(region: _core.Region, machine: Machine) -> str:
+    """Why a region cannot be written as shaped blocks; empty if it can."""
+    slowest = region.path.slowest_feed_mm_per_s * 60.0
+    least = machine.controller.minimum_feed_mm_per_min
+    if slowest < least * (1 - 1e-9):
+        return f"feed {slowest:g} mm/min is below controller.minimum_feed_mm_per_min = {least:g}"
+    return ""
+
+
+def _keep(program: Program, region: _core.Region, machine: Machine, reason: str) -> str:
+    """The warning for a region that keeps its text."""
+    if machine.input.arc_centre == "absolute" and region.path.largest_sweep_rad > 0.0:
+        raise _region_error(program, region, f"{reason}; its arcs have absolute centres and cannot be kept as they are")
+    first, last = region.first_line, region.last_line
+    return f"{program.source}:{first}: lines {first} to {last} kept untouched: {reason}"
+
+
+def _region_error(program: Program, region: _core.Region, message: str) -> _core.ProgramError:
+    first, last = region.first_line, region.last_line
+    error = _core.ProgramError(f"{program.source}:{first}:1: lines {first} to {last}: {message}")
+    error.__dict__.update(line=first, column=1)
+    return error
 
 
 def _header(machine: Machine, grid: Grid) -> list[str]:
@@ -168,26 +235,23 @@ def _plain(text: str) -> str:
 
 
 def _report(
-    program: Program,
-    machine: Machine,
-    grid: Grid,
-    text: bytes,
-    blocks: int,
-    placed: list[Placed],
-    figures: dict[str, Any],
+    program: Program, machine: Machine, grid: Grid, written: _Written, figures: dict[str, Any]
 ) -> dict[str, Any]:
-    warnings = program.warnings
+    placed = written.placed
+    warnings = [*program.warnings, *written.kept_warnings]
     cutting = {
         which: sum(region["time_s"][which] for region in figures["regions"]) for which in ("original", "emitted")
     }
-    other = other_time_s(program.core.other_moves, machine)
+    other = written.kept_s + other_time_s(program.core.other_moves, machine)
     prefill = machine.emission.prefill_dwell_s * len(placed)
     if not placed:
         warnings.append(f"{program.source}: no cutting moves that can be shaped: the text is unchanged")
     for region in figures["regions"]:
         first, last = region["lines"]
         warnings += [f"{program.source}:{first}: lines {first} to {last}: {miss}" for miss in region["misses"]]
-    warnings += _controller_warnings(machine, text, cutting["emitted"], blocks, figures["slowed_blocks"])
+    warnings += _controller_warnings(
+        machine, written.text, cutting["emitted"], written.blocks, figures["slowed_blocks"]
+    )
     return {
         "program": program.source,
         "machine": machine.name,
@@ -201,17 +265,15 @@ def _report(
             "times_s": [float(t) for t in grid.shaper.times_s],
             "amplitudes": [float(a) for a in grid.shaper.amplitudes],
         },
-        "blocks": {"read": program.core.block_count, "emitted": blocks},
-        "bytes_emitted": len(text),
+        "blocks": {"read": program.core.block_count, "emitted": written.blocks},
+        "bytes_emitted": len(written.text),
         **figures,
         "within_tolerance": not any(region["misses"] for region in figures["regions"]),
         "warnings": warnings,
     }
 
 
-def _controller_warnings(
-    machine: Machine, text: bytes, cutting_s: float, blocks: int, slowed_blocks: int
-) -> list[str]:
+def _controller_warnings(machine: Machine, text: bytes, cutting_s: float, blocks: int, slowed_blocks: int) -> list[str]:
     controller = machine.controller
     warnings = []
     if len(text) > controller.program_memory_bytes:

@@ -17,6 +17,7 @@ from shapegcode.verify import largest_um, playback_options
 # Paper 000, Table 2 (orbit error of the command in %) and its text on time ("up to 37 %", "under 4 %").
 _PAPER_ORBIT_PERCENT = {(100, 40): 0.0270, (200, 40): 0.1075, (100, 1): 0.1051, (200, 1): 0.3546}
 _PAPER_TIME = {40: "up to +37 %", 1: "under +4 %"}
+_LONGEST_IDEAL_S = 0.05
 _FINE_PERIOD_S = 1e-5  # the ideal command is continuous; at this period its figures no longer change
 
 
@@ -34,11 +35,9 @@ def ideal_command(path: _core.Path, machine: Machine, arc_feed_ratio: float) -> 
         Set-points, (n, 3), every 10 us, and their figures.
     """
     modes = [mode for axis in machine.axes.as_tuple() for mode in axis.modes]
-    shaper = next(
-        design
-        for design in _core.minimal_two_mode(*(_core.Mode(m.frequency_hz, m.damping_ratio) for m in modes), 0.05)
-        if not design.has_negative
-    )
+    first, second = (_core.Mode(mode.frequency_hz, mode.damping_ratio) for mode in modes)
+    designs = _core.minimal_two_mode(first, second, _LONGEST_IDEAL_S)
+    shaper = next(design for design in designs if not design.has_negative)
     delays = [round(t / _FINE_PERIOD_S) for t in shaper.times_s]
     profile = _core.plan_speed(path, motion_limits(machine, arc_feed_ratio=arc_feed_ratio))
     samples = _core.Fir(delays, list(shaper.amplitudes)).apply(_core.interpolate(path, profile, _FINE_PERIOD_S))
@@ -90,7 +89,7 @@ def path_demo() -> dict[str, Any]:
         "conditions": rows,
         "remark": (
             "The paper's 1 % rows are .0319 (100 mm/s) and .0638 (200 mm/s) above the model. Likely cause: there the "
-            "stretch of constant speed before the arc lasts 125.25 (25.25) ms, off a 0.1 ms simulation grid; losing 50 us "
-            "shifts the arc, and a path shifted so gives .1050 and .3544. Nothing here is tuned to the paper."
+            "stretch of constant speed before the arc lasts 125.25 (25.25) ms, off a 0.1 ms simulation grid; losing "
+            "50 us shifts the arc, and a path shifted so gives .1050 and .3544. Nothing here is tuned to the paper."
         ),
     }

@@ -82,7 +82,9 @@ def motion_limits(
     return limits
 
 
-def emit_region(program: Program, region: _core.Region, machine: Machine, grid: Grid, limits: _core.MotionLimits) -> EmittedRegion:
+def emit_region(
+    program: Program, region: _core.Region, machine: Machine, grid: Grid, limits: _core.MotionLimits
+) -> EmittedRegion:
     """Shape one region and write it.
 
     The text begins with `emission.prologue` and a full safe line and ends with the modal state of the original.
@@ -141,9 +143,7 @@ def emit_region(program: Program, region: _core.Region, machine: Machine, grid: 
     tail = [_restore_line(region, motion, plane), *machine.emission.epilogue]
     end = line_end.encode()
     lines = b"".join(line.encode("latin-1") + end for line in head)
-    return EmittedRegion(
-        lines + text + b"".join(line.encode("latin-1") + end for line in tail), len(fitted)
-    )
+    return EmittedRegion(lines + text + b"".join(line.encode("latin-1") + end for line in tail), len(fitted))
 
 
 def decimal(value: float, decimals: int) -> str:
@@ -154,7 +154,7 @@ def decimal(value: float, decimals: int) -> str:
 
 def feed_word(feed: float) -> str:
     """F with a point, and with a digit behind it below 10, so that it is never a one-digit feed code."""
-    text = decimal(feed, 4)
+    text = decimal(feed, 8)  # as many digits as a word can have
     return f"F{text}0" if feed < 10.0 and text.endswith(".") else f"F{text}"
 
 
@@ -176,7 +176,7 @@ def _safe_line(region: _core.Region, start: list[int], decimals: int, number: in
         ]
     # In G93 the modal F is no speed; the first block brings its own.
     unit = MM_PER_INCH if entry.units == 20 else 1.0
-    words.append(feed_word(max(0.0001, region.path[0].feed_mm_per_s * 60.0 / unit)))
+    words.append(feed_word(max(1e-8, region.path[0].feed_mm_per_s * 60.0 / unit)))
     return "".join(words)
 
 

@@ -147,9 +147,7 @@ class Mode(_Table):
     frequency_hz: Annotated[_Positive, Field(le=10_000)] = _key(
         "natural frequency; from a tap test, or from the decay after a rapid stop", unit="Hz"
     )
-    damping_ratio: Annotated[_NonNegative, Field(lt=1)] = _key(
-        "damping ratio (1 = critically damped)", unit="1"
-    )
+    damping_ratio: Annotated[_NonNegative, Field(lt=1)] = _key("damping ratio (1 = critically damped)", unit="1")
     participation: _Positive = _key(
         "share of this mode in the axis's deflection; several modes of one axis need not add up to 1",
         unit="1",
@@ -172,9 +170,7 @@ class Axis(_Table):
     max_jerk_mm_s3: _Positive | None = _key(
         "largest jerk while cutting; left out: not limited", unit="mm/s³", default=None
     )
-    modes: tuple[Mode, ...] = _key(
-        "vibration modes, one table each; none: the axis is taken as rigid", default=()
-    )
+    modes: tuple[Mode, ...] = _key("vibration modes, one table each; none: the axis is taken as rigid", default=())
 
 
 class Axes(_Table):
@@ -221,8 +217,7 @@ class Controller(_Table):
         assumed=True,
     )
     time_constant_s: Annotated[_NonNegative, Field(le=10)] = _key(
-        "duration of a speed change (look-ahead, constant time) or length of the moving average (after "
-        "interpolation)",
+        "duration of a speed change (look-ahead, constant time) or length of the moving average (after interpolation)",
         unit="s",
         fanuc="1622, 1769",
         default=0.05,
@@ -236,8 +231,7 @@ class Controller(_Table):
         assumed=True,
     )
     corner_speed_difference_mm_per_min: _AxisValues = _key(
-        "largest speed step of an axis where two blocks meet; 0: stop at every corner. One number, or "
-        "x, y, z",
+        "largest speed step of an axis where two blocks meet; 0: stop at every corner. One number, or x, y, z",
         unit="mm/min",
         fanuc="1783",
         default=500.0,
@@ -303,8 +297,7 @@ class Controller(_Table):
         "smallest coordinate step in G20", unit="inch", default=0.0001
     )
     arc_radius_tolerance_mm: _Positive = _key(
-        "start and end radius of an arc may differ by this much; beyond it the block is an error (alarm "
-        "0020)",
+        "start and end radius of an arc may differ by this much; beyond it the block is an error (alarm 0020)",
         unit="mm",
         fanuc="3410",
         default=0.01,
@@ -329,12 +322,8 @@ class Controller(_Table):
 class PowerOn(_Table):
     """Modal state before the first block of a program."""
 
-    motion: Literal["G00", "G01", "G02", "G03"] = _key(
-        "kind of motion", fanuc="3402#0", default="G00", assumed=True
-    )
-    plane: Literal["G17", "G18", "G19"] = _key(
-        "plane of arcs", fanuc="3402#1, #2", default="G17", assumed=True
-    )
+    motion: Literal["G00", "G01", "G02", "G03"] = _key("kind of motion", fanuc="3402#0", default="G00", assumed=True)
+    plane: Literal["G17", "G18", "G19"] = _key("plane of arcs", fanuc="3402#1, #2", default="G17", assumed=True)
     distance: Literal["G90", "G91"] = _key(
         "absolute (G90) or incremental (G91) coordinates", fanuc="3402#3", default="G90", assumed=True
     )
@@ -342,9 +331,7 @@ class PowerOn(_Table):
     feed_mode: Literal["G93", "G94", "G95"] = _key(
         "feed per minute (G94), inverse time (G93) or per revolution (G95)", default="G94", assumed=True
     )
-    path_mode: Literal["G61", "G64"] = _key(
-        "exact stop (G61) or cutting mode (G64)", default="G64", assumed=True
-    )
+    path_mode: Literal["G61", "G64"] = _key("exact stop (G61) or cutting mode (G64)", default="G64", assumed=True)
     work_offset: Literal["G54", "G55", "G56", "G57", "G58", "G59"] = _key(
         "work coordinate system", default="G54", assumed=True
     )
@@ -365,8 +352,7 @@ class Input(_Table):
         default="incremental",
     )
     tool_change_unknown_axes: Annotated[str, Strict(), Field(pattern=r"^X?Y?Z?$")] = _key(
-        "axes whose position is not known after M06, until they are programmed again; letters of XYZ in this "
-        "order",
+        "axes whose position is not known after M06, until they are programmed again; letters of XYZ in this order",
         default="XYZ",
         assumed=True,
     )
@@ -385,9 +371,7 @@ class Input(_Table):
     def _known_offsets(cls, offsets: dict[str, Any]) -> dict[str, Any]:
         for name in offsets:
             if not _OFFSET_NAME.fullmatch(name):
-                raise ValueError(
-                    f'{name} is no work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"'
-                )
+                raise ValueError(f'{name} is no work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"')
         return offsets
 
 
@@ -420,8 +404,7 @@ class Emission(_Table):
         "longest line written", unit="characters", default=60, assumed=True
     )
     arc_min_chord_mm: _NonNegative = _key(
-        "a piece of an arc with a shorter chord is written as a line: rounding could turn it into a full "
-        "circle",
+        "a piece of an arc with a shorter chord is written as a line: rounding could turn it into a full circle",
         unit="mm",
         default=0.02,
     )
@@ -457,9 +440,7 @@ class Emission(_Table):
 class Shaping(_Table):
     """What is shaped, and how."""
 
-    max_duration_s: Annotated[_Positive, Field(le=10)] = _key(
-        "longest shaper that is accepted", unit="s", default=0.25
-    )
+    max_duration_s: Annotated[_Positive, Field(le=10)] = _key("longest shaper that is accepted", unit="s", default=0.25)
     arc_feed_ratio: Annotated[_Positive, Field(le=1)] = _key(
         "feed in arcs as a share of the programmed feed, reached before the arc begins; 1: no reduction",
         unit="1",
@@ -480,8 +461,7 @@ class Tolerance(_Table):
         "largest deviation of the emitted command from the programmed path", unit="µm", default=50.0
     )
     residual_ratio: Annotated[_NonNegative, Field(le=1)] = _key(
-        "residual vibration passes if it is below this share of the original program's, or below "
-        "residual_floor_um",
+        "residual vibration passes if it is below this share of the original program's, or below residual_floor_um",
         unit="1",
         default=0.25,
     )
@@ -623,9 +603,7 @@ class Machine(_Table):
         """Names of the machines that come with shapegcode, sorted."""
         folder = resources.files("shapegcode") / "data"
         return tuple(
-            sorted(
-                entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
-            )
+            sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
         )
 
     @classmethod

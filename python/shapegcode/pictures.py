@@ -28,9 +28,7 @@ def write_pictures(conversion: Conversion, machine: Machine, folder: str | Path)
     """
     if not conversion.placed:
         return []
-    residuals = [
-        max(region["residual_vibration_um"]["original"].values()) for region in conversion.report["regions"]
-    ]
+    residuals = [max(region["residual_vibration_um"]["original"].values()) for region in conversion.report["regions"]]
     place = conversion.placed[int(np.argmax(residuals))]
     path = place.region.path
     blocks = conversion.emitted.core.cutting_path(place.first_line, place.last_line)

@@ -116,9 +116,7 @@ def plot_path(
     across, up = (_AXIS_NAMES.index(name) for name in plane)
     figure = _figure(7.2, 6.4)
     axes = figure.add_subplot()
-    axes.plot(
-        polyline[:, across], polyline[:, up], color=_GREY, linewidth=3, alpha=0.55, label="programmed path"
-    )
+    axes.plot(polyline[:, across], polyline[:, up], color=_GREY, linewidth=3, alpha=0.55, label="programmed path")
     for number, (label, feet, deviation) in enumerate(drawn):
         curve = feet + factor * deviation
         largest_um = 1e3 * float(np.linalg.norm(deviation, axis=1).max())
@@ -177,9 +175,7 @@ def plot_feed(file: str | Path, traces: Sequence[Trace]) -> None:
     _save(figure, file)
 
 
-def plot_vibration(
-    file: str | Path, traces: Sequence[Trace], *, rest_s: Mapping[str, float] | None = None
-) -> None:
+def plot_vibration(file: str | Path, traces: Sequence[Trace], *, rest_s: Mapping[str, float] | None = None) -> None:
     """How much does each axis swing about its command, and how much of it remains after the stop?
 
     Args:
@@ -326,9 +322,7 @@ def _title(axes: Axes, text: str, *, above_legend: bool = False) -> None:
 
 def _legend_above(panel: Axes) -> None:
     """Legend between the panel and what is above it, where it hides no curve."""
-    panel.legend(
-        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.2, fontsize=9
-    )
+    panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.2, fontsize=9)
 
 
 def _deviation_scale(axes: Axes, factor: float, largest_mm: float) -> None:

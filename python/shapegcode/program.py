@@ -17,9 +17,7 @@ MM_PER_INCH = 25.4
 _ARC_OFF_RADIUS = "off its radius"
 
 
-def reader_options(
-    machine: Machine, *, emitted: bool = False, probe_lines: Sequence[int] = ()
-) -> _core.ReaderOptions:
+def reader_options(machine: Machine, *, emitted: bool = False, probe_lines: Sequence[int] = ()) -> _core.ReaderOptions:
     """Settings with which the core reads a program of this machine.
 
     Args:
@@ -34,9 +32,7 @@ def reader_options(
     options.least_increment_inch = machine.controller.least_increment_inch
     options.arc_tolerance_mm = machine.controller.arc_radius_tolerance_mm
     options.max_line_length = machine.input.max_line_length
-    options.unknown_after_tool_change = [
-        axis in machine.input.tool_change_unknown_axes for axis in "XYZ"
-    ]
+    options.unknown_after_tool_change = [axis in machine.input.tool_change_unknown_axes for axis in "XYZ"]
     offsets = machine.input.work_offsets
     if offsets:
         options.work_offsets_mm = [offsets.get(f"G{code}", (0.0, 0.0, 0.0)) for code in range(54, 60)]
@@ -98,7 +94,7 @@ class Program:
         except ProgramError as error:
             hint = _absolute_centre_hint(data, options) if _ARC_OFF_RADIUS in str(error) else ""
             located = ProgramError(f"{source}:{error.line}:{error.column}: {error}{hint}")
-            located.line, located.column = error.line, error.column
+            located.__dict__.update(line=error.line, column=error.column)
             raise located from None
 
     @property

@@ -137,8 +137,7 @@ def choose_block_period(
             f"{_ms(interpolation_period_s)}"
         )
     candidates = tuple(
-        _candidate(modes, multiple * interpolation_period_s, max_duration_s)
-        for multiple in range(fewest, most + 1)
+        _candidate(modes, multiple * interpolation_period_s, max_duration_s) for multiple in range(fewest, most + 1)
     )
     designs = [(each.period_s, each.shaper) for each in candidates if each.shaper is not None]
     if not designs:
@@ -148,9 +147,7 @@ def choose_block_period(
             f"modes {_names(modes)}; the first says: {candidates[0].refusal}"
         )
     limit = (1.0 + _SAME_DURATION) * min(shaper.duration_s for _, shaper in designs)
-    period_s, shaper = max(
-        (each for each in designs if each[1].duration_s <= limit), key=lambda each: each[0]
-    )
+    period_s, shaper = max((each for each in designs if each[1].duration_s <= limit), key=lambda each: each[0])
     return BlockPeriodChoice(period_s, shaper, candidates)
 
 
@@ -295,9 +292,7 @@ def _polished(vertex: FloatArray, modes: Sequence[Mode], period_s: float) -> Sha
 def _none_exists(modes: Sequence[Mode], period_s: float, max_duration_s: float) -> str:
     try:
         polynomial = grid_polynomial(modes, period_s)
-        what_exists = (
-            f"the shortest polynomial lasts {_ms(polynomial.duration_s)} with sum|a| {polynomial.abs_sum:.4g}"
-        )
+        what_exists = f"the shortest polynomial lasts {_ms(polynomial.duration_s)} with sum|a| {polynomial.abs_sum:.4g}"
     except ShapegcodeError as error:
         what_exists = f"nor is there a polynomial: {error}"
     return (

@@ -6,9 +6,8 @@ Nothing here looks at what the converter meant to write; the figures are those o
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,9 +82,7 @@ def playback_options(machine: Machine, *, time_constant_s: float = 0.0) -> _core
     options.period_s = period
     options.modes = axis_modes(machine)
     options.axis_filters = [
-        _core.Fir.moving_average(round(length / period))
-        for length in (time_constant_s,)
-        if round(length / period) > 1
+        _core.Fir.moving_average(round(length / period)) for length in (time_constant_s,) if round(length / period) > 1
     ]
     return options
 
@@ -115,16 +112,18 @@ def play_emitted(
     *,
     override: float = 1.0,
     contour: bool = True,
+    last_seconds: float = 0.0,
     record_samples: int = 0,
 ) -> _core.PlaybackFigures:
     """Emitted blocks as the controller plays them, measured against the programmed path."""
     options = playback_options(machine, time_constant_s=machine.controller.shaped_time_constant_s)
     options.measure_contour = contour
+    options.last_seconds = last_seconds
     options.record_samples = record_samples
     return _core.play_blocks(blocks, path, block_end, override, options)
 
 
-def read_back(text: bytes, placed: Sequence[Placed], original: Program, machine: Machine) -> Program:
+def read_back(text: bytes, placed: Sequence[Placed], machine: Machine) -> Program:
     """Read the emitted text and hold it against the original: end points, modal state at every border, sweeps.
 
     Raises:
@@ -137,7 +136,7 @@ def read_back(text: bytes, placed: Sequence[Placed], original: Program, machine:
         _compare_states(states[2 * index], place.region.entry, place.first_line - 1, place.region.incremental)
         _compare_states(states[2 * index + 1], place.region.exit, place.last_line, place.region.incremental)
         blocks = emitted.core.cutting_path(place.first_line, place.last_line)
-        _compare_ends(blocks, place, machine)
+        _compare_ends(blocks, place)
         if blocks.largest_sweep_rad >= _LARGEST_SWEEP_RAD:
             raise RoundTripError(
                 f"emitted arc between lines {place.first_line} and {place.last_line} sweeps "
@@ -147,39 +146,63 @@ def read_back(text: bytes, placed: Sequence[Placed], original: Program, machine:
 
 
 def measure(
-    emitted: Program, placed: Sequence[Placed], machine: Machine, on_step: Step = lambda _: None
+    emitted: Program,
+    placed: Sequence[Placed],
+    originals: Sequence[Future[_core.PlaybackFigures]],
+    machine: Machine,
+    pool: Executor,
+    on_step: Step = lambda _: None,
 ) -> list[RegionFigures]:
-    """Play every region, original and emitted, on all cores.
+    """Play every emitted region beside its original.
 
     Args:
         emitted: the program read back.
         placed: the regions and their places in it.
+        originals: the originals' playbacks under way, one per region (`play_original`).
         machine: controller model and plant.
+        pool: runs the playbacks.
         on_step: called with the number of regions done.
     """
     controller_rule = getattr(_core.BlockEnd, machine.controller.block_end)
     corner = [value / 60.0 for value in machine.controller.corner_speed_difference_mm_per_min.as_tuple()]
     feeds = [axis.max_feed_mm_per_min / 60.0 for axis in machine.axes.as_tuple()]
-    results: list[RegionFigures] = []
-    with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
-        for done, place in enumerate(placed, start=1):
-            path = place.region.path
-            blocks = emitted.core.cutting_path(place.first_line, place.last_line)
-            slow = [pool.submit(play_original, path, machine)]
-            slow += [pool.submit(play_emitted, blocks, path, machine, rule) for rule in _BLOCK_ENDS]
-            overrides = [
-                pool.submit(play_emitted, blocks, path, machine, controller_rule, override=ratio, contour=False)
-                for ratio in OVERRIDES
-            ]
-            slowed = _core.count_slowed_blocks(blocks, corner, feeds)
-            original, *played = (task.result() for task in slow)
-            results.append(
-                RegionFigures(
-                    original, tuple(played), tuple(task.result().residual_mm for task in overrides), slowed
-                )
+    memory_s = _vibration_memory_s(machine)
+    running = []
+    for place in placed:
+        path = place.region.path
+        blocks = emitted.core.cutting_path(place.first_line, place.last_line)
+        runs = [pool.submit(play_emitted, blocks, path, machine, rule) for rule in _BLOCK_ENDS]
+        overrides = [
+            pool.submit(
+                play_emitted, blocks, path, machine, controller_rule,
+                override=ratio, contour=False, last_seconds=memory_s,
             )
-            on_step(done)
+            for ratio in OVERRIDES
+        ]  # fmt: skip
+        running.append((runs, overrides, pool.submit(_core.count_slowed_blocks, blocks, corner, feeds)))
+    results: list[RegionFigures] = []
+    for original, (runs, overrides, slowed) in zip(originals, running, strict=True):
+        results.append(
+            RegionFigures(
+                original.result(),
+                tuple(run.result() for run in runs),
+                tuple(run.result().residual_mm for run in overrides),
+                slowed.result(),
+            )
+        )
+        on_step(len(results))
     return results
+
+
+def _vibration_memory_s(machine: Machine) -> float:
+    """Time after which a vibration is a millionth of itself; 0 where a mode has no damping to speak of."""
+    rates = [
+        mode.damping_ratio * 2.0 * math.pi * mode.frequency_hz
+        for axis in machine.axes.as_tuple()
+        for mode in axis.modes
+    ]
+    slowest = min(rates, default=0.0)
+    return math.log(1e6) / slowest if slowest > 0.01 else 0.0
 
 
 def other_time_s(moves: Iterable[tuple[_core.Segment, float]], machine: Machine) -> float:
@@ -249,9 +272,7 @@ def summarise(figures: Sequence[RegionFigures], placed: Sequence[Placed], machin
             for k, ratio in enumerate(OVERRIDES)
         ],
         "slowed_blocks": sum(region.slowed_blocks for region in figures),
-        "regions": [
-            _region_summary(region, place, machine) for region, place in zip(figures, placed, strict=True)
-        ],
+        "regions": [_region_summary(region, place, machine) for region, place in zip(figures, placed, strict=True)],
     }
 
 
@@ -295,7 +316,7 @@ def _compare_states(emitted: _core.ModalState, original: _core.ModalState, line:
             raise RoundTripError(f"emitted line {line}: {axis} is at {now:.6f} mm, the original at {was:.6f} mm")
 
 
-def _compare_ends(blocks: _core.Path, place: Placed, machine: Machine) -> None:
+def _compare_ends(blocks: _core.Path, place: Placed) -> None:
     path = place.region.path
     travel = path.end_mm - path.start_mm
     gap = float(np.abs((blocks.end_mm - blocks.start_mm) - travel).max())

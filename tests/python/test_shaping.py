@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import least_squares, linprog
+
 from shapegcode._core import (
     ArgumentError,
     DesignError,
@@ -25,7 +26,6 @@ from shapegcode._core import (
     minimal_two_mode,
     zv,
 )
-
 from shapegcode.shaping import choose_block_period, shortest_non_negative
 
 PAPER_MODES = (Mode(46.0, 0.02), Mode(131.0, 0.02))

@@ -97,7 +97,8 @@ class Fitter {
   [[nodiscard]] Eigen::Vector2d bump(std::uint32_t k, int normal) const {
     const int a = (normal + 1) % 3;
     const int b = (normal + 2) % 3;
-    return {middle_(k, a) - 0.5 * (grid_(k, a) + grid_(k + 1, a)), middle_(k, b) - 0.5 * (grid_(k, b) + grid_(k + 1, b))};
+    return {middle_(k, a) - 0.5 * (grid_(k, a) + grid_(k + 1, a)),
+            middle_(k, b) - 0.5 * (grid_(k, b) + grid_(k + 1, b))};
   }
 
   [[nodiscard]] bool bends(std::uint32_t k) const {
@@ -112,8 +113,8 @@ class Fitter {
     // An F that is exact to within rounding stays; all others go up.
     auto value = static_cast<std::int64_t>(std::ceil(exact * (1.0 - 1e-12)));
     value = std::max(value, options_.minimum_feed);
-    const double ticks = length_mm / (static_cast<double>(value) * options_.feed_unit_mm_per_s) /
-                         options_.interpolation_period_s;
+    const double ticks =
+        length_mm / (static_cast<double>(value) * options_.feed_unit_mm_per_s) / options_.interpolation_period_s;
     if (std::ceil(ticks - tick_tolerance) != static_cast<double>(periods * ticks_per_period_)) {
       return std::nullopt;
     }
@@ -121,7 +122,8 @@ class Fitter {
   }
 
   [[nodiscard]] std::int64_t nearest_feed(double length_mm, std::uint32_t periods) const {
-    const double exact = length_mm / (static_cast<double>(periods) * options_.block_period_s) / options_.feed_unit_mm_per_s;
+    const double exact =
+        length_mm / (static_cast<double>(periods) * options_.block_period_s) / options_.feed_unit_mm_per_s;
     return std::max(options_.minimum_feed, static_cast<std::int64_t>(std::ceil(exact)));
   }
 
@@ -245,8 +247,8 @@ class Fitter {
                        static_cast<std::uint8_t>(normal)};
   }
 
-  // Longest arc of at least `least` periods from period k, found by doubling and halving steps. A piece too short to show
-  // its curvature is no arc by itself but may be part of one.
+  // Longest arc of at least `least` periods from period k, found by doubling and halving steps. A piece too short to
+  // show its curvature is no arc by itself but may be part of one.
   std::optional<FittedBlock> fit_arc(std::uint32_t k, std::uint32_t limit, std::uint32_t least) {
     const int normal = arc_normal_[k];
     std::uint32_t last = k;

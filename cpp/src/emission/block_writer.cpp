@@ -14,7 +14,7 @@ int plane_code(std::uint8_t normal) noexcept { return normal == 2 ? 17 : normal 
 }  // namespace
 
 WrittenBlocks write_blocks(std::span<const FittedBlock> blocks, std::array<std::int64_t, axis_count> start,
-                         std::span<const BlockMark> marks, const WriterOptions& options) {
+                           std::span<const BlockMark> marks, const WriterOptions& options) {
   std::string text;
   text.reserve(blocks.size() * 26 + 64);
   auto position = start;

@@ -6,7 +6,8 @@
 namespace shapegcode {
 namespace {
 
-// Clearance to which a peck returns before it feeds on (parameter 5114/5115; the value on a given machine is not known).
+// Clearance to which a peck returns before it feeds on (parameter 5114/5115; the value on a given machine is not
+// known).
 constexpr double peck_clearance_mm = 0.5;
 constexpr int max_pecks = 10'000;
 

@@ -104,8 +104,8 @@ void scan_number(std::string_view text, std::uint32_t line, std::size_t& i, std:
     fail_at_letter(text, letter_at, line);
   }
   if (significant > max_digits) {
-    fail("too many digits in address " + std::string(1, word.letter) + ": " + std::to_string(significant) +
-             " (limit " + std::to_string(max_digits) + ")",
+    fail("too many digits in address " + std::string(1, word.letter) + ": " + std::to_string(significant) + " (limit " +
+             std::to_string(max_digits) + ")",
          line, letter_at);
   }
   if (word.has_point && takes_whole_numbers(word.letter)) {
@@ -124,7 +124,7 @@ void scan_number(std::string_view text, std::uint32_t line, std::size_t& i, std:
 
 void scan_block(std::string_view text, std::uint32_t line, std::size_t max_length, Block& block) {
   block.word_count = 0;
-  block.comment = {};
+  block.comment_count = 0;
   block.optional_skip = false;
   const std::size_t n = text.size();
   if (n > max_length) {
@@ -152,11 +152,10 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
       if (close == std::string_view::npos) {
         fail("comment does not close: '(' without ')'", line, i);
       }
-      const char* first = block.comment.empty() ? text.data() + i : block.comment.data();
-      block.comment = std::string_view(first, static_cast<std::size_t>(text.data() + close + 1 - first));
-      if (block.comment.find('\0') != std::string_view::npos) {
-        fail("byte 0x00 in a comment: this is no program text", line, i);
+      if (block.comment_count == Block::max_comments) {
+        fail("more than " + std::to_string(Block::max_comments) + " comments in a block", line, i);
       }
+      block.comments[block.comment_count++] = text.substr(i, close + 1 - i);
       i = close + 1;
     } else if (c == '/') {
       if (block.word_count > 1 || (block.word_count == 1 && block.words[0].letter != 'N')) {

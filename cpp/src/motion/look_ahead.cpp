@@ -82,8 +82,8 @@ double curvature_speed(double curvature_per_mm, const MotionLimits& limits, doub
   double speed = std::sqrt(centripetal / curvature_per_mm);
   if (limits.filter_variance_s2 > 0.0) {
     // spec section 0: radial error = variance * v^2 * curvature / 2
-    speed = std::min(speed, std::sqrt(2.0 * limits.contour_tolerance_mm /
-                                      (limits.filter_variance_s2 * curvature_per_mm)));
+    speed =
+        std::min(speed, std::sqrt(2.0 * limits.contour_tolerance_mm / (limits.filter_variance_s2 * curvature_per_mm)));
   }
   return speed;
 }
@@ -121,7 +121,8 @@ std::vector<Piece> make_pieces(const Path& path, const MotionLimits& limits, con
   }
   std::vector<Zone> at_start(n);
   std::vector<Zone> at_end(n);
-  const auto sweep = [&](std::size_t from, std::size_t into, double corner_limit, Zone carry, std::vector<Zone>& zones) {
+  const auto sweep = [&](std::size_t from, std::size_t into, double corner_limit, Zone carry,
+                         std::vector<Zone>& zones) {
     const double limit = std::min(corner_limit, speed[from]);
     if (limit < speed[into]) {
       extend(carry, limit, 0.5 * limit * jerk_s);
@@ -229,7 +230,8 @@ void piece_phases(const Piece& piece, double end_speed, PhaseList& list) {
   list.add(peak, v1, down);
 }
 
-// Constant-time law: a ramp that is shorter than the time constant is stretched into the steady stretch at its fast end.
+// Constant-time law: a ramp that is shorter than the time constant is stretched into the steady stretch at its fast
+// end.
 std::vector<SpeedPhase> stretch_ramps(const std::vector<SpeedPhase>& phases, double length, double time_constant_s) {
   const std::size_t n = phases.size();
   const auto end_speed = [&](std::size_t i) {

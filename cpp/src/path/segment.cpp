@@ -24,14 +24,11 @@ double pitch_mm_per_rad(const Segment& segment) noexcept {
   return (segment.end_mm[n] - segment.start_mm[n]) / std::abs(segment.sweep_rad);
 }
 
-double mean_radius(const Segment& segment) noexcept {
-  return 0.5 * (segment.start_radius_mm + segment.end_radius_mm);
-}
+double mean_radius(const Segment& segment) noexcept { return 0.5 * (segment.start_radius_mm + segment.end_radius_mm); }
 
 Vector3 arc_point(const Segment& segment, double fraction) noexcept {
   const auto [a, b] = plane_axes(segment.normal);
-  const double radius =
-      segment.start_radius_mm + (segment.end_radius_mm - segment.start_radius_mm) * fraction;
+  const double radius = segment.start_radius_mm + (segment.end_radius_mm - segment.start_radius_mm) * fraction;
   const double angle = segment.start_angle_rad + segment.sweep_rad * fraction;
   Vector3 p;
   p[a] = segment.centre_mm[a] + radius * std::cos(angle);
@@ -46,8 +43,7 @@ Nearest nearest_on_line(const Segment& segment, const Vector3& p) noexcept {
     return {(p - segment.start_mm).norm(), 0.0};
   }
   const Vector3 along = segment.end_mm - segment.start_mm;
-  const double fraction =
-      std::clamp((p - segment.start_mm).dot(along) / along.squaredNorm(), 0.0, 1.0);
+  const double fraction = std::clamp((p - segment.start_mm).dot(along) / along.squaredNorm(), 0.0, 1.0);
   const Vector3 foot = segment.start_mm + fraction * along;
   return {(p - foot).norm(), fraction * segment.length_mm};
 }

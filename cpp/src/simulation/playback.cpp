@@ -15,10 +15,12 @@ constexpr double recorded_decay_s = 0.25;
 // Everything that hangs on one stream of set-points.
 class Recorder {
  public:
-  Recorder(const Path& path, const PlaybackOptions& options)
+  // `command_on_path`: the command follows the path exactly, so only the response can leave it.
+  Recorder(const Path& path, const PlaybackOptions& options, bool command_on_path)
       : options_(options),
         plant_(options.modes, options.period_s),
         tracks_contour_(options.measure_contour && path.length_mm() > 0.0),
+        tracks_command_(tracks_contour_ && !command_on_path),
         command_tracker_(path),
         response_tracker_(path),
         orbit_(path) {
@@ -51,9 +53,11 @@ class Recorder {
     acceleration_ = acceleration_.cwiseMax((command - 2.0 * last_ + before_last_).cwiseAbs());
     before_last_ = last_;
     last_ = command;
-    if (tracks_contour_) {
+    if (tracks_command_) {
       figures_.command.add(command_tracker_.step(command));
       orbit_.step(command, command_tracker_.segment());
+    }
+    if (tracks_contour_) {
       figures_.response.add(response_tracker_.step(response));
     }
     record(command, response);
@@ -74,6 +78,7 @@ class Recorder {
     figures_.end_mm = last_;
     if (tracks_contour_) {
       figures_.orbit_error_percent = orbit_.percent();
+      figures_.command.count = figures_.response.count;
     }
     // A picture of the decay needs what comes after the stop.
     const auto decay = static_cast<std::size_t>(recorded_decay_s / options_.period_s);
@@ -108,6 +113,7 @@ class Recorder {
   ModalPlant plant_;
   ModalPlant at_rest_plant_ = plant_;
   bool tracks_contour_;
+  bool tracks_command_;
   ContourTracker command_tracker_;
   ContourTracker response_tracker_;
   OrbitError orbit_;
@@ -123,8 +129,8 @@ class Recorder {
 };
 
 template <class Step>
-PlaybackFigures play(const Path& path, const PlaybackOptions& options, Step&& step) {
-  Recorder recorder(path, options);
+PlaybackFigures play(const Path& path, const PlaybackOptions& options, bool command_on_path, Step&& step) {
+  Recorder recorder(path, options, command_on_path);
   Vector3 position = Vector3::Zero();
   while (step(position)) {
     recorder.add(position);
@@ -132,23 +138,35 @@ PlaybackFigures play(const Path& path, const PlaybackOptions& options, Step&& st
   return recorder.finish(position);
 }
 
+std::span<const Segment> last_blocks(std::span<const Segment> blocks, double seconds) {
+  std::size_t first = blocks.size();
+  while (first > 0 && seconds > 0.0) {
+    --first;
+    seconds -= blocks[first].length_mm / blocks[first].feed_mm_per_s;
+  }
+  return blocks.subspan(first);
+}
+
 }  // namespace
 
 PlaybackFigures play_path(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
                           const PlaybackOptions& options) {
   Interpolator interpolator(path, std::move(profile), options.period_s);
-  return play(*path, options, [&](Vector3& position) { return interpolator.step(position); });
+  return play(*path, options, options.axis_filters.empty(), [&](Vector3& position) { return interpolator.step(position); });
 }
 
 PlaybackFigures play_blocks(std::span<const Segment> blocks, const Path& path, BlockEnd block_end,
                             double override_ratio, const PlaybackOptions& options) {
+  if (options.last_seconds > 0.0) {
+    blocks = last_blocks(blocks, options.last_seconds * override_ratio);
+  }
   BlockPlayer player(blocks, options.period_s, block_end, override_ratio);
-  return play(path, options, [&](Vector3& position) { return player.step(position); });
+  return play(path, options, false, [&](Vector3& position) { return player.step(position); });
 }
 
 PlaybackFigures play_samples(const Samples& samples, const Path& path, const PlaybackOptions& options) {
   Eigen::Index row = 0;
-  return play(path, options, [&](Vector3& position) {
+  return play(path, options, false, [&](Vector3& position) {
     if (samples.positions_mm.rows() > 0) {
       position = samples.positions_mm.row(std::min(row, samples.positions_mm.rows() - 1));
     }

@@ -21,12 +21,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", metavar="IN", help="CNC program")
     add_machine_argument(parser)
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help="program to write")
-    parser.add_argument("--arc-feed", metavar="RATIO", type=ratio, default=None,
-                        help="feed on arcs relative to the programmed feed, for example 60%%")
-    parser.add_argument("--block-period", metavar="TIME", type=seconds, default=None,
-                        help="duration of the shortest block, for example 5ms (default: chosen for the modes)")
-    parser.add_argument("--plots", metavar="DIR", default=None,
-                        help="write pictures (PNG and SVG) of the region that vibrates most into this folder")
+    parser.add_argument(
+        "--arc-feed",
+        metavar="RATIO",
+        type=ratio,
+        default=None,
+        help="feed on arcs relative to the programmed feed, for example 60%%",
+    )
+    parser.add_argument(
+        "--block-period",
+        metavar="TIME",
+        type=seconds,
+        default=None,
+        help="duration of the shortest block, for example 5ms (default: chosen for the modes)",
+    )
+    parser.add_argument(
+        "--plots",
+        metavar="DIR",
+        default=None,
+        help="write pictures (PNG and SVG) of the region that vibrates most into this folder",
+    )
     add_json_argument(parser)
 
 

@@ -12,8 +12,12 @@ __all__ = ["add_arguments", "run"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = "Repeats the figures of a paper with this program's models, and shows both."
-    parser.add_argument("name", metavar="NAME", choices=("path",),
-                        help="path: line, arc, line of paper 000 at both feeds and reductions")
+    parser.add_argument(
+        "name",
+        metavar="NAME",
+        choices=("path",),
+        help="path: line, arc, line of paper 000 at both feeds and reductions",
+    )
     add_json_argument(parser)
 
 

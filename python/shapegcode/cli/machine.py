@@ -72,9 +72,7 @@ def _init(args: argparse.Namespace) -> int:
         )
         return ExitCode.BAD_INPUT
     print(f"wrote {args.output}, the values of {args.name}")
-    print(
-        f"next: put in your machine's limits and vibration modes, then: shapegcode machine show {args.output}"
-    )
+    print(f"next: put in your machine's limits and vibration modes, then: shapegcode machine show {args.output}")
     return ExitCode.OK
 
 

@@ -15,11 +15,21 @@ _TIME_UNITS = {"ms": 1e-3, "us": 1e-6, "s": 1.0}
 
 def add_machine_argument(parser: argparse.ArgumentParser) -> None:
     """Declare ``-m MACHINE`` and ``--set KEY=VALUE``."""
-    parser.add_argument("-m", "--machine", metavar="MACHINE", required=True,
-                        help="machine file (TOML), or name of a built-in machine such as vx500")
-    parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[],
-                        help="use another value for one key of the machine file, for example "
-                             "--set input.arc_centre=absolute; may be repeated")
+    parser.add_argument(
+        "-m",
+        "--machine",
+        metavar="MACHINE",
+        required=True,
+        help="machine file (TOML), or name of a built-in machine such as vx500",
+    )
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="use another value for one key of the machine file, for example "
+        "--set input.arc_centre=absolute; may be repeated",
+    )
 
 
 def load_machine(args: argparse.Namespace) -> Machine:

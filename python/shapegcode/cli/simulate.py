@@ -18,10 +18,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("input", metavar="IN", help="CNC program")
     add_machine_argument(parser)
-    parser.add_argument("--shaped", action="store_true",
-                        help="IN was written by shapegcode: play its blocks at their feed, without look-ahead")
-    parser.add_argument("--plots", metavar="DIR", default=None,
-                        help="write pictures (PNG and SVG) of the region that vibrates most into this folder")
+    parser.add_argument(
+        "--shaped",
+        action="store_true",
+        help="IN was written by shapegcode: play its blocks at their feed, without look-ahead",
+    )
+    parser.add_argument(
+        "--plots",
+        metavar="DIR",
+        default=None,
+        help="write pictures (PNG and SVG) of the region that vibrates most into this folder",
+    )
     add_json_argument(parser)
 
 

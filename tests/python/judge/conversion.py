@@ -11,14 +11,23 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from .interpreter import INCH_MM, Interpretation, JudgeError, LineRecord, Move, canonical_g, interpret
+from .interpreter import (
+    INCH_MM,
+    MODAL_GROUPS,
+    Interpretation,
+    JudgeError,
+    LineRecord,
+    Move,
+    canonical_g,
+    interpret,
+)
 from .plant import contour_error_um, path_polyline
 
 Vector = npt.NDArray[np.float64]
@@ -37,14 +46,33 @@ LARGEST_SWEEP = math.pi / 2.0
 _DUST = 1e-6
 
 
-def is_strong(record: LineRecord) -> bool:
-    """Whether a converter must leave this line where it is, to the letter."""
+#: Groups whose codes are weak where they change nothing: G40 in a safe line, G21 in a metric program.
+IDLE_GROUPS = frozenset(("comp", "units", "return_level", "wcs"))
+
+
+def is_strong(record: LineRecord, inserted: frozenset[str] = frozenset()) -> bool:
+    """Whether a converter must leave this line where it is, to the letter.
+
+    `inserted` are lines that it was told to write around its regions.
+    """
     if not record.executed:
         return True
+    if record.text.rstrip("\r") in inserted:
+        return False
     for address, number in record.words:
-        if address not in WEAK_ADDRESSES or (address == "G" and canonical_g(number) not in WEAK_G):
+        if address not in WEAK_ADDRESSES:
+            return True
+        if address == "G" and not is_weak_code(canonical_g(number), record):
             return True
     return any(not move.is_cut for move in record.moves)
+
+
+def is_weak_code(code: str, record: LineRecord) -> bool:
+    """Whether a G code only says what a converter may say too: motion, plane, feed, or what holds anyway."""
+    if code in WEAK_G:
+        return True
+    group = MODAL_GROUPS.get(code)
+    return group in IDLE_GROUPS and record.modal_before[group] == code
 
 
 def is_comment(record: LineRecord) -> bool:
@@ -76,12 +104,14 @@ class Gap:
         return [r.text for r in self.lines]
 
 
-def split(program: Interpretation) -> tuple[list[LineRecord], list[Gap]]:
+def split(
+    program: Interpretation, inserted: frozenset[str] = frozenset()
+) -> tuple[list[LineRecord], list[Gap]]:
     """Strong lines, and the gaps before, between and after them (one more than the strong lines)."""
     strong: list[LineRecord] = []
     loose: list[list[LineRecord]] = [[]]
     for record in program.lines:
-        if is_strong(record):
+        if is_strong(record, inserted):
             strong.append(record)
             loose.append([])
         else:
@@ -106,7 +136,9 @@ class _Verdict:
         emitted: Interpretation,
         ranges: Ranges | None,
         contour_tolerance_um: float | None,
+        inserted: frozenset[str],
     ) -> None:
+        self.inserted = inserted
         self.original = original
         self.emitted = emitted
         self.ranges = ranges
@@ -120,7 +152,7 @@ class _Verdict:
 
     def judge(self) -> list[str]:
         strong, gaps = split(self.original)
-        got, got_gaps = split(self.emitted)
+        got, got_gaps = split(self.emitted, self.inserted)
         for theirs, ours in zip(got, strong, strict=False):
             if theirs.text != ours.text:
                 self.say(
@@ -347,6 +379,7 @@ def verify_conversion(
     calculator_decimal_point: bool = True,
     arc_centre: Literal["incremental", "absolute"] = "incremental",
     contour_tolerance_um: float | None = None,
+    inserted: Collection[str] = (),
 ) -> list[str]:
     """Complaints about an emitted program; an empty list is an acquittal.
 
@@ -355,7 +388,8 @@ def verify_conversion(
     has one digit and no point, (d) every N word is there in order and no more often, (e) no NaN, every run
     ends where it ended, (f) exact stops are still block ends, (g) with `contour_tolerance_um`: the two paths
     of every run are no further apart (each from the other; not in time). `region_line_ranges` are (first,
-    last) 1-based original lines said to be shaped: what lies outside them is then held to the letter too.
+    last) 1-based original lines said to be shaped: what lies outside them is then held to the letter too. `inserted` are lines (without line end)
+    that the converter was told to write around every region.
     Texts are compared with their line ends (CR included).
 
     Raises JudgeError if the *original* cannot be interpreted.
@@ -369,4 +403,6 @@ def verify_conversion(
         )
     except JudgeError as error:
         return [f"(e) the emitted program cannot be interpreted: {error}"]
-    return _Verdict(original, emitted, region_line_ranges, contour_tolerance_um).judge()
+    return _Verdict(
+        original, emitted, region_line_ranges, contour_tolerance_um, frozenset(inserted)
+    ).judge()

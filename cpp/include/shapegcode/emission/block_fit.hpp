@@ -25,25 +25,25 @@ struct FittedBlock {
 
 /// Grid on which blocks are fitted.
 struct FitOptions {
-  double increment_mm = 0.001;        ///< least increment of the words (0.0001 inch = 0.00254 mm)
+  double increment_mm = 0.001;  ///< least increment of the words (0.0001 inch = 0.00254 mm)
   double block_period_s = 0.005;
   double interpolation_period_s = 0.001;
-  double feed_unit_mm_per_s = 0.1 / 60.0;  ///< one step of the last F digit
-  std::int64_t minimum_feed = 10;     ///< in feed units
+  double feed_unit_mm_per_s = 0.1 / 60.0;   ///< one step of the last F digit
+  std::int64_t minimum_feed = 10;           ///< in feed units
   double merge_tolerance_increments = 0.5;  ///< deviation of merged blocks from the shaped command, per axis
-  double arc_min_chord_mm = 0.02;     ///< shorter pieces are lines
-  double max_sweep_rad = 1.3962634;   ///< 80 degrees: no piece can be mistaken for the long way round
+  double arc_min_chord_mm = 0.02;           ///< shorter pieces are lines
+  double max_sweep_rad = 1.3962634;         ///< 80 degrees: no piece can be mistaken for the long way round
 };
 
 /// Turns a shaped command into blocks that each last a whole number of block periods.
 ///
-/// `grid_mm`: positions at k*T_B, (n+1, 3). `middle_mm`: positions half a period later, (n, 3), from which the curvature
-/// within a block is read. `arc_normal`: per period the axis across the plane of an arc that the command follows
-/// there, or -1: (n). `breaks`: ascending period indices at which a block must end (program marks).
-/// Every word is rounded once, to the nearest increment, so nothing drifts. F is rounded up, so that a controller that
-/// starts blocks on its interpolation ticks takes exactly the intended number of ticks. A block that rounds to
-/// nothing lends its time to its successor; at the very end it is rest and left out.
-/// Throws Error(argument) on mismatched sizes or a position outside +-99999.999 mm.
+/// `grid_mm`: positions at k*T_B, (n+1, 3). `middle_mm`: positions half a period later, (n, 3), from which the
+/// curvature within a block is read. `arc_normal`: per period the axis across the plane of an arc that the command
+/// follows there, or -1: (n). `breaks`: ascending period indices at which a block must end (program marks). Every word
+/// is rounded once, to the nearest increment, so nothing drifts. F is rounded up, so that a controller that starts
+/// blocks on its interpolation ticks takes exactly the intended number of ticks. A block that rounds to nothing lends
+/// its time to its successor; at the very end it is rest and left out. Throws Error(argument) on mismatched sizes or a
+/// position outside +-99999.999 mm.
 [[nodiscard]] std::vector<FittedBlock> fit_blocks(const Eigen::Ref<const Eigen::MatrixXd>& grid_mm,
                                                   const Eigen::Ref<const Eigen::MatrixXd>& middle_mm,
                                                   std::span<const std::int8_t> arc_normal,

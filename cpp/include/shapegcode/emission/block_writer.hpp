@@ -20,8 +20,8 @@ struct BlockMark {
 struct WriterOptions {
   int position_decimals = 3;
   int feed_decimals = 1;
-  bool incremental = false;  ///< G91 words: differences of the rounded absolute positions
-  int plane = 17;            ///< plane active before the first block; G01 is active too
+  bool incremental = false;        ///< G91 words: differences of the rounded absolute positions
+  int plane = 17;                  ///< plane active before the first block; G01 is active too
   bool exact_stop_at_end = false;  ///< G09 on the last block
   std::string line_end = "\n";
 };
@@ -32,10 +32,10 @@ struct WrittenBlocks {
   int plane = 17;  ///< modal plane behind the last block
 };
 
-/// Text of fitted blocks: modal G codes, X Y Z, R, F only where they change. N words go to distinct blocks in their order, at or
-/// behind their place; those that find no block of their own stand alone. `start` is in increments.
+/// Text of fitted blocks: modal G codes, X Y Z, R, F only where they change. N words go to distinct blocks in their
+/// order, at or behind their place; those that find no block of their own stand alone. `start` is in increments.
 [[nodiscard]] WrittenBlocks write_blocks(std::span<const FittedBlock> blocks,
-                                         std::array<std::int64_t, axis_count> start,
-                                         std::span<const BlockMark> marks, const WriterOptions& options);
+                                         std::array<std::int64_t, axis_count> start, std::span<const BlockMark> marks,
+                                         const WriterOptions& options);
 
 }  // namespace shapegcode

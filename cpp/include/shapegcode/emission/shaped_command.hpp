@@ -16,17 +16,17 @@ struct ShapingOptions {
   MotionLimits limits;
   double block_period_s = 0.005;
   double interpolation_period_s = 0.001;
-  double plunge_axis_angle_rad = 0.26;   ///< see forced_stops
+  double plunge_axis_angle_rad = 0.26;  ///< see forced_stops
   double plunge_corner_angle_rad = 0.78;
   double rest_at_stop_s = 0.0;  ///< pause at a forced stop, so that a filter behind the program runs out
 };
 
 /// A region's command, shaped and on the block grid, ready for fit_blocks.
 struct ShapedCommand {
-  Eigen::MatrixXd grid_mm;    ///< (n+1, 3) at k*T_B
-  Eigen::MatrixXd middle_mm;  ///< (n, 3) half a period later
-  std::vector<std::int8_t> arc_normal;      ///< (n) see fit_blocks
-  std::vector<std::uint32_t> run_ends;      ///< periods at which the command is at rest
+  Eigen::MatrixXd grid_mm;                     ///< (n+1, 3) at k*T_B
+  Eigen::MatrixXd middle_mm;                   ///< (n, 3) half a period later
+  std::vector<std::int8_t> arc_normal;         ///< (n) see fit_blocks
+  std::vector<std::uint32_t> run_ends;         ///< periods at which the command is at rest
   std::vector<std::uint32_t> segment_periods;  ///< per marked segment: period in which its begin is reached
 };
 

@@ -9,11 +9,11 @@ namespace shapegcode {
 /// A drilling cycle G73 ... G89 at one hole, as its modal words stand.
 struct CannedCycle {
   int code = 80;
-  double r_mm = 0.0;      ///< R level, absolute
-  double bottom_mm = 0.0; ///< Z, absolute
-  double peck_mm = 0.0;   ///< Q, 0 if none
-  double dwell_s = 0.0;   ///< P
-  double initial_mm = 0.0;  ///< level before the cycle, the return level of G98
+  double r_mm = 0.0;         ///< R level, absolute
+  double bottom_mm = 0.0;    ///< Z, absolute
+  double peck_mm = 0.0;      ///< Q, 0 if none
+  double dwell_s = 0.0;      ///< P
+  double initial_mm = 0.0;   ///< level before the cycle, the return level of G98
   bool return_to_r = false;  ///< G99
 };
 

@@ -20,7 +20,9 @@ struct Block {
   static constexpr std::size_t max_words = 40;
   std::array<Word, max_words> words;
   std::size_t word_count = 0;
-  std::string_view comment;  ///< from the first '(' to the last ')', with the parentheses; empty if none
+  static constexpr std::size_t max_comments = 8;
+  std::array<std::string_view, max_comments> comments;  ///< each with its parentheses
+  std::size_t comment_count = 0;
   bool optional_skip = false;
 
   [[nodiscard]] const Word* begin() const noexcept { return words.data(); }
@@ -29,7 +31,8 @@ struct Block {
 
 /// Splits one line (without its line end) into words. `line` counts from 1 and goes into errors.
 /// Throws Error(program) with line and column on: a byte that is no program character, a letter without a number, a
-/// comment that does not close, more than 40 words, more than 8 digits in a number, a custom macro statement, a
+/// comment that does not close, more than 40 words
+/// or 8 comments, more than 8 digits in a number, a custom macro statement, a
 /// decimal point in an address that takes whole numbers, a line longer than `max_length` characters.
 void scan_block(std::string_view text, std::uint32_t line, std::size_t max_length, Block& block);
 

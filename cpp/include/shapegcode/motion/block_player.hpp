@@ -14,8 +14,8 @@ enum class BlockEnd : std::uint8_t {
   carry,  ///< at once: the remainder of a period is carried over
 };
 
-/// A controller without look-ahead: every block runs at its feed for its whole length, the next one follows at once. The
-/// acceleration filter comes after it (a moving average: block overlap). Real-time form.
+/// A controller without look-ahead: every block runs at its feed for its whole length, the next one follows at once.
+/// The acceleration filter comes after it (a moving average: block overlap). Real-time form.
 class BlockPlayer {
  public:
   /// `override_ratio` scales every feed. Throws Error(argument) on period or ratio <= 0, or a segment without feed.

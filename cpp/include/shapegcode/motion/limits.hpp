@@ -25,11 +25,11 @@ struct MotionLimits {
   Vector3 max_jerk_mm_per_s3 = Vector3::Constant(none);
   Vector3 corner_speed_difference_mm_per_s = Vector3::Constant(none);  ///< per axis at a corner
   double centripetal_acceleration_mm_per_s2 = none;                    ///< on arcs and along polylines
-  double arc_feed_ratio = 1.0;  ///< feed on arcs relative to the programmed feed
+  double arc_feed_ratio = 1.0;                                         ///< feed on arcs relative to the programmed feed
   /// Deviation that a filter with the spread below may cause at corners and on arcs.
   double contour_tolerance_mm = none;
-  double filter_variance_s2 = 0.0;        ///< second central moment of the filter that follows
-  double filter_mean_deviation_s = 0.0;   ///< its mean absolute deviation from the mean delay
+  double filter_variance_s2 = 0.0;       ///< second central moment of the filter that follows
+  double filter_mean_deviation_s = 0.0;  ///< its mean absolute deviation from the mean delay
 };
 
 }  // namespace shapegcode

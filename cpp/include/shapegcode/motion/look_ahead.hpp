@@ -13,21 +13,22 @@ namespace shapegcode {
 /// deceleration ended where a slower segment begins. O(n). Throws Error(argument) on a limit that is not positive
 /// or a segment without feed.
 ///
-/// Forward and backward passes over the segments' boundary speeds (the planner of grbl and of LinuxCNC, in v^2); then, under
-/// the constant-time law, ramps are stretched to the time constant where a neighbouring steady stretch leaves room. A jerk
-/// time smooths distance over time by a moving average of that length; the slow stretches around corners are lengthened
-/// by half of it on both sides, so that smoothing does not raise the speed at the corner.
+/// Forward and backward passes over the segments' boundary speeds (the planner of grbl and of LinuxCNC, in v^2); then,
+/// under the constant-time law, ramps are stretched to the time constant where a neighbouring steady stretch leaves
+/// room. A jerk time smooths distance over time by a moving average of that length; the slow stretches around corners
+/// are lengthened by half of it on both sides, so that smoothing does not raise the speed at the corner.
 [[nodiscard]] SpeedProfile plan_speed(const Path& path, const MotionLimits& limits);
 
 /// Highest speed at which segment `i` may be run under the limits.
 [[nodiscard]] double segment_speed_limit(const Segment& segment, const MotionLimits& limits) noexcept;
 
 /// Highest speed at the junction of two segments.
-[[nodiscard]] double corner_speed_limit(const Segment& before, const Segment& after, const MotionLimits& limits) noexcept;
+[[nodiscard]] double corner_speed_limit(const Segment& before, const Segment& after,
+                                        const MotionLimits& limits) noexcept;
 
-/// Indices of segments before which the tool must come to rest: sharp corners between the tool axis and the plane across it
-/// (a plunge or retract), which a shaper must not mix, and exact stops. `axis_angle_rad`: how far a side may lean from
-/// the tool axis Z and still count as plunge; `corner_angle_rad`: least change of direction.
+/// Indices of segments before which the tool must come to rest: sharp corners between the tool axis and the plane
+/// across it (a plunge or retract), which a shaper must not mix, and exact stops. `axis_angle_rad`: how far a side may
+/// lean from the tool axis Z and still count as plunge; `corner_angle_rad`: least change of direction.
 [[nodiscard]] std::vector<std::size_t> forced_stops(const std::vector<Segment>& segments, double axis_angle_rad,
                                                     double corner_angle_rad);
 

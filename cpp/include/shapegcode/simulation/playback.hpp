@@ -20,15 +20,18 @@ struct PlaybackOptions {
   std::vector<Fir> axis_filters;  ///< after the set-points, in order (acceleration after interpolation)
   AxisModes modes;
   bool measure_contour = true;  ///< deviation of command and response and orbit errors
+  /// Blocks only: play no more than the last so many seconds (0: all). Enough for the residual where older vibration has
+  /// decayed; peak and contour figures then speak of that part alone.
+  double last_seconds = 0.0;
   /// Keep at most so many samples of command and response for pictures (0: none); longer runs keep their beginning.
   std::size_t record_samples = 0;
 };
 
 /// Figures of one run from rest to rest. Deviations in mm against the programmed path.
 struct PlaybackFigures {
-  double duration_s = 0.0;  ///< until the set-points rest, after every filter
-  Vector3 residual_mm = Vector3::Zero();  ///< largest |response - command| from that instant on
-  Vector3 peak_mm = Vector3::Zero();      ///< largest |response - command| before it
+  double duration_s = 0.0;                                ///< until the set-points rest, after every filter
+  Vector3 residual_mm = Vector3::Zero();                  ///< largest |response - command| from that instant on
+  Vector3 peak_mm = Vector3::Zero();                      ///< largest |response - command| before it
   Vector3 peak_acceleration_mm_per_s2 = Vector3::Zero();  ///< of the command, second difference
   DeviationStats command;
   DeviationStats response;
@@ -38,8 +41,8 @@ struct PlaybackFigures {
   Samples recorded_response;
 };
 
-/// Plays a path under a speed profile (a controller with look-ahead) through filters and plant. Streams: memory does not
-/// grow with the length of the run.
+/// Plays a path under a speed profile (a controller with look-ahead) through filters and plant. Streams: memory does
+/// not grow with the length of the run.
 [[nodiscard]] PlaybackFigures play_path(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
                                         const PlaybackOptions& options);
 
@@ -50,8 +53,8 @@ struct PlaybackFigures {
 /// Any set-points, (n, 3), measured against the programmed `path` (empty: no contour figures).
 [[nodiscard]] PlaybackFigures play_samples(const Samples& samples, const Path& path, const PlaybackOptions& options);
 
-/// Blocks that a controller with look-ahead would run slower than programmed: per-axis speed step at a border over the corner
-/// limit, feed over an axis limit.
+/// Blocks that a controller with look-ahead would run slower than programmed: per-axis speed step at a border over the
+/// corner limit, feed over an axis limit.
 struct LookAheadLimits {
   Vector3 corner_speed_difference_mm_per_s;
   Vector3 max_feed_mm_per_s;

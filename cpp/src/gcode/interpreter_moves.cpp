@@ -1,0 +1,275 @@
+// Axis moves: cutting regions, rapids, drilling cycles.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "interpreter_impl.hpp"
+#include "shapegcode/gcode/arc_geometry.hpp"
+
+namespace shapegcode::detail {
+
+void Interpreter::check_range() const {
+  const double unit = state_.units == 20 ? mm_per_inch : 1.0;
+  const double limit = (state_.units == 20 ? 9999.9999 : 99999.999) * (1.0 + 1e-12);
+  for (char letter : {'X', 'Y', 'Z', 'I', 'J', 'K', 'R'}) {
+    if (words_.has(letter) && std::abs(length_mm(words_[letter])) > limit * unit) {
+      char value[80];
+      std::snprintf(value, sizeof value, "%c%.4f lies outside +-%.4f", letter, length_mm(words_[letter]) / unit, limit);
+      fail(value, words_[letter].column);
+    }
+  }
+}
+
+// End point of a block from its X Y Z words. False if an absolute word moves an axis from where it is not known.
+bool Interpreter::target(Vector3& end, std::array<bool, 3>& known_after, bool& relative) const noexcept {
+  bool from_known = true;
+  relative = false;
+  end = state_.position_mm;
+  known_after = state_.known;
+  for (int axis = 0; axis < axis_count; ++axis) {
+    const char letter = static_cast<char>('X' + axis);
+    if (!words_.has(letter)) {
+      continue;
+    }
+    const auto i = static_cast<std::size_t>(axis);
+    const double value = length_mm(words_[letter]);
+    if (state_.distance == 90) {
+      from_known = from_known && state_.known[i];
+      end[axis] = value;
+      known_after[i] = true;
+    } else {
+      relative = relative || !state_.known[i];
+      end[axis] += value;
+    }
+  }
+  return from_known;
+}
+
+Segment Interpreter::cutting_segment(const Vector3& end) const {
+  if (state_.motion == 1) {
+    Segment segment = make_line(state_.position_mm, end, 0.0, line_number_);
+    segment.feed_mm_per_s = feed_mm_per_s(segment.length_mm);
+    return segment;
+  }
+  ArcWords arc;
+  arc.start_mm = state_.position_mm;
+  arc.end_mm = end;
+  arc.clockwise = state_.motion == 2;
+  arc.normal = plane_normal(state_.plane);
+  arc.tolerance_mm = options_.arc_tolerance_mm;
+  std::uint32_t column = 0;
+  if (words_.has('R')) {
+    arc.radius_mm = length_mm(words_['R']);
+    column = words_['R'].column;
+  } else {
+    arc.centre_mm = options_.absolute_arc_centres ? Vector3(Vector3::Zero()) : arc.start_mm;
+    bool given = false;
+    for (int axis = 0; axis < axis_count; ++axis) {
+      const char letter = static_cast<char>('I' + axis);
+      if (words_.has(letter) && axis != arc.normal) {
+        arc.centre_mm[axis] += length_mm(words_[letter]);
+        column = words_[letter].column;
+        given = true;
+      } else if (options_.absolute_arc_centres) {
+        arc.centre_mm[axis] = arc.start_mm[axis];
+      }
+    }
+    if (!given) {
+      fail("arc without R or I J K in its plane G" + std::to_string(state_.plane) + " (alarm 0022)",
+           words_.g_count > 0 ? words_.g_column[0] : 1);
+    }
+  }
+  Segment segment = resolve_arc(arc, 0.0, line_number_, column);
+  segment.feed_mm_per_s = feed_mm_per_s(segment.length_mm);
+  return segment;
+}
+
+void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t begin, std::size_t end) {
+  if (!distance_given_) {
+    warn_once(seen_distance_, "neither G90 nor G91 before the first move: G" + std::to_string(state_.distance) +
+                                  " assumed (power_on.distance)");
+  }
+  for (char letter : {'X', 'Y', 'Z', 'I', 'J', 'K', 'R'}) {
+    if (words_.has(letter) && !words_[letter].has_point && words_[letter].value != 0.0) {
+      warn_once(seen_no_point_, std::string("numbers without a decimal point are read as ") +
+                                    (options_.calculator_decimal_point ? "mm or inch" : "least increments") +
+                                    " (controller.calculator_decimal_point)");
+    }
+  }
+  if (state_.cycle != 80) {
+    close_region();
+    cycle_block();
+    return;
+  }
+  if (state_.motion == 0) {
+    close_region();
+    Vector3 to;
+    std::array<bool, 3> known_after{};
+    bool relative = false;
+    const bool measurable = target(to, known_after, relative);
+    if (foreign_ == 0) {
+      OtherMove rapid{make_line(measurable ? state_.position_mm : to, to, 0.0, line_number_), 0.0};
+      rapid.segment.kind = SegmentKind::rapid;
+      if (rapid.segment.length_mm > 0.0) {
+        program_.other_moves.push_back(rapid);
+      }
+      state_.position_mm = to;
+      state_.known = known_after;
+    }
+    corner_pending_ = false;
+    return;
+  }
+  const char* why_kept = nullptr;
+  if (flow.stop) {
+    why_kept = "it shares its block with another function";
+  }
+  if (state_.motion == 33) {
+    why_kept = "threading G33 is not supported yet";
+  } else if (foreign_ != 0) {
+    why_kept = "a coordinate mode that is not supported yet is on";
+  } else if (state_.compensation != 40) {
+    why_kept = "cutter compensation is not supported yet";
+  } else if (state_.feed_mode == 95) {
+    why_kept = "feed per revolution G95 is not supported yet";
+  } else if (state_.exact_stop == 63 || state_.exact_stop == 62) {
+    why_kept = state_.exact_stop == 63 ? "tapping mode G63 is not supported yet"
+                                       : "automatic corner override G62 is not supported yet";
+  } else if (words_.corner != nullptr || corner_pending_) {
+    why_kept = "corner words ,R ,C are not supported yet";
+  } else if (state_.uncertain_groups != 0) {
+    why_kept = "the modal state depends on the block-skip switch";
+  }
+  cut(why_kept, before, begin, end);
+  corner_pending_ = words_.corner != nullptr;
+}
+
+void Interpreter::cut(const char* why_kept, const ModalState& before, std::size_t begin, std::size_t end) {
+  if (!(state_.feed > 0.0)) {
+    fail(words_.has('F') ? "cutting move with feed F0 (alarm 0011)"
+                         : "cutting move, but no feed F was given (alarm 0011)",
+         words_.has('F') ? words_['F'].column : 1);
+  }
+  check_range();
+  Vector3 to;
+  std::array<bool, 3> known_after{};
+  bool relative = false;
+  if (!target(to, known_after, relative) && why_kept == nullptr) {
+    why_kept = "the position before it is not known";
+  }
+  if (why_kept != nullptr) {
+    if (options_.absolute_arc_centres && state_.motion > 1 && words_.has_any(centre_letters)) {
+      fail(std::string("arc with an absolute centre cannot be kept as it is: ") + why_kept);
+    }
+    close_region();
+    // Kept to the letter. Its length is known only where start and path are.
+    if (foreign_ == 0) {
+      const bool plain = state_.motion == 1 || state_.compensation != 40 || state_.motion == 33;
+      const double rate = state_.feed_mode == 94 ? feed_mm_per_s(0.0) : 0.0;
+      Segment segment = make_line(state_.position_mm, to, rate, line_number_);
+      if (!plain && target(to, known_after, relative)) {
+        segment = cutting_segment(to);
+      }
+      if (target(to, known_after, relative) && segment.feed_mm_per_s > 0.0 && segment.length_mm > 0.0) {
+        program_.other_moves.push_back({segment, 0.0});
+      }
+      state_.position_mm = to;
+      state_.known = known_after;
+    }
+    // One warning for a run of such blocks.
+    if (kept_run_line_ + 1 != line_number_) {
+      warn(std::string("cutting move kept untouched: ") + why_kept);
+    }
+    kept_run_line_ = line_number_;
+    return;
+  }
+  Segment segment = cutting_segment(to);
+  const bool stops = explicit_exact_stop_ || state_.exact_stop == 61;
+  if (region_ == nullptr) {
+    region_ = std::make_shared<Region>();
+    region_->first_line = line_number_;
+    region_->text_begin = begin;
+    region_->entry = before;
+    notes_kept_ = 0;
+  }
+  note(segments_.size());
+  region_->incremental = region_->incremental || relative;
+  segment.stop_at_end = stops;
+  if (segment.length_mm > 0.0) {
+    segments_.push_back(segment);
+  }
+  state_.position_mm = to;
+  state_.known = known_after;
+  region_->last_line = line_number_;
+  region_->text_end = end;
+  region_->exit = state_;
+  region_->exact_stop_at_end = stops;
+  ++region_->blocks;
+  notes_kept_ = region_->notes.size();
+  if (stops) {
+    close_region();
+  }
+}
+
+void Interpreter::cycle_block() {
+  const int axis = plane_normal(state_.plane);
+  const auto z = static_cast<std::size_t>(axis);
+  const char depth_letter = static_cast<char>('X' + axis);
+  const bool incremental = state_.distance == 91;
+  if (words_.has('R')) {
+    cycle_r_ = length_mm(words_['R']);
+  }
+  if (words_.has(depth_letter)) {
+    cycle_z_ = length_mm(words_[depth_letter]);
+  }
+  if (words_.has('Q')) {
+    cycle_.peck_mm = std::abs(length_mm(words_['Q']));
+  }
+  if (words_.has('P')) {
+    cycle_.dwell_s = words_['P'].value * 1e-3;
+  }
+  cycle_.code = state_.cycle;
+  cycle_.return_to_r = state_.cycle_return == 99;
+  int repeats = 1;
+  for (char letter : {'K', 'L'}) {
+    if (words_.has(letter)) {
+      repeats = static_cast<int>(std::clamp(words_[letter].value, 0.0, 9999.0));
+    }
+  }
+  if (!(state_.feed > 0.0) && repeats > 0) {
+    fail("drilling cycle G" + std::to_string(state_.cycle) + " without a feed F (alarm 0011)");
+  }
+  const double level = cycle_.initial_mm;
+  cycle_.r_mm = incremental ? level + cycle_r_ : cycle_r_;
+  cycle_.bottom_mm = incremental ? cycle_.r_mm + cycle_z_ : cycle_z_;
+  const double rate = state_.feed_mode == 94 ? feed_mm_per_s(0.0) : 0.0;
+  for (int k = 0; k < repeats && foreign_ == 0; ++k) {
+    Vector3 hole = state_.position_mm;
+    for (int i = 0; i < axis_count; ++i) {
+      const char letter = static_cast<char>('X' + i);
+      if (i == axis || !words_.has(letter)) {
+        continue;
+      }
+      const double value = length_mm(words_[letter]);
+      hole[i] = incremental ? hole[i] + value : value;
+      if (!incremental) {
+        state_.known[static_cast<std::size_t>(i)] = true;
+      }
+    }
+    OtherMove approach{make_line(state_.position_mm, hole, 0.0, line_number_), 0.0};
+    approach.segment.kind = SegmentKind::rapid;
+    if (approach.segment.length_mm > 0.0) {
+      program_.other_moves.push_back(approach);
+    }
+    if (state_.known[z] && rate > 0.0) {
+      state_.position_mm = expand_cycle(cycle_, hole, axis, rate, line_number_, program_.other_moves);
+    } else {
+      state_.position_mm = hole;
+      if (cycle_.return_to_r) {
+        state_.position_mm[axis] = cycle_.r_mm;
+        state_.known[z] = !incremental && state_.known[z];
+      }
+    }
+  }
+}
+
+}  // namespace shapegcode::detail

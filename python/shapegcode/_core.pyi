@@ -1,0 +1,1454 @@
+"""
+Compiled core of shapegcode: program text, motion, filters, shapers, plant and metrology.
+"""
+from __future__ import annotations
+import collections.abc
+import numpy
+import numpy.typing
+import typing
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockMark', 'DesignError', 'DeviationStats', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'Interpolator', 'ModalState', 'Mode', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'ReaderOptions', 'Region', 'RegionNote', 'Segment', 'SegmentKind', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'WriterOptions', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'fit_blocks', 'grid_polynomial', 'interpolate', 'minimal_two_mode', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'read_program', 'shape_path', 'write_blocks', 'zv']
+class ShapegcodeError(Exception):
+    """
+    Base of every error that shapegcode raises.
+    """
+class ProgramError(ShapegcodeError):
+    """
+    The CNC program cannot be read; `line` and `column` count from 1, 0 if not known.
+    """
+    column: typing.ClassVar[int] = 0
+    line: typing.ClassVar[int] = 0
+class DesignError(ShapegcodeError):
+    """
+    The shaper asked for does not exist, or not on this grid.
+    """
+class ArgumentError(ShapegcodeError, ValueError):
+    """
+    A value is outside its stated range.
+    """
+class NumericError(ShapegcodeError):
+    """
+    A solver failed; the message carries its flag.
+    """
+class Mode:
+    """
+    One vibration mode of one axis, base-excited by the axis command. Immutable.
+    
+    Args:
+        frequency_hz: Undamped natural frequency in Hz, above 0.
+        damping_ratio: Damping ratio (no unit), 0 <= zeta < 1.
+        participation: Share of this mode's relative deflection in the response (no unit), finite.
+    
+    Raises:
+        ArgumentError: A value is outside its range.
+    """
+    def __eq__(self, arg0: Mode) -> bool:
+        ...
+    def __getstate__(self) -> tuple[float, float, float]:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __init__(self, frequency_hz: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, participation: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        """
+        Make a mode; ArgumentError if a value is outside the range that the class states.
+        """
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    @property
+    def damping_ratio(self) -> float:
+        """
+        Damping ratio, no unit.
+        """
+    @property
+    def frequency_hz(self) -> float:
+        """
+        Undamped natural frequency in Hz.
+        """
+    @property
+    def participation(self) -> float:
+        """
+        Share of this mode's relative deflection in the response, no unit.
+        """
+    @property
+    def pole(self) -> complex:
+        """
+        Pole -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s (spec 2; paper 002, eq. 7).
+        """
+class Shaper:
+    """
+    Input shaper: amplitudes at ascending times that add up to one. Immutable.
+    
+    Args:
+        times_s: Times of the taps in s, shape (n_taps,), n_taps >= 1, strictly ascending from exactly 0.
+        amplitudes: Amplitudes of the taps (no unit), shape (n_taps,), sum 1 within 1e-9; may be negative.
+    
+    Raises:
+        ArgumentError: Unequal lengths, no tap, a value that is not finite, times that do not ascend from 0, or a sum
+            other than 1.
+    
+    Source: paper 002, eq. 4 and 9.
+    """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: Shaper) -> bool:
+        ...
+    def __getstate__(self) -> tuple[list[float], list[float]]:
+        ...
+    def __init__(self, times_s: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], amplitudes: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        """
+        Make a shaper; ArgumentError if the taps are not what the class asks for.
+        """
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, arg0: tuple) -> None:
+        ...
+    def residual_ratio(self, mode: Mode) -> float:
+        """
+        Residual vibration of a mode after the last tap, relative to the unshaped one.
+        
+        V = exp(-zeta*omega*t_N) * |sum A_k exp(zeta*omega*t_k) exp(j*omega_d*t_k)|; the participation plays no part. Its
+        rounding floor is about 1e-16*(1 + omega*t_N)*abs_sum.
+        
+        Args:
+            mode: The mode whose vibration is judged; need not be one that the shaper was designed for.
+        
+        Returns:
+            The ratio V (no unit), 0 where the shaper cancels the mode.
+        
+        Source: spec 2; paper 002, eq. 8.
+        """
+    @property
+    def abs_sum(self) -> float:
+        """
+        Sum of the amplitudes' magnitudes (no unit): 1 for a non-negative shaper.
+        """
+    @property
+    def amplitudes(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Amplitudes of the taps (no unit), shape (n_taps,), read-only view.
+        """
+    @property
+    def duration_s(self) -> float:
+        """
+        Time of the last tap in s: how much longer the shaped command moves.
+        """
+    @property
+    def has_negative(self) -> bool:
+        """
+        True if any amplitude is below zero.
+        """
+    @property
+    def mean_s(self) -> float:
+        """
+        First moment in s: the mean delay of the shaped command.
+        """
+    @property
+    def times_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Times of the taps in s, shape (n_taps,), read-only view.
+        """
+    @property
+    def variance_s2(self) -> float:
+        """
+        Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2 (spec 0).
+        """
+class Fir:
+    """
+    Weights on the sample grid that add up to one: an acceleration filter (moving average) or an input shaper. One filter type for both (spec section 0).
+    """
+    @staticmethod
+    def moving_average(length: typing.SupportsInt | typing.SupportsIndex) -> Fir:
+        """
+        Equal weights over `length` samples; costs the same for any length. Raises ArgumentError below 1.
+        """
+    def __init__(self, delays: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], taps: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        """
+        Taps at whole-sample delays, ascending, adding up to 1. Raises ArgumentError otherwise.
+        """
+    def __repr__(self) -> str:
+        ...
+    def apply(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Filter samples of shape (n,) or (n, n_axes); the result has duration_samples more rows. The input is held at its first value before and at its last value after. Bit-identical to FirStream. Raises ArgumentError on another shape.
+        """
+    @property
+    def delays(self) -> list[int]:
+        """
+        Delays in samples.
+        """
+    @property
+    def duration_samples(self) -> int:
+        """
+        Largest delay in samples.
+        """
+    @property
+    def mean_samples(self) -> float:
+        """
+        Mean delay in samples.
+        """
+    @property
+    def taps(self) -> list[float]:
+        """
+        Weights, adding up to 1.
+        """
+    @property
+    def variance_samples2(self) -> float:
+        """
+        Second central moment in samples squared: the contour cost.
+        """
+class FirStream:
+    """
+    Real-time form of Fir: one sample of every axis per step.
+    """
+    def __init__(self, fir: Fir, n_axes: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        At rest at zero. Raises ArgumentError on n_axes < 1.
+        """
+    def reset(self, position: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        """
+        Rest at `position`, shape (n_axes,).
+        """
+    def step(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Filtered sample, shape (n_axes,).
+        """
+class SegmentKind:
+    """
+    Kind of a canonical move.
+    
+    Members:
+    
+      rapid
+    
+      line
+    
+      arc
+    """
+    __members__: typing.ClassVar[dict[str, SegmentKind]]
+    arc: typing.ClassVar[SegmentKind]
+    line: typing.ClassVar[SegmentKind]
+    rapid: typing.ClassVar[SegmentKind]
+    @typing.overload
+    def __eq__(self, other: SegmentKind) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: SegmentKind) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class Segment:
+    """
+    One canonical move in mm.
+    """
+    @staticmethod
+    def arc(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], centre_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], sweep_rad: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, normal: typing.SupportsInt | typing.SupportsIndex = 2) -> Segment:
+        """
+        An arc or helix about the axis `normal` (0 X, 1 Y, 2 Z); `sweep_rad` > 0 turns counter-clockwise seen along it. Raises ArgumentError on a zero radius or sweep.
+        """
+    @staticmethod
+    def line(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex) -> Segment:
+        """
+        A straight move.
+        """
+    def point_at(self, s_mm: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Position at a distance from the start, shape (3,), mm.
+        """
+    @property
+    def centre_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Centre of an arc, shape (3,), mm.
+        """
+    @property
+    def end_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        End, shape (3,), mm.
+        """
+    @property
+    def feed_mm_per_s(self) -> float:
+        """
+        Programmed feed, mm/s; 0 for a rapid.
+        """
+    @property
+    def kind(self) -> SegmentKind:
+        """
+        Kind of the move.
+        """
+    @property
+    def length_mm(self) -> float:
+        """
+        Length, mm.
+        """
+    @property
+    def line_number(self) -> int:
+        """
+        Source line, from 1; 0 if there is none.
+        """
+    @property
+    def normal(self) -> int:
+        """
+        Axis across the plane of an arc: 0 X, 1 Y, 2 Z.
+        """
+    @property
+    def radius_mm(self) -> float:
+        """
+        Radius of an arc at its start, mm.
+        """
+    @property
+    def start_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Start, shape (3,), mm.
+        """
+    @property
+    def sweep_rad(self) -> float:
+        """
+        Signed sweep of an arc, rad.
+        """
+class Path:
+    """
+    A connected run of segments.
+    """
+    def __getitem__(self, index: typing.SupportsInt | typing.SupportsIndex) -> Segment:
+        """
+        Segment at an index.
+        """
+    def __init__(self, segments: collections.abc.Sequence[Segment]) -> None:
+        """
+        Raises ArgumentError if a segment does not start where its predecessor ends.
+        """
+    def __len__(self) -> int:
+        ...
+    def polyline(self, step_rad: typing.SupportsFloat | typing.SupportsIndex = 0.05) -> numpy.ndarray:
+        """
+        Points along the path, (n, 3), mm: segment ends, arcs in steps of `step_rad`.
+        """
+    @property
+    def end_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        End, shape (3,), mm.
+        """
+    @property
+    def largest_sweep_rad(self) -> float:
+        """
+        Largest sweep of any arc, rad; 0 without arcs.
+        """
+    @property
+    def length_mm(self) -> float:
+        """
+        Whole length, mm.
+        """
+    @property
+    def slowest_feed_mm_per_s(self) -> float:
+        """
+        Smallest programmed feed, mm/s; infinity for an empty path.
+        """
+    @property
+    def start_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Start, shape (3,), mm.
+        """
+class AccelerationLaw:
+    """
+    Law of a change of speed.
+    
+    Members:
+    
+      constant_time
+    
+      jerk_limited
+    """
+    __members__: typing.ClassVar[dict[str, AccelerationLaw]]
+    constant_time: typing.ClassVar[AccelerationLaw]
+    jerk_limited: typing.ClassVar[AccelerationLaw]
+    @typing.overload
+    def __eq__(self, other: AccelerationLaw) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: AccelerationLaw) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class MotionLimits:
+    """
+    What look-ahead keeps; infinity switches a limit off.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def arc_feed_ratio(self) -> float:
+        """
+        Feed on arcs relative to the programmed one.
+        """
+    @arc_feed_ratio.setter
+    def arc_feed_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def centripetal_acceleration_mm_per_s2(self) -> float:
+        """
+        Across the path on arcs and along polylines.
+        """
+    @centripetal_acceleration_mm_per_s2.setter
+    def centripetal_acceleration_mm_per_s2(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def contour_tolerance_mm(self) -> float:
+        """
+        Deviation allowed to the filter that follows.
+        """
+    @contour_tolerance_mm.setter
+    def contour_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def corner_speed_difference_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Speed step per axis at a corner, shape (3,).
+        """
+    @corner_speed_difference_mm_per_s.setter
+    def corner_speed_difference_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def filter_mean_deviation_s(self) -> float:
+        """
+        Its mean absolute deviation, s.
+        """
+    @filter_mean_deviation_s.setter
+    def filter_mean_deviation_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def filter_variance_s2(self) -> float:
+        """
+        Its second central moment, s^2.
+        """
+    @filter_variance_s2.setter
+    def filter_variance_s2(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def jerk_time_s(self) -> float:
+        """
+        Smoothing of the acceleration, s; 0 = none.
+        """
+    @jerk_time_s.setter
+    def jerk_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def law(self) -> AccelerationLaw:
+        """
+        Law of a change of speed.
+        """
+    @law.setter
+    def law(self, arg0: AccelerationLaw) -> None:
+        ...
+    @property
+    def max_acceleration_mm_per_s2(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Per axis, shape (3,).
+        """
+    @max_acceleration_mm_per_s2.setter
+    def max_acceleration_mm_per_s2(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def max_feed_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Per axis, shape (3,).
+        """
+    @max_feed_mm_per_s.setter
+    def max_feed_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def max_jerk_mm_per_s3(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Per axis, shape (3,).
+        """
+    @max_jerk_mm_per_s3.setter
+    def max_jerk_mm_per_s3(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def time_constant_s(self) -> float:
+        """
+        Ramp from rest to the programmed feed, s.
+        """
+    @time_constant_s.setter
+    def time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class SpeedProfile:
+    """
+    Distance along a path as a function of time.
+    """
+    @property
+    def duration_s(self) -> float:
+        """
+        Whole time, s.
+        """
+    @property
+    def length_mm(self) -> float:
+        """
+        Distance at the end, mm.
+        """
+    @property
+    def phases(self) -> numpy.ndarray:
+        """
+        (n, 5): start s, duration s, distance mm, speed mm/s, acceleration mm/s^2.
+        """
+class Interpolator:
+    """
+    Set-points of a path, one per interpolation period (real-time form).
+    """
+    def __init__(self, path: Path, profile: SpeedProfile, period_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Raises ArgumentError on a period <= 0.
+        """
+    def step(self) -> tuple[bool, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]]:
+        """
+        (moving, position of shape (3,)); moving is False once the last set-point was given.
+        """
+    @property
+    def sample_count(self) -> int:
+        """
+        Set-points from start to end.
+        """
+class ModalState:
+    """
+    Modal state of the controller, as G numbers.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def compensation(self) -> int:
+        """
+        Group 07: 40, 41, 42.
+        """
+    @compensation.setter
+    def compensation(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def coordinate_system(self) -> int:
+        """
+        Group 14: 54 ... 59.
+        """
+    @coordinate_system.setter
+    def coordinate_system(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def cycle(self) -> int:
+        """
+        Group 09: 73 ... 89, 80 = none.
+        """
+    @cycle.setter
+    def cycle(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def cycle_return(self) -> int:
+        """
+        Group 10: 98, 99.
+        """
+    @cycle_return.setter
+    def cycle_return(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def distance(self) -> int:
+        """
+        Group 03: 90, 91.
+        """
+    @distance.setter
+    def distance(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def exact_stop(self) -> int:
+        """
+        Group 15: 61 ... 64.
+        """
+    @exact_stop.setter
+    def exact_stop(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def feed(self) -> float:
+        """
+        F as programmed; 0 before the first.
+        """
+    @feed.setter
+    def feed(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def feed_mode(self) -> int:
+        """
+        Group 05: 93, 94, 95.
+        """
+    @feed_mode.setter
+    def feed_mode(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def known(self) -> typing.Annotated[list[bool], "FixedSize(3)"]:
+        """
+        Whether each axis' position is known.
+        """
+    @property
+    def length_number(self) -> int:
+        """
+        H.
+        """
+    @length_number.setter
+    def length_number(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def length_offset(self) -> int:
+        """
+        Group 08: 43, 44, 49.
+        """
+    @length_offset.setter
+    def length_offset(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def motion(self) -> int:
+        """
+        Group 01: 0, 1, 2, 3.
+        """
+    @motion.setter
+    def motion(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def plane(self) -> int:
+        """
+        Group 02: 17, 18, 19.
+        """
+    @plane.setter
+    def plane(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Position in the active work coordinates, shape (3,), mm.
+        """
+    @property
+    def units(self) -> int:
+        """
+        Group 06: 20, 21.
+        """
+    @units.setter
+    def units(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class ReaderOptions:
+    """
+    The controller's settings that change how a text is read.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def absolute_arc_centres(self) -> bool:
+        """
+        I J K are positions (not FANUC).
+        """
+    @absolute_arc_centres.setter
+    def absolute_arc_centres(self, arg0: bool) -> None:
+        ...
+    @property
+    def arc_tolerance_mm(self) -> float:
+        """
+        Largest difference of an arc's radii, mm (parameter 3410).
+        """
+    @arc_tolerance_mm.setter
+    def arc_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def calculator_decimal_point(self) -> bool:
+        """
+        True: X10 is 10 mm; False: 10 least increments (parameter 3401#0).
+        """
+    @calculator_decimal_point.setter
+    def calculator_decimal_point(self, arg0: bool) -> None:
+        ...
+    @property
+    def least_increment_inch(self) -> float:
+        """
+        Inch least increment, inch.
+        """
+    @least_increment_inch.setter
+    def least_increment_inch(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def least_increment_mm(self) -> float:
+        """
+        Metric least increment, mm.
+        """
+    @least_increment_mm.setter
+    def least_increment_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_line_length(self) -> int:
+        """
+        Characters.
+        """
+    @max_line_length.setter
+    def max_line_length(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def power_on(self) -> ModalState:
+        """
+        Modal state before the first block.
+        """
+    @power_on.setter
+    def power_on(self, arg0: ModalState) -> None:
+        ...
+    @property
+    def probe_lines(self) -> list[int]:
+        """
+        Ascending lines behind which the state is kept.
+        """
+    @probe_lines.setter
+    def probe_lines(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def unknown_after_tool_change(self) -> typing.Annotated[list[bool], "FixedSize(3)"]:
+        """
+        Axes whose position is not known after M06.
+        """
+    @unknown_after_tool_change.setter
+    def unknown_after_tool_change(self, arg0: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(3)"]) -> None:
+        ...
+    @property
+    def work_offsets_mm(self) -> list[typing.Annotated[list[float], "FixedSize(3)"]]:
+        """
+        G54 ... G59, mm; empty: not known.
+        """
+    @work_offsets_mm.setter
+    def work_offsets_mm(self, arg0: collections.abc.Sequence[typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]]) -> None:
+        ...
+class RegionNote:
+    """
+    An N word or a comment inside a region.
+    """
+    @property
+    def comment_length(self) -> int:
+        """
+        Bytes; 0: no comment.
+        """
+    @property
+    def comment_offset(self) -> int:
+        """
+        Byte offset of its comment in the text.
+        """
+    @property
+    def n_number(self) -> int:
+        """
+        -1: none.
+        """
+    @property
+    def segment(self) -> int:
+        """
+        Index of the segment before which it stood.
+        """
+class Region:
+    """
+    A run of cutting moves between two stops.
+    """
+    @property
+    def blocks(self) -> int:
+        """
+        Source blocks with a cutting move.
+        """
+    @property
+    def entry(self) -> ModalState:
+        """
+        Modal state before it.
+        """
+    @property
+    def exact_stop_at_end(self) -> bool:
+        """
+        Ends with G09 or in G61.
+        """
+    @property
+    def exit(self) -> ModalState:
+        """
+        Modal state after it.
+        """
+    @property
+    def first_line(self) -> int:
+        """
+        From 1.
+        """
+    @property
+    def incremental(self) -> bool:
+        """
+        Moves an axis of unknown position: its origin is arbitrary.
+        """
+    @property
+    def last_line(self) -> int:
+        """
+        From 1, inclusive.
+        """
+    @property
+    def notes(self) -> list[RegionNote]:
+        """
+        N words and comments in order.
+        """
+    @property
+    def path(self) -> Path:
+        """
+        Its moves.
+        """
+    @property
+    def text_begin(self) -> int:
+        """
+        Byte offset of its first line.
+        """
+    @property
+    def text_end(self) -> int:
+        """
+        Byte offset behind its last line.
+        """
+class ProgramText:
+    """
+    A program read: its text to the letter and its regions.
+    """
+    def cutting_path(self, first_line: typing.SupportsInt | typing.SupportsIndex, last_line: typing.SupportsInt | typing.SupportsIndex) -> Path:
+        """
+        The cutting moves of the regions within a range of lines, as one path.
+        """
+    def slice(self, begin: typing.SupportsInt | typing.SupportsIndex, end: typing.SupportsInt | typing.SupportsIndex) -> bytes:
+        """
+        Bytes of the text between two offsets.
+        """
+    @property
+    def block_count(self) -> int:
+        """
+        Lines with at least one word.
+        """
+    @property
+    def final_state(self) -> ModalState:
+        """
+        Modal state at the end.
+        """
+    @property
+    def header_offset(self) -> int:
+        """
+        Byte offset at which a header comment may stand.
+        """
+    @property
+    def line_count(self) -> int:
+        """
+        Lines.
+        """
+    @property
+    def line_end(self) -> str:
+        """
+        Line end of the text.
+        """
+    @property
+    def other_moves(self) -> list:
+        """
+        Rapids, cycles and kept moves as (Segment, dwell_s) pairs, for the clock.
+        """
+    @property
+    def probed(self) -> list[ModalState]:
+        """
+        Modal state behind each of ReaderOptions.probe_lines.
+        """
+    @property
+    def program_number(self) -> int:
+        """
+        O number; -1: none.
+        """
+    @property
+    def regions(self) -> list[Region]:
+        """
+        Runs of cutting moves in order.
+        """
+    @property
+    def size(self) -> int:
+        """
+        Bytes.
+        """
+    @property
+    def text(self) -> bytes:
+        """
+        The whole text.
+        """
+    @property
+    def warnings(self) -> list:
+        """
+        (line, message) pairs.
+        """
+class ShapingOptions:
+    """
+    How a region is turned into a shaped command on the block grid.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def block_period_s(self) -> float:
+        """
+        s.
+        """
+    @block_period_s.setter
+    def block_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def interpolation_period_s(self) -> float:
+        """
+        s.
+        """
+    @interpolation_period_s.setter
+    def interpolation_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def limits(self) -> MotionLimits:
+        """
+        Limits of the look-ahead.
+        """
+    @limits.setter
+    def limits(self, arg0: MotionLimits) -> None:
+        ...
+    @property
+    def plunge_axis_angle_rad(self) -> float:
+        """
+        How far a side of a corner may lean from Z and still count as plunge, rad.
+        """
+    @plunge_axis_angle_rad.setter
+    def plunge_axis_angle_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def plunge_corner_angle_rad(self) -> float:
+        """
+        Least change of direction of such a corner, rad.
+        """
+    @plunge_corner_angle_rad.setter
+    def plunge_corner_angle_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rest_at_stop_s(self) -> float:
+        """
+        Pause at a forced stop, s.
+        """
+    @rest_at_stop_s.setter
+    def rest_at_stop_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class ShapedCommand:
+    """
+    A shaped command on the block grid.
+    """
+    @property
+    def arc_normal(self) -> list[int]:
+        """
+        Per period the axis across an arc's plane, or -1.
+        """
+    @property
+    def grid_mm(self) -> numpy.ndarray:
+        """
+        (n+1, 3) positions at k*T_B, mm, read-only view.
+        """
+    @property
+    def middle_mm(self) -> numpy.ndarray:
+        """
+        (n, 3) positions half a period later, mm, read-only view.
+        """
+    @property
+    def run_ends(self) -> list[int]:
+        """
+        Periods at which the command is at rest.
+        """
+    @property
+    def segment_periods(self) -> list[int]:
+        """
+        Per marked segment the period in which its begin is reached.
+        """
+class FitOptions:
+    """
+    Grid on which blocks are fitted.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def arc_min_chord_mm(self) -> float:
+        """
+        Shorter pieces are lines, mm.
+        """
+    @arc_min_chord_mm.setter
+    def arc_min_chord_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def block_period_s(self) -> float:
+        """
+        s.
+        """
+    @block_period_s.setter
+    def block_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def feed_unit_mm_per_s(self) -> float:
+        """
+        One step of the last F digit, mm/s.
+        """
+    @feed_unit_mm_per_s.setter
+    def feed_unit_mm_per_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def increment_mm(self) -> float:
+        """
+        Least increment of the words, mm.
+        """
+    @increment_mm.setter
+    def increment_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def interpolation_period_s(self) -> float:
+        """
+        s.
+        """
+    @interpolation_period_s.setter
+    def interpolation_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def merge_tolerance_increments(self) -> float:
+        """
+        Deviation of merged blocks per axis, least increments.
+        """
+    @merge_tolerance_increments.setter
+    def merge_tolerance_increments(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def minimum_feed(self) -> int:
+        """
+        In feed units.
+        """
+    @minimum_feed.setter
+    def minimum_feed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class FittedBlocks:
+    """
+    Blocks ready to be written.
+    """
+    def __len__(self) -> int:
+        ...
+    @property
+    def periods(self) -> numpy.typing.NDArray[numpy.uint32]:
+        """
+        Whole block periods that each lasts, (n,).
+        """
+class BlockMark:
+    """
+    An N word or comment to be written before the block that begins there.
+    """
+    def __init__(self, period: typing.SupportsInt | typing.SupportsIndex, n_number: typing.SupportsInt | typing.SupportsIndex = -1, comment: str = '') -> None:
+        ...
+class WriterOptions:
+    """
+    How fitted blocks are written.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def exact_stop_at_end(self) -> bool:
+        """
+        G09 on the last block.
+        """
+    @exact_stop_at_end.setter
+    def exact_stop_at_end(self, arg0: bool) -> None:
+        ...
+    @property
+    def feed_decimals(self) -> int:
+        """
+        Digits behind the point.
+        """
+    @feed_decimals.setter
+    def feed_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def incremental(self) -> bool:
+        """
+        G91 words.
+        """
+    @incremental.setter
+    def incremental(self, arg0: bool) -> None:
+        ...
+    @property
+    def line_end(self) -> str:
+        """
+        Line end.
+        """
+    @line_end.setter
+    def line_end(self, arg0: str) -> None:
+        ...
+    @property
+    def plane(self) -> int:
+        """
+        Plane active before the first block.
+        """
+    @plane.setter
+    def plane(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_decimals(self) -> int:
+        """
+        Digits behind the point.
+        """
+    @position_decimals.setter
+    def position_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class BlockEnd:
+    """
+    When a block's successor starts.
+    
+    Members:
+    
+      ceil
+    
+      carry
+    """
+    __members__: typing.ClassVar[dict[str, BlockEnd]]
+    carry: typing.ClassVar[BlockEnd]
+    ceil: typing.ClassVar[BlockEnd]
+    @typing.overload
+    def __eq__(self, other: BlockEnd) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: BlockEnd) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class DeviationStats:
+    """
+    Statistics of a signed deviation.
+    """
+    @property
+    def count(self) -> int:
+        """
+        Samples.
+        """
+    @property
+    def max_abs_mm(self) -> float:
+        """
+        Largest magnitude, mm.
+        """
+    @property
+    def most_negative_mm(self) -> float:
+        """
+        Right of the path or below, mm.
+        """
+    @property
+    def most_positive_mm(self) -> float:
+        """
+        Left of the path or above, mm.
+        """
+    @property
+    def rms_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def sum_of_squares_mm2(self) -> float:
+        """
+        mm^2.
+        """
+class PlaybackOptions:
+    """
+    What a run of set-points is measured with.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def axis_filters(self) -> list[Fir]:
+        """
+        Filters after the set-points, in order.
+        """
+    @axis_filters.setter
+    def axis_filters(self, arg0: collections.abc.Sequence[Fir]) -> None:
+        ...
+    @property
+    def last_seconds(self) -> float:
+        """
+        Blocks only: play the last so many seconds; 0: all.
+        """
+    @last_seconds.setter
+    def last_seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def measure_contour(self) -> bool:
+        """
+        Deviations and orbit errors.
+        """
+    @measure_contour.setter
+    def measure_contour(self, arg0: bool) -> None:
+        ...
+    @property
+    def modes(self) -> typing.Annotated[list[list[Mode]], "FixedSize(3)"]:
+        """
+        Modes of X, Y and Z.
+        """
+    @modes.setter
+    def modes(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> None:
+        ...
+    @property
+    def period_s(self) -> float:
+        """
+        Interpolation period, s.
+        """
+    @period_s.setter
+    def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def record_samples(self) -> int:
+        """
+        Samples kept for pictures; 0: none.
+        """
+    @record_samples.setter
+    def record_samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class PlaybackFigures:
+    """
+    Figures of one run from rest to rest.
+    """
+    @property
+    def command(self) -> DeviationStats:
+        """
+        Deviation of the command from the path.
+        """
+    @property
+    def duration_s(self) -> float:
+        """
+        Until the set-points rest, s.
+        """
+    @property
+    def end_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Last set-point, (3,), mm.
+        """
+    @property
+    def orbit_error_percent(self) -> list[float]:
+        """
+        Per arc of the path.
+        """
+    @property
+    def peak_acceleration_mm_per_s2(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Of the command, (3,), mm/s^2.
+        """
+    @property
+    def peak_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Largest |response - command| before it, (3,), mm.
+        """
+    @property
+    def recorded_command(self) -> numpy.ndarray:
+        """
+        (n, 3), mm.
+        """
+    @property
+    def recorded_response(self) -> numpy.ndarray:
+        """
+        (n, 3), mm.
+        """
+    @property
+    def residual_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Largest |response - command| from the instant at which the set-points rest, (3,), mm.
+        """
+    @property
+    def response(self) -> DeviationStats:
+        """
+        Deviation of the response from the path.
+        """
+def convolve(first: Shaper, second: Shaper) -> Shaper:
+    """
+    The two shapers in series: cancels what either cancels, lasts as long as both together.
+    
+    Args:
+        first: A shaper.
+        second: Another one; the order does not matter.
+    
+    Returns:
+        The series shaper; taps whose times agree within 1e-12 of its duration are merged.
+    
+    Source: paper 002, eq. 3.
+    """
+def convolved_zv(modes: collections.abc.Sequence[Mode]) -> Shaper:
+    """
+    Convolved ZV, the conventional multi-mode shaper: 2^n non-negative taps.
+    
+    Args:
+        modes: The n >= 1 modes to cancel.
+    
+    Returns:
+        The shaper; its duration is the sum of the half damped periods.
+    
+    Raises:
+        ArgumentError: No mode.
+    
+    Source: paper 002, section 2.
+    """
+def count_slowed_blocks(blocks: Path, corner_speed_difference_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], max_feed_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> int:
+    """
+    Blocks that a controller with look-ahead would run slower than programmed.
+    """
+def fit_blocks(command: ShapedCommand, breaks: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: FitOptions) -> FittedBlocks:
+    """
+    Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. Raises ArgumentError on a position outside +-99999.999 mm.
+    """
+def grid_polynomial(modes: collections.abc.Sequence[Mode], period_s: typing.SupportsFloat | typing.SupportsIndex) -> Shaper:
+    """
+    Shortest shaper with taps at multiples of a period that cancels every mode exactly there.
+    
+    The polynomial with the roots z = exp(s*period) and their conjugates: two periods per mode, one for a mode whose z is
+    real, none for one that aliases onto an earlier one. Amplitudes may be negative and large: look at abs_sum before use.
+    
+    Args:
+        modes: The modes to cancel, at least one; one above the grid's Nyquist frequency is fine.
+        period_s: Period of the grid in s, above 0.
+    
+    Returns:
+        The shaper; residual_ratio of every mode is at most 1e-10, some 1e-16*abs_sum as a rule.
+    
+    Raises:
+        ArgumentError: No mode, or a period that is not positive.
+        DesignError: A z closer to +1 than 0.01, or so large an abs_sum that rounding leaves more than 1e-10.
+    
+    Source: this project (spec 2, grid-exact shapers).
+    """
+def interpolate(path: Path, profile: SpeedProfile, period_s: typing.SupportsFloat | typing.SupportsIndex) -> numpy.ndarray:
+    """
+    All set-points of a path, (n_samples, 3), mm, read-only. Raises ArgumentError on a period <= 0.
+    """
+def minimal_two_mode(first: Mode, second: Mode, max_duration_s: typing.SupportsFloat | typing.SupportsIndex, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> list[Shaper]:
+    """
+    All minimal (three-impulse) shapers of two modes, ascending in duration, then in the second time.
+    
+    Complete: boxes of the plane of the two free times are discarded only where a bound on derivatives proves that they
+    hold no solution, and Newton starts from all that are left. Where one ZV serves both modes (undamped, odd ratio) it is
+    listed with its two taps; where amplitudes at given times are not unique, those with the smallest sum of squares are.
+    
+    Args:
+        first: One mode, damped or not.
+        second: The other one, either may be the faster.
+        max_duration_s: Largest duration in s, above 0, at most 100 periods of the faster mode.
+        max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1; 1 is not enough for rounding, use
+            has_negative to pick the non-negative ones.
+    
+    Returns:
+        The shapers, residual_ratio of both modes below 1e-13; empty if there is none in the range.
+    
+    Raises:
+        ArgumentError: The modes' poles agree within 1e-6, or a value is outside its range.
+    
+    Source: paper 002, eq. 12-17; the search is this project's.
+    """
+def plan_speed(path: Path, limits: MotionLimits) -> SpeedProfile:
+    """
+    Tangential speed profile over a whole path from rest to rest. Raises ArgumentError on a limit that is not > 0.
+    """
+def play_blocks(blocks: Path, path: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: PlaybackOptions) -> PlaybackFigures:
+    """
+    Play blocks at their feed (a controller without look-ahead), measured against the programmed path.
+    """
+def play_duration_s(blocks: Path, period_s: typing.SupportsFloat | typing.SupportsIndex, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> float:
+    """
+    Sum of block durations, s.
+    """
+def play_path(path: Path, profile: SpeedProfile, options: PlaybackOptions) -> PlaybackFigures:
+    """
+    Play a path under a speed profile (a controller with look-ahead) through filters and plant.
+    """
+def play_samples(positions_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], path: Path, options: PlaybackOptions) -> PlaybackFigures:
+    """
+    Play set-points (n, 3), measured against the programmed path. Raises ArgumentError on another shape.
+    """
+def read_program(text: bytes, options: ReaderOptions = ...) -> ProgramText:
+    """
+    Read a program text (bytes). Raises ProgramError with line and column.
+    """
+def shape_path(path: Path, shaper: Fir, marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> ShapedCommand:
+    """
+    Split at forced stops, plan, sample on half the block grid and shape. `shaper` has its taps in whole block periods. Raises ArgumentError if the block period is no multiple of the interpolation period.
+    """
+def write_blocks(blocks: FittedBlocks, start: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"], marks: collections.abc.Sequence[BlockMark], options: WriterOptions) -> tuple[bytes, int, int]:
+    """
+    (text as bytes, motion code, plane) of fitted blocks; `start` in increments.
+    """
+def zv(mode: Mode) -> Shaper:
+    """
+    Zero-vibration shaper of one mode: taps at 0 and half the damped period.
+    
+    Args:
+        mode: The mode to cancel.
+    
+    Returns:
+        A shaper with 2 non-negative taps.
+    
+    Source: paper 002, eq. 1-2 (Smith 1958).
+    """
+__version__: str = '0.1.0'

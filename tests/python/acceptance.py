@@ -1,0 +1,180 @@
+"""Converts a program with the package and lets the judge, which shares no code with it, have the last word."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import shapegcode as sg
+from judge import (
+    Interpretation,
+    Mode,
+    Move,
+    contour_error_um,
+    durations,
+    interpret,
+    play,
+    residual_um,
+    response,
+    starts,
+    verify_conversion,
+)
+from judge.player import BlockEnd
+
+PROGRAMS = Path(__file__).parents[1] / "golden" / "programs"
+SAMPLES = sorted(p.name for p in PROGRAMS.iterdir() if p.suffix.lower() == ".nc")
+BLOCK_ENDS: tuple[BlockEnd, ...] = ("ceil", "carry")
+#: Settings that a sample needs to be read as it was meant.
+SAMPLE_KEYS: dict[str, dict[str, Any]] = {"BOTTLE.NC": {"input.arc_centre": "absolute"}}
+HEADER_LINE = re.compile(r"\([A-Z0-9 .-]{1,60}\)\r?")
+
+
+def machine_with(keys: Mapping[str, Any] | None = None, base: str = "vx500") -> sg.Machine:
+    """A built-in machine with other values for some dotted keys."""
+    data = sg.Machine.load(base).model_dump(exclude_none=True)
+    for key, value in (keys or {}).items():
+        *tables, last = key.split(".")
+        table = data
+        for name in tables:
+            table = table[name]
+        table[last] = value
+    return sg.Machine.from_data(data, "machine of a test")
+
+
+def read_sample(name: str) -> str:
+    return (PROGRAMS / name).read_bytes().decode("ascii")
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A conversion as the judge sees it; texts are without the header comments of the converter."""
+
+    conversion: sg.Conversion
+    machine: sg.Machine
+    original: str
+    emitted: str
+    header_lines: int
+
+    def interpretation(self, text: str, *, emitted: bool) -> Interpretation:
+        return interpret(
+            text,
+            calculator_decimal_point=self.machine.controller.calculator_decimal_point,
+            arc_centre="incremental" if emitted else self.machine.input.arc_centre,
+        )
+
+    def regions(self) -> Iterator[tuple[list[Move], list[Move], Mapping[str, Any]]]:
+        """Original moves, emitted moves and the report of every region."""
+        ours = self.interpretation(self.original, emitted=False).lines
+        theirs = self.interpretation(self.emitted, emitted=True).lines
+        for entry in self.conversion.report["regions"]:
+            first, last = entry["lines"]
+            begin, end = (line - self.header_lines for line in entry["emitted_lines"])
+            yield (
+                [m for r in ours[first - 1 : last] for m in r.moves],
+                [m for r in theirs[begin - 1 : end] for m in r.moves],
+                entry,
+            )
+
+    @property
+    def modes(self) -> list[list[Mode]]:
+        return [
+            [Mode(m.frequency_hz, m.damping_ratio, m.participation) for m in axis.modes]
+            for axis in self.machine.axes.as_tuple()
+        ]
+
+
+def without_header(original: str, emitted: str, machine: sg.Machine) -> tuple[str, int]:
+    """The emitted text without the comments that the converter put behind the O line, and how many they are."""
+    ours, theirs = original.split("\n"), emitted.split("\n")
+    if not machine.emission.header or original == emitted:
+        return emitted, 0
+    at = next(i for i, line in enumerate(theirs) if line.startswith("(SHAPEGCODE "))
+    assert theirs[:at] == ours[:at]
+    count = 0
+    while "TIME CONSTANT" not in theirs[at + count]:
+        count += 1
+    count += 1
+    for line in theirs[at : at + count]:
+        assert HEADER_LINE.fullmatch(line), line
+        assert line.endswith("\r") == ours[0].endswith("\r")
+    assert any("OVERRIDE 100 PCT" in line for line in theirs[at : at + count])
+    return "\n".join(theirs[:at] + theirs[at + count :]), count
+
+
+def convert(text: str, machine: sg.Machine, **options: Any) -> Judged:
+    """Convert, and hold the text against the original; every complaint of the judge is a failure."""
+    program = sg.Program.from_text(text.encode("latin-1"), machine, source="part.nc")
+    conversion = sg.convert(program, machine, **options)
+    emitted, header = without_header(text, conversion.text.decode("latin-1"), machine)
+    judged = Judged(conversion, machine, text, emitted, header)
+    complaints = verify_conversion(
+        text,
+        emitted,
+        [(e["lines"][0], e["lines"][1]) for e in conversion.report["regions"]],
+        calculator_decimal_point=machine.controller.calculator_decimal_point,
+        arc_centre=machine.input.arc_centre,
+        # What the shaper rounds is within the tolerance; the words add their rounding.
+        contour_tolerance_um=max(machine.tolerance.contour_um, conversion.report["contour_error_um"]["command"]["emitted"]["max"]) + 2.0,
+        inserted=inserted_lines(machine),
+    )
+    assert not complaints, "\n".join(complaints[:10])
+    return judged
+
+
+def inserted_lines(machine: sg.Machine) -> list[str]:
+    lines = [*machine.emission.prologue, *machine.emission.epilogue]
+    if machine.emission.prefill_dwell_s > 0:
+        lines.append(f"G04P{round(machine.emission.prefill_dwell_s * 1e3)}")
+    return lines
+
+
+def whole_periods(judged: Judged) -> None:
+    """Under "ceil" every block of every region lasts a whole multiple of the block period."""
+    period = judged.conversion.report["block_period_s"]
+    tick = judged.machine.controller.interpolation_period_s
+    for _, moves, entry in judged.regions():
+        cuts = [m for m in moves if m.length > 0.0]
+        if not cuts:
+            continue
+        times = durations(cuts, period_s=tick, block_end="ceil")
+        off = np.abs(times / period - np.round(times / period))
+        worst = int(off.argmax())
+        assert off[worst] < 1e-6, f"{entry['lines']}: block {cuts[worst]} lasts {times[worst] * 1e3:g} ms"
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What the judge measures of a run of blocks, µm; contour errors are at the ticks."""
+
+    residual: npt.NDArray[np.float64]
+    command: tuple[float, float]
+    response: tuple[float, float]
+
+
+def figures(
+    judged: Judged, blocks: list[Move], programmed: list[Move], rule: BlockEnd, *, contour: bool = True, override: float = 1.0
+) -> Figures:
+    tick = judged.machine.controller.interpolation_period_s
+    filter_ticks = round(judged.machine.controller.shaped_time_constant_s / tick)
+    cuts = [m for m in blocks if m.length > 0.0]
+    points = play(cuts, period_s=tick, block_end=rule, acceleration_samples=filter_ticks, override=override)
+    # Both paths count from their own known start; from an unknown origin the region begins at zero.
+    points = points + (starts(programmed)[0] - points[0])
+    residual = residual_um(points, judged.modes, tick, still_mm=1e-9)
+    if not contour:
+        return Figures(residual, (0.0, 0.0), (0.0, 0.0))
+    _, _, moved = response(points, judged.modes, tick)
+    over = (len(moved) - 1) // (len(points) - 1)
+    return Figures(
+        residual, contour_error_um(points, programmed), contour_error_um(moved[::over], programmed)
+    )
+
+
+def close(ours: float, theirs: float, relative: float = 0.1, absolute_um: float = 0.2) -> bool:
+    return abs(ours - theirs) <= max(absolute_um, relative * abs(theirs))
