@@ -179,7 +179,7 @@ TEST_CASE("interpreter: what ends a region") {
        {"M08", "M00", "M01", "S1000", "T2", "D1", "H1", "G04 P100", "G04 X1.", "G00 X12.", "G00 Z5.", "G53 X0.", "G28 Z0.",
         "G91 G28 Z0.", "G30 Z0.", "G61", "G43 H1", "G55", "G52 X0.", "G92 X10.", "G20", "G41 D1", "G10 L2 P1 X0.", "/G01 X11.",
         "/", "/M08", "/(SKIP)", "G81 X11. Z-1. R1.", "G99", "G05.1 Q1", "G08 P1", "G09", "G16", "G68 X0. Y0. R0.", "G51.1 X0.",
-        "A90.", "B1.", "G63", "G33 X11. F1."}) {
+        "A90.", "B1.", "G63", "G33 X11. F1.", "G80", "G97 S800", "G54.1 P3", "G69", "G50", "G15"}) {
     CAPTURE(std::string(stop));
     const Program program = read("G01 X10. F600.\n" + std::string(stop) + "\nG40 G69 G15 G50.1 G64 G49 G80 G54 G21 G90 G00 X10. "
                                  "Y0. Z0.\nG01 X20. F600.\n");
@@ -192,7 +192,7 @@ TEST_CASE("interpreter: what ends a region") {
 TEST_CASE("interpreter: what leaves a region open") {
   for (const char* neutral :
        {"", "   ", ";", "(COMMENT)", "N100", "N100 (COMMENT)", "G17", "G18", "G19", "G90", "G91", "G94", "F1200.", "G00", "G01",
-        "G02", "G40", "G49", "G54", "G64", "G80", "G21", "G98", "N5 G90 G94 F100."}) {
+        "G02", "G40", "G49", "G54", "G64", "G21", "G98", "N5 G90 G94 F100."}) {
     CAPTURE(std::string(neutral));
     CHECK(regions_around(neutral) == 1);
   }
@@ -240,7 +240,6 @@ TEST_CASE("interpreter: a region's lines, bytes, blocks, length and states") {
   CHECK(region.exit.feed == 600.0);
   CHECK_FALSE(region.incremental);
   CHECK_FALSE(region.exact_stop_at_end);
-  CHECK(read_program("%\nG90\n").line_count == 0 + 2);
 }
 
 TEST_CASE("interpreter: trailing neutral lines belong to no region") {
@@ -353,6 +352,36 @@ TEST_CASE("interpreter: which axes each code forgets") {
   CHECK(program.final_state.known[0]);
   CHECK(program.final_state.known[1]);
   CHECK_FALSE(program.final_state.known[2]);
+}
+
+TEST_CASE("interpreter: a move beside a code that takes no axis words is a move") {
+  for (const char* code : {"G69", "G50", "G15", "G13.1", "G40 G49 G50 G69 G80", "G97 S800", "G08 P1", "G23", "G80 G98"}) {
+    CAPTURE(std::string(code));
+    const Program program = read(std::string(code) + " G00 X50.\nG01 X60. F60.\n");
+    CHECK(program.final_state.position_mm.x() == 60.0);
+    REQUIRE(program.regions.size() == 1);
+    CHECK(near((*program.regions[0]->path)[0].start_mm, {50.0, 0.0, 0.0}));
+  }
+  // Axis words of the code itself move nothing.
+  for (const char* code : {"G50.1 X50.", "G22 X50. Y1. Z1. I0. J0. K0."}) {
+    CAPTURE(std::string(code));
+    CHECK(read(std::string(code) + "\n").final_state.position_mm.x() == 0.0);
+  }
+  // A cut beside such a code is kept, and moves.
+  const Program cut = read("G97 S800 G01 X50. F60.\nX60.\n");
+  REQUIRE(cut.regions.size() == 1);
+  CHECK(near((*cut.regions[0]->path)[0].start_mm, {50.0, 0.0, 0.0}));
+}
+
+TEST_CASE("interpreter: additional work coordinates G54.1 and back") {
+  const Program there = read("G54.1 P1 G00 X1. Y2. Z3.\nG01 X4. F60.\n");
+  REQUIRE(there.regions.size() == 1);
+  CHECK(near((*there.regions[0]->path)[0].start_mm, {1.0, 2.0, 3.0}));
+  // G54 is a change again, although it was the last of G54 ... G59.
+  const Program back = read("G54.1 P1 G00 X1. Y2. Z3.\nG54\n");
+  CHECK_FALSE(back.final_state.known[0]);
+  CHECK_FALSE(back.final_state.known[2]);
+  CHECK_FALSE(read("G54.1 P1 G00 X1. Y2. Z3.\nG54.1 P2\n").final_state.known[0]);
 }
 
 TEST_CASE("interpreter: G92 sets a position, G52 shifts it, known work offsets move it") {
@@ -506,7 +535,7 @@ TEST_CASE("interpreter: start and end radius may differ within the tolerance") {
 // --- Refusals ---------------------------------------------------------------------------------------------------------
 
 TEST_CASE("interpreter: an arc off its radius is refused with both ends, centre, radii and tolerance") {
-  check_refused(framed("G00 X10.\nG03 X0. Y10.37 I-10. F60.\n"), 5, 18,
+  check_refused(framed("G00 X10.\nG03 X0. Y10.37 I-10. F60.\n"), 5, 16,
                 {"0.3700", "start (X10.0000 Y0.0000)", "end (X0.0000 Y10.3700)", "centre (X0.0000 Y0.0000)",
                  "start radius 10.0000", "end radius 10.3700", "tolerance 0.0100", "0020"});
   check_refused(framed("G18 G00 Z10.\nG03 X10.5 Z0. K-10. F60.\n"), 5, 15, {"start (Z10.0000 X0.0000)", "0.5000"});
@@ -588,17 +617,22 @@ TEST_CASE("interpreter: after a '/' that changes the modal state nothing is shap
     const char* again;
   };
   for (const Case& c :
-       {Case{"/G91", "G90"}, Case{"/G18", "G17"}, Case{"/F1200.", "F600."}, Case{"/G00", "G01"}, Case{"/G20", "G21"},
-        Case{"/G61", "G64"}, Case{"/G93", "G94"}}) {
+       {Case{"/G91", "G90"}, Case{"/G18", "G17"}, Case{"/G00", "G01"}, Case{"/G20", "G21"},
+        Case{"/G61", "G64"}, Case{"/G95", "G94 F600."}}) {
     CAPTURE(std::string(c.skipped));
     const Program program =
-        read("G01 X10. F600.\n" + std::string(c.skipped) + "\nG01 X20.\n" + c.again + "\nG90 G00 X0. Y0. Z0.\nG01 X30. F600.\n");
+        read("G01 X10. F600.\n" + std::string(c.skipped) + "\nX20. F700.\n" + c.again + "\nG90 G00 X0. Y0. Z0.\nG01 X30. F600.\n");
     CHECK(warns(program, "block skip '/' changes the modal state", 5));
     REQUIRE(program.regions.size() == 2);
     CHECK(program.regions[0]->last_line == 4);
     CHECK(program.regions[1]->first_line == 9);
     CHECK(program.final_state.uncertain_groups == 0U);
   }
+  // F is a group of its own, settled by the next F.
+  const Program feed = read("G01 X10. F600.\n/F1200.\nX20.\nX30. F600.\n");
+  REQUIRE(feed.regions.size() == 2);
+  CHECK(feed.regions[0]->last_line == 4);
+  CHECK(feed.regions[1]->first_line == 7);
   // The same state again changes nothing.
   CHECK(read("G01 X10. F600.\n/G90\nX20.\n").regions.size() == 2);
   CHECK(read("G01 X10. F600.\n/G90\nX20.\n").final_state.uncertain_groups == 0U);
@@ -617,17 +651,23 @@ TEST_CASE("interpreter: a second '/' block does not settle what a first one left
 TEST_CASE("interpreter: a move in an uncertain state leaves the axis unknown") {
   // X is 10 + 10 with the switch off, 10 with it on.
   const Program distance = read("G01 X10. F600.\n/G91\nG01 X10.\nG90\nY5.\nX30.\nY10.\n");
-  CHECK(near((*distance.regions[0]->path)[0].end_mm, {10.0, 0.0, 0.0}));
-  for (const auto& region : distance.regions) {
-    CAPTURE(region->first_line);
-    CHECK((region->last_line <= 4 || region->first_line >= 10 || region->last_line == 8));
-    // Line 9 leaves from an X that nobody knows.
-    CHECK_FALSE((region->first_line <= 9 && region->last_line >= 9));
-  }
+  REQUIRE(distance.regions.size() == 3);
+  CHECK(distance.regions[0]->last_line == 4);
+  CHECK(distance.regions[1]->first_line == 8);  // Y alone
+  CHECK(distance.regions[1]->last_line == 8);
+  CHECK(distance.regions[2]->first_line == 10);  // line 9 leaves from an X that nobody knows
   // 25.4 mm or 1 mm.
   const Program units = read("G01 X10. F600.\n/G20\nG01 X1.\nG21\nG01 X30. F600.\nY10.\n");
   REQUIRE(units.regions.size() == 2);
   CHECK(units.regions[1]->first_line == 9);
+}
+
+TEST_CASE("interpreter: a '/' in front of M30 or of a mode's cancellation settles nothing") {
+  const Program end = read("G01 X10. F600.\n/M30\nX20.\n");
+  CHECK(end.regions.size() == 2);
+  const Program rotation = read("G68 X0. Y0. R30.\n/G69\nG90 G00 X0. Y0. Z0.\nG01 X10. F600.\nG69\nG00 X0. Y0. Z0.\nG01 X20.\n");
+  REQUIRE(rotation.regions.size() == 1);
+  CHECK(rotation.regions[0]->first_line == 10);
 }
 
 TEST_CASE("interpreter: a '/' move leaves its axes unknown until they are given") {

@@ -74,11 +74,13 @@ TEST_CASE("lexer: words with letter, value, point and column") {
   CHECK_FALSE(block.optional_skip);
 }
 
-TEST_CASE("lexer: blanks anywhere between letter, sign and number") {
-  const Block block = scan("\tX \t- 1.5");
-  // FANUC ignores blanks, so a sign may stand apart; if that is refused it must be refused loudly, not misread.
-  REQUIRE(block.word_count == 1);
+TEST_CASE("lexer: blanks between words and between letter and number; others are refused, never misread") {
+  const Block block = scan("\tX \t-1.5Y2.");
+  REQUIRE(block.word_count == 2);
   check_word(block.words[0], 'X', -1.5, true, 2);
+  check_word(block.words[1], 'Y', 2.0, true, 9);
+  check_refused("X- 1.5", 1, "X has no number");
+  check_refused("X1 0.5", 4, "'0'");
 }
 
 TEST_CASE("lexer: an empty line, a lone semicolon, a lone comment") {

@@ -142,11 +142,7 @@ def test_remarks_stand_at_their_lines() -> None:
 @pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
 @pytest.mark.parametrize(
     "key",
-    [
-        v.info.key
-        for v in Machine.load("vx500").values()
-        if v.value.replace(".", "").isdigit() and "." in v.value
-    ],
+    [v.info.key for v in Machine.load("vx500").values() if v.value.replace(".", "").isdigit() and "." in v.value],
 )
 def test_no_number_may_be_nan_or_infinite(key: str, number: str) -> None:
     data = Machine.load("vx500").model_dump(mode="python")
@@ -197,8 +193,7 @@ def test_no_number_may_be_nan_or_infinite(key: str, number: str) -> None:
         (
             'name = "M"',
             'name = "Fräse"',
-            '2: name = "Fräse": malformed; short name, in plain ASCII because it goes into the header of '
-            "programs",
+            '2: name = "Fräse": malformed; short name, in plain ASCII because it goes into the header of programs',
         ),
     ],
 )
@@ -214,8 +209,7 @@ def test_message_has_file_line_key_value_and_limit(old: str, new: str, message: 
             "17: axes.x.modes.1.damping_ratio = 1.0: must be less than 1",
         ),
         (
-            "[[axes.x.modes]]\nfrequency_hz = 46\ndamping_ratio = 0.1\n"
-            "[[axes.x.modes]]\nfrequency_hz = true\n",
+            "[[axes.x.modes]]\nfrequency_hz = 46\ndamping_ratio = 0.1\n[[axes.x.modes]]\nfrequency_hz = true\n",
             "19: axes.x.modes.2.frequency_hz = true: must be a number (unit: Hz)",
         ),
         (
@@ -248,8 +242,7 @@ def test_message_has_file_line_key_value_and_limit(old: str, new: str, message: 
         ),
         (
             "[input]\nwork_offsets = {G60 = [1, 2, 3]}\n",
-            "16: input.work_offsets: G60 is no work offset; "
-            'names are G54 ... G59 and "G54.1P1" ... "G54.1P999"',
+            '16: input.work_offsets: G60 is no work offset; names are G54 ... G59 and "G54.1P1" ... "G54.1P999"',
         ),
         (
             "[emission]\nblock_period_s = 0.0125\n",
@@ -354,9 +347,7 @@ def test_every_key_has_a_meaning_and_every_dimensioned_key_a_unit_that_agrees_wi
 
 
 def test_origin_tells_file_from_default() -> None:
-    values = {
-        v.info.key: v for v in Machine.from_toml(MINIMAL + "[controller]\nblock_time_s = 0.005\n").values()
-    }
+    values = {v.info.key: v for v in Machine.from_toml(MINIMAL + "[controller]\nblock_time_s = 0.005\n").values()}
     assert values["controller.block_time_s"].origin == "file"
     assert not values["controller.block_time_s"].assumed
     assert values["controller.block_end"].origin == "default"
@@ -431,9 +422,7 @@ def test_debug_shows_the_traceback(tmp_path: Path) -> None:
         main(["machine", "show", str(tmp_path / "no.toml"), "--debug"])
 
 
-@pytest.mark.parametrize(
-    "argv", [[], ["bogus"], ["machine"], ["machine", "show"], ["machine", "show", "a", "b"]]
-)
+@pytest.mark.parametrize("argv", [[], ["bogus"], ["machine"], ["machine", "show"], ["machine", "show", "a", "b"]])
 def test_wrong_arguments_exit_2(argv: list[str]) -> None:
     assert main(argv) == 2
 
@@ -452,9 +441,7 @@ def test_help_names_every_command_and_imports_nothing_heavy() -> None:
 def test_full_disk_behind_standard_output_is_bad_input() -> None:
     code = "import sys; from shapegcode.cli import main; sys.exit(main(['machine', 'show', 'vx500']))"
     with open("/dev/full", "w") as full:
-        run = subprocess.run(
-            [sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE, text=True, check=False
-        )
+        run = subprocess.run([sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert run.returncode == 2
     assert run.stderr == "shapegcode: No space left on device\n"
 

@@ -12,8 +12,8 @@ namespace {
 
 constexpr double largest_position_mm = 99999.999;
 constexpr double largest_radius_mm = 99999.999;
-// Ticks by which a block may miss a whole tick and still count as ending on it (rounding of doubles only).
-constexpr double tick_tolerance = 1e-7;
+// Ticks by which a block ends before its last tick: far over the rounding of any controller, far under what matters.
+constexpr double tick_margin = 1e-4;
 // How far a line is tried beyond its last good end before it is settled: keeps the fit linear in the program's length.
 constexpr std::uint32_t line_patience = 2048;
 constexpr std::uint32_t longest_arc_periods = 65536;
@@ -38,6 +38,12 @@ struct ChordArc {
   }
 };
 
+// A block and how many periods of the command it stands for; what it does not last is lent to its successor.
+struct Candidate {
+  FittedBlock block;
+  std::uint32_t covered = 0;
+};
+
 class Fitter {
  public:
   Fitter(const Eigen::Ref<const Eigen::MatrixXd>& grid, const Eigen::Ref<const Eigen::MatrixXd>& middle,
@@ -56,18 +62,19 @@ class Fitter {
     std::uint32_t k = 0;
     while (k < periods_) {
       const std::uint32_t limit = next_break(k);
-      std::optional<FittedBlock> block = fit_line(k, limit);
-      if (!block) {
+      std::optional<Candidate> best = fit_line(k, limit);
+      if (!best) {
         break;  // rest to the end
       }
       if (arc_normal_[k] >= 0) {
-        if (const auto arc = fit_arc(k, limit, bends(k) ? 1 : block->periods + 1)) {
-          block = arc;
+        if (const auto arc = fit_arc(k, limit, bends(k) ? 1 : best->covered + 1)) {
+          best = arc;
         }
       }
-      k = block->first_period + block->periods;
-      position_ = block->end;
-      blocks.push_back(*block);
+      k += best->covered;
+      lent_ += best->covered - best->block.periods;
+      position_ = best->block.end;
+      blocks.push_back(best->block);
     }
     return blocks;
   }
@@ -106,37 +113,46 @@ class Fitter {
     return normal >= 0 && bump(k, normal).norm() > 0.5 * options_.increment_mm;
   }
 
-  // F that makes the block last `periods`, rounded up; nullopt if no F of this resolution gives the right ticks.
+  // F, rounded up, that makes the block end just before its last tick: a controller that starts blocks on ticks then
+  // takes exactly the intended number of them, whatever its own rounding. nullopt if no F of this resolution does.
   [[nodiscard]] std::optional<std::int64_t> feed(double length_mm, std::uint32_t periods) const {
-    const double duration = static_cast<double>(periods) * options_.block_period_s;
-    const double exact = length_mm / duration / options_.feed_unit_mm_per_s;
-    // An F that is exact to within rounding stays; all others go up.
-    auto value = static_cast<std::int64_t>(std::ceil(exact * (1.0 - 1e-12)));
-    value = std::max(value, options_.minimum_feed);
+    const std::int64_t value = nearest_feed(length_mm, periods);
     const double ticks =
         length_mm / (static_cast<double>(value) * options_.feed_unit_mm_per_s) / options_.interpolation_period_s;
-    if (std::ceil(ticks - tick_tolerance) != static_cast<double>(periods * ticks_per_period_)) {
+    const auto wanted = static_cast<double>(periods * ticks_per_period_);
+    if (!(ticks > wanted - 1.0 + tick_margin)) {
       return std::nullopt;
     }
     return value;
   }
 
   [[nodiscard]] std::int64_t nearest_feed(double length_mm, std::uint32_t periods) const {
-    const double exact =
-        length_mm / (static_cast<double>(periods) * options_.block_period_s) / options_.feed_unit_mm_per_s;
+    const double ticks = static_cast<double>(periods * ticks_per_period_) - tick_margin;
+    const double exact = length_mm / (ticks * options_.interpolation_period_s) / options_.feed_unit_mm_per_s;
     return std::max(options_.minimum_feed, static_cast<std::int64_t>(std::ceil(exact)));
   }
 
+  // A line over `covered` periods. One too slow for the resolution of F is run a little faster, in fewer whole periods.
+  [[nodiscard]] Candidate line_to(const Position& end, double length, std::uint32_t k, std::uint32_t covered) const {
+    Candidate line{{end, 0, 0, k, covered + lent_, BlockKind::line, 2}, covered};
+    auto f = feed(length, line.block.periods);
+    while (!f && line.block.periods > 1) {
+      f = feed(length, --line.block.periods);
+    }
+    line.block.feed = f ? *f : nearest_feed(length, line.block.periods);
+    return line;
+  }
+
   // Longest line from period k that stays within the merge tolerance of every sample (an opening cone per axis).
-  std::optional<FittedBlock> fit_line(std::uint32_t k, std::uint32_t limit) {
+  std::optional<Candidate> fit_line(std::uint32_t k, std::uint32_t limit) {
     const double tolerance = options_.merge_tolerance_increments + 1e-6;
     std::array<double, axis_count> lowest;
     std::array<double, axis_count> highest;
     lowest.fill(-std::numeric_limits<double>::infinity());
     highest.fill(std::numeric_limits<double>::infinity());
-    std::optional<FittedBlock> best;
+    std::optional<Candidate> best;
     for (std::uint32_t j = k + 1; j <= periods_; ++j) {
-      if (best && (j > limit || bends(j - 1) || j - k > best->periods + line_patience)) {
+      if (best && (j > limit || bends(j - 1) || j - k > best->covered + line_patience)) {
         break;
       }
       const double steps = j - k;
@@ -155,9 +171,8 @@ class Fitter {
       }
       if (end != position_ && (inside || !best)) {
         const double length = (to_mm(end) - to_mm(position_)).norm();
-        const auto f = feed(length, j - k);
-        if (f || !best) {
-          best = FittedBlock{end, 0, f ? *f : nearest_feed(length, j - k), k, j - k, BlockKind::line, 2};
+        if (!best || feed(length, j - k + lent_)) {
+          best = line_to(end, length, k, j - k);
         }
       }
       if (best && !open) {
@@ -200,7 +215,7 @@ class Fitter {
   }
 
   // An arc over periods k ... j, if it follows every sample between; a single period needs no such check.
-  [[nodiscard]] std::optional<FittedBlock> arc_over(std::uint32_t k, std::uint32_t j, int normal) const {
+  [[nodiscard]] std::optional<Candidate> arc_over(std::uint32_t k, std::uint32_t j, int normal) const {
     const int a = (normal + 1) % 3;
     const int b = (normal + 2) % 3;
     const std::uint32_t m = j - k;
@@ -232,30 +247,27 @@ class Fitter {
       }
     }
     const double length = std::hypot(arc->radius * arc->sweep, q[normal] - p[normal]);
-    const auto f = feed(length, m);
+    const auto f = feed(length, m + lent_);
     if (!f && m > 1) {
       return std::nullopt;
     }
     // Counter-clockwise turns left, so its path bulges to the right of the chord.
     const BlockKind kind = arc->bulge_side < 0.0 ? BlockKind::counter_clockwise : BlockKind::clockwise;
-    return FittedBlock{end,
-                       std::llround(arc->radius / options_.increment_mm),
-                       f ? *f : nearest_feed(length, m),
-                       k,
-                       m,
-                       kind,
-                       static_cast<std::uint8_t>(normal)};
+    const std::uint32_t periods = m + lent_;
+    return Candidate{{end, std::llround(arc->radius / options_.increment_mm), f ? *f : nearest_feed(length, periods), k,
+                      periods, kind, static_cast<std::uint8_t>(normal)},
+                     m};
   }
 
   // Longest arc of at least `least` periods from period k, found by doubling and halving steps. A piece too short to
   // show its curvature is no arc by itself but may be part of one.
-  std::optional<FittedBlock> fit_arc(std::uint32_t k, std::uint32_t limit, std::uint32_t least) {
+  std::optional<Candidate> fit_arc(std::uint32_t k, std::uint32_t limit, std::uint32_t least) {
     const int normal = arc_normal_[k];
     std::uint32_t last = k;
     while (last < limit && arc_normal_[last] == normal && last - k < longest_arc_periods) {
       ++last;
     }
-    std::optional<FittedBlock> best;
+    std::optional<Candidate> best;
     std::uint32_t reached = 0;
     for (std::uint32_t step = least; step > 0 && k + least <= last;) {
       const std::uint32_t trial = reached + step;
@@ -281,6 +293,7 @@ class Fitter {
   std::uint32_t periods_;
   std::int64_t ticks_per_period_;
   Position position_{};
+  std::uint32_t lent_ = 0;  // periods that the blocks so far did not last
   std::size_t break_ = 0;
 };
 

@@ -186,6 +186,7 @@ void Interpreter::line(std::string_view text, std::size_t begin, std::size_t end
     }
   }
   const ModalState before = state_;
+  const std::uint32_t foreign_before = foreign_;
   LineFlow flow;
   flow.stop = block_.optional_skip || words_.has_any(~region_letters & ~letter_mask("G"));
   read_codes(flow);
@@ -216,6 +217,7 @@ void Interpreter::line(std::string_view text, std::size_t begin, std::size_t end
   }
   if (flow.motion) {
     move(flow, before, begin, end);
+    forget_uncertain_end();
   } else if (flow.stop) {
     close_region();
   } else if (region_ != nullptr) {
@@ -224,6 +226,7 @@ void Interpreter::line(std::string_view text, std::size_t begin, std::size_t end
   m_codes(flow);
   if (block_.optional_skip) {
     optional_skip_block(before);
+    foreign_ |= foreign_before;
   }
 }
 

@@ -28,7 +28,7 @@ void Interpreter::optional_skip_block(const ModalState& before) {
   if (changed != 0) {
     warn("block skip '/' changes the modal state: nothing is shaped until that group is given again");
   }
-  state_.uncertain_groups |= changed;
+  state_.uncertain_groups |= changed | before.uncertain_groups;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     const auto i = static_cast<Eigen::Index>(axis);
     if (before.position_mm[i] != state_.position_mm[i] || before.known[axis] != state_.known[axis]) {
@@ -109,7 +109,7 @@ void Interpreter::read_codes(LineFlow& flow) {
         } else {
           if (state_.cycle == 80) {
             cycle_ = CannedCycle{};
-            cycle_.initial_mm = state_.position_mm[2];
+            cycle_.initial_mm = state_.position_mm[plane_normal(state_.plane)];
           }
           state_.cycle = whole;
         }
@@ -136,11 +136,16 @@ void Interpreter::read_codes(LineFlow& flow) {
         break;
       case Group::harmless:
         flow.stop = true;
-        one_shot_axes_ = true;
+        one_shot_axes_ = one_shot_axes_ || g == 220;  // the others may share their block with a move
         break;
       case Group::unknown_position:
         flow.stop = true;
-        one_shot_axes_ = true;
+        if (g == 541) {  // G54.1 leaves G54 ... G59; X Y Z beside it are a move
+          state_.coordinate_system = g;
+          state_.uncertain_groups &= ~bit(Group::coordinates);
+        } else {
+          one_shot_axes_ = true;
+        }
         if (words_.has_any(axis_letters) && g != 100 && g != 541) {
           forget_axes(words_.present);
         } else {
@@ -266,7 +271,8 @@ void Interpreter::foreign_switch(int g_tenths) {
       name = "tool axis offset G43.x";
       state_.known[2] = false;
   }
-  one_shot_axes_ = true;
+  // G69, G50, G15, G13.1 have no axis words of their own: X Y Z beside them are a move. G50.1 has.
+  one_shot_axes_ = one_shot_axes_ || on || g_tenths == 501;
   if (on && (foreign_ & mode) == 0) {
     warn(std::string(name) + " is not supported yet: passed through untouched until it is cancelled");
   }
@@ -296,7 +302,7 @@ void Interpreter::m_codes(LineFlow& flow) {
       case 2:
       case 30:
         close_region();
-        ended_ = true;
+        ended_ = ended_ || !block_.optional_skip;
         break;
       case 6:
         for (std::size_t axis = 0; axis < axis_count; ++axis) {

@@ -54,6 +54,7 @@ class Interpreter {
   void m_codes(LineFlow& flow);
   void move(LineFlow& flow, const ModalState& before, std::size_t begin, std::size_t end);
   void cut(const char* why_kept, const ModalState& before, std::size_t begin, std::size_t end);
+  void forget_uncertain_end() noexcept;
   void check_range() const;
   void cycle_block();
   void foreign_switch(int g_tenths);

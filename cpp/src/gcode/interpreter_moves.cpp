@@ -20,7 +20,19 @@ void Interpreter::check_range() const {
   }
 }
 
-// End point of a block from its X Y Z words. False if an absolute word moves an axis from where it is not known.
+// Where a move ends is not known if that depends on a group that a '/' block left open.
+void Interpreter::forget_uncertain_end() noexcept {
+  const std::uint32_t of_cycles = bit(Group::cycle) | bit(Group::cycle_return);
+  const std::uint32_t of_ends = bit(Group::distance) | bit(Group::units) | bit(Group::compensation) |
+                                bit(Group::length_offset) | bit(Group::coordinates);
+  if ((state_.uncertain_groups & of_cycles) != 0) {
+    forget_all();
+  } else if ((state_.uncertain_groups & of_ends) != 0) {
+    forget_axes(words_.present);
+  }
+}
+
+// End point of a block from its X Y Z words. False if in G90 the block moves an axis from where it is not known.
 bool Interpreter::target(Vector3& end, std::array<bool, 3>& known_after, bool& relative) const noexcept {
   bool from_known = true;
   relative = false;
@@ -40,6 +52,13 @@ bool Interpreter::target(Vector3& end, std::array<bool, 3>& known_after, bool& r
     } else {
       relative = relative || !state_.known[i];
       end[axis] += value;
+    }
+  }
+  // An arc moves both axes of its plane, named or not.
+  for (int axis = 0; axis < axis_count && (state_.motion == 2 || state_.motion == 3); ++axis) {
+    if (axis != plane_normal(state_.plane) && !state_.known[static_cast<std::size_t>(axis)]) {
+      from_known = from_known && state_.distance != 90;
+      relative = relative || state_.distance != 90;
     }
   }
   return from_known;

@@ -1,0 +1,177 @@
+"""What the tables of the machine file are made of: types of values, fields with their facts, TOML notation."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
+from pydantic.fields import FieldInfo
+
+# Numbers are strict: a string or a truth value in place of a number is an error; 3 for 3.0 is not.
+Float = Annotated[float, Strict(), Field(allow_inf_nan=False)]
+Positive = Annotated[float, Strict(), Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Strict(), Field(ge=0, allow_inf_nan=False)]
+Count = Annotated[int, Strict(), Field(ge=0)]
+Bool = Annotated[bool, Strict()]
+Text = Annotated[str, Strict()]
+
+
+def key(meaning: str, *, unit: str = "", fanuc: str = "", assumed: bool = False, **field: Any) -> Any:
+    """A pydantic field with the four facts that the documentation of a key needs.
+
+    Left out of *field*, ``default`` makes the key mandatory.
+    """
+    noted: dict[str, Any] = {"unit": unit, "fanuc": fanuc, "assumed": assumed}
+    return Field(description=meaning, json_schema_extra=noted, **field)
+
+
+class Table(BaseModel):
+    """Base of every table of the file: unknown keys are errors and values never change after loading."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+
+class PerAxis(Table):
+    """One value per axis. A machine file may give a single number, which then holds for all three."""
+
+    x: NonNegative = key("value of the X axis")
+    y: NonNegative = key("value of the Y axis")
+    z: NonNegative = key("value of the Z axis")
+
+    def as_tuple(self) -> tuple[float, float, float]:
+        """The three values in the order X, Y, Z."""
+        return (self.x, self.y, self.z)
+
+
+def _spread(value: object) -> object:
+    """A single number stands for all three axes; a table must name all three."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return {"x": value, "y": value, "z": value}
+    return value
+
+
+AxisValues = Annotated[PerAxis, BeforeValidator(_spread)]
+
+
+@dataclass(frozen=True)
+class KeyInfo:
+    """One key of the machine file with what the documentation says of it.
+
+    Attributes:
+        key: dotted name; ``axes.x.modes.1.frequency_hz`` for values, ``axes.<x|y|z>`` and ``modes[]`` in the
+            documentation of the format.
+        unit: unit, "1" for a ratio, empty where there is none.
+        default: default as written in TOML, or "required", or "not set".
+        meaning: what it is.
+        fanuc: numbers of the FANUC parameters that correspond to it, or empty.
+        assumed: True where the default is an assumption and not a known value.
+    """
+
+    key: str
+    unit: str
+    default: str
+    meaning: str
+    fanuc: str
+    assumed: bool
+
+
+@dataclass(frozen=True)
+class KeyValue:
+    """One value of a loaded machine.
+
+    Attributes:
+        info: the key.
+        value: the value as TOML, "not set" for an optional key without one.
+        origin: "file" where the machine file gives the value, else "default".
+    """
+
+    info: KeyInfo
+    value: str
+    origin: Literal["file", "default"]
+
+    @property
+    def assumed(self) -> bool:
+        """True where the value is a default that is an assumption."""
+        return self.origin == "default" and self.info.assumed
+
+
+def facts(field: FieldInfo | None) -> dict[str, Any]:
+    """What `key` noted of a field."""
+    extra = field.json_schema_extra if field is not None else None
+    return dict(extra) if isinstance(extra, dict) else {}
+
+
+def table_type(field: FieldInfo) -> type[Table] | None:
+    """The table type of a field: a table itself or the items of a list of tables; None for a plain value."""
+    return _as_table(field.annotation) or item_type(field)
+
+
+def item_type(field: FieldInfo) -> type[Table] | None:
+    """The table type of the items of a field that holds a list of tables; None for every other field."""
+    arguments = get_args(field.annotation)
+    is_list = len(arguments) == 2 and arguments[1] is Ellipsis
+    return _as_table(arguments[0]) if is_list else None
+
+
+def _as_table(annotation: Any) -> type[Table] | None:
+    return annotation if isinstance(annotation, type) and issubclass(annotation, Table) else None
+
+
+def key_info(field: FieldInfo, key: str) -> KeyInfo:
+    """What the documentation says of a field; *key* is its dotted name."""
+    noted = facts(field)
+    if field.is_required():
+        default = "required"
+    elif field.default is None:
+        default = "not set"
+    else:
+        default = toml(field.default)
+    return KeyInfo(
+        key=key,
+        unit=noted.get("unit", ""),
+        default=default,
+        meaning=field.description or "",
+        fanuc=noted.get("fanuc", ""),
+        assumed=bool(noted.get("assumed")),
+    )
+
+
+def toml(value: object) -> str:
+    """A value in TOML notation."""
+    if isinstance(value, PerAxis):
+        if value.x == value.y == value.z:
+            return toml(value.x)
+        return "{ " + ", ".join(f"{axis} = {toml(getattr(value, axis))}" for axis in "xyz") + " }"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return _toml_float(value)
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, str):
+        # JSON strings are TOML basic strings, but for DEL, which TOML wants escaped.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(toml(item) for item in value) + "]"
+    if isinstance(value, dict):
+        return (
+            "{ " + ", ".join(f"{toml_key(key)} = {toml(item)}" for key, item in value.items()) + " }" if value else "{}"
+        )
+    return str(value)
+
+
+def _toml_float(value: float) -> str:
+    if not math.isfinite(value):
+        return str(value)
+    if value == int(value) and abs(value) < 1e15:
+        return f"{value:.1f}"
+    return repr(value)
+
+
+def toml_key(key: str) -> str:
+    """A key in TOML notation: in quotes where it must be."""
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key)
