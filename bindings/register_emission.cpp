@@ -68,6 +68,15 @@ void register_emission(py::module_& module) {
       .def_readwrite("minimum_feed", &FitOptions::minimum_feed, "In feed units.")
       .def_readwrite("merge_tolerance_increments", &FitOptions::merge_tolerance_increments,
                      "Deviation of merged blocks per axis, least increments.")
+      .def(
+          "end_with_arc",
+          [](FitOptions& self, bool clockwise, int normal, double radius_mm) {
+            self.last_kind = clockwise ? BlockKind::clockwise : BlockKind::counter_clockwise;
+            self.last_normal = static_cast<std::uint8_t>(normal);
+            self.last_radius_mm = radius_mm;
+          },
+          py::arg("clockwise"), py::arg("normal"), py::arg("radius_mm"),
+          "The last block must be an arc, so that the modal motion code behind it is G02 or G03.")
       .def_readwrite("arc_min_chord_mm", &FitOptions::arc_min_chord_mm, "Shorter pieces are lines, mm.");
 
   py::class_<FittedBlocks, std::shared_ptr<FittedBlocks>>(module, "FittedBlocks", "Blocks ready to be written.")

@@ -1008,6 +1008,10 @@ class FitOptions:
     """
     def __init__(self) -> None:
         ...
+    def end_with_arc(self, clockwise: bool, normal: typing.SupportsInt | typing.SupportsIndex, radius_mm: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        The last block must be an arc, so that the modal motion code behind it is G02 or G03.
+        """
     @property
     def arc_min_chord_mm(self) -> float:
         """

@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from shapegcode import _core
@@ -81,7 +82,7 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
 
 
 def convert(
-    program: Program,
+    program: Program | str | Path,
     machine: Machine,
     *,
     arc_feed_ratio: float | None = None,
@@ -91,7 +92,7 @@ def convert(
     """Shape every cutting region of a program, and judge the emitted text by playing it.
 
     Args:
-        program: what to convert.
+        program: what to convert, or its file.
         machine: controller, modes, tolerances.
         arc_feed_ratio: feed on arcs relative to the programmed one, reached before the arc; None:
             `shaping.arc_feed_ratio`.
@@ -99,12 +100,15 @@ def convert(
         on_progress: called with stage, regions done and regions in all.
 
     Raises:
+        ProgramError: the program cannot be read, or a region not be written.
         DesignError: no shaper exists on this grid.
         ArgumentError: a value outside its range.
         RoundTripError: the emitted text would not be equivalent: a defect of shapegcode.
     """
     if arc_feed_ratio is not None and not 0.0 < arc_feed_ratio <= 1.0:
         raise _core.ArgumentError(f"arc feed ratio is {arc_feed_ratio:g}, must be above 0 and at most 1")
+    if not isinstance(program, Program):
+        program = Program.read(program, machine)
     grid = choose_grid(machine, block_period_s)
     limits = motion_limits(
         machine,

@@ -63,8 +63,8 @@ class Program:
     source: str
 
     @classmethod
-    def read(cls, path: str | Path, machine: Machine) -> Program:
-        """Read a program file.
+    def read(cls, path: str | Path, machine: Machine | None = None) -> Program:
+        """Read a program file as the controller of `machine` would (None: as that of the built-in ``vx500``).
 
         Raises:
             ProgramError: the text is no program that can be read; the message starts with ``file:line:column``.
@@ -76,7 +76,7 @@ class Program:
     def from_text(
         cls,
         text: bytes | str,
-        machine: Machine,
+        machine: Machine | None = None,
         *,
         source: str = "<text>",
         emitted: bool = False,
@@ -87,6 +87,9 @@ class Program:
         Raises:
             ProgramError: the text is no program that can be read; the message starts with ``source:line:column``.
         """
+        from shapegcode.machine import Machine
+
+        machine = machine or Machine.load("vx500")
         data = text.encode() if isinstance(text, str) else text
         options = reader_options(machine, emitted=emitted, probe_lines=probe_lines)
         try:

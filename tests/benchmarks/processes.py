@@ -19,6 +19,7 @@ class Run:
     """One finished process."""
 
     exit_code: int
+    messages: str
     wall_s: float
     cpu_s: float
     peak_mb: float
@@ -49,8 +50,8 @@ class Rs274:
     def count_feed_moves(self, program: Path) -> int:
         """How many straight feed moves it finds: proof that it reads what we time."""
         run = subprocess.run(
-            self._command(program), env=self._environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE, text=True, check=True,
+            self._command(program), env=self._environment, stdin=subprocess.DEVNULL, capture_output=True,
+            text=True, check=True,
         )  # fmt: skip
         return run.stdout.count("STRAIGHT_FEED(")
 
@@ -70,5 +71,5 @@ def _launch(command: Sequence[str | Path], environment: Mapping[str, str], accep
     text = subprocess.run(launcher, env=dict(environment), stdout=subprocess.PIPE, text=True, check=True).stdout
     run = Run(**json.loads(text))
     if run.exit_code not in accepted:
-        raise RuntimeError(f"{' '.join(map(str, command))} ended with exit code {run.exit_code}")
+        raise RuntimeError(f"{' '.join(map(str, command))} ended with exit code {run.exit_code}: {run.messages}")
     return run

@@ -181,8 +181,8 @@ TEST_CASE("interpreter: what ends a region") {
         "/", "/M08", "/(SKIP)", "G81 X11. Z-1. R1.", "G99", "G05.1 Q1", "G08 P1", "G09", "G16", "G68 X0. Y0. R0.", "G51.1 X0.",
         "A90.", "B1.", "G63", "G33 X11. F1.", "G80", "G97 S800", "G54.1 P3", "G69", "G50", "G15"}) {
     CAPTURE(std::string(stop));
-    const Program program = read("G01 X10. F600.\n" + std::string(stop) + "\nG40 G69 G15 G50.1 G64 G49 G80 G54 G21 G90 G00 X10. "
-                                 "Y0. Z0.\nG01 X20. F600.\n");
+    const Program program = read("G01 X10. F600.\n" + std::string(stop) + "\nG40 G69 G15 G50.1 G64 G49 G80 G54 G21\n"
+                                 "G90 G00 X10. Y0. Z0.\nG01 X20. F600.\n");
     CHECK(program.regions.size() == 2);
     CHECK(program.regions[0]->first_line == 4);
     CHECK(program.regions[0]->last_line == 4);

@@ -119,12 +119,17 @@ def convert(text: str, machine: sg.Machine, **options: Any) -> Judged:
         [(e["lines"][0], e["lines"][1]) for e in conversion.report["regions"]],
         calculator_decimal_point=machine.controller.calculator_decimal_point,
         arc_centre=machine.input.arc_centre,
-        # What the shaper rounds is within the tolerance; the words add their rounding.
-        contour_tolerance_um=max(machine.tolerance.contour_um, conversion.report["contour_error_um"]["command"]["emitted"]["max"]) + 2.0,
+        contour_tolerance_um=contour_limit_um(machine, conversion.report),
         inserted=inserted_lines(machine),
     )
     assert not complaints, "\n".join(complaints[:10])
     return judged
+
+
+def contour_limit_um(machine: sg.Machine, report: Mapping[str, Any]) -> float:
+    """How far the texts may lie apart, either from the other; a missed corner lies further from the curve."""
+    stated: float = report["contour_error_um"]["command"]["emitted"]["max"]
+    return 2.0 * max(machine.tolerance.contour_um, stated) + 2.0
 
 
 def inserted_lines(machine: sg.Machine) -> list[str]:

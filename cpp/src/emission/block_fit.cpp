@@ -76,10 +76,49 @@ class Fitter {
       position_ = best->block.end;
       blocks.push_back(best->block);
     }
+    end_with_arc(blocks);
     return blocks;
   }
 
  private:
+  // Makes the last line an arc where the original ends with one. Blocks without a move in its plane are joined to their
+  // predecessors first; at the end of a stop they are a few increments long.
+  void end_with_arc(std::vector<FittedBlock>& blocks) const {
+    if (options_.last_kind == BlockKind::line || blocks.empty()) {
+      return;
+    }
+    const int normal = options_.last_normal;
+    const auto a = static_cast<std::size_t>((normal + 1) % 3);
+    const auto b = static_cast<std::size_t>((normal + 2) % 3);
+    FittedBlock last = blocks.back();
+    if (last.kind == options_.last_kind && last.normal == normal) {
+      return;
+    }
+    const auto start_of = [&](std::size_t i) { return i == 0 ? rounded(0) : blocks[i - 1].end; };
+    std::size_t first = blocks.size() - 1;
+    Position start = start_of(first);
+    while (first > 0 && start[a] == last.end[a] && start[b] == last.end[b]) {
+      --first;
+      last.periods += blocks[first].periods;
+      last.first_period = blocks[first].first_period;
+      start = start_of(first);
+    }
+    const Vector3 move = to_mm(last.end) - to_mm(start);
+    const double chord = std::hypot(move[static_cast<Eigen::Index>(a)], move[static_cast<Eigen::Index>(b)]);
+    if (chord <= 0.0) {
+      return;  // no move in the plane at all: the original's arc is shorter than an increment
+    }
+    const double radius = std::max(options_.last_radius_mm, chord);
+    last.radius = std::llround(radius / options_.increment_mm);
+    last.kind = options_.last_kind;
+    last.normal = options_.last_normal;
+    const double sweep = 2.0 * std::asin(0.5 * chord / (static_cast<double>(last.radius) * options_.increment_mm));
+    const double length = std::hypot(radius * sweep, move[normal]);
+    last.feed = nearest_feed(length, last.periods);
+    blocks.resize(first);
+    blocks.push_back(last);
+  }
+
   [[nodiscard]] Position rounded(std::uint32_t k) const {
     Position result;
     for (int i = 0; i < axis_count; ++i) {

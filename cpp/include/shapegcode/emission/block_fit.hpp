@@ -32,7 +32,12 @@ struct FitOptions {
   std::int64_t minimum_feed = 10;           ///< in feed units
   double merge_tolerance_increments = 0.5;  ///< deviation of merged blocks from the shaped command, per axis
   double arc_min_chord_mm = 0.02;           ///< shorter pieces are lines
-  double max_sweep_rad = 1.3962634;         ///< 80 degrees: no piece can be mistaken for the long way round
+  /// What the last block must be, so that the modal motion code behind it is the original's: a control refuses G02 or
+  /// G03 alone. An arc that takes the place of a line there has `last_radius_mm` in the plane across `last_normal`.
+  BlockKind last_kind = BlockKind::line;
+  std::uint8_t last_normal = 2;
+  double last_radius_mm = 0.0;
+  double max_sweep_rad = 1.3962634;  ///< 80 degrees: no piece can be mistaken for the long way round
 };
 
 /// Turns a shaped command into blocks that each last a whole number of block periods.
