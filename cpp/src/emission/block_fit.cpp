@@ -152,17 +152,29 @@ class Fitter {
     return normal >= 0 && bump(k, normal).norm() > 0.5 * options_.increment_mm;
   }
 
-  // F, rounded up, that makes the block end just before its last tick: a controller that starts blocks on ticks then
-  // takes exactly the intended number of them, whatever its own rounding. nullopt if no F of this resolution does.
+  // F, rounded up, that makes the block end just before its last tick, so that a controller that starts blocks on ticks
+  // takes exactly the intended number of them, whatever its own rounding. What it then stands still may be no more than
+  // half an increment of way; a longer steady block may have an F that is exact. nullopt if no F of this resolution
+  // will do.
   [[nodiscard]] std::optional<std::int64_t> feed(double length_mm, std::uint32_t periods) const {
-    const std::int64_t value = nearest_feed(length_mm, periods);
-    const double ticks =
-        length_mm / (static_cast<double>(value) * options_.feed_unit_mm_per_s) / options_.interpolation_period_s;
     const auto wanted = static_cast<double>(periods * ticks_per_period_);
-    if (!(ticks > wanted - 1.0 + tick_margin)) {
-      return std::nullopt;
+    const auto early = [&](std::int64_t value) {
+      const double speed = static_cast<double>(value) * options_.feed_unit_mm_per_s;
+      return wanted * options_.interpolation_period_s * speed - length_mm;  // way not used, mm
+    };
+    const auto last_tick = [&](std::int64_t value) {
+      return static_cast<double>(value) * options_.feed_unit_mm_per_s * options_.interpolation_period_s;
+    };
+    const std::int64_t up = nearest_feed(length_mm, periods);
+    if (early(up) <= 0.5 * options_.increment_mm && early(up) < (1.0 - tick_margin) * last_tick(up)) {
+      return up;
     }
-    return value;
+    const std::int64_t exact =
+        std::llround(length_mm / (wanted * options_.interpolation_period_s) / options_.feed_unit_mm_per_s);
+    if (exact >= options_.minimum_feed && std::abs(early(exact)) <= 1e-9 * length_mm) {
+      return exact;
+    }
+    return std::nullopt;
   }
 
   [[nodiscard]] std::int64_t nearest_feed(double length_mm, std::uint32_t periods) const {

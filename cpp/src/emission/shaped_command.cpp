@@ -97,7 +97,7 @@ ShapedCommand shape_path(const std::shared_ptr<const Path>& path, const Fir& sha
   const Fir half_shaper = on_half_grid(shaper);
   const std::vector<Segment>& segments = path->segments();
   std::vector<std::size_t> borders =
-      forced_stops(segments, options.plunge_axis_angle_rad, options.plunge_corner_angle_rad);
+      forced_stops(segments, options.plunge_axis_angle_rad, options.plunge_corner_angle_rad, options.limits);
   borders.push_back(segments.size());
   const auto rest = static_cast<std::uint32_t>(std::ceil(options.rest_at_stop_s / options.block_period_s - 1e-9));
 

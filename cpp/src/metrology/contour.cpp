@@ -35,6 +35,8 @@ void DeviationStats::add(double deviation_mm) noexcept {
   ++count;
 }
 
+void DeviationStats::include_missed(double distance_mm) noexcept { max_abs_mm = std::max(max_abs_mm, distance_mm); }
+
 double DeviationStats::rms_mm() const noexcept {
   return count == 0 ? 0.0 : std::sqrt(sum_of_squares_mm2 / static_cast<double>(count));
 }

@@ -296,7 +296,13 @@ double corner_speed_limit(const Segment& before, const Segment& after, const Mot
   speed = std::min(speed, curvature_speed(polyline_curvature(before, after, angle), limits,
                                           limits.centripetal_acceleration_mm_per_s2));
   if (limits.filter_mean_deviation_s > 0.0) {
-    speed = std::min(speed, 2.0 * limits.contour_tolerance_mm / (size * limits.filter_mean_deviation_s));
+    // A filter of symmetric spread passes the corner at |change| * (v*E|t| + a*E[t^2]/2) / 2: what the speed at the
+    // corner and the ramps on both sides of it cost.
+    const double acceleration = std::max(segment_acceleration(before, segment_speed_limit(before, limits), limits),
+                                         segment_acceleration(after, segment_speed_limit(after, limits), limits));
+    const double ramps = std::isfinite(acceleration) ? 0.5 * acceleration * limits.filter_variance_s2 : 0.0;
+    const double room = 2.0 * limits.contour_tolerance_mm / size - ramps;
+    speed = std::min(speed, std::max(0.0, room / limits.filter_mean_deviation_s));
   }
   return speed;
 }
@@ -358,7 +364,7 @@ SpeedProfile plan_speed(const Path& path, const MotionLimits& limits) {
 }
 
 std::vector<std::size_t> forced_stops(const std::vector<Segment>& segments, double axis_angle_rad,
-                                      double corner_angle_rad) {
+                                      double corner_angle_rad, const MotionLimits& limits) {
   const double along = std::cos(axis_angle_rad);
   const double turned = std::cos(corner_angle_rad);
   std::vector<std::size_t> stops;
@@ -366,7 +372,8 @@ std::vector<std::size_t> forced_stops(const std::vector<Segment>& segments, doub
     const Vector3 before = tangent_at(segments[i - 1], segments[i - 1].length_mm);
     const Vector3 after = tangent_at(segments[i], 0.0);
     const bool plunges = std::abs(before[2]) >= along || std::abs(after[2]) >= along;
-    if (segments[i - 1].stop_at_end || (plunges && before.dot(after) <= turned)) {
+    if (segments[i - 1].stop_at_end || (plunges && before.dot(after) <= turned) ||
+        corner_speed_limit(segments[i - 1], segments[i], limits) <= 0.0) {
       stops.push_back(i);
     }
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "shapegcode/metrology/corner_reach.hpp"
 #include "shapegcode/metrology/orbit.hpp"
 #include "shapegcode/motion/interpolator.hpp"
 
@@ -23,7 +24,9 @@ class Recorder {
         tracks_command_(tracks_contour_ && !command_on_path),
         command_tracker_(path),
         response_tracker_(path),
-        orbit_(path) {
+        orbit_(path),
+        command_reach_(path),
+        response_reach_(path) {
     for (const Fir& fir : options.axis_filters) {
       filters_.emplace_back(fir, axis_count);
       tail_ += fir.duration_samples();
@@ -56,9 +59,11 @@ class Recorder {
     if (tracks_command_) {
       figures_.command.add(command_tracker_.step(command));
       orbit_.step(command, command_tracker_.segment());
+      command_reach_.step(command, command_tracker_.s_mm());
     }
     if (tracks_contour_) {
       figures_.response.add(response_tracker_.step(response));
+      response_reach_.step(response, response_tracker_.s_mm());
     }
     record(command, response);
     ++count_;
@@ -79,6 +84,8 @@ class Recorder {
     if (tracks_contour_) {
       figures_.orbit_error_percent = orbit_.percent();
       figures_.command.count = figures_.response.count;
+      figures_.command.include_missed(command_reach_.largest_mm());
+      figures_.response.include_missed(response_reach_.largest_mm());
     }
     // A picture of the decay needs what comes after the stop.
     const auto decay = static_cast<std::size_t>(recorded_decay_s / options_.period_s);
@@ -117,6 +124,8 @@ class Recorder {
   ContourTracker command_tracker_;
   ContourTracker response_tracker_;
   OrbitError orbit_;
+  CornerReach command_reach_;
+  CornerReach response_reach_;
   PlaybackFigures figures_;
   Vector3 last_ = Vector3::Zero();
   Vector3 before_last_ = Vector3::Zero();
@@ -152,7 +161,8 @@ std::span<const Segment> last_blocks(std::span<const Segment> blocks, double sec
 PlaybackFigures play_path(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
                           const PlaybackOptions& options) {
   Interpolator interpolator(path, std::move(profile), options.period_s);
-  return play(*path, options, options.axis_filters.empty(), [&](Vector3& position) { return interpolator.step(position); });
+  return play(*path, options, options.axis_filters.empty(),
+              [&](Vector3& position) { return interpolator.step(position); });
 }
 
 PlaybackFigures play_blocks(std::span<const Segment> blocks, const Path& path, BlockEnd block_end,

@@ -16,6 +16,8 @@ struct DeviationStats {
   double sum_of_squares_mm2 = 0.0;
   std::size_t count = 0;
   void add(double deviation_mm) noexcept;
+  /// A distance by which the track missed a corner of the path (CornerReach): counts in the largest magnitude alone.
+  void include_missed(double distance_mm) noexcept;
   /// Root mean square; 0 without samples.
   [[nodiscard]] double rms_mm() const noexcept;
 };

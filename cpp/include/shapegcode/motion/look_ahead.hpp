@@ -27,9 +27,10 @@ namespace shapegcode {
                                         const MotionLimits& limits) noexcept;
 
 /// Indices of segments before which the tool must come to rest: sharp corners between the tool axis and the plane
-/// across it (a plunge or retract), which a shaper must not mix, and exact stops. `axis_angle_rad`: how far a side may
-/// lean from the tool axis Z and still count as plunge; `corner_angle_rad`: least change of direction.
+/// across it (a plunge or retract), which a shaper must not mix; corners that the filter behind cannot pass within the
+/// contour tolerance at any speed; and exact stops. `axis_angle_rad`: how far a side may lean from the tool axis Z and
+/// still count as plunge; `corner_angle_rad`: least change of direction of such a corner.
 [[nodiscard]] std::vector<std::size_t> forced_stops(const std::vector<Segment>& segments, double axis_angle_rad,
-                                                    double corner_angle_rad);
+                                                    double corner_angle_rad, const MotionLimits& limits);
 
 }  // namespace shapegcode

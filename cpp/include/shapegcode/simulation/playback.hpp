@@ -20,8 +20,8 @@ struct PlaybackOptions {
   std::vector<Fir> axis_filters;  ///< after the set-points, in order (acceleration after interpolation)
   AxisModes modes;
   bool measure_contour = true;  ///< deviation of command and response and orbit errors
-  /// Blocks only: play no more than the last so many seconds (0: all). Enough for the residual where older vibration has
-  /// decayed; peak and contour figures then speak of that part alone.
+  /// Blocks only: play no more than the last so many seconds (0: all). Enough for the residual where older vibration
+  /// has decayed; peak and contour figures then speak of that part alone.
   double last_seconds = 0.0;
   /// Keep at most so many samples of command and response for pictures (0: none); longer runs keep their beginning.
   std::size_t record_samples = 0;

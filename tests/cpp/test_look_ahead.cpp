@@ -1,0 +1,658 @@
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "shapegcode/error.hpp"
+#include "shapegcode/motion/interpolator.hpp"
+#include "shapegcode/motion/look_ahead.hpp"
+
+using shapegcode::AccelerationLaw;
+using shapegcode::corner_speed_limit;
+using shapegcode::Error;
+using shapegcode::forced_stops;
+using shapegcode::make_arc;
+using shapegcode::make_line;
+using shapegcode::MotionLimits;
+using shapegcode::Path;
+using shapegcode::plan_speed;
+using shapegcode::Segment;
+using shapegcode::segment_speed_limit;
+using shapegcode::SegmentKind;
+using shapegcode::SpeedPhase;
+using shapegcode::SpeedProfile;
+using shapegcode::Vector3;
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr double none = std::numeric_limits<double>::infinity();
+
+MotionLimits constant_time(double time_constant_s) {
+  MotionLimits limits;
+  limits.law = AccelerationLaw::constant_time;
+  limits.time_constant_s = time_constant_s;
+  return limits;
+}
+
+MotionLimits accelerating(double acceleration, double jerk_time_s = 0.0) {
+  MotionLimits limits;
+  limits.law = AccelerationLaw::jerk_limited;
+  limits.max_acceleration_mm_per_s2 = Vector3::Constant(acceleration);
+  limits.jerk_time_s = jerk_time_s;
+  return limits;
+}
+
+Path straight(double length, double feed) { return Path({make_line({0, 0, 0}, {length, 0, 0}, feed)}); }
+
+/// Collinear lines along X with one feed each.
+Path row_of_lines(const std::vector<double>& lengths, const std::vector<double>& feeds) {
+  std::vector<Segment> segments;
+  double x = 0.0;
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    segments.push_back(make_line({x, 0, 0}, {x + lengths[i], 0, 0}, feeds[i]));
+    x += lengths[i];
+  }
+  return Path(std::move(segments));
+}
+
+Path paper_path(double feed) {
+  return Path({make_line({0, 0, 0}, {20, 0, 0}, feed),
+               make_arc({20, 0, 0}, {40, 20, 0}, {20, 20, 0}, pi / 2, 2, feed),
+               make_line({40, 20, 0}, {40, 40, 0}, feed)});
+}
+
+double speed_at(const SpeedProfile& profile, double time) {
+  std::size_t cursor = 0;
+  return profile.speed_mm_per_s(time, cursor);
+}
+
+double distance_at(const SpeedProfile& profile, double time) {
+  std::size_t cursor = 0;
+  return profile.distance_mm(time, cursor);
+}
+
+/// The profile joins up: time and distance without gaps, speed without jumps, from rest to rest over the whole length.
+void check_joined(const SpeedProfile& profile, double length) {
+  double time = 0.0;
+  double distance = 0.0;
+  double speed = 0.0;
+  double fastest = 0.0;
+  for (const SpeedPhase& phase : profile.phases()) {
+    CHECK(phase.duration_s > 0.0);
+    CHECK(phase.start_s == doctest::Approx(time).epsilon(1e-12));
+    CHECK(std::abs(phase.distance_mm - distance) < 1e-9 * (1.0 + length));
+    fastest = std::max(fastest, phase.speed_mm_per_s);
+    CHECK(std::abs(phase.speed_mm_per_s - speed) < 1e-5 * (1.0 + fastest));
+    CHECK(phase.speed_mm_per_s >= 0.0);
+    time += phase.duration_s;
+    distance = phase.distance_mm +
+               phase.duration_s * (phase.speed_mm_per_s + 0.5 * phase.acceleration_mm_per_s2 * phase.duration_s);
+    speed = phase.speed_mm_per_s + phase.acceleration_mm_per_s2 * phase.duration_s;
+  }
+  CHECK(std::abs(speed) < 1e-5 * (1.0 + fastest));
+  CHECK(std::abs(distance - length) < 1e-9 * (1.0 + length));
+  CHECK(profile.ramp_duration_s() == doctest::Approx(time).epsilon(1e-12));
+}
+
+}  // namespace
+
+// --- Closed forms -----------------------------------------------------------------------------------------------------
+
+TEST_CASE("look-ahead: trapezoid and triangle under the acceleration law") {
+  // 100 mm at 100 mm/s with 1000 mm/s2: 1 s and one ramp of 0.1 s.
+  const SpeedProfile trapezoid = plan_speed(straight(100.0, 100.0), accelerating(1000.0));
+  CHECK(trapezoid.duration_s() == doctest::Approx(1.1).epsilon(1e-12));
+  REQUIRE(trapezoid.phases().size() == 3);
+  CHECK(trapezoid.phases()[0].duration_s == doctest::Approx(0.1));
+  CHECK(distance_at(trapezoid, 0.1) == doctest::Approx(5.0));
+  CHECK(distance_at(trapezoid, 0.55) == doctest::Approx(50.0));
+  CHECK(speed_at(trapezoid, 0.05) == doctest::Approx(50.0));
+  CHECK(speed_at(trapezoid, 1.075) == doctest::Approx(25.0));
+  // 4 mm: up to sqrt(1000*4) and down, 2*sqrt(4/1000).
+  const SpeedProfile triangle = plan_speed(straight(4.0, 100.0), accelerating(1000.0));
+  CHECK(triangle.duration_s() == doctest::Approx(2.0 * std::sqrt(0.004)).epsilon(1e-12));
+  CHECK(triangle.phases().size() == 2);
+  CHECK(distance_at(triangle, std::sqrt(0.004)) == doctest::Approx(2.0));
+  check_joined(trapezoid, 100.0);
+  check_joined(triangle, 4.0);
+}
+
+TEST_CASE("look-ahead: under the constant-time law a ramp lasts the time constant whatever the feed") {
+  for (const double feed : {10.0, 100.0, 700.0}) {
+    const SpeedProfile profile = plan_speed(straight(100.0, feed), constant_time(0.05));
+    CHECK(profile.duration_s() == doctest::Approx(100.0 / feed + 0.05).epsilon(1e-12));
+    REQUIRE(profile.phases().size() == 3);
+    CHECK(profile.phases()[0].duration_s == doctest::Approx(0.05).epsilon(1e-12));
+    CHECK(profile.phases()[2].duration_s == doctest::Approx(0.05).epsilon(1e-12));
+  }
+  // Too short for both ramps: F/A up and down.
+  CHECK(plan_speed(straight(2.0, 100.0), constant_time(0.05)).duration_s() ==
+        doctest::Approx(2.0 * std::sqrt(2.0 / 2000.0)).epsilon(1e-12));
+}
+
+TEST_CASE("look-ahead: the paper's path, times and ramps of paper 000") {
+  struct Case {
+    double feed, ratio, duration;
+  };
+  // Straight: ramp up A, steady, ramp down A of mean (F + rF)/2; arc 10*pi/(rF); twice.
+  for (const Case& c : {Case{100.0, 0.6, 0.9936}, Case{100.0, 0.99, 0.7678}, Case{200.0, 0.6, 0.0}, Case{200.0, 0.99, 0.0}}) {
+    CAPTURE(c.feed);
+    CAPTURE(c.ratio);
+    MotionLimits limits = constant_time(0.05);
+    limits.arc_feed_ratio = c.ratio;
+    const Path path = paper_path(c.feed);
+    const SpeedProfile profile = plan_speed(path, limits);
+    const double slow = c.ratio * c.feed;
+    const double steady = (20.0 - 0.05 * c.feed / 2.0 - 0.05 * (c.feed + slow) / 2.0) / c.feed;
+    const double expected = 2.0 * (0.1 + steady) + 10.0 * pi / slow;
+    CHECK(profile.duration_s() == doctest::Approx(expected).epsilon(1e-12));
+    if (c.duration > 0.0) CHECK(std::abs(profile.duration_s() - c.duration) < 5e-5);
+    // Deceleration ends exactly where the arc begins, acceleration begins exactly where it ends.
+    REQUIRE(profile.phases().size() == 7);
+    const auto& phases = profile.phases();
+    CHECK(std::abs(phases[3].distance_mm - 20.0) < 1e-12);
+    CHECK(phases[3].acceleration_mm_per_s2 == 0.0);
+    CHECK(phases[3].speed_mm_per_s == doctest::Approx(slow).epsilon(1e-12));
+    CHECK(std::abs(phases[4].distance_mm - path.distance_mm(2)) < 1e-12);
+    for (const std::size_t ramp : {0U, 2U, 4U, 6U}) CHECK(phases[ramp].duration_s == doctest::Approx(0.05).epsilon(1e-9));
+    check_joined(profile, path.length_mm());
+  }
+}
+
+TEST_CASE("look-ahead: a feed step between collinear lines is run on the faster side") {
+  // 100 mm at 100 then 100 mm at 50, 1000 mm/s2: 0.1 s up, 3.75 mm of braking before the border, 1.25 mm at the end.
+  const Path path = row_of_lines({100.0, 100.0}, {100.0, 50.0});
+  const SpeedProfile profile = plan_speed(path, accelerating(1000.0));
+  const double first = 0.1 + (100.0 - 5.0 - 3.75) / 100.0 + 0.05;
+  const double second = (100.0 - 1.25) / 50.0 + 0.05;
+  CHECK(profile.duration_s() == doctest::Approx(first + second).epsilon(1e-12));
+  CHECK(distance_at(profile, first) == doctest::Approx(100.0).epsilon(1e-12));
+  CHECK(speed_at(profile, first) == doctest::Approx(50.0).epsilon(1e-9));
+}
+
+TEST_CASE("look-ahead: collinear lines of one feed are one move") {
+  const SpeedProfile profile = plan_speed(row_of_lines({0.1, 30.0, 0.001, 20.0}, {100, 100, 100, 100}), accelerating(1000.0));
+  CHECK(profile.duration_s() == doctest::Approx(0.50101 + 0.1).epsilon(1e-9));
+  CHECK(profile.phases().size() == 3);
+}
+
+TEST_CASE("look-ahead: without any acceleration limit every line runs at its own feed") {
+  MotionLimits limits;
+  limits.law = AccelerationLaw::jerk_limited;
+  const Path path = row_of_lines({100.0, 100.0, 50.0}, {100.0, 50.0, 200.0});
+  const SpeedProfile profile = plan_speed(path, limits);
+  CHECK(profile.duration_s() == doctest::Approx(1.0 + 2.0 + 0.25).epsilon(1e-12));
+  CHECK(speed_at(profile, 0.5) == doctest::Approx(100.0));
+  CHECK(speed_at(profile, 2.0) == doctest::Approx(50.0));
+  CHECK(speed_at(profile, 3.1) == doctest::Approx(200.0));
+  CHECK(distance_at(profile, 2.0) == doctest::Approx(150.0));
+}
+
+// --- Single limits by hand --------------------------------------------------------------------------------------------
+
+TEST_CASE("look-ahead: axis feed limits act along the direction of travel") {
+  MotionLimits limits;
+  limits.max_feed_mm_per_s = {100.0, 50.0, 10.0};
+  // 3-4-5 triangle: X allows 100/.6, Y allows 50/.8.
+  CHECK(segment_speed_limit(make_line({0, 0, 0}, {3, 4, 0}, 500.0), limits) == doctest::Approx(62.5));
+  CHECK(segment_speed_limit(make_line({0, 0, 0}, {3, -4, 0}, 40.0), limits) == doctest::Approx(40.0));
+  CHECK(segment_speed_limit(make_line({0, 0, 0}, {0, 0, -2}, 40.0), limits) == doctest::Approx(10.0));
+  CHECK(segment_speed_limit(make_line({0, 0, 0}, {-7, 0, 0}, 500.0), limits) == doctest::Approx(100.0));
+  // An arc in XY points along Y somewhere.
+  CHECK(segment_speed_limit(make_arc({10, 0, 0}, {0, 10, 0}, {0, 0, 0}, pi / 2, 2, 500.0), limits) <= 50.0);
+}
+
+TEST_CASE("look-ahead: an arc's feed ratio and centripetal limit") {
+  const Segment arc = make_arc({20, 0, 0}, {40, 20, 0}, {20, 20, 0}, pi / 2, 2, 200.0);
+  MotionLimits limits;
+  limits.arc_feed_ratio = 0.6;
+  CHECK(segment_speed_limit(arc, limits) == doctest::Approx(120.0));
+  CHECK(segment_speed_limit(make_line({0, 0, 0}, {1, 0, 0}, 200.0), limits) == doctest::Approx(200.0));
+  limits.centripetal_acceleration_mm_per_s2 = 500.0;  // sqrt(500*20)
+  CHECK(segment_speed_limit(arc, limits) == doctest::Approx(100.0));
+  MotionLimits contour;
+  contour.contour_tolerance_mm = 0.001;
+  contour.filter_variance_s2 = 1e-4;  // R*sigma^2*(v/R)^2/2 = tolerance: v = sqrt(2*.001*20/1e-4) = 20
+  CHECK(segment_speed_limit(arc, contour) == doctest::Approx(20.0));
+}
+
+TEST_CASE("look-ahead: speed difference at corners of 90, 180 and 0 degrees") {
+  MotionLimits limits;
+  limits.corner_speed_difference_mm_per_s = {8.0, 5.0, none};
+  const Segment along_x = make_line({0, 0, 0}, {10, 0, 0}, 100.0);
+  const Segment along_y = make_line({10, 0, 0}, {10, 10, 0}, 100.0);
+  const Segment back = make_line({10, 0, 0}, {0, 0, 0}, 100.0);
+  const Segment on = make_line({10, 0, 0}, {20, 0, 0}, 100.0);
+  const Segment up = make_line({10, 0, 0}, {10, 0, 10}, 100.0);
+  CHECK(corner_speed_limit(along_x, along_y, limits) == doctest::Approx(5.0));  // X loses v, Y gains v
+  CHECK(corner_speed_limit(along_x, back, limits) == doctest::Approx(4.0));     // X changes by 2v
+  CHECK(corner_speed_limit(along_x, up, limits) == doctest::Approx(8.0));
+  CHECK(corner_speed_limit(along_x, on, limits) == none);
+  // 60 degrees: X changes by v/2, Y by v*sqrt(3)/2.
+  const Segment slanted = make_line({10, 0, 0}, {15, 5.0 * std::sqrt(3.0), 0}, 100.0);
+  CHECK(corner_speed_limit(along_x, slanted, limits) == doctest::Approx(5.0 / std::sqrt(0.75)));
+  // A line that runs tangentially into an arc is no corner; one that meets it at 90 degrees is.
+  CHECK(corner_speed_limit(along_x, make_arc({10, 0, 0}, {20, 10, 0}, {10, 10, 0}, pi / 2, 2, 1.0), limits) == none);
+  CHECK(corner_speed_limit(along_y, make_arc({10, 10, 0}, {20, 20, 0}, {10, 20, 0}, pi / 2, 2, 1.0), limits) ==
+        doctest::Approx(5.0));
+}
+
+TEST_CASE("look-ahead: a corner is passed at its limit, not below and not above") {
+  MotionLimits limits = accelerating(1000.0);
+  limits.corner_speed_difference_mm_per_s = Vector3::Constant(10.0);
+  const Path path({make_line({0, 0, 0}, {20, 0, 0}, 100.0), make_line({20, 0, 0}, {20, 20, 0}, 100.0)});
+  const SpeedProfile profile = plan_speed(path, limits);
+  std::size_t cursor = 0;
+  const double at_corner = profile.time_s(20.0, cursor);
+  CHECK(speed_at(profile, at_corner) == doctest::Approx(10.0).epsilon(1e-6));
+  // Each side: 0 to 100 in 5 mm, 100 to 10 in 4.95 mm, the rest steady.
+  CHECK(profile.duration_s() == doctest::Approx(2.0 * (0.1 + 0.09 + (20.0 - 5.0 - 4.95) / 100.0)).epsilon(1e-9));
+}
+
+TEST_CASE("look-ahead: the corner limit of the contour tolerance holds behind a filter of that spread") {
+  // Two equal taps 2*d apart have the mean deviation d. Played through them, the corner is cut by no more than the tolerance.
+  constexpr double period = 1e-4;
+  constexpr int d = 40;
+  MotionLimits limits = accelerating(20000.0);
+  limits.contour_tolerance_mm = 0.02;
+  limits.filter_mean_deviation_s = d * period;
+  for (const double angle : {pi / 2, pi / 4, 2.0}) {
+    const Vector3 turned(std::cos(angle), std::sin(angle), 0.0);
+    const auto path = std::make_shared<const Path>(
+        std::vector<Segment>{make_line({-20, 0, 0}, {0, 0, 0}, 200.0), make_line({0, 0, 0}, 20.0 * turned, 200.0)});
+    const auto profile = std::make_shared<const SpeedProfile>(plan_speed(*path, limits));
+    const auto filtered =
+        shapegcode::Fir({0, 2 * d}, {0.5, 0.5}).apply(shapegcode::interpolate(path, profile, period)).positions_mm;
+    double worst = 0.0;
+    for (Eigen::Index i = 0; i < filtered.rows(); ++i) {
+      const Vector3 p = filtered.row(i);
+      const double to_first = p.x() < 0.0 ? std::hypot(p.y(), p.z()) : p.norm();
+      const double along = std::max(0.0, p.dot(turned));
+      worst = std::max(worst, std::min(to_first, (p - along * turned).norm()));
+    }
+    CAPTURE(angle);
+    CHECK(worst < 0.02);
+    CHECK(worst > 0.005);  // and the limit is no more careful than need be
+  }
+}
+
+TEST_CASE("look-ahead: axis acceleration acts along the direction of travel") {
+  MotionLimits limits;
+  limits.law = AccelerationLaw::jerk_limited;
+  limits.max_acceleration_mm_per_s2 = {3000.0, 800.0, 100.0};
+  // 3-4-5: X allows 5000, Y allows 1000.
+  const Path slanted({make_line({0, 0, 0}, {30, 40, 0}, 100.0)});
+  CHECK(plan_speed(slanted, limits).duration_s() == doctest::Approx(0.5 + 0.1).epsilon(1e-12));
+  const Path plunge({make_line({0, 0, 0}, {0, 0, -50}, 50.0)});
+  CHECK(plan_speed(plunge, limits).duration_s() == doctest::Approx(1.0 + 0.5).epsilon(1e-12));
+}
+
+// --- Jerk time --------------------------------------------------------------------------------------------------------
+
+TEST_CASE("look-ahead: the jerk time adds itself to a move from rest to rest and bounds the slope of the acceleration") {
+  for (const double length : {100.0, 8.0}) {  // a trapezoid, and a triangle whose acceleration turns over at once
+    MotionLimits limits = accelerating(1000.0);
+    limits.max_jerk_mm_per_s3 = Vector3::Constant(20000.0);
+    const auto path = std::make_shared<const Path>(straight(length, 100.0));
+    const auto profile = std::make_shared<const SpeedProfile>(plan_speed(*path, limits));
+    CHECK(profile->jerk_time_s() >= 0.05 - 1e-12);  // 1000/20000
+    CHECK(profile->duration_s() == doctest::Approx(profile->ramp_duration_s() + profile->jerk_time_s()));
+    constexpr double period = 1e-4;
+    const Eigen::MatrixXd p = shapegcode::interpolate(path, profile, period).positions_mm;
+    double jerk = 0.0;
+    double acceleration = 0.0;
+    for (Eigen::Index i = 3; i < p.rows(); ++i) {
+      acceleration = std::max(acceleration, std::abs(p(i, 0) - 2.0 * p(i - 1, 0) + p(i - 2, 0)) / (period * period));
+      jerk = std::max(jerk, std::abs(p(i, 0) - 3.0 * p(i - 1, 0) + 3.0 * p(i - 2, 0) - p(i - 3, 0)) /
+                                (period * period * period));
+    }
+    CAPTURE(length);
+    CHECK(acceleration < 1000.0 * (1.0 + 1e-6));
+    CHECK(jerk < 20000.0 * (1.0 + 1e-3));
+  }
+}
+
+TEST_CASE("look-ahead: a given jerk time is kept as it is, by both laws") {
+  CHECK(plan_speed(straight(100.0, 100.0), accelerating(1000.0, 0.03)).jerk_time_s() == 0.03);
+  CHECK(plan_speed(straight(100.0, 100.0), accelerating(1000.0, 0.03)).duration_s() == doctest::Approx(1.13));
+  MotionLimits limits = constant_time(0.05);
+  limits.jerk_time_s = 0.03;
+  CHECK(plan_speed(straight(100.0, 100.0), limits).duration_s() == doctest::Approx(1.08));
+  CHECK(plan_speed(straight(100.0, 100.0), constant_time(0.05)).jerk_time_s() == 0.0);
+}
+
+// --- Properties on random paths ---------------------------------------------------------------------------------------
+
+namespace {
+
+std::vector<Segment> random_segments(std::mt19937_64& generator, int count, bool arcs, double longest) {
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  std::vector<Segment> segments;
+  Vector3 at = Vector3::Zero();
+  Vector3 direction(1, 0, 0);
+  for (int i = 0; i < count; ++i) {
+    const double feed = 5.0 + 295.0 * share(generator);
+    const double length = longest * std::pow(10.0, -2.5 * share(generator));
+    // A mixture of soft and sharp turns.
+    const Vector3 turn(unit(generator), unit(generator), 0.3 * unit(generator));
+    direction = (direction + (i % 3 == 0 ? 2.0 : 0.1) * turn).normalized();
+    if (arcs && i % 4 == 3) {
+      const int normal = static_cast<int>(3 * share(generator)) % 3;
+      const int a = (normal + 1) % 3;
+      const int b = (normal + 2) % 3;
+      const double radius = 0.2 + length;
+      const double from = pi * unit(generator);
+      const double sweep = 1.9 * pi * unit(generator) + 0.01;
+      Vector3 centre = at;
+      centre[a] -= radius * std::cos(from);
+      centre[b] -= radius * std::sin(from);
+      Vector3 end = centre;
+      end[a] += radius * std::cos(from + sweep);
+      end[b] += radius * std::sin(from + sweep);
+      end[normal] = at[normal] + (i % 8 == 3 ? length * unit(generator) : 0.0);
+      segments.push_back(make_arc(at, end, centre, sweep, normal, feed));
+      direction = tangent_at(segments.back(), segments.back().length_mm);
+      at = end;
+    } else {
+      const Vector3 end = at + length * direction;
+      segments.push_back(make_line(at, end, feed));
+      at = end;
+    }
+  }
+  return segments;
+}
+
+struct Worst {
+  double segment_speed = 0.0, corner_speed = 0.0, axis_acceleration = 0.0, axis_speed = 0.0, centripetal = 0.0;
+};
+
+/// How far a motion s(t) along the path uses each limit (1 = all of it), from the geometry alone.
+class Judge {
+ public:
+  Judge(const Path& path, const MotionLimits& limits) : path_(path), limits_(limits) {}
+
+  void at(double s, double speed, double acceleration, Worst& worst) {
+    while (cursor_ + 1 < path_.size() && s >= path_.distance_mm(cursor_ + 1)) ++cursor_;
+    const Segment& segment = path_[cursor_];
+    const double ratio = segment.kind == SegmentKind::arc ? limits_.arc_feed_ratio : 1.0;
+    worst.segment_speed = std::max(worst.segment_speed, speed / (ratio * segment.feed_mm_per_s));
+    const double local = std::clamp(s - path_.distance_mm(cursor_), 0.0, segment.length_mm);
+    const Vector3 tangent = tangent_at(segment, local);
+    Vector3 total = acceleration * tangent;
+    if (segment.kind == SegmentKind::arc) {
+      // Towards the centre.
+      Vector3 inwards = segment.centre_mm - point_at(segment, local);
+      inwards[segment.normal] = 0.0;
+      const double turning = speed * speed * curvature(segment);
+      total += turning * inwards.normalized();
+      worst.centripetal = std::max(worst.centripetal, turning / limits_.centripetal_acceleration_mm_per_s2);
+    }
+    for (int i = 0; i < 3; ++i) {
+      worst.axis_speed = std::max(worst.axis_speed, std::abs(speed * tangent[i]) / limits_.max_feed_mm_per_s[i]);
+      worst.axis_acceleration =
+          std::max(worst.axis_acceleration, std::abs(total[i]) / limits_.max_acceleration_mm_per_s2[i]);
+    }
+  }
+
+  void corner(std::size_t i, double speed, Worst& worst) const {
+    const Vector3 before = tangent_at(path_[i - 1], path_[i - 1].length_mm);
+    const Vector3 after = tangent_at(path_[i], 0.0);
+    for (int k = 0; k < 3; ++k) {
+      worst.corner_speed = std::max(worst.corner_speed, std::abs(speed * (after[k] - before[k])) /
+                                                            limits_.corner_speed_difference_mm_per_s[k]);
+    }
+    const double angle = std::acos(std::clamp(before.dot(after), -1.0, 1.0));
+    const double bend = angle / (0.5 * (path_[i - 1].length_mm + path_[i].length_mm));
+    if (angle > 1e-5) {
+      worst.corner_speed =
+          std::max(worst.corner_speed, speed * speed * bend / limits_.centripetal_acceleration_mm_per_s2);
+    }
+  }
+
+ private:
+  const Path& path_;
+  const MotionLimits& limits_;
+  std::size_t cursor_ = 0;
+};
+
+MotionLimits all_limits(AccelerationLaw law) {
+  MotionLimits limits;
+  limits.law = law;
+  limits.time_constant_s = 0.05;
+  limits.max_feed_mm_per_s = {200.0, 150.0, 60.0};
+  limits.max_acceleration_mm_per_s2 = {3000.0, 2000.0, 900.0};
+  limits.corner_speed_difference_mm_per_s = {15.0, 12.0, 6.0};
+  limits.centripetal_acceleration_mm_per_s2 = 800.0;
+  limits.arc_feed_ratio = 0.8;
+  return limits;
+}
+
+}  // namespace
+
+TEST_CASE("look-ahead: no limit is passed anywhere on random paths, sampled") {
+  std::mt19937_64 generator(101);
+  for (int round = 0; round < 120; ++round) {
+    const auto law = round % 2 == 0 ? AccelerationLaw::constant_time : AccelerationLaw::jerk_limited;
+    const MotionLimits limits = all_limits(law);
+    const Path path(random_segments(generator, 40, round % 3 != 0, 20.0));
+    const SpeedProfile profile = plan_speed(path, limits);
+    CAPTURE(round);
+    check_joined(profile, path.length_mm());
+    Worst worst;
+    Judge judge(path, limits);
+    std::size_t cursor = 0;
+    for (const SpeedPhase& phase : profile.phases()) {
+      for (int k = 0; k <= 40; ++k) {
+        const double t = phase.duration_s * std::clamp(k / 40.0, 1e-9, 1.0 - 1e-9);
+        const double speed = phase.speed_mm_per_s + phase.acceleration_mm_per_s2 * t;
+        judge.at(phase.distance_mm + t * (phase.speed_mm_per_s + 0.5 * phase.acceleration_mm_per_s2 * t), speed,
+                 phase.acceleration_mm_per_s2, worst);
+      }
+    }
+    for (std::size_t i = 1; i < path.size(); ++i) {
+      judge.corner(i, profile.speed_mm_per_s(profile.time_s(path.distance_mm(i), cursor), cursor), worst);
+    }
+    CHECK(worst.segment_speed < 1.0 + 1e-6);
+    CHECK(worst.axis_speed < 1.0 + 1e-6);
+    CHECK(worst.centripetal < 1.0 + 1e-6);
+    CHECK(worst.axis_acceleration < 1.0 + 1e-6);
+    CHECK(worst.corner_speed < 1.0 + 1e-5);
+    // Every limit that can be reached is reached somewhere: the plan is not merely slow.
+    CHECK(std::max(worst.axis_speed, worst.segment_speed) > 0.5);
+    if (law == AccelerationLaw::jerk_limited) CHECK(worst.axis_acceleration > 0.9);
+    CHECK(worst.corner_speed > 0.9);
+  }
+}
+
+TEST_CASE("look-ahead: distance never runs backwards, and time and distance are each other's inverse") {
+  std::mt19937_64 generator(7);
+  const Path path(random_segments(generator, 60, true, 10.0));
+  const SpeedProfile profile = plan_speed(path, all_limits(AccelerationLaw::constant_time));
+  double last = -1.0;
+  std::size_t cursor = 0;
+  std::size_t inverse = 0;
+  for (int i = 0; i <= 20000; ++i) {
+    const double time = profile.ramp_duration_s() * i / 20000.0;
+    const double distance = profile.distance_mm(time, cursor);
+    CHECK(distance >= last);
+    last = distance;
+    CHECK(std::abs(profile.distance_mm(profile.time_s(distance, inverse), inverse) - distance) < 1e-9);
+  }
+  CHECK(last == path.length_mm());
+  CHECK(distance_at(profile, -1.0) == 0.0);
+  CHECK(speed_at(profile, profile.ramp_duration_s() + 1.0) == 0.0);
+}
+
+TEST_CASE("look-ahead: no plan that keeps the limits is faster, against a fine grid of speeds") {
+  // Lines only, acceleration law: the best plan is the forward and backward pass over a grid of small steps.
+  std::mt19937_64 generator(55);
+  for (int round = 0; round < 10; ++round) {
+    const MotionLimits limits = all_limits(AccelerationLaw::jerk_limited);
+    const Path path(random_segments(generator, 12, false, 20.0));
+    const double duration = plan_speed(path, limits).duration_s();
+    // Square of the speed at grid points; the segments' own grid keeps corners on it.
+    std::vector<double> square{0.0};
+    std::vector<double> step;
+    std::vector<double> acceleration;
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      const Vector3 tangent = tangent_at(path[i], 0.0).cwiseAbs();
+      double speed = path[i].feed_mm_per_s;
+      double a = none;
+      for (int k = 0; k < 3; ++k) {
+        speed = std::min(speed, limits.max_feed_mm_per_s[k] / tangent[k]);
+        a = std::min(a, limits.max_acceleration_mm_per_s2[k] / tangent[k]);
+      }
+      if (i > 0) {
+        const Vector3 before = tangent_at(path[i - 1], 0.0);
+        const Vector3 change = (tangent_at(path[i], 0.0) - before).cwiseAbs();
+        double corner = none;
+        for (int k = 0; k < 3; ++k) corner = std::min(corner, limits.corner_speed_difference_mm_per_s[k] / change[k]);
+        const double angle = std::acos(std::clamp(before.dot(tangent_at(path[i], 0.0)), -1.0, 1.0));
+        corner = std::min(corner, std::sqrt(800.0 * 0.5 * (path[i - 1].length_mm + path[i].length_mm) / angle));
+        square.back() = std::min({square.back(), corner * corner, speed * speed});
+      }
+      constexpr int n = 2000;
+      for (int k = 0; k < n; ++k) {
+        step.push_back(path[i].length_mm / n);
+        acceleration.push_back(a);
+        square.push_back(speed * speed);
+      }
+    }
+    square.back() = 0.0;
+    for (std::size_t i = 0; i < step.size(); ++i) {
+      square[i + 1] = std::min(square[i + 1], square[i] + 2.0 * acceleration[i] * step[i]);
+    }
+    for (std::size_t i = step.size(); i-- > 0;) {
+      square[i] = std::min(square[i], square[i + 1] + 2.0 * acceleration[i] * step[i]);
+    }
+    double expected = 0.0;
+    for (std::size_t i = 0; i < step.size(); ++i) {
+      expected += 2.0 * step[i] / (std::sqrt(square[i]) + std::sqrt(square[i + 1]));
+    }
+    CAPTURE(round);
+    CHECK(duration == doctest::Approx(expected).epsilon(1e-4));
+  }
+}
+
+TEST_CASE("look-ahead: with a jerk time no limit is passed either, at corners and between") {
+  std::mt19937_64 generator(202);
+  for (int round = 0; round < 60; ++round) {
+    const double jerk_time = 0.02 + 0.01 * (round % 4);
+    MotionLimits limits = all_limits(round % 2 == 0 ? AccelerationLaw::jerk_limited : AccelerationLaw::constant_time);
+    limits.jerk_time_s = jerk_time;
+    limits.max_acceleration_mm_per_s2 = Vector3::Constant(1500.0);
+    const Path path(random_segments(generator, 25, false, 20.0));
+    const SpeedProfile profile = plan_speed(path, limits);
+    REQUIRE(profile.jerk_time_s() == jerk_time);
+    // Smoothed exactly: mean of distance(t') over t - jerk_time ... t, by the phases' own closed form.
+    const auto integral = [&](double time) {
+      double sum = 0.0;
+      for (const SpeedPhase& phase : profile.phases()) {
+        const double t = std::clamp(time - phase.start_s, 0.0, phase.duration_s);
+        sum += t * (phase.distance_mm + t * (phase.speed_mm_per_s / 2.0 + phase.acceleration_mm_per_s2 * t / 6.0));
+      }
+      return sum + path.length_mm() * std::max(0.0, time - profile.ramp_duration_s());
+    };
+    const auto smooth = [&](double time) { return (integral(time) - integral(time - jerk_time)) / jerk_time; };
+    const auto smooth_speed = [&](double time) {
+      return (distance_at(profile, time) - distance_at(profile, time - jerk_time)) / jerk_time;
+    };
+    const auto smooth_acceleration = [&](double time) {
+      return (speed_at(profile, time) - speed_at(profile, time - jerk_time)) / jerk_time;
+    };
+    Worst worst;
+    Judge judge(path, limits);
+    constexpr int n = 4000;
+    for (int i = 0; i <= n; ++i) {
+      const double time = profile.duration_s() * i / n;
+      judge.at(smooth(time), smooth_speed(time), smooth_acceleration(time), worst);
+    }
+    for (std::size_t i = 1; i < path.size(); ++i) {
+      double low = 0.0;
+      double high = profile.duration_s();
+      for (int k = 0; k < 60; ++k) {
+        const double middle = 0.5 * (low + high);
+        (smooth(middle) < path.distance_mm(i) ? low : high) = middle;
+      }
+      judge.corner(i, smooth_speed(low), worst);
+    }
+    CAPTURE(round);
+    CHECK(worst.corner_speed < 1.0 + 1e-6);
+    CHECK(worst.segment_speed < 1.0 + 1e-6);
+    CHECK(worst.axis_speed < 1.0 + 1e-6);
+    CHECK(worst.axis_acceleration < 1.0 + 1e-6);
+  }
+}
+
+// --- Refusals and stops -----------------------------------------------------------------------------------------------
+
+TEST_CASE("look-ahead: refuses limits that are not positive and segments without feed") {
+  const Path path = straight(10.0, 100.0);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double bad : {0.0, -1.0, nan}) {
+    MotionLimits limits;
+    limits.time_constant_s = bad;
+    CHECK_THROWS_AS((void)plan_speed(path, limits), Error);
+    limits = MotionLimits{};
+    limits.max_feed_mm_per_s.y() = bad;
+    CHECK_THROWS_AS((void)plan_speed(path, limits), Error);
+    limits = MotionLimits{};
+    limits.max_acceleration_mm_per_s2.z() = bad;
+    CHECK_THROWS_AS((void)plan_speed(path, limits), Error);
+    limits = MotionLimits{};
+    limits.max_jerk_mm_per_s3.x() = bad;
+    CHECK_THROWS_AS((void)plan_speed(path, limits), Error);
+    limits = MotionLimits{};
+    limits.corner_speed_difference_mm_per_s.x() = bad;
+    CHECK_THROWS_AS((void)plan_speed(path, limits), Error);
+    limits = MotionLimits{};
+    limits.arc_feed_ratio = bad;
+    CHECK_THROWS_AS((void)plan_speed(path, limits), Error);
+    limits = MotionLimits{};
+    limits.centripetal_acceleration_mm_per_s2 = bad;
+    CHECK_THROWS_AS((void)plan_speed(path, limits), Error);
+    CHECK_THROWS_AS((void)plan_speed(straight(10.0, bad), MotionLimits{}), Error);
+  }
+  MotionLimits limits;
+  limits.jerk_time_s = -0.01;
+  CHECK_THROWS_AS((void)plan_speed(path, limits), Error);
+  limits.jerk_time_s = nan;
+  CHECK_THROWS_AS((void)plan_speed(path, limits), Error);
+}
+
+TEST_CASE("look-ahead: a path without length takes no time") {
+  CHECK(plan_speed(Path(), MotionLimits{}).duration_s() == 0.0);
+  CHECK(plan_speed(Path({make_line({1, 0, 0}, {1, 0, 0}, 10.0)}), MotionLimits{}).duration_s() == 0.0);
+}
+
+TEST_CASE("look-ahead: forced stops at plunges, retracts and exact stops") {
+  const double lean = 15.0 * pi / 180.0;
+  const double corner = 45.0 * pi / 180.0;
+  std::vector<Segment> segments = {
+      make_line({0, 0, 5}, {0, 0, 0}, 1.0),     // 0: plunge
+      make_line({0, 0, 0}, {10, 0, 0}, 1.0),    // 1: stop before it
+      make_line({10, 0, 0}, {10, 10, 0}, 1.0),  // 2: a corner in the plane is none
+      make_line({10, 10, 0}, {10, 10, 5}, 1.0), // 3: retract: stop before it
+      make_line({10, 10, 5}, {10, 10, 9}, 1.0), // 4: straight on
+      make_line({10, 10, 9}, {10, 12, 19}, 1.0),  // 5: leans by 11.3 degrees, turns by as much: none
+      make_line({10, 12, 19}, {10, 22, 19}, 1.0), // 6: from near the axis by 79 degrees: stop
+  };
+  CHECK(forced_stops(segments, lean, corner) == std::vector<std::size_t>{1, 3, 6});
+  segments[1].stop_at_end = true;
+  segments[6].stop_at_end = true;  // the end of the path is a stop anyway
+  CHECK(forced_stops(segments, lean, corner) == std::vector<std::size_t>{1, 2, 3, 6});
+  // 40 degrees off the axis is no plunge.
+  const double tan40 = std::tan(40.0 * pi / 180.0);
+  CHECK(forced_stops({make_line({0, 0, 10}, {10 * tan40, 0, 0}, 1.0), make_line({10 * tan40, 0, 0}, {50, 0, 0}, 1.0)}, lean, corner)
+            .empty());
+  // A helix that begins tangentially to the plunge's side does not turn a plunge into none.
+  CHECK(forced_stops({}, lean, corner).empty());
+}
