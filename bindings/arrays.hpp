@@ -15,6 +15,9 @@ namespace shapegcode::bindings {
 /// Column-major float64, converted if needed.
 using MatrixArray = pybind11::array_t<double, pybind11::array::f_style | pybind11::array::forcecast>;
 
+/// Contiguous float64, converted if needed.
+using VectorArray = pybind11::array_t<double, pybind11::array::c_style | pybind11::array::forcecast>;
+
 /// Read-only NumPy view of a matrix that lives as long as `base`.
 pybind11::array view(const Eigen::MatrixXd& matrix, pybind11::handle base);
 

@@ -14,24 +14,29 @@ namespace py = pybind11;
 namespace shapegcode::bindings {
 namespace {
 
-// NumPy owns the output: one pass from input to result.
-py::array_t<double> apply(const Fir& fir, const MatrixArray& samples) {
+// NumPy owns the output: one pass from input to result, in the memory order of the input.
+py::array_t<double> apply(const Fir& fir, const py::array_t<double, py::array::forcecast>& samples) {
   if (samples.ndim() != 1 && samples.ndim() != 2) {
     throw Error(ErrorKind::argument, "samples must have the shape (n_samples,) or (n_samples, n_axes)");
   }
   const py::ssize_t rows = samples.shape(0);
   const py::ssize_t columns = samples.ndim() == 2 ? samples.shape(1) : 1;
   const py::ssize_t out_rows = rows + fir.duration_samples();
-  py::array_t<double> out =
-      samples.ndim() == 1
-          ? py::array_t<double>(out_rows)
-          : py::array_t<double>({out_rows, columns}, {static_cast<py::ssize_t>(sizeof(double)),
-                                                      static_cast<py::ssize_t>(sizeof(double)) * out_rows});
-  const double* in = samples.data();
+  constexpr auto size = static_cast<py::ssize_t>(sizeof(double));
+  if (samples.ndim() == 2 && (samples.flags() & py::array::c_style) != 0) {
+    py::array_t<double> out({out_rows, columns});
+    double* to = out.mutable_data();
+    const py::gil_scoped_release release;
+    fir.apply_rows(samples.data(), rows, static_cast<int>(columns), to);
+    return out;
+  }
+  const MatrixArray by_column(samples);
+  py::array_t<double> out = samples.ndim() == 1 ? py::array_t<double>(out_rows)
+                                                : py::array_t<double>({out_rows, columns}, {size, size * out_rows});
   double* to = out.mutable_data();
   {
     const py::gil_scoped_release release;
-    fir.apply(in, rows, static_cast<int>(columns), to);
+    fir.apply(by_column.data(), rows, static_cast<int>(columns), to);
   }
   return out;
 }
@@ -94,9 +99,7 @@ void register_filter(py::module_& module) {
           py::arg("position"), "Rest at `position`, shape (n_axes,).")
       .def(
           "step",
-          [](PyStream& self, const py::array_t<double, py::array::forcecast>& position) {
-            return stream_step(self.stream, position, self.n_axes);
-          },
+          [](PyStream& self, const VectorArray& position) { return stream_step(self.stream, position, self.n_axes); },
           py::arg("position"), "Filtered sample, shape (n_axes,).");
 }
 

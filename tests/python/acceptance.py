@@ -155,31 +155,90 @@ def whole_periods(judged: Judged) -> None:
 
 @dataclass(frozen=True)
 class Figures:
-    """What the judge measures of a run of blocks, µm; contour errors are at the ticks."""
+    """What the judge measures of a run of blocks, µm; contour errors (largest, RMS) are those at the ticks."""
 
     residual: npt.NDArray[np.float64]
-    command: tuple[float, float]
-    response: tuple[float, float]
+    command: tuple[float, float] = (0.0, 0.0)
+    response: tuple[float, float] = (0.0, 0.0)
 
 
 def figures(
-    judged: Judged, blocks: list[Move], programmed: list[Move], rule: BlockEnd, *, contour: bool = True, override: float = 1.0
+    judged: Judged,
+    blocks: list[Move],
+    programmed: list[Move],
+    rule: BlockEnd,
+    *,
+    contour: bool = True,
+    override: float = 1.0,
 ) -> Figures:
+    """Play the emitted blocks of a region and measure them against the programmed moves."""
     tick = judged.machine.controller.interpolation_period_s
     filter_ticks = round(judged.machine.controller.shaped_time_constant_s / tick)
     cuts = [m for m in blocks if m.length > 0.0]
+    if not cuts:
+        return Figures(np.zeros(3))
     points = play(cuts, period_s=tick, block_end=rule, acceleration_samples=filter_ticks, override=override)
-    # Both paths count from their own known start; from an unknown origin the region begins at zero.
-    points = points + (starts(programmed)[0] - points[0])
-    residual = residual_um(points, judged.modes, tick, still_mm=1e-9)
+    # From an unknown origin both count from zero; a known start is the same to within its rounding.
+    points = points + (np.round(starts(programmed)[0] - points[0], 2))
+    residual = residual_um(points[-memory(judged.modes, tick) :], judged.modes, tick, still_mm=1e-9)
     if not contour:
-        return Figures(residual, (0.0, 0.0), (0.0, 0.0))
+        return Figures(residual)
     _, _, moved = response(points, judged.modes, tick)
     over = (len(moved) - 1) // (len(points) - 1)
-    return Figures(
-        residual, contour_error_um(points, programmed), contour_error_um(moved[::over], programmed)
-    )
+    return Figures(residual, contour_error_um(points, programmed), contour_error_um(moved[::over], programmed))
+
+
+def memory(modes: list[list[Mode]], tick: float) -> int:
+    """Ticks after which no mode remembers anything (1e-9)."""
+    decays = [2.0 * np.pi * m.frequency_hz * m.damping_ratio for axis in modes for m in axis]
+    return int(21.0 / min(decays) / tick) if decays and min(decays) > 0.0 else 10**9
 
 
 def close(ours: float, theirs: float, relative: float = 0.1, absolute_um: float = 0.2) -> bool:
+    """Whether two figures agree as well as two programs that share nothing should."""
     return abs(ours - theirs) <= max(absolute_um, relative * abs(theirs))
+
+
+def check_figures(judged: Judged, *, contour_budget_s: float = 15.0) -> None:
+    """The report's residuals, times and, within a budget of playing time, contour errors are the judge's too."""
+    report = judged.conversion.report
+    measured_all = True
+    worst = {"command": 0.0, "response": 0.0}
+    at_override = np.zeros((len(report["override_residual"]), 3))
+    for programmed, blocks, entry in judged.regions():
+        contour = entry["time_s"]["emitted"] <= contour_budget_s
+        contour_budget_s -= entry["time_s"]["emitted"] if contour else 0.0
+        measured_all = measured_all and contour
+        runs = [figures(judged, blocks, programmed, rule, contour=contour) for rule in BLOCK_ENDS]
+        residual = np.max([run.residual for run in runs], axis=0)
+        for axis, ours in zip("xyz", residual, strict=True):
+            theirs = entry["residual_vibration_um"]["emitted"][axis]
+            assert close(ours, theirs), f"lines {entry['lines']}: residual {axis} {ours}, report {theirs}"
+        if contour:
+            worst["command"] = max([worst["command"], *(run.command[0] for run in runs)])
+            worst["response"] = max([worst["response"], *(run.response[0] for run in runs)])
+            limit = entry["contour_error_um"]
+            ours = max(run.command[0] for run in runs)
+            # The report measures along the path, in order; where a path comes near itself that is more.
+            assert ours <= limit + max(0.2, 0.02 * limit), f"lines {entry['lines']}: contour {ours}, report {limit}"
+        for k, override in enumerate(report["override_residual"]):
+            rule = judged.machine.controller.block_end
+            run = figures(judged, blocks, programmed, rule, contour=False, override=override["override"])
+            at_override[k] = np.maximum(at_override[k], run.residual)
+        lasts = max(played_s(judged, blocks, rule) for rule in BLOCK_ENDS)
+        assert abs(lasts - entry["time_s"]["emitted"]) < 2.1 * judged.machine.controller.interpolation_period_s
+    for override, ours_xyz in zip(report["override_residual"], at_override, strict=True):
+        for axis, ours in zip("xyz", ours_xyz, strict=True):
+            assert close(ours, override["residual_um"][axis]), f"{override}: judge {ours_xyz}"
+    if measured_all:
+        for what, ours in worst.items():
+            theirs = report["contour_error_um"][what]["emitted"]["max"]
+            assert ours <= theirs + max(0.2, 0.02 * theirs), f"contour of the {what} {ours}, report {theirs}"
+
+
+def played_s(judged: Judged, blocks: list[Move], rule: BlockEnd) -> float:
+    """Time of a region's blocks and of the controller's own filter behind them."""
+    tick = judged.machine.controller.interpolation_period_s
+    cuts = [m for m in blocks if m.length > 0.0]
+    ticks = max(0, round(judged.machine.controller.shaped_time_constant_s / tick) - 1)
+    return float(durations(cuts, period_s=tick, block_end=rule).sum()) + ticks * tick if cuts else 0.0

@@ -81,42 +81,64 @@ class Fitter {
   }
 
  private:
-  // Makes the last line an arc where the original ends with one. Blocks without a move in its plane are joined to their
-  // predecessors first; at the end of a stop they are a few increments long.
+  // Makes the last line an arc where the original ends with one. A line that does not move in the arc's plane (the end
+  // of a steep helix) gets one increment of way in it from its predecessor.
   void end_with_arc(std::vector<FittedBlock>& blocks) const {
     if (options_.last_kind == BlockKind::line || blocks.empty()) {
       return;
     }
+    FittedBlock& last = blocks.back();
     const int normal = options_.last_normal;
-    const auto a = static_cast<std::size_t>((normal + 1) % 3);
-    const auto b = static_cast<std::size_t>((normal + 2) % 3);
-    FittedBlock last = blocks.back();
     if (last.kind == options_.last_kind && last.normal == normal) {
       return;
     }
     const auto start_of = [&](std::size_t i) { return i == 0 ? rounded(0) : blocks[i - 1].end; };
-    std::size_t first = blocks.size() - 1;
-    Position start = start_of(first);
-    while (first > 0 && start[a] == last.end[a] && start[b] == last.end[b]) {
-      --first;
-      last.periods += blocks[first].periods;
-      last.first_period = blocks[first].first_period;
-      start = start_of(first);
-    }
-    const Vector3 move = to_mm(last.end) - to_mm(start);
-    const double chord = std::hypot(move[static_cast<Eigen::Index>(a)], move[static_cast<Eigen::Index>(b)]);
-    if (chord <= 0.0) {
+    if (plane_travel(start_of(blocks.size() - 1), last.end, normal) == 0.0 && !lend_increment(blocks, normal)) {
       return;  // no move in the plane at all: the original's arc is shorter than an increment
     }
-    const double radius = std::max(options_.last_radius_mm, chord);
-    last.radius = std::llround(radius / options_.increment_mm);
+    const Position start = start_of(blocks.size() - 1);
+    const double chord = plane_travel(start, last.end, normal);
+    last.radius = std::llround(std::max(options_.last_radius_mm, chord) / options_.increment_mm);
     last.kind = options_.last_kind;
     last.normal = options_.last_normal;
-    const double sweep = 2.0 * std::asin(0.5 * chord / (static_cast<double>(last.radius) * options_.increment_mm));
-    const double length = std::hypot(radius * sweep, move[normal]);
-    last.feed = nearest_feed(length, last.periods);
-    blocks.resize(first);
-    blocks.push_back(last);
+    const double radius = static_cast<double>(last.radius) * options_.increment_mm;
+    const double climb = to_mm(last.end)[normal] - to_mm(start)[normal];
+    last.feed = nearest_feed(std::hypot(2.0 * radius * std::asin(0.5 * chord / radius), climb), last.periods);
+  }
+
+  [[nodiscard]] double plane_travel(const Position& from, const Position& to, int normal) const {
+    const Vector3 move = to_mm(to) - to_mm(from);
+    return std::hypot(move[(normal + 1) % 3], move[(normal + 2) % 3]);
+  }
+
+  // Takes one increment of the last way in the plane from the line that made it, or from the line before the last
+  // block.
+  [[nodiscard]] bool lend_increment(std::vector<FittedBlock>& blocks, int normal) const {
+    for (std::size_t i = blocks.size() - 1; i-- > 0;) {
+      const Position start = i == 0 ? rounded(0) : blocks[i - 1].end;
+      const auto a = static_cast<std::size_t>((normal + 1) % 3);
+      const auto b = static_cast<std::size_t>((normal + 2) % 3);
+      const std::size_t axis = blocks[i].end[a] != start[a] ? a : b;
+      const std::int64_t way = blocks[i].end[axis] - start[axis];
+      Position behind = blocks[i].end;
+      behind[axis] -= way > 0 ? 1 : -1;
+      if (way == 0 || behind == start) {
+        continue;
+      }
+      // All blocks from there to the last but one stay one increment behind; lines only, so that no arc changes its
+      // shape.
+      for (std::size_t k = i; k + 1 < blocks.size(); ++k) {
+        if (blocks[k].kind != BlockKind::line) {
+          return false;
+        }
+      }
+      for (std::size_t k = i; k + 1 < blocks.size(); ++k) {
+        blocks[k].end[axis] -= way > 0 ? 1 : -1;
+      }
+      blocks[i].feed = nearest_feed((to_mm(blocks[i].end) - to_mm(start)).norm(), blocks[i].periods);
+      return true;
+    }
+    return false;
   }
 
   [[nodiscard]] Position rounded(std::uint32_t k) const {

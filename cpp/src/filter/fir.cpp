@@ -118,6 +118,30 @@ void weigh_column(const double* in, Index rows, const std::vector<int>& delays, 
   weigh_boundary(in, rows, delays, taps, out, rows, rows + duration);
 }
 
+/// Row-major samples: all axes together are one series whose delays are n_axes times as long.
+void weigh_rows(const double* in, Index rows, Index n_axes, const std::vector<int>& delays,
+                const std::vector<double>& taps, double* out) {
+  std::vector<int> flat_delays(delays);
+  for (int& delay : flat_delays) delay *= static_cast<int>(n_axes);
+  const Index duration = delays.back();
+  const auto boundary = [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      for (Index axis = 0; axis < n_axes; ++axis) {
+        const auto delayed = [&](std::size_t k) {
+          return in[std::clamp<Index>(i - delays[k], 0, rows - 1) * n_axes + axis];
+        };
+        double sum = taps[0] * delayed(0);
+        for (std::size_t k = 1; k < taps.size(); ++k) sum += taps[k] * delayed(k);
+        out[i * n_axes + axis] = sum;
+      }
+    }
+  };
+  const Index interior_begin = std::min(duration, rows);
+  boundary(0, interior_begin);
+  weigh_interior(in, flat_delays, taps, out, interior_begin * n_axes, rows * n_axes);
+  boundary(rows, rows + duration);
+}
+
 void average_column(const double* in, Index rows, Index length, double* out) {
   const Index out_rows = rows + length - 1;
   const auto divisor = static_cast<double>(length);
@@ -147,6 +171,24 @@ void average_column(const double* in, Index rows, Index length, double* out) {
 }
 
 }  // namespace
+
+void Fir::apply_rows(const double* in, Index rows, int n_axes, double* out) const {
+  if (rows < 1 || n_axes < 1) {
+    throw Error(ErrorKind::argument, "filter input of " + std::to_string(rows) + " samples and " +
+                                         std::to_string(n_axes) + " axes, at least 1 of each needed");
+  }
+  if (!moving_average_) {
+    weigh_rows(in, rows, n_axes, delays_, taps_, out);
+    return;
+  }
+  const auto to_row_major = Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>(1, n_axes);
+  using Rows = Eigen::Map<Eigen::MatrixXd, 0, Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>>;
+  using ConstRows = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>>;
+  const Eigen::MatrixXd columns = ConstRows(in, rows, n_axes, to_row_major);
+  Eigen::MatrixXd result(rows + duration_samples(), n_axes);
+  apply(columns.data(), rows, n_axes, result.data());
+  Rows(out, result.rows(), n_axes, to_row_major) = result;
+}
 
 Fir::Fir(std::vector<int> delays, std::vector<double> taps) : delays_(std::move(delays)), taps_(std::move(taps)) {
   if (taps_.empty()) throw Error(ErrorKind::argument, "filter without taps");

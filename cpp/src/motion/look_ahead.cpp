@@ -90,7 +90,8 @@ double curvature_speed(double curvature_per_mm, const MotionLimits& limits, doub
 
 double jerk_time(const MotionLimits& limits, double acceleration) {
   const double jerk = limits.max_jerk_mm_per_s3.minCoeff();
-  const double from_jerk = std::isfinite(jerk) && std::isfinite(acceleration) ? acceleration / jerk : 0.0;
+  // Twice, because acceleration may turn into deceleration at once.
+  const double from_jerk = std::isfinite(jerk) && std::isfinite(acceleration) ? 2.0 * acceleration / jerk : 0.0;
   return std::max(limits.jerk_time_s, from_jerk);
 }
 
@@ -191,7 +192,10 @@ class PhaseList {
     if (!phases.empty()) {
       SpeedPhase& last = phases.back();
       const double scale = std::max(std::abs(last.acceleration_mm_per_s2), std::abs(acceleration));
-      if (std::abs(last.acceleration_mm_per_s2 - acceleration) <= 1e-9 * scale || scale == 0.0) {
+      const double end_speed = last.speed_mm_per_s + last.acceleration_mm_per_s2 * last.duration_s;
+      // Without an acceleration limit the speed jumps from one steady stretch to the next.
+      const bool joins = std::abs(end_speed - v0) <= 1e-6 * (end_speed + v0);
+      if (joins && (std::abs(last.acceleration_mm_per_s2 - acceleration) <= 1e-9 * scale || scale == 0.0)) {
         last.duration_s += duration;
         length += distance;
         return;
@@ -310,6 +314,10 @@ double corner_speed_limit(const Segment& before, const Segment& after, const Mot
 SpeedProfile plan_speed(const Path& path, const MotionLimits& limits) {
   require_positive(limits.time_constant_s, "acceleration time constant (s)");
   require_positive(limits.arc_feed_ratio, "arc feed ratio");
+  if (!(limits.jerk_time_s >= 0.0) || !std::isfinite(limits.jerk_time_s)) {
+    throw Error(ErrorKind::argument,
+                "jerk time is " + std::to_string(limits.jerk_time_s) + " s, must be finite and >= 0");
+  }
   require_positive(limits.contour_tolerance_mm, "contour tolerance (mm)");
   require_positive(limits.centripetal_acceleration_mm_per_s2, "centripetal acceleration (mm/s2)");
   for (int i = 0; i < axis_count; ++i) {

@@ -1,0 +1,155 @@
+// Counts allocations in the real-time forms. An executable of its own, because it replaces operator new.
+#include <array>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <new>
+#include <numbers>
+#include <vector>
+
+#include "shapegcode/filter/fir.hpp"
+#include "shapegcode/metrology/contour.hpp"
+#include "shapegcode/motion/block_player.hpp"
+#include "shapegcode/motion/interpolator.hpp"
+#include "shapegcode/motion/look_ahead.hpp"
+#include "shapegcode/plant/modal.hpp"
+
+namespace {
+
+// Not atomic: one thread. Volatile: the compiler may not leave out a pair of new and delete that it can see through.
+volatile std::size_t allocations = 0;
+
+void* allocate(std::size_t size, std::size_t alignment) {
+  allocations = allocations + 1;
+  void* memory = std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) { return allocate(size, alignof(std::max_align_t)); }
+void* operator new[](std::size_t size) { return allocate(size, alignof(std::max_align_t)); }
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return allocate(size, static_cast<std::size_t>(alignment));
+}
+void* operator new[](std::size_t size, std::align_val_t alignment) {
+  return allocate(size, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+
+namespace {
+
+using namespace shapegcode;
+
+int failures = 0;
+
+/// Runs `steps` and reports any allocation made in it.
+template <class Steps>
+void expect_none(const char* name, Steps&& steps) {
+  const std::size_t before = allocations;
+  const long done = steps();
+  const std::size_t made = allocations - before;
+  std::printf("%-24s %8ld steps, %zu allocations\n", name, done, made);
+  if (made != 0 || done < 100) ++failures;
+}
+
+std::vector<Segment> many_segments() {
+  std::vector<Segment> segments;
+  Vector3 at = Vector3::Zero();
+  for (int i = 0; i < 200; ++i) {
+    const Vector3 end = at + Vector3(i % 3 == 0 ? 0.02 : 1.5, i % 5 == 0 ? -0.7 : 0.4, 0.1);
+    segments.push_back(make_line(at, end, 60.0));
+    const Vector3 after = end + Vector3(2.0, 2.0, 0.3);
+    segments.push_back(make_arc(end, after, end + Vector3(0.0, 2.0, 0.0), std::numbers::pi / 2, 2, 60.0));
+    at = after;
+  }
+  return segments;
+}
+
+}  // namespace
+
+int main() {
+  // The count itself works: a test that cannot fail is none.
+  const std::size_t before = allocations;
+  { const std::vector<double> probe(100, 1.0); }
+  auto* single = new Vector3(Vector3::Zero());
+  delete single;
+  if (allocations - before != 2) {
+    std::printf("operator new is not replaced: %zu allocations counted, 2 made\n", allocations - before);
+    return 1;
+  }
+
+  const std::vector<Segment> segments = many_segments();
+  const auto path = std::make_shared<const Path>(segments);
+  MotionLimits limits;
+  limits.jerk_time_s = 0.02;
+  limits.corner_speed_difference_mm_per_s = Vector3::Constant(10.0);
+  const auto profile = std::make_shared<const SpeedProfile>(plan_speed(*path, limits));
+  Vector3 position = Vector3::Zero();
+  double sink = 0.0;
+
+  Interpolator interpolator(path, profile, 1e-3);
+  expect_none("Interpolator::step", [&] {
+    long steps = 0;
+    for (; interpolator.step(position); ++steps) sink += position.sum() + interpolator.distance_mm();
+    for (int i = 0; i < 100; ++i) interpolator.step(position);  // past the end
+    return steps;
+  });
+
+  for (const BlockEnd end : {BlockEnd::ceil, BlockEnd::carry}) {
+    BlockPlayer player(segments, 1e-3, end, 0.9);
+    expect_none(end == BlockEnd::ceil ? "BlockPlayer::step ceil" : "BlockPlayer::step carry", [&] {
+      long steps = 0;
+      for (; player.step(position); ++steps) sink += position.sum();
+      player.step(position);
+      return steps;
+    });
+  }
+
+  for (const Fir& fir : {Fir::moving_average(50), Fir({0, 3, 7}, {0.5, 0.2, 0.3}), Fir({0}, {1.0})}) {
+    FirStream stream(fir, 3);
+    expect_none("FirStream::step", [&] {
+      position = Vector3(1.0, 2.0, 3.0);
+      stream.reset({position.data(), 3});
+      for (int i = 0; i < 5000; ++i) {
+        position = Vector3(1.0 + i, 2.0, 3.0 - 0.5 * i);
+        stream.step({position.data(), 3});
+        sink += position.sum();
+      }
+      return 5000L;
+    });
+  }
+
+  AxisModes modes;
+  modes[0] = {{46.0, 0.02, 1.0}, {210.0, 0.05, 0.2}};
+  modes[1] = {{131.0, 0.02, 1.0}};
+  ModalPlant plant(modes, 1e-3);
+  expect_none("ModalPlant::step", [&] {
+    plant.reset(Vector3::Zero());
+    for (int i = 0; i < 5000; ++i) {
+      sink += plant.step(Vector3(0.1 * i, 0.001 * i * i, 0.0)).sum() + plant.peak().sum() + plant.deflection().sum();
+    }
+    plant.reset_peak();
+    return 5000L;
+  });
+
+  ContourTracker tracker(*path);
+  Interpolator along(path, profile, 1e-3);
+  expect_none("ContourTracker::step", [&] {
+    long steps = 0;
+    for (; along.step(position); ++steps) sink += tracker.step(position + Vector3(0.001, 0.0, 0.0));
+    return steps;
+  });
+
+  if (failures != 0) std::printf("%d real-time form(s) allocate or did not run\n", failures);
+  return failures == 0 && sink == sink ? 0 : 1;
+}

@@ -1,0 +1,172 @@
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "shapegcode/error.hpp"
+#include "shapegcode/motion/block_player.hpp"
+
+using shapegcode::BlockEnd;
+using shapegcode::BlockPlayer;
+using shapegcode::Error;
+using shapegcode::make_arc;
+using shapegcode::make_line;
+using shapegcode::play_duration_s;
+using shapegcode::Segment;
+using shapegcode::Vector3;
+
+namespace {
+
+/// Lines along X, one after the other.
+std::vector<Segment> row_of_lines(const std::vector<double>& lengths, const std::vector<double>& feeds) {
+  std::vector<Segment> blocks;
+  double x = 0.0;
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    blocks.push_back(make_line({x, 0, 0}, {x + lengths[i], 0, 0}, feeds[i], static_cast<std::uint32_t>(i + 1)));
+    x += lengths[i];
+  }
+  return blocks;
+}
+
+std::vector<double> played(const std::vector<Segment>& blocks, double period, BlockEnd end, double ratio = 1.0) {
+  BlockPlayer player(blocks, period, end, ratio);
+  std::vector<double> x;
+  Vector3 position;
+  while (player.step(position)) x.push_back(position.x());
+  return x;
+}
+
+void check_set_points(const std::vector<double>& found, const std::vector<double>& expected) {
+  REQUIRE(found.size() == expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    CAPTURE(i);
+    CHECK(found[i] == doctest::Approx(expected[i]).epsilon(1e-12));
+  }
+}
+
+}  // namespace
+
+TEST_CASE("block player: a block of two and a half periods lasts three under ceil, its successor starts on the tick") {
+  // Period 1 ms: 0.25 mm at 100 mm/s, then 0.2 mm at 50 mm/s.
+  const auto blocks = row_of_lines({0.25, 0.2}, {100.0, 50.0});
+  check_set_points(played(blocks, 1e-3, BlockEnd::ceil), {0.0, 0.1, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45});
+  CHECK(play_duration_s(blocks, 1e-3, BlockEnd::ceil) == doctest::Approx(0.007));
+}
+
+TEST_CASE("block player: under carry the remainder goes on at the successor's feed") {
+  // The first block ends at 2.5 ms: at 3 ms the second has run half a millisecond; it ends at 6.5 ms.
+  const auto blocks = row_of_lines({0.25, 0.2}, {100.0, 50.0});
+  check_set_points(played(blocks, 1e-3, BlockEnd::carry), {0.0, 0.1, 0.2, 0.275, 0.325, 0.375, 0.425, 0.45});
+  CHECK(play_duration_s(blocks, 1e-3, BlockEnd::carry) == doctest::Approx(0.0065));
+}
+
+TEST_CASE("block player: several blocks within one period") {
+  // 0.03 mm at 100 mm/s last 0.3 ms each: under carry three and a third to the period, under ceil one.
+  const std::vector<double> lengths(10, 0.03);
+  const std::vector<double> feeds(10, 100.0);
+  const auto blocks = row_of_lines(lengths, feeds);
+  check_set_points(played(blocks, 1e-3, BlockEnd::carry), {0.0, 0.1, 0.2, 0.3});
+  check_set_points(played(blocks, 1e-3, BlockEnd::ceil), {0.0, 0.03, 0.06, 0.09, 0.12, 0.15, 0.18, 0.21, 0.24, 0.27, 0.3});
+}
+
+TEST_CASE("block player: feed override scales the time") {
+  const auto blocks = row_of_lines({0.5}, {100.0});  // 5 ms
+  CHECK(play_duration_s(blocks, 1e-3, BlockEnd::carry, 0.5) == doctest::Approx(0.010));
+  CHECK(play_duration_s(blocks, 1e-3, BlockEnd::carry, 1.2) == doctest::Approx(0.005 / 1.2));
+  CHECK(play_duration_s(blocks, 1e-3, BlockEnd::ceil, 0.9) == doctest::Approx(0.006));  // 5.56 ms
+  CHECK(play_duration_s(blocks, 1e-3, BlockEnd::ceil, 1.2) == doctest::Approx(0.005));  // 4.17 ms
+  check_set_points(played(blocks, 1e-3, BlockEnd::carry, 2.0), {0.0, 0.2, 0.4, 0.5});
+}
+
+TEST_CASE("block player: a block that ends on a tick to within rounding ends there") {
+  // 5 ms at feeds of a tenth of mm/min: l = F*5 ms in doubles.
+  int wrong = 0;
+  for (int f = 1; f < 20000; ++f) {
+    const double feed = f / 10.0 / 60.0;
+    const std::vector<Segment> block{make_line({0, 0, 0}, {feed * 0.005, 0, 0}, feed)};
+    if (std::abs(play_duration_s(block, 1e-3, BlockEnd::ceil) - 0.005) > 1e-12) ++wrong;
+  }
+  CHECK(wrong == 0);
+  // One part in a thousand longer is a tick more.
+  const std::vector<Segment> longer{make_line({0, 0, 0}, {0.1001, 0, 0}, 20.0)};
+  CHECK(play_duration_s(longer, 1e-3, BlockEnd::ceil) == doctest::Approx(0.006));
+}
+
+TEST_CASE("block player: blocks without length take no time and need no feed") {
+  auto blocks = row_of_lines({0.1, 0.0, 0.0, 0.1}, {100.0, 0.0, 100.0, 100.0});
+  for (const BlockEnd end : {BlockEnd::ceil, BlockEnd::carry}) check_set_points(played(blocks, 1e-3, end), {0.0, 0.1, 0.2});
+  blocks = row_of_lines({0.0}, {0.0});
+  CHECK(played(blocks, 1e-3, BlockEnd::ceil).size() == 1);
+  CHECK(played({}, 1e-3, BlockEnd::ceil).empty());
+  CHECK(play_duration_s({}, 1e-3, BlockEnd::ceil) == 0.0);
+}
+
+TEST_CASE("block player: random blocks against times added up by hand") {
+  std::mt19937_64 generator(9);
+  std::uniform_real_distribution<double> length(0.001, 0.4);
+  std::uniform_real_distribution<double> feed(5.0, 120.0);
+  std::vector<double> lengths;
+  std::vector<double> feeds;
+  for (int i = 0; i < 500; ++i) {
+    lengths.push_back(length(generator));
+    feeds.push_back(feed(generator));
+  }
+  const auto blocks = row_of_lines(lengths, feeds);
+  for (const BlockEnd end : {BlockEnd::ceil, BlockEnd::carry}) {
+    constexpr double period = 1e-3;
+    // Start time and start of every block.
+    std::vector<double> starts{0.0};
+    for (std::size_t i = 0; i < lengths.size(); ++i) {
+      const double exact = lengths[i] / feeds[i];
+      starts.push_back(starts.back() + (end == BlockEnd::ceil ? std::ceil(exact / period) * period : exact));
+    }
+    CHECK(play_duration_s(blocks, period, end) == doctest::Approx(starts.back()).epsilon(1e-12));
+    BlockPlayer player(blocks, period, end);
+    Vector3 position;
+    double worst = 0.0;
+    int wrong_block = 0;
+    std::size_t count = 0;
+    for (; player.step(position); ++count) {
+      const double time = period * static_cast<double>(count);
+      std::size_t block = 0;
+      while (block + 1 < lengths.size() && time >= starts[block + 1] - 1e-9) ++block;
+      const double expected =
+          blocks[block].start_mm.x() + std::min(lengths[block], feeds[block] * (time - starts[block]));
+      worst = std::max(worst, std::abs(position.x() - expected));
+      if (player.block() != block) ++wrong_block;
+    }
+    CHECK(worst < 1e-9);
+    CHECK(wrong_block == 0);
+    CHECK(count == static_cast<std::size_t>(std::ceil(starts.back() / period - 1e-6)) + 1);
+    CHECK_FALSE(player.step(position));
+    CHECK(position == blocks.back().end_mm);  // to the last bit
+  }
+}
+
+TEST_CASE("block player: an arc is run along its circle at its feed") {
+  const double half_turn = 5.0 * std::numbers::pi;  // mm
+  const std::vector<Segment> blocks{make_arc({10, 0, 0}, {0, 0, 0}, {5, 0, 0}, std::numbers::pi, 2, half_turn / 0.1)};
+  BlockPlayer player(blocks, 1e-3, BlockEnd::ceil);
+  Vector3 position;
+  for (int i = 0; i <= 100; ++i) {
+    REQUIRE(player.step(position));
+    const double angle = std::numbers::pi * i / 100.0;
+    CHECK((position - Vector3(5.0 + 5.0 * std::cos(angle), 5.0 * std::sin(angle), 0.0)).norm() < 1e-12);
+  }
+  CHECK_FALSE(player.step(position));
+}
+
+TEST_CASE("block player: refuses a period, an override or a feed that is not positive") {
+  const auto blocks = row_of_lines({1.0}, {10.0});
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double bad : {0.0, -1.0, nan}) {
+    CHECK_THROWS_AS(BlockPlayer(blocks, bad, BlockEnd::ceil), Error);
+    CHECK_THROWS_AS(BlockPlayer(blocks, 1e-3, BlockEnd::ceil, bad), Error);
+    const auto without_feed = row_of_lines({1.0, 1.0}, {10.0, bad});
+    CHECK_THROWS_AS(BlockPlayer(without_feed, 1e-3, BlockEnd::ceil), Error);
+  }
+}
