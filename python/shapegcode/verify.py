@@ -279,10 +279,14 @@ def summarise(figures: Sequence[RegionFigures], placed: Sequence[Placed], machin
 def _region_summary(figures: RegionFigures, place: Placed, machine: Machine) -> dict[str, Any]:
     tolerance = machine.tolerance
     misses = []
+    inch = place.region.exit.units == 20
+    controller = machine.controller
+    increment_um = (controller.least_increment_inch * MM_PER_INCH if inch else controller.least_increment_mm) * 1e3
+    rounding_um = tolerance.residual_floor_increments * increment_um
     before = figures.original.residual_mm * 1e3
     after = np.max([run.residual_mm for run in figures.emitted], axis=0) * 1e3
     for axis, was, now in zip("XYZ", before, after, strict=True):
-        limit = max(tolerance.residual_ratio * was, tolerance.residual_floor_um)
+        limit = max(tolerance.residual_ratio * was, tolerance.residual_floor_um, rounding_um)
         if now > limit:
             misses.append(f"residual vibration {axis} {now:.2f} um, limit {limit:.2f} um")
     contour = max(run.command.max_abs_mm for run in figures.emitted) * 1e3

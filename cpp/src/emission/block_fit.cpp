@@ -103,7 +103,7 @@ class Fitter {
     last.normal = options_.last_normal;
     const double radius = static_cast<double>(last.radius) * options_.increment_mm;
     const double climb = to_mm(last.end)[normal] - to_mm(start)[normal];
-    last.feed = nearest_feed(std::hypot(2.0 * radius * std::asin(0.5 * chord / radius), climb), last.periods);
+    set_feed(last, std::hypot(2.0 * radius * std::asin(0.5 * chord / radius), climb));
   }
 
   [[nodiscard]] double plane_travel(const Position& from, const Position& to, int normal) const {
@@ -135,7 +135,7 @@ class Fitter {
       for (std::size_t k = i; k + 1 < blocks.size(); ++k) {
         blocks[k].end[axis] -= way > 0 ? 1 : -1;
       }
-      blocks[i].feed = nearest_feed((to_mm(blocks[i].end) - to_mm(start)).norm(), blocks[i].periods);
+      set_feed(blocks[i], (to_mm(blocks[i].end) - to_mm(start)).norm());
       return true;
     }
     return false;
@@ -205,14 +205,19 @@ class Fitter {
     return std::max(options_.minimum_feed, static_cast<std::int64_t>(std::ceil(exact)));
   }
 
-  // A line over `covered` periods. One too slow for the resolution of F is run a little faster, in fewer whole periods.
+  // Gives a block its F for the periods that it has. One too slow for the resolution of F is run a little faster, in
+  // fewer whole periods.
+  void set_feed(FittedBlock& block, double length_mm) const {
+    auto f = feed(length_mm, block.periods);
+    while (!f && block.periods > 1) {
+      f = feed(length_mm, --block.periods);
+    }
+    block.feed = f ? *f : nearest_feed(length_mm, block.periods);
+  }
+
   [[nodiscard]] Candidate line_to(const Position& end, double length, std::uint32_t k, std::uint32_t covered) const {
     Candidate line{{end, 0, 0, k, covered + lent_, BlockKind::line, 2}, covered};
-    auto f = feed(length, line.block.periods);
-    while (!f && line.block.periods > 1) {
-      f = feed(length, --line.block.periods);
-    }
-    line.block.feed = f ? *f : nearest_feed(length, line.block.periods);
+    set_feed(line.block, length);
     return line;
   }
 
