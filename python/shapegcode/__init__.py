@@ -103,3 +103,8 @@ def __getattr__(name: str) -> Any:
     value = getattr(importlib.import_module(f"shapegcode.{_HOME[name]}"), name)
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    """The public names, loaded or not."""
+    return __all__

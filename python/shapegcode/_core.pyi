@@ -354,6 +354,11 @@ class Path:
         End, shape (3,), mm.
         """
     @property
+    def fastest_feed_mm_per_s(self) -> float:
+        """
+        Largest programmed feed, mm/s; 0 for an empty path.
+        """
+    @property
     def largest_sweep_rad(self) -> float:
         """
         Largest sweep of any arc, rad; 0 without arcs.
@@ -826,6 +831,11 @@ class Region:
     def last_line(self) -> int:
         """
         From 1, inclusive.
+        """
+    @property
+    def look_ahead_mode(self) -> bool:
+        """
+        The program switched a look-ahead mode on before it (G05.1 Q1, G08 P1, G05 P10000).
         """
     @property
     def notes(self) -> list[RegionNote]:

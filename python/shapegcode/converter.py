@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +16,35 @@ from shapegcode.emit import Grid, emit_region, make_grid, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.shaping import choose_block_period, shortest_non_negative
-from shapegcode.verify import Placed, axis_modes, measure, other_time_s, play_original, read_back, summarise
+from shapegcode.verify import (
+    Placed,
+    RegionFigures,
+    axis_modes,
+    measure,
+    other_time_s,
+    play_original,
+    read_back,
+    summarise,
+)
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
+_ATTEMPTS = 4  # each with less room for the regions that left the contour tolerance
 _COMMENT_WIDTH = 60
+_HEADER_MARK = b"(SHAPEGCODE "
+_HEADER_REACH = 4096
+# One length, so that the verdict can take its place without moving a line.
+_VERDICT_PENDING, _VERDICT_GOOD, _VERDICT_BAD = (
+    b"(VERDICT PENDING                )",
+    b"(VERDICT WITHIN TOLERANCE       )",
+    b"(OUT OF TOLERANCE - DO NOT RUN  )",
+)
+# How much worse than the original's a figure must be to be worth a warning: ratio, and size in um.
+_WORSE_RATIO, _WORSE_UM = 1.2, 5.0
 
 Progress = Callable[[str, int, int], None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Conversion:
     """What a conversion made.
 
@@ -43,6 +64,13 @@ class Conversion:
     def within_tolerance(self) -> bool:
         """Whether every region keeps the machine's tolerances."""
         return bool(self.report["within_tolerance"])
+
+    def __repr__(self) -> str:
+        """Size and verdict, not the text."""
+        verdict = "within tolerance" if self.within_tolerance else "out of tolerance"
+        return (
+            f"<Conversion of {self.report['program']}: {len(self.placed)} regions, {len(self.text)} bytes, {verdict}>"
+        )
 
 
 def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
@@ -81,6 +109,11 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
     return make_grid(period, shortest_non_negative(modes, period, machine.shaping.max_duration_s))
 
 
+def written_by_shapegcode(program: Program) -> bool:
+    """Whether the header comment of this tool stands in the program."""
+    return _HEADER_MARK in program.core.slice(0, _HEADER_REACH)
+
+
 def convert(
     program: Program | str | Path,
     machine: Machine,
@@ -109,13 +142,13 @@ def convert(
         raise _core.ArgumentError(f"arc feed ratio is {arc_feed_ratio:g}, must be above 0 and at most 1")
     if not isinstance(program, Program):
         program = Program.read(program, machine)
+    if written_by_shapegcode(program):
+        raise _core.ProgramError(
+            f"{program.source}:1:1: written by shapegcode already (its header says so): convert the original"
+        )
     grid = choose_grid(machine, block_period_s)
-    limits = motion_limits(
-        machine,
-        arc_feed_ratio=machine.shaping.arc_feed_ratio if arc_feed_ratio is None else arc_feed_ratio,
-        grid=grid,
-        contour_tolerance_um=machine.tolerance.contour_um * _CONTOUR_MARGIN,
-    )
+    ratio = machine.shaping.arc_feed_ratio if arc_feed_ratio is None else arc_feed_ratio
+    room_um = [machine.tolerance.contour_um * _CONTOUR_MARGIN] * len(program.regions)
     # The originals are played on the other cores while this one shapes.
     pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
     try:
@@ -124,16 +157,19 @@ def convert(
             for region in program.regions
             if not _why_kept(region, machine)
         ]
-        written = _write(program, machine, grid, limits, on_progress)
-        emitted = read_back(written.text, written.placed, machine)
-        figures = measure(
-            emitted, written.placed, originals, machine, pool,
-            lambda done: on_progress("round trip", done, len(written.placed)),
-        )  # fmt: skip
+        for attempt in range(_ATTEMPTS):
+            stage = "shaping" if attempt == 0 else "shaping again, slower"
+            written = _write(program, machine, grid, ratio, room_um, partial(on_progress, stage))
+            emitted = read_back(written.text, written.placed, machine)
+            figures = measure(emitted, written.placed, originals, machine, pool, partial(on_progress, "round trip"))
+            if attempt + 1 == _ATTEMPTS or not _tighten(room_um, program, written.placed, figures, machine):
+                break
     finally:
         pool.shutdown(cancel_futures=True)
     report = _report(program, machine, grid, written, summarise(figures, written.placed, machine))
-    return Conversion(written.text, report, emitted, tuple(written.placed))
+    verdict = _VERDICT_GOOD if report["within_tolerance"] else _VERDICT_BAD
+    text = written.text.replace(_VERDICT_PENDING, verdict, 1)
+    return Conversion(text, report, emitted, tuple(written.placed))
 
 
 @dataclass(frozen=True)
@@ -147,8 +183,31 @@ class _Written:
     kept_s: float
 
 
+def _tighten(
+    room_um: list[float], program: Program, placed: list[Placed], figures: list[RegionFigures], machine: Machine
+) -> bool:
+    """Give regions that left the contour tolerance less room, so that they run slower. False if there is none.
+
+    The bound on feed counts corners and arcs one by one; where several fall into one shaper they add up.
+    """
+    limit = machine.tolerance.contour_um
+    places = {id(region): index for index, region in enumerate(program.regions)}
+    tightened = False
+    for place, region in zip(placed, figures, strict=True):
+        reached = max(run.command.max_abs_mm for run in region.emitted) * 1e3
+        if reached > limit:
+            room_um[places[id(place.region)]] *= _CONTOUR_MARGIN * limit / reached
+            tightened = True
+    return tightened
+
+
 def _write(
-    program: Program, machine: Machine, grid: Grid, limits: _core.MotionLimits, on_progress: Progress
+    program: Program,
+    machine: Machine,
+    grid: Grid,
+    arc_feed_ratio: float,
+    room_um: list[float],
+    on_progress: Callable[[int, int], None],
 ) -> _Written:
     core = program.core
     regions = program.regions
@@ -170,7 +229,7 @@ def _write(
     kept: list[str] = []
     kept_s = 0.0
     blocks = 0
-    for done, (region, reason) in enumerate(zip(regions, reasons, strict=True), start=1):
+    for done, (region, reason, room) in enumerate(zip(regions, reasons, room_um, strict=True), start=1):
         put(core.slice(position, region.text_begin))
         position = region.text_end
         if reason:
@@ -179,6 +238,7 @@ def _write(
             put(core.slice(region.text_begin, region.text_end))
             continue
         try:
+            limits = motion_limits(machine, arc_feed_ratio=arc_feed_ratio, grid=grid, contour_tolerance_um=room)
             shaped = emit_region(program, region, machine, grid, limits)
         except _core.ArgumentError as error:
             raise _region_error(program, region, str(error)) from error
@@ -186,7 +246,7 @@ def _write(
         put(shaped.text)
         placed.append(Placed(region, first, line - 1))
         blocks += shaped.blocks
-        on_progress("shaping", done, len(regions))
+        on_progress(done, len(regions))
     put(core.slice(position, core.size))
     return _Written(b"".join(parts), placed, blocks, kept, kept_s)
 
@@ -227,10 +287,11 @@ def _header(machine: Machine, grid: Grid) -> list[str]:
         f"SHAPEGCODE {__version__} MACHINE {machine.name}",
         *(f"MODE {mode}" for mode in modes),
         f"BLOCK PERIOD {grid.block_period_s * 1e3:g} MS SHAPER {grid.shaper.duration_s * 1e3:g} MS",
-        "OVERRIDE 100 PCT",
+        "SET FEED OVERRIDE 100 PCT",
         f"TIME CONSTANT AFTER INTERPOLATION {machine.controller.shaped_time_constant_s * 1e3:g} MS",
     ]
-    return [f"({_plain(line)[:_COMMENT_WIDTH]})" for line in lines]
+    first, *rest = (f"({_plain(line)[:_COMMENT_WIDTH]})" for line in lines)
+    return [first, _VERDICT_PENDING.decode(), *rest]
 
 
 def _plain(text: str) -> str:
@@ -253,10 +314,12 @@ def _report(
     for region in figures["regions"]:
         first, last = region["lines"]
         warnings += [f"{program.source}:{first}: lines {first} to {last}: {miss}" for miss in region["misses"]]
+    warnings += _worse_warnings(figures)
+    warnings += _region_warnings(program, placed, machine)
     warnings += _controller_warnings(
         machine, written.text, cutting["emitted"], written.blocks, figures["slowed_blocks"]
     )
-    return {
+    report = {
         "program": program.source,
         "machine": machine.name,
         "cycle_time_s": {
@@ -272,9 +335,62 @@ def _report(
         "blocks": {"read": program.core.block_count, "emitted": written.blocks},
         "bytes_emitted": len(written.text),
         **figures,
+        "limits": {
+            "contour_um": machine.tolerance.contour_um,
+            "residual_ratio": machine.tolerance.residual_ratio,
+            "residual_floor_um": machine.tolerance.residual_floor_um,
+            "residual_floor_increments": machine.tolerance.residual_floor_increments,
+        },
         "within_tolerance": not any(region["misses"] for region in figures["regions"]),
         "warnings": warnings,
     }
+    keep = report.pop("shaper")
+    return {**_tidy(report), "shaper": keep}
+
+
+def _worse_warnings(figures: dict[str, Any]) -> list[str]:
+    """Figures that the conversion made noticeably worse, within tolerance or not."""
+    pairs = [
+        (f"{name} {axis.upper()}", figures[key]["original"][axis], figures[key]["emitted"][axis])
+        for name, key in (("residual vibration", "residual_vibration_um"), ("peak vibration", "peak_vibration_um"))
+        for axis in "xyz"
+    ]
+    response = figures["contour_error_um"]["response"]
+    pairs.append(("contour error of the table", response["original"]["max"], response["emitted"]["max"]))
+    return [
+        f"{name} is larger than the original's: {before:.1f} -> {after:.1f} um"
+        for name, before, after in pairs
+        if after > _WORSE_RATIO * before and after - before > _WORSE_UM
+    ]
+
+
+def _region_warnings(program: Program, placed: list[Placed], machine: Machine) -> list[str]:
+    warnings = []
+    on = next((place.region for place in placed if place.region.look_ahead_mode), None)
+    if on is not None and not machine.emission.prologue:
+        warnings.append(
+            f"{program.source}:{on.first_line}: shaped blocks run while the program's look-ahead mode is on; the "
+            'verdict holds for it off: set emission.prologue = ["G05.1Q0"] and emission.epilogue = ["G05.1Q1"]'
+        )
+    fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
+    fast = next((place.region for place in placed if place.region.path.fastest_feed_mm_per_s * 60.0 > fastest), None)
+    if fast is not None:
+        warnings.append(
+            f"{program.source}:{fast.first_line}: programmed feed {fast.path.fastest_feed_mm_per_s * 60.0:g} mm/min is "
+            f"over every axis' largest ({fastest:g} mm/min, axes.*.max_feed_mm_per_min): shaped at the axes' limits"
+        )
+    return warnings
+
+
+def _tidy(value: Any) -> Any:
+    """Numbers as a person would write them: nine digits, and nothing below a millionth of a micrometre."""
+    if isinstance(value, dict):
+        return {key: _tidy(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_tidy(entry) for entry in value]
+    if isinstance(value, float):
+        return 0.0 if abs(value) < 1e-9 else float(f"{value:.9g}")
+    return value
 
 
 def _controller_warnings(machine: Machine, text: bytes, cutting_s: float, blocks: int, slowed_blocks: int) -> list[str]:

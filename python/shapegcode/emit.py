@@ -139,8 +139,10 @@ def emit_region(
     start = [round(float(x) / increment) for x in command.grid_mm[0]]
     text, motion, plane = _core.write_blocks(fitted, start, marks, writer)
 
-    head = [*machine.emission.prologue]
-    head.append(_safe_line(region, start, writer.position_decimals, first_number))
+    # A search for the region's N word must not skip the prologue.
+    head = [*machine.emission.prologue, _safe_line(region, start, writer.position_decimals, machine)]
+    if first_number >= 0:
+        head[0] = f"N{first_number}{head[0]}"
     if machine.emission.prefill_dwell_s > 0.0:
         head.append(f"G04P{round(machine.emission.prefill_dwell_s * 1e3)}")
     tail = [_restore_line(region, motion, plane), *machine.emission.epilogue]
@@ -166,10 +168,9 @@ def _mean_deviation_s(shaper: _core.Shaper) -> float:
     return float(sum(abs(a) * abs(t - mean) for t, a in zip(shaper.times_s, shaper.amplitudes, strict=True)))
 
 
-def _safe_line(region: _core.Region, start: list[int], decimals: int, number: int) -> str:
+def _safe_line(region: _core.Region, start: list[int], decimals: int, machine: Machine) -> str:
     entry = region.entry
-    words = [f"N{number}"] if number >= 0 else []
-    words += [f"G{entry.plane}", "G91" if region.incremental else "G90", "G94", "G40", "G64", "G01"]
+    words = [f"G{entry.plane}", "G91" if region.incremental else "G90", "G94", "G40", "G64", "G01"]
     if not region.incremental:
         known = entry.known
         words += [
@@ -177,9 +178,10 @@ def _safe_line(region: _core.Region, start: list[int], decimals: int, number: in
             for letter, value, is_known in zip("XYZ", start, known, strict=True)
             if is_known
         ]
-    # In G93 the modal F is no speed; the first block brings its own.
+    # In G93 the modal F is no speed; a feed over the axes' limit is none that the machine runs.
     unit = MM_PER_INCH if entry.units == 20 else 1.0
-    words.append(feed_word(max(1e-8, region.path[0].feed_mm_per_s * 60.0 / unit)))
+    fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
+    words.append(feed_word(max(1e-8, min(region.path[0].feed_mm_per_s * 60.0, fastest) / unit)))
     return "".join(words)
 
 

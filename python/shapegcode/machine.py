@@ -388,7 +388,7 @@ class Tolerance(Table):
         "residual vibration below this passes whatever the original's was", unit="µm", default=3.0
     )
     residual_floor_increments: NonNegative = key(
-        "residual vibration below this passes too: rounding the words alone may leave a lightly damped mode about so much",
+        "residual vibration below this passes too: rounding the words alone may leave a lightly damped mode so much",
         unit="increments",
         default=5.0,
     )

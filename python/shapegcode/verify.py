@@ -28,7 +28,7 @@ _STATE_FIELDS = (
 )  # fmt: skip
 
 Vector = npt.NDArray[np.float64]
-Step = Callable[[int], None]
+Step = Callable[[int, int], None]
 
 
 class RoundTripError(_core.ShapegcodeError):
@@ -58,29 +58,44 @@ class RegionFigures:
         original: the programmed path under the controller's own motion.
         emitted: the emitted blocks, one entry per rule (ceil, carry).
         overrides: residual of the emitted blocks per feed override, mm, (3,).
+        shifted: the same per shift of the modes (see `mode_shifts`).
         slowed_blocks: emitted blocks that the controller's look-ahead limits would slow.
     """
 
     original: _core.PlaybackFigures
     emitted: tuple[_core.PlaybackFigures, ...]
     overrides: tuple[Vector, ...]
+    shifted: tuple[Vector, ...]
     slowed_blocks: int
 
 
-def axis_modes(machine: Machine) -> list[list[_core.Mode]]:
-    """Modes of X, Y, Z for the core."""
+def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
+    """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty."""
     return [
-        [_core.Mode(mode.frequency_hz, mode.damping_ratio, mode.participation) for mode in axis.modes]
+        [
+            _core.Mode(
+                mode.frequency_hz * (1.0 + shift * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
+                mode.damping_ratio,
+                mode.participation,
+            )
+            for mode in axis.modes
+        ]
         for axis in machine.axes.as_tuple()
     ]
 
 
-def playback_options(machine: Machine, *, time_constant_s: float = 0.0) -> _core.PlaybackOptions:
+def mode_shifts(machine: Machine) -> tuple[float, ...]:
+    """-1 and +1 where a mode states an uncertainty of its frequency, else nothing."""
+    stated = any(mode.frequency_uncertainty_percent for axis in machine.axes.as_tuple() for mode in axis.modes)
+    return (-1.0, 1.0) if stated else ()
+
+
+def playback_options(machine: Machine, *, time_constant_s: float = 0.0, shift: float = 0.0) -> _core.PlaybackOptions:
     """Plant and interpolation period of a machine, with an acceleration filter after interpolation."""
     options = _core.PlaybackOptions()
     period = machine.controller.interpolation_period_s
     options.period_s = period
-    options.modes = axis_modes(machine)
+    options.modes = axis_modes(machine, shift)
     options.axis_filters = [
         _core.Fir.moving_average(round(length / period)) for length in (time_constant_s,) if round(length / period) > 1
     ]
@@ -113,10 +128,11 @@ def play_emitted(
     override: float = 1.0,
     contour: bool = True,
     last_seconds: float = 0.0,
+    shift: float = 0.0,
     record_samples: int = 0,
 ) -> _core.PlaybackFigures:
     """Emitted blocks as the controller plays them, measured against the programmed path."""
-    options = playback_options(machine, time_constant_s=machine.controller.shaped_time_constant_s)
+    options = playback_options(machine, time_constant_s=machine.controller.shaped_time_constant_s, shift=shift)
     options.measure_contour = contour
     options.last_seconds = last_seconds
     options.record_samples = record_samples
@@ -151,7 +167,7 @@ def measure(
     originals: Sequence[Future[_core.PlaybackFigures]],
     machine: Machine,
     pool: Executor,
-    on_step: Step = lambda _: None,
+    on_step: Step = lambda _done, _total: None,
 ) -> list[RegionFigures]:
     """Play every emitted region beside its original.
 
@@ -161,7 +177,7 @@ def measure(
         originals: the originals' playbacks under way, one per region (`play_original`).
         machine: controller model and plant.
         pool: runs the playbacks.
-        on_step: called with the number of regions done.
+        on_step: called with regions done and regions in all.
     """
     controller_rule = getattr(_core.BlockEnd, machine.controller.block_end)
     corner = [value / 60.0 for value in machine.controller.corner_speed_difference_mm_per_min.as_tuple()]
@@ -179,18 +195,25 @@ def measure(
             )
             for ratio in OVERRIDES
         ]  # fmt: skip
-        running.append((runs, overrides, pool.submit(_core.count_slowed_blocks, blocks, corner, feeds)))
+        shifted = [
+            pool.submit(
+                play_emitted, blocks, path, machine, controller_rule, shift=shift, contour=False, last_seconds=memory_s
+            )
+            for shift in mode_shifts(machine)
+        ]
+        running.append((runs, overrides, shifted, pool.submit(_core.count_slowed_blocks, blocks, corner, feeds)))
     results: list[RegionFigures] = []
-    for original, (runs, overrides, slowed) in zip(originals, running, strict=True):
+    for original, (runs, overrides, shifted, slowed) in zip(originals, running, strict=True):
         results.append(
             RegionFigures(
                 original.result(),
                 tuple(run.result() for run in runs),
                 tuple(run.result().residual_mm for run in overrides),
+                tuple(run.result().residual_mm for run in shifted),
                 slowed.result(),
             )
         )
-        on_step(len(results))
+        on_step(len(results), len(placed))
     return results
 
 
@@ -270,6 +293,10 @@ def summarise(figures: Sequence[RegionFigures], placed: Sequence[Placed], machin
         "override_residual": [
             {"override": ratio, "residual_um": largest_um(region.overrides[k] for region in figures)}
             for k, ratio in enumerate(OVERRIDES)
+        ],
+        "frequency_residual": [
+            {"shift": shift, "residual_um": largest_um(region.shifted[k] for region in figures)}
+            for k, shift in enumerate(mode_shifts(machine))
         ],
         "slowed_blocks": sum(region.slowed_blocks for region in figures),
         "regions": [_region_summary(region, place, machine) for region, place in zip(figures, placed, strict=True)],

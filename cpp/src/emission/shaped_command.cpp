@@ -89,7 +89,7 @@ void append_arc_normals(const Run& run, int reach_half_steps, std::vector<std::i
 ShapedCommand shape_path(const std::shared_ptr<const Path>& path, const Fir& shaper,
                          std::span<const std::uint32_t> marked_segments, const ShapingOptions& options) {
   const double ticks = options.block_period_s / options.interpolation_period_s;
-  if (!(ticks >= 1.0 - 1e-9) || std::abs(ticks - std::round(ticks)) > 1e-6) {
+  if (!(ticks >= 1.0 - 1e-9) || !(std::abs(ticks - std::round(ticks)) <= 1e-6)) {
     throw Error(ErrorKind::argument, "block period " + std::to_string(options.block_period_s) +
                                          " s is not a whole multiple of the interpolation period " +
                                          std::to_string(options.interpolation_period_s) + " s");

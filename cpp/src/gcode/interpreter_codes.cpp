@@ -135,6 +135,7 @@ void Interpreter::read_codes(LineFlow& flow) {
         foreign_switch(g);
         break;
       case Group::harmless:
+        look_ahead_switch(g);
         flow.stop = true;
         one_shot_axes_ = one_shot_axes_ || g == 220;  // the others may share their block with a move
         break;
@@ -280,6 +281,15 @@ void Interpreter::foreign_switch(int g_tenths) {
     forget_all();
   }
   foreign_ = on ? foreign_ | mode : foreign_ & ~mode;
+}
+
+// G05.1 Q1, G08 P1 and G05 P10000 switch modes on that plan short blocks anew.
+void Interpreter::look_ahead_switch(int g_tenths) {
+  if (g_tenths == 51 && words_.has('Q')) {
+    look_ahead_ = words_['Q'].value != 0.0;
+  } else if ((g_tenths == 80 || g_tenths == 50) && words_.has('P')) {
+    look_ahead_ = words_['P'].value != 0.0;
+  }
 }
 
 void Interpreter::change_coordinates(int number) {

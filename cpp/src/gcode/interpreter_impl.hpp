@@ -58,6 +58,7 @@ class Interpreter {
   void check_range() const;
   void cycle_block();
   void foreign_switch(int g_tenths);
+  void look_ahead_switch(int g_tenths);
   void change_coordinates(int number);
   void close_region();
   void note(std::size_t segment);
@@ -90,6 +91,7 @@ class Interpreter {
   bool one_shot_axes_ = false;  ///< axis words belong to a one-shot code
   bool distance_given_ = false;
   bool ended_ = false;
+  bool look_ahead_ = false;  ///< a look-ahead mode was switched on by the program
   bool framed_ = false;  ///< has its '%' lines
   Vector3 local_offset_ = Vector3::Zero();
   CannedCycle cycle_;

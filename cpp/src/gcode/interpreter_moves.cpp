@@ -208,6 +208,7 @@ void Interpreter::cut(const char* why_kept, const ModalState& before, std::size_
     region_->first_line = line_number_;
     region_->text_begin = begin;
     region_->entry = before;
+    region_->look_ahead_mode = look_ahead_;
     notes_kept_ = 0;
   }
   note(segments_.size());

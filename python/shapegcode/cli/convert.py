@@ -51,11 +51,14 @@ def run(args: argparse.Namespace) -> int:
         ProgramError, DesignError, MachineError: bad input.
         OSError: a file cannot be read or written.
     """
+    from shapegcode._core import ArgumentError
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, print_before_after, progress, write_bytes, write_json
     from shapegcode.converter import convert
     from shapegcode.program import Program
 
+    if args.output == "-":
+        raise ArgumentError("-o - : the program needs a file of its own; --json - writes the report to standard output")
     output = Path(args.output)
     _refuse_input_as_output(Path(args.input), output)
     machine = load_machine(args)
@@ -63,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     _refuse_input_as_output(Path(args.input), failed)
     with progress(f"converting {args.input}", args.json) as bar:
         program = Program.read(args.input, machine)
-        stages = {"shaping": 0.0, "round trip": 0.5}
+        stages = {"shaping": 0.0, "shaping again, slower": 0.0, "round trip": 0.5}
         conversion = convert(
             program,
             machine,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 import tomllib
 from typing import TYPE_CHECKING, Any
 
@@ -51,11 +52,23 @@ def load_machine(args: argparse.Namespace) -> Machine:
         *tables, last = key.strip().split(".")
         place: Any = data
         for name in tables:
-            place = place.setdefault(name, {}) if isinstance(place, dict) else None
-        if not isinstance(place, dict):
+            place = _inside(place, name)
+        if isinstance(place, list) and last.isdigit() and 0 < int(last) <= len(place):
+            place[int(last) - 1] = _toml_value(text)
+        elif isinstance(place, dict):
+            place[last] = _toml_value(text)
+        else:
             raise MachineError("--set", (Problem(key, text, "no such key"),))
-        place[last] = _toml_value(text)
     return Machine.from_data(data, f"{args.machine} with --set")
+
+
+def _inside(place: Any, name: str) -> Any:
+    """A table of the file by its name; the entries of a list count from 1, as `machine show` prints them."""
+    if isinstance(place, dict):
+        return place.setdefault(name, {})
+    if isinstance(place, list | tuple) and name.isdigit() and 0 < int(name) <= len(place):
+        return place[int(name) - 1]
+    return None
 
 
 def _toml_value(text: str) -> Any:
@@ -75,15 +88,14 @@ def ratio(text: str) -> float:
 
 
 def seconds(text: str) -> float:
-    """A time such as ``5ms`` or ``0.005s``; a bare number counts as seconds."""
-    for unit, factor in _TIME_UNITS.items():
-        if text.endswith(unit):
-            value = _number(text[: -len(unit)]) * factor
-            break
-    else:
-        value = _number(text)
+    """A time with its unit, such as ``5ms`` or ``0.005s``."""
+    match = re.fullmatch(r"([-+.\d]+(?:[eE][-+]?\d+)?)\s*(ms|us|s)", text)
+    try:
+        value = float(match[1]) * _TIME_UNITS[match[2]] if match else 0.0
+    except ValueError:
+        value = 0.0
     if not (math.isfinite(value) and value > 0.0):
-        raise argparse.ArgumentTypeError(f"{text!r}: must be a time above 0, for example 5ms")
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a time above 0 with its unit (s, ms, us), for example 5ms")
     return value
 
 

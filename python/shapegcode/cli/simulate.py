@@ -41,6 +41,7 @@ def run(args: argparse.Namespace) -> int:
     """
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.converter import written_by_shapegcode
     from shapegcode.program import Program
     from shapegcode.report import simulation_table
     from shapegcode.simulator import simulate
@@ -48,10 +49,12 @@ def run(args: argparse.Namespace) -> int:
     machine = load_machine(args)
     with progress(f"playing {args.input}", args.json) as bar:
         program = Program.read(args.input, machine)
+        # A program of ours says so; played as an ordinary one it would show figures of nothing.
+        shaped = args.shaped or written_by_shapegcode(program)
         simulation = simulate(
             program,
             machine,
-            shaped=args.shaped,
+            shaped=shaped,
             record_samples=200_000 if args.plots is not None else 0,
             on_progress=lambda done, total: bar.update(done / total),
         )
@@ -66,5 +69,8 @@ def run(args: argparse.Namespace) -> int:
     console.print(simulation_table(report))
     for warning in report["warnings"]:
         console.print(f"warning: {warning}", markup=False)
-    console.print("next: shapegcode convert shapes this program and shows what it gains", markup=False)
+    if shaped:
+        console.print("played block by block at its feed, as a shaped program", markup=False)
+    else:
+        console.print("next: shapegcode convert shapes this program and shows what it gains", markup=False)
     return ExitCode.OK
