@@ -15,7 +15,6 @@ from shapegcode import _core
 from shapegcode.emit import Grid, emit_region, make_grid, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.program import Program
-from shapegcode.shaping import choose_block_period, shortest_non_negative
 from shapegcode.verify import (
     Placed,
     RegionFigures,
@@ -84,6 +83,9 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
         DesignError: no shaper exists within `shaping.max_duration_s`.
         ArgumentError: the machine has no mode, or the period does not fit the controller.
     """
+    # SciPy's solvers take a quarter of a second to load: not before they are needed.
+    from shapegcode.shaping import choose_block_period, shortest_non_negative
+
     modes = [mode for axis in axis_modes(machine) for mode in axis]
     if not modes:
         raise _core.ArgumentError("the machine file gives no vibration mode (axes.x.modes): nothing to shape for")

@@ -2,13 +2,15 @@
 
 Matplotlib is imported when the first picture is drawn and draws to files only (PNG or SVG, by the file's
 ending); no window system and no global state are touched. Colours are those of Okabe and Ito, which
-colour-blind readers can tell apart; the original program is also the thinner line.
+colour-blind readers can tell apart; the original program is also the wider line, so that it shows
+beneath the emitted one.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -21,20 +23,25 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_feed", "plot_path", "plot_vibration", "thin_min_max"]
+__all__ = ["View", "follow", "plot_feed", "plot_path", "plot_vibration", "thin_min_max"]
 
 FloatArray = npt.NDArray[np.float64]
 Plane = Literal["XY", "ZX", "YZ"]
 
 _AXIS_NAMES = "XYZ"
 _COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7")
-_WIDTHS = (0.9, 1.4, 1.4, 1.4)
+_WIDTHS = (2.4, 0.9, 0.9, 0.9)
 _GREY = "#8a8a8a"
 _MAX_POINTS = 4000
 _FORMATS = (".png", ".svg")
 _MOVES_MM = 1e-9
+# A deflection below this is none.
+_SHOWN_MM = 5e-5
 # Pieces of the programmed path among which the nearest one is looked for.
 _PATH_PIECES = 20_000
+# A millimetre between two places along the path counts as this many mm between a sample and the path.
+_PROGRESS_WEIGHT = 0.03
+_SEGMENTS_ASKED = 3  # on either side of the nearest vertex
 
 
 def thin_min_max(
@@ -69,6 +76,21 @@ def thin_min_max(
     return t[indices], v[indices]
 
 
+@dataclass(frozen=True)
+class View:
+    """A stretch of time, drawn as one column of a picture.
+
+    Attributes:
+        traces: usually the original and the emitted program.
+        heading: what the stretch is; empty where it is all there is.
+        time_label: of the time axis.
+    """
+
+    traces: Sequence[Trace]
+    heading: str = ""
+    time_label: str = "time in s"
+
+
 def plot_path(
     file: str | Path,
     programmed_mm: npt.ArrayLike,
@@ -77,10 +99,13 @@ def plot_path(
     quantity: Literal["response", "command"] = "response",
     plane: Plane = "XY",
     magnification: float | None = None,
+    part: str = "",
+    whole_mm: npt.ArrayLike | None = None,
 ) -> float:
     """How far, and to which side, does the table leave the programmed path?
 
-    Each curve is the programmed path plus the deviation times the magnification.
+    Each curve is the programmed path plus the deviation times the magnification, every sample of it. The legend
+    has the figure that the core measured over the whole run; where a trace has none, that of the samples drawn.
 
     Args:
         file: ``.png`` or ``.svg``.
@@ -89,6 +114,9 @@ def plot_path(
         quantity: deviation of the table ("response") or of the set-points ("command").
         plane: plane of the picture.
         magnification: factor of the deviation; None: chosen so that the largest one is easy to see.
+        part: which part of the program this is, for the title.
+        whole_mm: the whole path where `programmed_mm` is a piece of it, shape (k, 3): a second panel shows where
+            the piece lies.
 
     Returns:
         The magnification that was used.
@@ -97,127 +125,185 @@ def plot_path(
         ValueError: a wrong shape, ending or magnification.
         OSError: the file cannot be written.
     """
-    polyline = np.asarray(programmed_mm, dtype=np.float64)
-    if polyline.ndim != 2 or polyline.shape[1] != 3 or len(polyline) < 2 or not np.isfinite(polyline).all():
-        raise ValueError(f"programmed_mm has shape {polyline.shape}: must be (m, 3), m >= 2, and finite")
+    polyline = _checked_polyline("programmed_mm", programmed_mm)
+    whole = None if whole_mm is None else _checked_polyline("whole_mm", whole_mm)
     _check_traces(traces)
     if magnification is not None and not (math.isfinite(magnification) and magnification > 0):
         raise ValueError(f"magnification = {magnification}: must be finite and greater than 0")
 
     drawn = []
     for trace in traces:
-        points = _telling_samples(trace, quantity)
-        feet = _foot_points(points, polyline)
-        drawn.append((trace.label, feet, points - feet))
+        points = trace.response_mm if quantity == "response" else trace.command_mm
+        _, feet = follow(trace.command_mm, points, polyline, complete=trace.stops and whole is None)
+        drawn.append((trace, feet, points - feet))
     largest_mm = max(float(np.linalg.norm(deviation, axis=1).max()) for _, _, deviation in drawn)
     size_mm = float(np.linalg.norm(np.ptp(polyline, axis=0)))
     factor = magnification or _round_factor(0.1 * size_mm / largest_mm if largest_mm > 0 else 1.0)
 
+    figure = _figure(7.2 if whole is None else 10.4, 6.4)
+    axes, locator = _path_axes(figure, with_locator=whole is not None)
     across, up = (_AXIS_NAMES.index(name) for name in plane)
-    figure = _figure(7.2, 6.4)
-    axes = figure.add_subplot()
     axes.plot(polyline[:, across], polyline[:, up], color=_GREY, linewidth=3, alpha=0.55, label="programmed path")
-    for number, (label, feet, deviation) in enumerate(drawn):
+    for number, (trace, feet, deviation) in enumerate(drawn):
         curve = feet + factor * deviation
-        largest_um = 1e3 * float(np.linalg.norm(deviation, axis=1).max())
-        axes.plot(
-            curve[:, across],
-            curve[:, up],
-            color=_colour(number),
-            linewidth=_width(number),
-            label=f"{label}, largest {largest_um:.1f} µm",
-        )
+        label = _path_label(trace, deviation, quantity, is_part=whole is not None)
+        axes.plot(curve[:, across], curve[:, up], color=_colour(number), linewidth=_width(number), label=label)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)
     axes.set_xlabel(f"{plane[0]} in mm")
     axes.set_ylabel(f"{plane[1]} in mm")
     what = "table" if quantity == "response" else "command"
-    _title(axes, f"Deviation of the {what} from the path, drawn ×{factor:g}")
-    _deviation_scale(axes, factor, largest_mm)
-    axes.legend(loc="best", frameon=False)
+    _heading(figure, f"Deviation of the {what} from the path, drawn ×{factor:g}", part)
+    if _only_along(polyline, [deviation for _, _, deviation in drawn]):
+        axes.text(
+            0.5, 0.3, "The path is straight: the table deviates along it only,\nwhich no drawing of the path shows. "
+            "See the picture of the vibration.", transform=axes.transAxes, ha="center", va="center",
+        )  # fmt: skip
+    else:
+        _deviation_scale(axes, factor, largest_mm)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, borderaxespad=0.2, fontsize=9)
+    if whole is not None and locator is not None:
+        _locate(locator, whole[:, [across, up]], polyline[:, [across, up]])
     _save(figure, file)
     return factor
 
 
-def plot_feed(file: str | Path, traces: Sequence[Trace]) -> None:
+def plot_feed(file: str | Path, views: Sequence[View], *, part: str = "") -> None:
     """How fast does the command go, along the path and per axis?
 
     Args:
         file: ``.png`` or ``.svg``.
-        traces: usually the original and the emitted program.
+        views: stretches of time, side by side.
+        part: which part of the program this is, for the title.
 
     Raises:
         ValueError: a wrong ending, or no trace.
         OSError: the file cannot be written.
     """
-    _check_traces(traces)
-    moving = _moving_axes(traces)
-    figure = _figure(8.0, 1.6 + 1.7 * (1 + len(moving)))
-    panels = _panels(figure, 1 + len(moving))
-    for number, trace in enumerate(traces):
-        speeds = np.diff(trace.command_mm, axis=0) / trace.period_s * 60
-        # A difference belongs to the middle of its period.
-        middles = trace.times_s[:-1] + trace.period_s / 2
-        curves = [np.linalg.norm(speeds, axis=1), *(speeds[:, axis] for axis in moving)]
-        for panel, values in zip(panels, curves, strict=True):
-            _curve(panel, number, trace.label, middles, values)
-    panels[0].set_ylabel("path feed\nin mm/min")
-    for panel, axis in zip(panels[1:], moving, strict=True):
+    _check_views(views)
+    moving = _moving_axes([trace for view in views for trace in view.traces])
+    figure = _figure(8.0 + 4.0 * (len(views) - 1), 1.8 + 1.7 * (1 + len(moving)))
+    grid = _panels(figure, 1 + len(moving), len(views))
+    for view, panels in zip(views, grid, strict=True):
+        for number, trace in enumerate(view.traces):
+            speeds = np.diff(trace.command_mm, axis=0) / trace.period_s * 60
+            # A difference belongs to the middle of its period.
+            middles = trace.times_s[:-1] + trace.period_s / 2
+            curves = [np.linalg.norm(speeds, axis=1), *(speeds[:, axis] for axis in moving)]
+            for panel, values in zip(panels, curves, strict=True):
+                _curve(panel, number, trace.label, middles, values)
+        _column_heading(panels[0], view)
+        _legend_above(panels[0])
+        # Standstill before and after says nothing about feed.
+        begin = min(trace.departure_s for trace in view.traces)
+        end = max(trace.rest_s if trace.stops else float(trace.times_s[-1]) for trace in view.traces)
+        margin = 0.03 * (end - begin) or view.traces[0].period_s
+        panels[-1].set_xlim(begin - margin, end + margin)
+        panels[-1].set_xlabel(view.time_label)
+    grid[0][0].set_ylabel("path feed\nin mm/min")
+    for panel, axis in zip(grid[0][1:], moving, strict=True):
         panel.set_ylabel(f"{_AXIS_NAMES[axis]} speed\nin mm/min")
-    _title(panels[0], "Feed of the command", above_legend=True)
-    _legend_above(panels[0])
-    # Standstill before and after says nothing about feed.
-    begin, end = min(trace.departure_s for trace in traces), max(trace.rest_s for trace in traces)
-    margin = 0.03 * (end - begin) or traces[0].period_s
-    panels[-1].set_xlim(begin - margin, end + margin)
-    panels[-1].set_xlabel("time in s")
-    figure.align_ylabels(panels)
+    _heading(figure, "Feed of the command", part)
+    figure.align_ylabels(grid[0])
     _save(figure, file)
 
 
-def plot_vibration(file: str | Path, traces: Sequence[Trace], *, rest_s: Mapping[str, float] | None = None) -> None:
+def plot_vibration(file: str | Path, views: Sequence[View], *, part: str = "") -> None:
     """How much does each axis swing about its command, and how much of it remains after the stop?
+
+    Axes that do not swing are named, not drawn.
 
     Args:
         file: ``.png`` or ``.svg``.
-        traces: usually the original and the emitted program.
-        rest_s: by label, the instant from which vibration counts as residual; None: where the trace's command
-            has come to rest.
+        views: stretches of time, side by side.
+        part: which part of the program this is, for the title.
 
     Raises:
-        ValueError: a wrong ending, no trace, or an instant outside its trace.
+        ValueError: a wrong ending, or no trace.
         OSError: the file cannot be written.
     """
-    _check_traces(traces)
-    instants = [float((rest_s or {}).get(trace.label, trace.rest_s)) for trace in traces]
-    for trace, instant in zip(traces, instants, strict=True):
-        if not 0 <= instant <= len(trace.command_mm) * trace.period_s:
-            raise ValueError(
-                f"trace {trace.label}: rest at {instant} s is outside the trace, which ends at "
-                f"{trace.times_s[-1]:.6g} s"
-            )
+    _check_views(views)
+    traces = [trace for view in views for trace in view.traces]
     moving = _moving_axes(traces)
-    figure = _figure(8.0, 1.6 + 2.2 * len(moving))
-    panels = _panels(figure, len(moving))
-    for panel, axis in zip(panels, moving, strict=True):
-        for number, (trace, instant) in enumerate(zip(traces, instants, strict=True)):
-            deflection_um = trace.deflection_mm[:, axis] * 1e3
-            remaining = deflection_um[trace.times_s >= instant - trace.period_s / 2]
-            residual = float(np.abs(remaining).max()) if len(remaining) else 0.0
-            _curve(panel, number, f"{trace.label}, residual {residual:.1f} µm", trace.times_s, deflection_um)
-            panel.axvline(instant, color=_colour(number), linewidth=1, linestyle=(0, (4, 3)))
-        panel.axhline(0, color=_GREY, linewidth=0.6, zorder=0)
+    swing_mm = np.max([np.abs(trace.deflection_mm).max(axis=0) for trace in traces], axis=0)
+    swinging = [axis for axis in moving if swing_mm[axis] >= _SHOWN_MM]
+    still = [axis for axis in moving if axis not in swinging]
+    shown = swinging or still[:1]
+    figure = _figure(8.0 + 4.0 * (len(views) - 1), 1.8 + 2.2 * len(shown))
+    grid = _panels(figure, len(shown), len(views))
+    for view, panels in zip(views, grid, strict=True):
+        for panel, axis in zip(panels, shown, strict=True):
+            for number, trace in enumerate(view.traces):
+                label = _vibration_label(trace, axis)
+                _curve(panel, number, label, trace.times_s, trace.deflection_mm[:, axis] * 1e3)
+                if trace.stops:
+                    panel.axvline(trace.rest_s, color=_colour(number), linewidth=1, linestyle=(0, (4, 3)))
+            panel.axhline(0, color=_GREY, linewidth=0.6, zorder=0)
+            _legend_above(panel)
+            if axis not in swinging:
+                panel.set_ylim(-1, 1)
+        _column_heading(panels[0], view)
+        panels[-1].set_xlabel(view.time_label)
+    for panel, axis in zip(grid[0], shown, strict=True):
         panel.set_ylabel(f"{_AXIS_NAMES[axis]} table − command\nin µm")
-        _legend_above(panel)
-    _title(panels[0], "Vibration; dashed: the command has come to rest", above_legend=True)
-    panels[-1].set_xlabel("time in s")
-    figure.align_ylabels(panels)
+    notes = ["dashed: the command has come to rest"] if any(trace.stops for trace in traces) else []
+    notes += (
+        [f"{', '.join(_AXIS_NAMES[axis] for axis in still)}: rigid (below {_SHOWN_MM * 1e3:g} µm)"] if still else []
+    )
+    _heading(figure, "; ".join(["Vibration", *notes]), part)
+    figure.align_ylabels(grid[0])
     _save(figure, file)
+
+
+def _checked_polyline(name: str, points: npt.ArrayLike) -> FloatArray:
+    polyline = np.asarray(points, dtype=np.float64)
+    if polyline.ndim != 2 or polyline.shape[1] != 3 or len(polyline) < 2 or not np.isfinite(polyline).all():
+        raise ValueError(f"{name} has shape {polyline.shape}: must be (m, 3), m >= 2, and finite")
+    return polyline
 
 
 def _check_traces(traces: Sequence[Trace]) -> None:
     if not traces:
         raise ValueError("no trace: must be one or more")
+
+
+def _check_views(views: Sequence[View]) -> None:
+    if not views:
+        raise ValueError("no view: must be one or more")
+    for view in views:
+        _check_traces(view.traces)
+
+
+def _path_label(trace: Trace, deviation: FloatArray, quantity: str, *, is_part: bool) -> str:
+    """Name and figures: the core's own, which also see what lies between and beyond the samples drawn."""
+    here = f"{1e3 * float(np.linalg.norm(deviation, axis=1).max()):.1f} µm"
+    if trace.largest_mm is None or quantity != "response":
+        return f"{trace.label}, largest {here} in this picture"
+    return f"{trace.label}, largest {1e3 * trace.largest_mm:.1f} µm" + (f", here {here}" if is_part else "")
+
+
+def _vibration_label(trace: Trace, axis: int) -> str:
+    deflection = np.abs(trace.deflection_mm[:, axis])
+    if not trace.stops:
+        return f"{trace.label}, here up to {1e3 * float(deflection.max()):.1f} µm"
+    if trace.residual_mm is not None:
+        return f"{trace.label}, residual {1e3 * trace.residual_mm[axis]:.1f} µm"
+    remaining = deflection[trace.times_s >= trace.rest_s - trace.period_s / 2]
+    return f"{trace.label}, residual {1e3 * float(remaining.max()):.1f} µm"
+
+
+def _only_along(polyline: FloatArray, deviations: Sequence[FloatArray]) -> bool:
+    """Whether the path is one straight line and nothing deviates across it."""
+    chord = polyline[-1] - polyline[0]
+    length = float(np.linalg.norm(chord))
+    if length == 0:
+        return False
+    direction = chord / length
+
+    def across(vectors: FloatArray) -> float:
+        return float(np.linalg.norm(vectors - np.outer(vectors @ direction, direction), axis=1).max())
+
+    return across(polyline - polyline[0]) < _MOVES_MM and max(map(across, deviations)) < _SHOWN_MM
 
 
 def _colour(number: int) -> str:
@@ -234,38 +320,61 @@ def _moving_axes(traces: Sequence[Trace]) -> list[int]:
     return [axis for axis in range(3) if travel[axis] > _MOVES_MM] or [0]
 
 
-def _telling_samples(trace: Trace, quantity: str) -> FloatArray:
-    """Positions to draw; of a long trace one per stretch, the one that swings most."""
-    points = trace.response_mm if quantity == "response" else trace.command_mm
-    if len(points) <= _MAX_POINTS:
-        return points
-    starts = np.linspace(0, len(points), _MAX_POINTS, endpoint=False).astype(np.intp)
-    swing = np.linalg.norm(trace.deflection_mm, axis=1)
-    ends = [*starts[1:], len(points)]
-    chosen = [begin + int(np.argmax(swing[begin:end])) for begin, end in zip(starts, ends, strict=True)]
-    return points[np.array([0, *chosen, len(points) - 1], dtype=np.intp)]
+def follow(
+    command_mm: FloatArray, points_mm: FloatArray, polyline_mm: FloatArray, *, complete: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Where on a polyline are samples that follow it? For drawing; figures come from the core's metrology.
+
+    Where the polyline passes a place twice, the distance that the command has gone decides.
+
+    Args:
+        command_mm: set-points, shape (n, 3).
+        points_mm: the samples asked for at the same instants, shape (n, 3).
+        polyline_mm: shape (m, 3).
+        complete: the command goes from the beginning to the end of the polyline.
+
+    Returns:
+        Distance of each foot along the polyline, shape (n,), and the foot itself, shape (n, 3).
+    """
+    vertices = _refine(polyline_mm)
+    lengths = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
+    steps = np.linalg.norm(np.diff(command_mm, axis=0), axis=1)
+    gone = np.concatenate([[0.0], np.cumsum(steps)])
+    if complete and gone[-1] > 0:
+        gone *= along[-1] / gone[-1]
+    elif not complete and len(vertices) > 1:
+        gone += _feet(command_mm[:1], vertices, None)[0][0]
+    return _feet(points_mm, vertices, gone)
 
 
-def _foot_points(points: FloatArray, polyline: FloatArray) -> FloatArray:
-    """Nearest point of the polyline to each point: for drawing; figures come from the core's metrology."""
+def _feet(points: FloatArray, vertices: FloatArray, gone: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+    """Nearest points of the polyline, as distances along it and places."""
     from scipy.spatial import KDTree
 
-    vertices = _refine(polyline)
     if len(vertices) < 2:
-        return np.broadcast_to(vertices[0], points.shape).copy()
-    nearest = KDTree(vertices).query(points)[1]
+        return np.zeros(len(points)), np.broadcast_to(vertices[0], points.shape).copy()
+    lengths = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
+    distance = np.concatenate([[0.0], np.cumsum(lengths)])
+    if gone is None:
+        nearest = KDTree(vertices).query(points)[1]
+    else:
+        tree = KDTree(np.column_stack([vertices, _PROGRESS_WEIGHT * distance]))
+        nearest = tree.query(np.column_stack([points, _PROGRESS_WEIGHT * gone]), workers=-1)[1]
     feet, best = np.empty_like(points), np.full(len(points), np.inf)
-    # The foot lies on one of the two segments that meet in the nearest vertex.
-    for shift in (-1, 0):
+    progress = np.zeros(len(points))
+    # The foot lies on a segment near the nearest vertex.
+    for shift in range(-_SEGMENTS_ASKED, _SEGMENTS_ASKED):
         first = np.clip(nearest + shift, 0, len(vertices) - 2)
-        start, along = vertices[first], vertices[first + 1] - vertices[first]
-        dot = np.einsum("ij,ij->i", points - start, along)
-        share = np.clip(dot / np.einsum("ij,ij->i", along, along), 0, 1)
-        candidate = start + share[:, None] * along
+        start, chord = vertices[first], vertices[first + 1] - vertices[first]
+        dot = np.einsum("ij,ij->i", points - start, chord)
+        share = np.clip(dot / np.einsum("ij,ij->i", chord, chord), 0, 1)
+        candidate = start + share[:, None] * chord
         distance2 = np.einsum("ij,ij->i", points - candidate, points - candidate)
         closer = distance2 < best
         feet[closer], best[closer] = candidate[closer], distance2[closer]
-    return feet
+        progress[closer] = (distance[first] + share * lengths[first])[closer]
+    return progress, feet
 
 
 def _refine(polyline: FloatArray) -> FloatArray:
@@ -299,16 +408,34 @@ def _figure(width_inch: float, height_inch: float) -> Figure:
     return figure
 
 
-def _panels(figure: Figure, count: int) -> list[Axes]:
-    """Panels one below the other that share the time axis."""
-    grid: Any = figure.subplots(count, 1, sharex=True, squeeze=False)
-    panels: list[Axes] = list(grid[:, 0])
-    for panel in panels:
+def _panels(figure: Figure, rows: int, columns: int) -> list[list[Axes]]:
+    """Columns of panels that share their time axis."""
+    grid: Any = figure.subplots(rows, columns, sharex="col", squeeze=False)
+    for panel in grid.flat:
         panel.grid(True, color="#e4e4e4", linewidth=0.6)
         panel.set_axisbelow(True)
         panel.margins(x=0.01)
         panel.spines[["top", "right"]].set_visible(False)
-    return panels
+    return [list(grid[:, column]) for column in range(columns)]
+
+
+def _path_axes(figure: Figure, *, with_locator: bool) -> tuple[Axes, Axes | None]:
+    if not with_locator:
+        return figure.add_subplot(), None
+    grid: Any = figure.subplots(1, 2, width_ratios=[2.4, 1])
+    return grid[0], grid[1]
+
+
+def _locate(axes: Axes, whole: FloatArray, piece: FloatArray) -> None:
+    """The whole path, small, and where the piece lies on it."""
+    axes.plot(whole[:, 0], whole[:, 1], color=_GREY, linewidth=0.8)
+    axes.plot(piece[:, 0], piece[:, 1], color="black", linewidth=2)
+    middle = (piece.min(axis=0) + piece.max(axis=0)) / 2
+    axes.plot(*middle, marker="o", markersize=16, markerfacecolor="none", markeredgecolor="black")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.08)
+    axes.set_title("where that is on the whole path", loc="left", fontsize=9)
+    axes.tick_params(labelsize=8)
 
 
 def _curve(panel: Axes, number: int, label: str, times: FloatArray, values: FloatArray) -> None:
@@ -316,8 +443,14 @@ def _curve(panel: Axes, number: int, label: str, times: FloatArray, values: Floa
     panel.plot(t, v, color=_colour(number), linewidth=_width(number), label=label)
 
 
-def _title(axes: Axes, text: str, *, above_legend: bool = False) -> None:
-    axes.set_title(text, loc="left", fontsize=11, pad=24 if above_legend else 8)
+def _heading(figure: Figure, text: str, part: str) -> None:
+    """Title of the whole picture, and which part of the program it shows."""
+    figure.suptitle(text + (f"\n{part}" if part else ""), x=0.01, ha="left", fontsize=11)
+
+
+def _column_heading(panel: Axes, view: View) -> None:
+    if view.heading:
+        panel.set_title(view.heading, loc="left", fontsize=10, pad=22)
 
 
 def _legend_above(panel: Axes) -> None:

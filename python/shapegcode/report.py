@@ -6,11 +6,13 @@ The report itself is a plain dictionary, the JSON that ``--json`` writes. Its ke
     residual_vibration_um, peak_vibration_um  {original: {x, y, z}, emitted: {x, y, z}}
     contour_error_um                          {command | response: {original | emitted: {max, rms}}}
     orbit_error_percent                       one number per arc
-    block_period_s, bytes_emitted             numbers
+    block_period_s, bytes_read, bytes_emitted numbers
     shaper                                    {times_s, amplitudes}
     blocks                                    {read, emitted}
     override_residual                         [{override, residual_um: {x, y, z}}]
     within_tolerance                          true or false
+    frequency_residual                        [{shift, residual_um: {x, y, z}}]
+    limits                                    {contour_um, ...}
     regions                                   [{lines: [first, last], misses: [text]}], and more
     warnings                                  list of texts
 
@@ -20,8 +22,8 @@ left out too.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,11 +31,24 @@ import numpy.typing as npt
 
 if TYPE_CHECKING:
     from rich.table import Table
+    from rich.text import Text
 
-__all__ = ["Row", "Trace", "before_after_rows", "before_after_table", "next_step", "simulation_table"]
+__all__ = [
+    "Row",
+    "Trace",
+    "before_after_rows",
+    "before_after_table",
+    "next_step",
+    "nothing_to_shape",
+    "simulation_table",
+    "warning_table",
+]
 
 # Rounding in sums of increments stays far below this, a least increment far above.
 _STILL_MM = 1e-9
+# A percentage of less than this compares rounding with rounding.
+_LEAST_COMPARED_UM = 1.0
+_CONTOURS = {"command": "contour error of the command", "response": "contour error of the table (response)"}
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -47,6 +62,11 @@ class Trace:
         period_s: time between two samples.
         command_mm: set-points of the axes after every filter, shape (n, 3).
         response_mm: position of the table at the same instants, shape (n, 3).
+        start_s: time of the first sample.
+        stops: the record holds the stop at the end; False where it is cut before.
+        largest_mm: largest distance of the table from the programmed path over the whole run, as the core measured
+            it; None: not measured.
+        residual_mm: largest |response - command| of each axis after the stop, likewise.
 
     Raises:
         ValueError: a wrong shape, fewer than two samples, a value that is not finite, or a period that is not
@@ -57,6 +77,10 @@ class Trace:
     period_s: float
     command_mm: FloatArray
     response_mm: FloatArray
+    start_s: float = 0.0
+    stops: bool = True
+    largest_mm: float | None = None
+    residual_mm: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         """Check the arrays and keep read-only views of them."""
@@ -78,14 +102,14 @@ class Trace:
 
     @property
     def times_s(self) -> FloatArray:
-        """Time of each sample from the first one, shape (n,)."""
-        return np.arange(len(self.command_mm), dtype=np.float64) * self.period_s
+        """Time of each sample, shape (n,)."""
+        return self.start_s + np.arange(len(self.command_mm), dtype=np.float64) * self.period_s
 
     @property
     def departure_s(self) -> float:
-        """Instant of the last sample before the set-points begin to move; 0 if they never do."""
+        """Instant of the last sample before the set-points begin to move; the first one if they never do."""
         moved = (np.abs(self.command_mm - self.command_mm[0]) > _STILL_MM).any(axis=1)
-        return float(max(int(moved.argmax()) - 1, 0)) * self.period_s
+        return self.start_s + float(max(int(moved.argmax()) - 1, 0)) * self.period_s
 
     @property
     def deflection_mm(self) -> FloatArray:
@@ -96,7 +120,21 @@ class Trace:
     def rest_s(self) -> float:
         """Instant at which the set-points have come to rest for good: first sample at the final position."""
         moved = np.flatnonzero((np.abs(self.command_mm - self.command_mm[-1]) > _STILL_MM).any(axis=1))
-        return float(moved[-1] + 1) * self.period_s if len(moved) else 0.0
+        return self.start_s + (float(moved[-1] + 1) * self.period_s if len(moved) else 0.0)
+
+    def part(self, begin_s: float, end_s: float, zero_s: float = 0.0) -> Trace:
+        """The samples between two instants, at least two; `zero_s` becomes time zero."""
+        count = len(self.command_mm)
+        ranks = (np.array([begin_s, end_s]) - self.start_s) / self.period_s
+        first = round(float(np.clip(ranks[0], 0, count - 2)))
+        last = round(float(np.clip(ranks[1], first + 1, count - 1)))
+        return replace(
+            self,
+            command_mm=self.command_mm[first : last + 1],
+            response_mm=self.response_mm[first : last + 1],
+            start_s=self.start_s + first * self.period_s - zero_s,
+            stops=self.stops and first * self.period_s <= self.rest_s - self.start_s <= last * self.period_s,
+        )
 
 
 @dataclass(frozen=True)
@@ -107,22 +145,25 @@ class Row:
         figure: what it is.
         unit: its unit.
         original: figure of the original program, None where there is none.
-        emitted: figure of the emitted program.
+        emitted: figure of the emitted program, or several of them.
         decimals: digits after the point.
         section: True where a new group of figures begins.
+        limit: what the emitted figure is judged by, None where it is not judged.
     """
 
     figure: str
     unit: str
     original: float | None
-    emitted: float
+    emitted: float | tuple[float, ...]
     decimals: int = 1
     section: bool = False
+    limit: float | None = None
 
     @property
     def change_percent(self) -> float | None:
-        """Change from original to emitted; None where there is no original or it shows as zero."""
-        if self.original is None or abs(self.original) < 0.5 * 10.0**-self.decimals:
+        """Change from original to emitted; None without an original, and where it is too small to compare with."""
+        least = _LEAST_COMPARED_UM if self.unit == "µm" else 0.5 * 10.0**-self.decimals
+        if self.original is None or isinstance(self.emitted, tuple) or abs(self.original) < least:
             return None
         return (self.emitted - self.original) / abs(self.original) * 100
 
@@ -155,17 +196,19 @@ def before_after_rows(report: Mapping[str, Any]) -> Iterator[Row]:
         for axis in "xyz":
             pair = _pair(report.get(key), axis)
             if pair is not None and any(pair):
-                yield Row(f"{name} {axis.upper()}", "µm", *pair, section=section)
+                limit = _residual_limit(report, axis) if key == "residual_vibration_um" else None
+                yield Row(f"{name} {axis.upper()}", "µm", *pair, section=section, limit=limit)
                 section = False
 
     section = True
     contour = report.get("contour_error_um") or {}
-    contours = (("command", "contour error of the command"), ("response", "contour error of the table"))
-    for key, name in contours:
+    for key, name in _CONTOURS.items():
         for statistic, suffix in (("max", "largest"), ("rms", "RMS")):
             pair = _pair(contour.get(key), statistic)
             if pair is not None:
-                yield Row(f"{name}, {suffix}", "µm", *pair, section=section)
+                judged = (key, statistic) == ("command", "max")
+                limit = (report.get("limits") or {}).get("contour_um") if judged else None
+                yield Row(f"{name}, {suffix}", "µm", *pair, section=section, limit=limit)
                 section = False
 
     orbit = report.get("orbit_error_percent") or []
@@ -174,16 +217,28 @@ def before_after_rows(report: Mapping[str, Any]) -> Iterator[Row]:
         yield Row(name, "%", None, max(orbit, key=abs), decimals=4, section=True)
 
     yield from _program_rows(report)
+    yield from _robustness_rows(report)
+
+
+def _residual_limit(report: Mapping[str, Any], axis: str) -> float | None:
+    """Limit of the region with the largest emitted residual, the one that the table shows."""
+    regions = [each for each in report.get("regions") or [] if "residual_limit_um" in each]
+    if not regions:
+        return None
+    worst = max(regions, key=lambda each: float(each["residual_vibration_um"]["emitted"][axis]))
+    return float(worst["residual_limit_um"][axis])
 
 
 def _program_rows(report: Mapping[str, Any]) -> Iterator[Row]:
-    """Figures of the emitted program and its shaper, and its residual vibration at other feed overrides."""
+    """Figures of the emitted program and its shaper."""
     rows: list[tuple[str, str, float | None, float, int]] = []
     blocks = report.get("blocks")
     if blocks:
         rows.append(("blocks", "", float(blocks["read"]), float(blocks["emitted"]), 0))
     if report.get("bytes_emitted") is not None:
-        rows.append(("size of the program", "bytes", None, float(report["bytes_emitted"]), 0))
+        read = report.get("bytes_read")
+        size = None if read is None else float(read)
+        rows.append(("size of the program", "bytes", size, float(report["bytes_emitted"]), 0))
     if report.get("block_period_s") is not None:
         rows.append(("block period", "ms", None, report["block_period_s"] * 1e3, 3))
     times = (report.get("shaper") or {}).get("times_s")
@@ -192,43 +247,65 @@ def _program_rows(report: Mapping[str, Any]) -> Iterator[Row]:
     for number, (name, unit, original, emitted, decimals) in enumerate(rows):
         yield Row(name, unit, original, emitted, decimals, section=number == 0)
 
-    section = True
-    for entry in report.get("override_residual") or []:
+
+def _robustness_rows(report: Mapping[str, Any]) -> Iterator[Row]:
+    """Residual vibration at other feed overrides and at other frequencies, one row per axis."""
+    overrides = report.get("override_residual") or []
+    shifts = report.get("frequency_residual") or []
+    at = "/".join(f"{entry['override'] * 100:g}" for entry in overrides)
+    shifted = "/".join("high" if entry["shift"] > 0 else "low" for entry in shifts)
+    for entries, condition in ((overrides, f"at {at} % override"), (shifts, f"with the modes {shifted}")):
+        section = True
         for axis in "xyz":
-            value = entry["residual_um"].get(axis)
+            values = tuple(float(entry["residual_um"].get(axis) or 0.0) for entry in entries)
             original = ((report.get("residual_vibration_um") or {}).get("original") or {}).get(axis)
-            if value is not None and (value or original):
-                name = f"residual vibration {axis.upper()} at {entry['override'] * 100:g} % override"
-                yield Row(name, "µm", None, float(value), section=section)
+            if entries and (any(values) or original):
+                yield Row(f"residual {axis.upper()} {condition}", "µm", None, values, section=section)
                 section = False
 
 
-def _number(value: float, decimals: int) -> str:
-    return f"{value:.{decimals}f}"
+def _text(value: float | tuple[float, ...] | None, decimals: int) -> str:
+    if value is None:
+        return ""
+    values = value if isinstance(value, tuple) else (value,)
+    return "/".join(f"{each:.{decimals}f}" for each in values)
 
 
 def _change(row: Row) -> str:
     change = row.change_percent
     if change is None:
-        return "" if row.original is None or row.emitted == row.original else "from 0"
+        return ""
     return "0 %" if abs(change) < 0.05 else f"{change:+.1f} %"
 
 
-def before_after_table(report: Mapping[str, Any]) -> Table:
-    """The report as a rich table: figure, unit, original, emitted, change; the verdict is its caption."""
+def nothing_to_shape(report: Mapping[str, Any]) -> bool:
+    """Whether the conversion left the program as it was."""
+    blocks = report.get("blocks")
+    return blocks is not None and blocks["emitted"] == 0
+
+
+def before_after_table(report: Mapping[str, Any]) -> Table | Text:
+    """The report as a rich table: figure, unit, original, emitted, change, limit; the verdict is its caption.
+
+    One line of text where nothing was shaped.
+    """
     from rich.table import Table
     from rich.text import Text
 
+    if nothing_to_shape(report):
+        return Text("nothing to shape: the text is unchanged")
+    rows = list(before_after_rows(report))
+    limits = any(row.limit is not None for row in rows)
     table = Table(show_edge=False, pad_edge=False, caption_justify="left")
     table.add_column("figure")
     table.add_column("unit")
-    for heading in ("original", "emitted", "change"):
+    for heading in ("original", "emitted", "change", *(["limit"] if limits else [])):
         table.add_column(heading, justify="right", no_wrap=True)
-    for row in before_after_rows(report):
+    for row in rows:
         if row.section:
             table.add_section()
-        original = "" if row.original is None else _number(row.original, row.decimals)
-        cells = (row.figure, row.unit, original, _number(row.emitted, row.decimals), _change(row))
+        cells = [row.figure, row.unit, _text(row.original, row.decimals), _text(row.emitted, row.decimals)]
+        cells += [_change(row), *([_text(row.limit, row.decimals)] if limits else [])]
         table.add_row(*(Text(cell) for cell in cells))
     if "within_tolerance" in report:
         good = bool(report["within_tolerance"])
@@ -238,8 +315,23 @@ def before_after_table(report: Mapping[str, Any]) -> Table:
     return table
 
 
+def warning_table(warnings: Iterable[str]) -> Table:
+    """Warnings one below the other; a long one wraps under its own text, not under the word `warning`."""
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table.grid(padding=(0, 1))
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for warning in warnings:
+        table.add_row("warning:", Text(warning))
+    return table
+
+
 def next_step(report: Mapping[str, Any]) -> str:
     """The one thing to do next, in one sentence."""
+    if nothing_to_shape(report):
+        return "run the original program: nothing in it was shaped."
     if report.get("within_tolerance", True):
         if report.get("warnings"):
             return "settle the warnings, then run the emitted program above the workpiece, without a tool."
@@ -269,9 +361,10 @@ def simulation_table(report: Mapping[str, Any]) -> Table:
     for name, key in (("residual vibration", "residual_vibration_um"), ("peak vibration", "peak_vibration_um")):
         for axis, value in report[key].items():
             table.add_row(f"{name} {axis.upper()}", f"{value:.2f}", "µm", end_section=axis == "z")
-    for name, deviation in report["contour_error_um"].items():
-        table.add_row(f"contour error of the {name}, largest", f"{deviation['max']:.2f}", "µm")
-        table.add_row(f"contour error of the {name}, RMS", f"{deviation['rms']:.2f}", "µm")
+    for key, name in _CONTOURS.items():
+        deviation = report["contour_error_um"][key]
+        table.add_row(f"{name}, largest", f"{deviation['max']:.2f}", "µm")
+        table.add_row(f"{name}, RMS", f"{deviation['rms']:.2f}", "µm", end_section=key == "response")
     if report["orbit_error_percent"]:
         table.add_row("orbit error, largest", f"{max(report['orbit_error_percent']):.4f}", "%")
     return table

@@ -45,13 +45,21 @@ class Simulation:
     """A program played region by region.
 
     Attributes:
+        machine: that the program was played on.
+        shaped: the program was played as one emitted by shapegcode.
         regions: in order; their arrays hold at most `record_samples` samples.
         report: `cycle_time_s`, `cutting_time_s`, `residual_vibration_um`, `peak_vibration_um`, `contour_error_um`
             (command, response), `orbit_error_percent`, `regions`, `warnings`.
     """
 
+    machine: Machine
+    shaped: bool
     regions: tuple[RegionRun, ...]
     report: dict[str, Any]
+
+    def play(self, run: RegionRun, *, record_samples: int) -> _core.PlaybackFigures:
+        """Play a region again, with another number of recorded samples."""
+        return _play(run.path, self.machine, self.shaped, record_samples)
 
 
 def simulate(
@@ -75,14 +83,10 @@ def simulate(
     Raises:
         ArgumentError: a limit of the machine is not usable.
     """
-    rule = getattr(_core.BlockEnd, machine.controller.block_end)
     runs = []
     for done, region in enumerate(program.regions, start=1):
         path = region.path
-        if shaped:
-            figures = play_emitted(path, path, machine, rule, record_samples=record_samples)
-        else:
-            figures = play_original(path, machine, record_samples=record_samples)
+        figures = _play(path, machine, shaped, record_samples)
         runs.append(
             RegionRun(
                 region.first_line,
@@ -119,4 +123,11 @@ def simulate(
         ],
         "warnings": program.warnings,
     }
-    return Simulation(tuple(runs), report)
+    return Simulation(machine, shaped, tuple(runs), report)
+
+
+def _play(path: _core.Path, machine: Machine, shaped: bool, record_samples: int) -> _core.PlaybackFigures:
+    if not shaped:
+        return play_original(path, machine, record_samples=record_samples)
+    rule = getattr(_core.BlockEnd, machine.controller.block_end)
+    return play_emitted(path, path, machine, rule, record_samples=record_samples)

@@ -88,6 +88,15 @@ TEST_CASE("arc geometry: start and end in one place are a full circle, a hair ap
   CHECK(resolve_arc(words, 1.0, 1, 1).sweep_rad == doctest::Approx(1e-4 - 2.0 * pi).epsilon(1e-9));
 }
 
+TEST_CASE("arc geometry: an end on the start's ray is a whole turn that spreads the difference of the radii") {
+  ArcWords words;
+  words.start_mm = Vector3(10.0, 0.0, 0.0);
+  words.end_mm = Vector3(10.005, 0.0, 0.0);
+  CHECK(resolve_arc(words, 1.0, 1, 1).sweep_rad == doctest::Approx(2.0 * pi));
+  words.clockwise = true;
+  CHECK(resolve_arc(words, 1.0, 1, 1).sweep_rad == doctest::Approx(-2.0 * pi));
+}
+
 TEST_CASE("arc geometry: the tolerance is on the difference of the radii, on both sides of it") {
   ArcWords words;
   words.start_mm = Vector3(10.0, 0.0, 0.0);

@@ -119,8 +119,9 @@ Findings judge(const Command& command, const std::vector<FittedBlock>& blocks, c
     const FittedBlock& block = blocks[n];
     const auto first = static_cast<Eigen::Index>(block.first_period);
     // The rest behind the last block is left out.
-    const Eigen::Index last = n + 1 < blocks.size() ? static_cast<Eigen::Index>(blocks[n + 1].first_period)
-                                                    : std::min<Eigen::Index>(first + block.periods, command.grid.rows() - 1);
+    const Eigen::Index last = n + 1 < blocks.size()
+                                  ? static_cast<Eigen::Index>(blocks[n + 1].first_period)
+                                  : std::min<Eigen::Index>(first + block.periods, command.grid.rows() - 1);
     if (block.end != rounded(command, last, options.increment_mm)) ++found.wrong_end;
     if (block.end == from) ++found.empty;
     const Played played = as_played(from, block, options.increment_mm);
@@ -214,7 +215,8 @@ TEST_CASE("block fit: F goes up, never down, and by no more than a step") {
   // Whatever the length, a block of one period ends within its last tick.
   const FitOptions options;
   for (std::int64_t um = 1; um < 3000; ++um) {
-    const Command command = sampled(1, [&](double k) { return Vector3(0.001 * static_cast<double>(um) * k, 0.0, 0.0); });
+    const Command command =
+        sampled(1, [&](double k) { return Vector3(0.001 * static_cast<double>(um) * k, 0.0, 0.0); });
     const auto blocks = fit(command);
     REQUIRE(blocks.size() == 1);
     const double exact = 0.001 * static_cast<double>(um) / 0.005 / options.feed_unit_mm_per_s;
@@ -245,7 +247,8 @@ TEST_CASE("block fit: random smooth commands keep time, place and tolerance") {
         CHECK(found.periods <= 3000);
         // Only the rest at the end is left out.
         std::uint64_t resting = 0;
-        while (rounded(command, 3000 - static_cast<Eigen::Index>(resting) - 1, increment) == blocks.back().end) ++resting;
+        while (rounded(command, 3000 - static_cast<Eigen::Index>(resting) - 1, increment) == blocks.back().end)
+          ++resting;
         CHECK(found.periods + resting >= 3000);
       }
     }
@@ -265,7 +268,8 @@ TEST_CASE("block fit: nothing drifts over 1e5 blocks") {
 
 TEST_CASE("block fit: rest at the start lends its time to the first block, rest at the end is left out") {
   // Ten periods of rest, ten of 0.1 mm, twenty of rest.
-  const Command command = sampled(40, [](double k) { return Vector3(0.1 * std::clamp(k - 10.0, 0.0, 10.0), 0.0, 0.0); });
+  const Command command =
+      sampled(40, [](double k) { return Vector3(0.1 * std::clamp(k - 10.0, 0.0, 10.0), 0.0, 0.0); });
   const auto blocks = fit(command);
   REQUIRE(blocks.size() == 2);
   CHECK(blocks[0].first_period == 0);
@@ -280,7 +284,8 @@ TEST_CASE("block fit: rest at the start lends its time to the first block, rest 
 
 TEST_CASE("block fit: a block that rounds to nothing lends its time to its successor") {
   // 0.4 um per period: an increment every two or three periods; no block is empty, no time is lost.
-  const Command command = sampled(100, [](double k) { return Vector3(0.0004 * k + (k > 50 ? 0.01 * (k - 50) : 0.0), 0.0, 0.0); });
+  const Command command =
+      sampled(100, [](double k) { return Vector3(0.0004 * k + (k > 50 ? 0.01 * (k - 50) : 0.0), 0.0, 0.0); });
   const FitOptions options;
   const auto blocks = fit(command, options);
   const Findings found = judge(command, blocks, options);
@@ -292,7 +297,8 @@ TEST_CASE("block fit: a block that rounds to nothing lends its time to its succe
 
 TEST_CASE("block fit: a move too slow for any F is run faster, in whole periods, and the time is not lost") {
   // 1 um in 1 s is 0.06 mm/min, the least F is 1.0: at most 60 ms of it.
-  const Command command = sampled(400, [](double k) { return Vector3(k < 200 ? 0.000005 * k : 0.001 + 0.1 * (k - 200), 0.0, 0.0); });
+  const Command command =
+      sampled(400, [](double k) { return Vector3(k < 200 ? 0.000005 * k : 0.001 + 0.1 * (k - 200), 0.0, 0.0); });
   const FitOptions options;
   const auto blocks = fit(command, options);
   const Findings found = judge(command, blocks, options);
@@ -313,7 +319,8 @@ TEST_CASE("block fit: a block ends at every break") {
   CHECK(blocks[3].first_period == 60);
 }
 
-// --- Arcs -------------------------------------------------------------------------------------------------------------
+// --- Arcs
+// -------------------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -338,7 +345,8 @@ TEST_CASE("block fit: steady arcs in three planes and both senses are few blocks
           const int periods = static_cast<int>(std::min(1000.0, 2.0 * pi / step));
           ++seed;
           const Command command = sampled(
-              periods, [&](double k) { return on_circle(centre, radius, 0.1 * seed + sense * step * k, normal, climb * k); },
+              periods,
+              [&](double k) { return on_circle(centre, radius, 0.1 * seed + sense * step * k, normal, climb * k); },
               normal);
           const FitOptions options;
           const auto blocks = fit(command, options);
@@ -354,7 +362,7 @@ TEST_CASE("block fit: steady arcs in three planes and both senses are few blocks
           CHECK(found.bad_sweep == 0);
           CHECK(found.periods == static_cast<std::uint64_t>(periods));
           CHECK(found.arcs + 2 >= static_cast<int>(blocks.size()));  // a piece at either end may pass for a line
-          CHECK(blocks.size() <= 8);  // five of 80 degrees make a full circle
+          CHECK(blocks.size() <= 8);                                 // five of 80 degrees make a full circle
           // Whatever a controller makes of the words stays on the circle between the samples too.
           double off = 0.0;
           int wrong_sense = 0;
@@ -380,16 +388,18 @@ TEST_CASE("block fit: steady arcs in three planes and both senses are few blocks
 
 TEST_CASE("block fit: a steady quarter arc is not cut into periods") {
   // 60 mm/s on a radius of 20 mm: 105 periods. F takes the arc's length, so whole periods are possible.
-  const Command command =
-      sampled(105, [&](double k) { return on_circle({20, 20, 0}, 20.0, -pi / 2 + 0.015 * k, 2, 0.0); }, 2);
+  const Command command = sampled(
+      105,
+      [&](double k) {
+        return on_circle({20, 20, 0}, 20.0, -pi / 2 + 0.015 * k, 2, 0.0);
+      },
+      2);
   const auto blocks = fit(command);
   CHECK(blocks.size() <= 5);
 }
 
 TEST_CASE("block fit: an arc of changing speed and radius is followed too") {
-  const auto at = [](double k) {
-    return on_circle({0, 0, 0}, 5.0 + 0.2 * std::sin(0.05 * k), 0.0002 * k * k, 2, 0.0);
-  };
+  const auto at = [](double k) { return on_circle({0, 0, 0}, 5.0 + 0.2 * std::sin(0.05 * k), 0.0002 * k * k, 2, 0.0); };
   const Command command = sampled(150, at, 2);
   const FitOptions options;
   const auto blocks = fit(command, options);
@@ -412,18 +422,29 @@ TEST_CASE("block fit: an arc of changing speed and radius is followed too") {
 
 TEST_CASE("block fit: pieces below the chord limit are lines, straight ones too") {
   // 0.01 mm per period on a radius of 0.05 mm: chords of 10 um, bulging by 0.25 um.
-  const Command small = sampled(30, [](double k) { return on_circle({0, 0, 0}, 0.05, 0.2 * k, 2, 0.0); }, 2);
+  const Command small = sampled(
+      30,
+      [](double k) {
+        return on_circle({0, 0, 0}, 0.05, 0.2 * k, 2, 0.0);
+      },
+      2);
   FitOptions options;
   options.arc_min_chord_mm = 0.5;
   for (const FittedBlock& block : fit(small, options)) CHECK(block.kind == BlockKind::line);
-  const Command straight = sampled(100, [](double k) { return Vector3(0.3 * k, 0.1 * k, 0.0); }, 2);
+  const Command straight = sampled(
+      100, [](double k) { return Vector3(0.3 * k, 0.1 * k, 0.0); }, 2);
   for (const FittedBlock& block : fit(straight)) CHECK(block.kind == BlockKind::line);
 }
 
 TEST_CASE("block fit: no piece sweeps more than asked for") {
   // A quarter turn per period cannot be one arc of 80 degrees.
   for (const double turn : {0.3, 1.0, 1.39, 1.5}) {
-    const Command command = sampled(40, [&](double k) { return on_circle({0, 0, 0}, 2.0, turn * k, 2, 0.0); }, 2);
+    const Command command = sampled(
+        40,
+        [&](double k) {
+          return on_circle({0, 0, 0}, 2.0, turn * k, 2, 0.0);
+        },
+        2);
     Position from = rounded(command, 0, 0.001);
     for (const FittedBlock& block : fit(command)) {
       CHECK(std::abs(as_played(from, block, 0.001).sweep) <= FitOptions{}.max_sweep_rad);

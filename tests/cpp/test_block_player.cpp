@@ -70,7 +70,8 @@ TEST_CASE("block player: several blocks within one period") {
   const std::vector<double> feeds(10, 100.0);
   const auto blocks = row_of_lines(lengths, feeds);
   check_set_points(played(blocks, 1e-3, BlockEnd::carry), {0.0, 0.1, 0.2, 0.3});
-  check_set_points(played(blocks, 1e-3, BlockEnd::ceil), {0.0, 0.03, 0.06, 0.09, 0.12, 0.15, 0.18, 0.21, 0.24, 0.27, 0.3});
+  check_set_points(played(blocks, 1e-3, BlockEnd::ceil),
+                   {0.0, 0.03, 0.06, 0.09, 0.12, 0.15, 0.18, 0.21, 0.24, 0.27, 0.3});
 }
 
 TEST_CASE("block player: feed override scales the time") {
@@ -98,7 +99,8 @@ TEST_CASE("block player: a block that ends on a tick to within rounding ends the
 
 TEST_CASE("block player: blocks without length take no time and need no feed") {
   auto blocks = row_of_lines({0.1, 0.0, 0.0, 0.1}, {100.0, 0.0, 100.0, 100.0});
-  for (const BlockEnd end : {BlockEnd::ceil, BlockEnd::carry}) check_set_points(played(blocks, 1e-3, end), {0.0, 0.1, 0.2});
+  for (const BlockEnd end : {BlockEnd::ceil, BlockEnd::carry})
+    check_set_points(played(blocks, 1e-3, end), {0.0, 0.1, 0.2});
   blocks = row_of_lines({0.0}, {0.0});
   CHECK(played(blocks, 1e-3, BlockEnd::ceil).size() == 1);
   CHECK(played({}, 1e-3, BlockEnd::ceil).empty());

@@ -48,12 +48,13 @@ std::string text_of(const std::vector<FittedBlock>& blocks, const std::vector<Bl
 }  // namespace
 
 TEST_CASE("block writer: only what changes is written") {
-  CHECK(text_of({line({12, 0, 0}, 1480), line({50, 0, 0}, 4470), line({123, -5, 0}, 4470), line({123, 0, 250}, 60000)}) ==
-        "X.012F148.\nX.05F447.\nX.123Y-.005\nY0.Z.25F6000.\n");
+  CHECK(text_of({line({12, 0, 0}, 1480), line({50, 0, 0}, 4470), line({123, -5, 0}, 4470),
+                 line({123, 0, 250}, 60000)}) == "X.012F148.\nX.05F447.\nX.123Y-.005\nY0.Z.25F6000.\n");
 }
 
 TEST_CASE("block writer: a feed below ten keeps a digit behind the point") {
-  CHECK(text_of({line({1, 0, 0}, 50), line({2, 0, 0}, 55), line({3, 0, 0}, 100)}) == "X.001F5.0\nX.002F5.5\nX.003F10.\n");
+  CHECK(text_of({line({1, 0, 0}, 50), line({2, 0, 0}, 55), line({3, 0, 0}, 100)}) ==
+        "X.001F5.0\nX.002F5.5\nX.003F10.\n");
 }
 
 TEST_CASE("block writer: arcs in their plane, G codes where they change") {
@@ -173,7 +174,8 @@ TEST_CASE("block writer: what is written is read back to the increment, in G90 a
         FittedBlock block;
         block.end = at;
         while (block.end == at) {
-          block.end = {at[0] + step(generator), at[1] + step(generator), pick(generator) < 3 ? at[2] + step(generator) : at[2]};
+          block.end = {at[0] + step(generator), at[1] + step(generator),
+                       pick(generator) < 3 ? at[2] + step(generator) : at[2]};
         }
         block.feed = pick(generator) < 5 && i > 0 ? blocks.back().feed : feed(generator);
         if (pick(generator) < 4) {
@@ -181,7 +183,8 @@ TEST_CASE("block writer: what is written is read back to the increment, in G90 a
           block.normal = static_cast<std::uint8_t>(pick(generator) % 3);
           const auto a = static_cast<std::size_t>((block.normal + 1) % 3);
           const auto b = static_cast<std::size_t>((block.normal + 2) % 3);
-          const double chord = std::hypot(static_cast<double>(block.end[a] - at[a]), static_cast<double>(block.end[b] - at[b]));
+          const double chord =
+              std::hypot(static_cast<double>(block.end[a] - at[a]), static_cast<double>(block.end[b] - at[b]));
           block.radius = static_cast<std::int64_t>(std::ceil(chord)) + 100;
           if (chord < 50.0) block.kind = BlockKind::line;
         }

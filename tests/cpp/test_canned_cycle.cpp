@@ -66,10 +66,18 @@ TEST_CASE("canned cycle: boring and tapping feed out") {
 
 TEST_CASE("canned cycle: pecks of 4 mm in a hole of 9 mm") {
   // G83 goes out to R and back to 0.5 mm over the last depth; G73 backs up by 0.5 mm only.
-  check_steps(cycle_of(83, 4.0), {{2, true}, {-2, false}, {2, true}, {-1.5, true}, {-6, false}, {2, true}, {-5.5, true},
-                                  {-7, false}, {2, true}, {10, true}});
-  check_steps(cycle_of(73, 4.0), {{2, true}, {-2, false}, {-1.5, true}, {-6, false}, {-5.5, true}, {-7, false}, {2, true},
+  check_steps(cycle_of(83, 4.0), {{2, true},
+                                  {-2, false},
+                                  {2, true},
+                                  {-1.5, true},
+                                  {-6, false},
+                                  {2, true},
+                                  {-5.5, true},
+                                  {-7, false},
+                                  {2, true},
                                   {10, true}});
+  check_steps(cycle_of(73, 4.0),
+              {{2, true}, {-2, false}, {-1.5, true}, {-6, false}, {-5.5, true}, {-7, false}, {2, true}, {10, true}});
   check_steps(cycle_of(83, 0.0), {{2, true}, {-7, false}, {2, true}, {10, true}});   // no Q
   check_steps(cycle_of(83, 20.0), {{2, true}, {-7, false}, {2, true}, {10, true}});  // one peck
 }

@@ -34,8 +34,9 @@ PathPointer straight(double length) {
 
 /// A line of 10 mm and a half circle of radius 5 mm.
 PathPointer line_and_arc() {
-  return std::make_shared<const Path>(std::vector<Segment>{
-      make_line({0, 0, 0}, {10, 0, 0}, 100.0), make_arc({10, 0, 0}, {10, 10, 0}, {10, 5, 0}, std::numbers::pi, 2, 100.0)});
+  return std::make_shared<const Path>(
+      std::vector<Segment>{make_line({0, 0, 0}, {10, 0, 0}, 100.0),
+                           make_arc({10, 0, 0}, {10, 10, 0}, {10, 5, 0}, std::numbers::pi, 2, 100.0)});
 }
 
 /// Ramp up, steady, ramp down over `length`, by hand.
@@ -44,9 +45,8 @@ ProfilePointer trapezoid(double length, double speed, double ramp_s, double jerk
   const double way = 0.5 * speed * ramp_s;
   const double steady_s = (length - 2.0 * way) / speed;
   return std::make_shared<const SpeedProfile>(
-      std::vector<SpeedPhase>{{0.0, ramp_s, 0.0, 0.0, a},
-                              {0.0, steady_s, way, speed, 0.0},
-                              {0.0, ramp_s, length - way, speed, -a}},
+      std::vector<SpeedPhase>{
+          {0.0, ramp_s, 0.0, 0.0, a}, {0.0, steady_s, way, speed, 0.0}, {0.0, ramp_s, length - way, speed, -a}},
       length, jerk_time_s);
 }
 

@@ -86,7 +86,8 @@ std::size_t regions_around(const std::string& line, const std::string& second = 
 
 }  // namespace
 
-// --- Numbers and units ------------------------------------------------------------------------------------------------
+// --- Numbers and units
+// ------------------------------------------------------------------------------------------------
 
 TEST_CASE("interpreter: decimal point rule both ways, metric and inch") {
   ReaderOptions calculator;
@@ -97,10 +98,9 @@ TEST_CASE("interpreter: decimal point rule both ways, metric and inch") {
     const char* words;
     double calculator_mm, increments_mm;
   };
-  for (const Case& c :
-       {Case{"G01 X10 F60.", 10.0, 0.010}, Case{"G01 X10. F60.", 10.0, 10.0}, Case{"G01 X-5 F60.", -5.0, -0.005},
-        Case{"G20 G01\nG01 X10 F60.", 254.0, 0.0254}, Case{"G20\nG01 X1. F60.", 25.4, 25.4},
-        Case{"G20\nG01 X.5 F60.", 12.7, 12.7}}) {
+  for (const Case& c : {Case{"G01 X10 F60.", 10.0, 0.010}, Case{"G01 X10. F60.", 10.0, 10.0},
+                        Case{"G01 X-5 F60.", -5.0, -0.005}, Case{"G20 G01\nG01 X10 F60.", 254.0, 0.0254},
+                        Case{"G20\nG01 X1. F60.", 25.4, 25.4}, Case{"G20\nG01 X.5 F60.", 12.7, 12.7}}) {
     CAPTURE(std::string(c.words));
     const Segment a = only_segment(read(std::string(c.words) + "\n", calculator));
     CHECK(a.end_mm.x() == doctest::Approx(c.calculator_mm).epsilon(1e-14));
@@ -172,16 +172,58 @@ TEST_CASE("interpreter: warns once of numbers without a point and of a distance 
   CHECK_FALSE(warns(read("G01 X1. F100\n"), "neither G90"));
 }
 
-// --- Regions ----------------------------------------------------------------------------------------------------------
+// --- Regions
+// ----------------------------------------------------------------------------------------------------------
 
 TEST_CASE("interpreter: what ends a region") {
-  for (const char* stop :
-       {"M08", "M00", "M01", "S1000", "T2", "D1", "H1", "G04 P100", "G04 X1.", "G00 X12.", "G00 Z5.", "G53 X0.", "G28 Z0.",
-        "G91 G28 Z0.", "G30 Z0.", "G61", "G43 H1", "G55", "G52 X0.", "G92 X10.", "G20", "G41 D1", "G10 L2 P1 X0.", "/G01 X11.",
-        "/", "/M08", "/(SKIP)", "G81 X11. Z-1. R1.", "G99", "G05.1 Q1", "G08 P1", "G09", "G16", "G68 X0. Y0. R0.", "G51.1 X0.",
-        "A90.", "B1.", "G63", "G33 X11. F1.", "G80", "G97 S800", "G54.1 P3", "G69", "G50", "G15"}) {
+  for (const char* stop : {"M08",
+                           "M00",
+                           "M01",
+                           "S1000",
+                           "T2",
+                           "D1",
+                           "H1",
+                           "G04 P100",
+                           "G04 X1.",
+                           "G00 X12.",
+                           "G00 Z5.",
+                           "G53 X0.",
+                           "G28 Z0.",
+                           "G91 G28 Z0.",
+                           "G30 Z0.",
+                           "G61",
+                           "G43 H1",
+                           "G55",
+                           "G52 X0.",
+                           "G92 X10.",
+                           "G20",
+                           "G41 D1",
+                           "G10 L2 P1 X0.",
+                           "/G01 X11.",
+                           "/",
+                           "/M08",
+                           "/(SKIP)",
+                           "G81 X11. Z-1. R1.",
+                           "G99",
+                           "G05.1 Q1",
+                           "G08 P1",
+                           "G09",
+                           "G16",
+                           "G68 X0. Y0. R0.",
+                           "G51.1 X0.",
+                           "A90.",
+                           "B1.",
+                           "G63",
+                           "G33 X11. F1.",
+                           "G80",
+                           "G97 S800",
+                           "G54.1 P3",
+                           "G69",
+                           "G50",
+                           "G15"}) {
     CAPTURE(std::string(stop));
-    const Program program = read("G01 X10. F600.\n" + std::string(stop) + "\nG40 G69 G15 G50.1 G64 G49 G80 G54 G21\n"
+    const Program program = read("G01 X10. F600.\n" + std::string(stop) +
+                                 "\nG40 G69 G15 G50.1 G64 G49 G80 G54 G21\n"
                                  "G90 G00 X10. Y0. Z0.\nG01 X20. F600.\n");
     CHECK(program.regions.size() == 2);
     CHECK(program.regions[0]->first_line == 4);
@@ -190,18 +232,37 @@ TEST_CASE("interpreter: what ends a region") {
 }
 
 TEST_CASE("interpreter: what leaves a region open") {
-  for (const char* neutral :
-       {"", "   ", ";", "(COMMENT)", "N100", "N100 (COMMENT)", "G17", "G18", "G19", "G90", "G91", "G94", "F1200.", "G00", "G01",
-        "G02", "G40", "G49", "G54", "G64", "G21", "G98", "N5 G90 G94 F100."}) {
+  for (const char* neutral : {"",
+                              "   ",
+                              ";",
+                              "(COMMENT)",
+                              "N100",
+                              "N100 (COMMENT)",
+                              "G17",
+                              "G18",
+                              "G19",
+                              "G90",
+                              "G91",
+                              "G94",
+                              "F1200.",
+                              "G00",
+                              "G01",
+                              "G02",
+                              "G40",
+                              "G49",
+                              "G54",
+                              "G64",
+                              "G21",
+                              "G98",
+                              "N5 G90 G94 F100."}) {
     CAPTURE(std::string(neutral));
     CHECK(regions_around(neutral) == 1);
   }
 }
 
 TEST_CASE("interpreter: a cut that shares its block with another function is kept, the run around it is split") {
-  for (const char* block :
-       {"G01 X15. M08", "G01 X15. S2000", "G01 X15. T3", "G01 X15. H2", "G01 X15. D2", "G01 X15. M08 M09", "/G01 X15.",
-        "G01 X15. A5.", "G43 G01 X15. H1"}) {
+  for (const char* block : {"G01 X15. M08", "G01 X15. S2000", "G01 X15. T3", "G01 X15. H2", "G01 X15. D2",
+                            "G01 X15. M08 M09", "/G01 X15.", "G01 X15. A5.", "G43 G01 X15. H1"}) {
     CAPTURE(std::string(block));
     const Program program = read("G01 X10. F600.\n" + std::string(block) + "\nG01 X20.\n");
     REQUIRE(program.regions.size() >= 1);
@@ -216,7 +277,8 @@ TEST_CASE("interpreter: a cut that shares its block with another function is kep
 TEST_CASE("interpreter: a region's lines, bytes, blocks, length and states") {
   const std::string head = "N1 G01 X10. F600. (FIRST)\r\n";
   const std::string tail = "\r\nG17\r\nN2 Y10.\r\n";
-  const std::string text = "%\r\nO0042(PART)\r\nG90 G21 G17\r\nG00 X0. Y0. Z0.\r\n" + head + tail + "(AFTER)\r\nM05\r\nM30\r\n%\r\n";
+  const std::string text =
+      "%\r\nO0042(PART)\r\nG90 G21 G17\r\nG00 X0. Y0. Z0.\r\n" + head + tail + "(AFTER)\r\nM05\r\nM30\r\n%\r\n";
   const Program program = read_program(text);
   CHECK(program.text == text);
   CHECK(program.line_end == "\r\n");
@@ -260,8 +322,7 @@ TEST_CASE("interpreter: a cut without length makes no segment, and alone no regi
 }
 
 TEST_CASE("interpreter: N words and comments of a region with the segment before which they stood") {
-  const Program program = read(
-      "N10 G01 X10. F600. (A)\nN20\n(B)\nN30 X20.\nX30.\nN40 (C)\nX40. (D)\nM05\n");
+  const Program program = read("N10 G01 X10. F600. (A)\nN20\n(B)\nN30 X20.\nX30.\nN40 (C)\nX40. (D)\nM05\n");
   REQUIRE(program.regions.size() == 1);
   const Region& region = *program.regions[0];
   struct Expected {
@@ -269,7 +330,7 @@ TEST_CASE("interpreter: N words and comments of a region with the segment before
     std::int32_t n_number;
     std::string comment;
   };
-  const std::vector<Expected> expected = {{0, -1, "(A)"}, {0, 10, ""}, {1, 20, ""},    {1, -1, "(B)"},
+  const std::vector<Expected> expected = {{0, -1, "(A)"}, {0, 10, ""},    {1, 20, ""}, {1, -1, "(B)"},
                                           {1, 30, ""},    {3, -1, "(C)"}, {3, 40, ""}, {3, -1, "(D)"}};
   REQUIRE(region.notes.size() == expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
@@ -315,7 +376,8 @@ TEST_CASE("interpreter: everything behind M30 is left alone") {
   CHECK(m02.regions.size() == 1);
 }
 
-// --- Position ---------------------------------------------------------------------------------------------------------
+// --- Position
+// ---------------------------------------------------------------------------------------------------------
 
 TEST_CASE("interpreter: an absolute move from an unknown position is kept and makes it known") {
   const Program program = read_program("%\nG90 G21 G17\nG01 X1. Y1. F60.\nX2.\nZ5.\nX3. Z6.\nM30\n%\n");
@@ -334,12 +396,13 @@ TEST_CASE("interpreter: which axes each code forgets") {
     bool x, y, z;
   };
   for (const Case& c :
-       {Case{"G91 G28 Z0.", true, true, false}, Case{"G28 X0. Y0.", false, false, true}, Case{"G30 Z0.", true, true, false},
-        Case{"G53 G00 X0.", false, true, true}, Case{"M06 T1", false, false, false}, Case{"G43 H7", true, true, false},
-        Case{"G55", false, false, false}, Case{"G92 X7.", true, true, true}, Case{"G52 X7.", true, true, true},
-        Case{"G10 L2 P1 X5.", false, false, false}, Case{"G31 Z-1. F60.", true, true, false},
-        Case{"G68 X0. Y0. R30.", false, false, false}, Case{"M08", true, true, true}, Case{"G04 X2.", true, true, true},
-        Case{"G54", true, true, true}, Case{"/G00 X5.", false, true, true}, Case{"/M06 T1", false, false, false}}) {
+       {Case{"G91 G28 Z0.", true, true, false}, Case{"G28 X0. Y0.", false, false, true},
+        Case{"G30 Z0.", true, true, false}, Case{"G53 G00 X0.", false, true, true}, Case{"M06 T1", false, false, false},
+        Case{"G43 H7", true, true, false}, Case{"G55", false, false, false}, Case{"G92 X7.", true, true, true},
+        Case{"G52 X7.", true, true, true}, Case{"G10 L2 P1 X5.", false, false, false},
+        Case{"G31 Z-1. F60.", true, true, false}, Case{"G68 X0. Y0. R30.", false, false, false},
+        Case{"M08", true, true, true}, Case{"G04 X2.", true, true, true}, Case{"G54", true, true, true},
+        Case{"/G00 X5.", false, true, true}, Case{"/M06 T1", false, false, false}}) {
     CAPTURE(std::string(c.block));
     const Program program = read(std::string(c.block) + "\n");
     CHECK(program.final_state.known[0] == c.x);
@@ -355,7 +418,8 @@ TEST_CASE("interpreter: which axes each code forgets") {
 }
 
 TEST_CASE("interpreter: a move beside a code that takes no axis words is a move") {
-  for (const char* code : {"G69", "G50", "G15", "G13.1", "G40 G49 G50 G69 G80", "G97 S800", "G08 P1", "G23", "G80 G98"}) {
+  for (const char* code :
+       {"G69", "G50", "G15", "G13.1", "G40 G49 G50 G69 G80", "G97 S800", "G08 P1", "G23", "G80 G98"}) {
     CAPTURE(std::string(code));
     const Program program = read(std::string(code) + " G00 X50.\nG01 X60. F60.\n");
     CHECK(program.final_state.position_mm.x() == 60.0);
@@ -438,7 +502,8 @@ TEST_CASE("interpreter: an arc moves both axes of its plane, named or not") {
   CHECK_FALSE(flat.regions[0]->incremental);
 }
 
-// --- Arcs -------------------------------------------------------------------------------------------------------------
+// --- Arcs
+// -------------------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -458,8 +523,8 @@ Vector3 halfway(const Segment& s) {
 }  // namespace
 
 TEST_CASE("interpreter: arcs in three planes turn the right way") {
-  // Quarter circles of radius 10 about the origin: half-way points by hand. Clockwise is seen from the plus end of the axis
-  // across the plane; in G18 the first axis is Z, so G03 leads from +Z to +X.
+  // Quarter circles of radius 10 about the origin: half-way points by hand. Clockwise is seen from the plus end of the
+  // axis across the plane; in G18 the first axis is Z, so G03 leads from +Z to +X.
   const double h = 10.0 * std::sqrt(0.5);
   struct Case {
     const char* text;
@@ -532,7 +597,8 @@ TEST_CASE("interpreter: start and end radius may differ within the tolerance") {
   CHECK(std::abs(half.sweep_rad) == doctest::Approx(std::numbers::pi).epsilon(1e-6));
 }
 
-// --- Refusals ---------------------------------------------------------------------------------------------------------
+// --- Refusals
+// ---------------------------------------------------------------------------------------------------------
 
 TEST_CASE("interpreter: an arc off its radius is refused with both ends, centre, radii and tolerance") {
   check_refused(framed("G00 X10.\nG03 X0. Y10.37 I-10. F60.\n"), 5, 16,
@@ -609,19 +675,19 @@ TEST_CASE("interpreter: a line over the limit is refused with its length") {
   CHECK(found.message == "line of 75 characters (limit 60)");
 }
 
-// --- Block skip -------------------------------------------------------------------------------------------------------
+// --- Block skip
+// -------------------------------------------------------------------------------------------------------
 
 TEST_CASE("interpreter: after a '/' that changes the modal state nothing is shaped until the group is given again") {
   struct Case {
     const char* skipped;
     const char* again;
   };
-  for (const Case& c :
-       {Case{"/G91", "G90"}, Case{"/G18", "G17"}, Case{"/G00", "G01"}, Case{"/G20", "G21"},
-        Case{"/G61", "G64"}, Case{"/G95", "G94 F600."}}) {
+  for (const Case& c : {Case{"/G91", "G90"}, Case{"/G18", "G17"}, Case{"/G00", "G01"}, Case{"/G20", "G21"},
+                        Case{"/G61", "G64"}, Case{"/G95", "G94 F600."}}) {
     CAPTURE(std::string(c.skipped));
-    const Program program =
-        read("G01 X10. F600.\n" + std::string(c.skipped) + "\nX20. F700.\n" + c.again + "\nG90 G00 X0. Y0. Z0.\nG01 X30. F600.\n");
+    const Program program = read("G01 X10. F600.\n" + std::string(c.skipped) + "\nX20. F700.\n" + c.again +
+                                 "\nG90 G00 X0. Y0. Z0.\nG01 X30. F600.\n");
     CHECK(warns(program, "block skip '/' changes the modal state", 5));
     REQUIRE(program.regions.size() == 2);
     CHECK(program.regions[0]->last_line == 4);
@@ -665,7 +731,8 @@ TEST_CASE("interpreter: a move in an uncertain state leaves the axis unknown") {
 TEST_CASE("interpreter: a '/' in front of M30 or of a mode's cancellation settles nothing") {
   const Program end = read("G01 X10. F600.\n/M30\nX20.\n");
   CHECK(end.regions.size() == 2);
-  const Program rotation = read("G68 X0. Y0. R30.\n/G69\nG90 G00 X0. Y0. Z0.\nG01 X10. F600.\nG69\nG00 X0. Y0. Z0.\nG01 X20.\n");
+  const Program rotation =
+      read("G68 X0. Y0. R30.\n/G69\nG90 G00 X0. Y0. Z0.\nG01 X10. F600.\nG69\nG00 X0. Y0. Z0.\nG01 X20.\n");
   REQUIRE(rotation.regions.size() == 1);
   CHECK(rotation.regions[0]->first_line == 10);
 }
@@ -678,7 +745,8 @@ TEST_CASE("interpreter: a '/' move leaves its axes unknown until they are given"
   CHECK(program.regions[2]->first_line == 8);  // X20. was kept and made X known
 }
 
-// --- Kept untouched ---------------------------------------------------------------------------------------------------
+// --- Kept untouched
+// ---------------------------------------------------------------------------------------------------
 
 TEST_CASE("interpreter: modes that are not supported keep their moves, with one warning for a run of them") {
   struct Case {
@@ -686,10 +754,11 @@ TEST_CASE("interpreter: modes that are not supported keep their moves, with one 
     const char* off;
     const char* why;
   };
-  for (const Case& c : {Case{"G41 D1", "G40", "cutter compensation"}, Case{"G95", "G94 F600.", "G95"},
-                        Case{"G62", "G64", "G62"}, Case{"G63", "G64", "G63"}, Case{"G68 X0. Y0. R30.", "G69", "coordinate mode"},
-                        Case{"G51 X0. Y0. P2000", "G50", "coordinate mode"}, Case{"G51.1 X0.", "G50.1", "coordinate mode"},
-                        Case{"G16", "G15", "coordinate mode"}}) {
+  for (const Case& c :
+       {Case{"G41 D1", "G40", "cutter compensation"}, Case{"G95", "G94 F600.", "G95"}, Case{"G62", "G64", "G62"},
+        Case{"G63", "G64", "G63"}, Case{"G68 X0. Y0. R30.", "G69", "coordinate mode"},
+        Case{"G51 X0. Y0. P2000", "G50", "coordinate mode"}, Case{"G51.1 X0.", "G50.1", "coordinate mode"},
+        Case{"G16", "G15", "coordinate mode"}}) {
     CAPTURE(std::string(c.on));
     const Program program = read("G01 X10. F600.\n" + std::string(c.on) + "\nG01 X20. F1.\nX21.\nX22.\n" + c.off +
                                  "\nG90 G00 X0. Y0. Z0.\nG01 X30. F600.\n");
@@ -720,7 +789,8 @@ TEST_CASE("interpreter: the position behind cutter compensation is not the progr
   CHECK_FALSE(program.final_state.uncertain_groups != 0U);
 }
 
-// --- The clock --------------------------------------------------------------------------------------------------------
+// --- The clock
+// --------------------------------------------------------------------------------------------------------
 
 TEST_CASE("interpreter: rapids and dwells between the regions") {
   const Program program = read("G00 X30. Y40.\nG04 P1500\nG04 X2.5\nG01 X31. F60.\nG00 Z10.\n");

@@ -63,8 +63,7 @@ Path row_of_lines(const std::vector<double>& lengths, const std::vector<double>&
 }
 
 Path paper_path(double feed) {
-  return Path({make_line({0, 0, 0}, {20, 0, 0}, feed),
-               make_arc({20, 0, 0}, {40, 20, 0}, {20, 20, 0}, pi / 2, 2, feed),
+  return Path({make_line({0, 0, 0}, {20, 0, 0}, feed), make_arc({20, 0, 0}, {40, 20, 0}, {20, 20, 0}, pi / 2, 2, feed),
                make_line({40, 20, 0}, {40, 40, 0}, feed)});
 }
 
@@ -103,7 +102,8 @@ void check_joined(const SpeedProfile& profile, double length) {
 
 }  // namespace
 
-// --- Closed forms -----------------------------------------------------------------------------------------------------
+// --- Closed forms
+// -----------------------------------------------------------------------------------------------------
 
 TEST_CASE("look-ahead: trapezoid and triangle under the acceleration law") {
   // 100 mm at 100 mm/s with 1000 mm/s2: 1 s and one ramp of 0.1 s.
@@ -142,7 +142,8 @@ TEST_CASE("look-ahead: the paper's path, times and ramps of paper 000") {
     double feed, ratio, duration;
   };
   // Straight: ramp up A, steady, ramp down A of mean (F + rF)/2; arc 10*pi/(rF); twice.
-  for (const Case& c : {Case{100.0, 0.6, 0.9936}, Case{100.0, 0.99, 0.7678}, Case{200.0, 0.6, 0.0}, Case{200.0, 0.99, 0.0}}) {
+  for (const Case& c :
+       {Case{100.0, 0.6, 0.9936}, Case{100.0, 0.99, 0.7678}, Case{200.0, 0.6, 0.0}, Case{200.0, 0.99, 0.0}}) {
     CAPTURE(c.feed);
     CAPTURE(c.ratio);
     MotionLimits limits = constant_time(0.05);
@@ -161,7 +162,8 @@ TEST_CASE("look-ahead: the paper's path, times and ramps of paper 000") {
     CHECK(phases[3].acceleration_mm_per_s2 == 0.0);
     CHECK(phases[3].speed_mm_per_s == doctest::Approx(slow).epsilon(1e-12));
     CHECK(std::abs(phases[4].distance_mm - path.distance_mm(2)) < 1e-12);
-    for (const std::size_t ramp : {0U, 2U, 4U, 6U}) CHECK(phases[ramp].duration_s == doctest::Approx(0.05).epsilon(1e-9));
+    for (const std::size_t ramp : {0U, 2U, 4U, 6U})
+      CHECK(phases[ramp].duration_s == doctest::Approx(0.05).epsilon(1e-9));
     check_joined(profile, path.length_mm());
   }
 }
@@ -178,7 +180,8 @@ TEST_CASE("look-ahead: a feed step between collinear lines is run on the faster 
 }
 
 TEST_CASE("look-ahead: collinear lines of one feed are one move") {
-  const SpeedProfile profile = plan_speed(row_of_lines({0.1, 30.0, 0.001, 20.0}, {100, 100, 100, 100}), accelerating(1000.0));
+  const SpeedProfile profile =
+      plan_speed(row_of_lines({0.1, 30.0, 0.001, 20.0}, {100, 100, 100, 100}), accelerating(1000.0));
   CHECK(profile.duration_s() == doctest::Approx(0.50101 + 0.1).epsilon(1e-9));
   CHECK(profile.phases().size() == 3);
 }
@@ -195,7 +198,8 @@ TEST_CASE("look-ahead: without any acceleration limit every line runs at its own
   CHECK(distance_at(profile, 2.0) == doctest::Approx(150.0));
 }
 
-// --- Single limits by hand --------------------------------------------------------------------------------------------
+// --- Single limits by hand
+// --------------------------------------------------------------------------------------------
 
 TEST_CASE("look-ahead: axis feed limits act along the direction of travel") {
   MotionLimits limits;
@@ -257,8 +261,8 @@ TEST_CASE("look-ahead: a corner is passed at its limit, not below and not above"
 }
 
 TEST_CASE("look-ahead: the corner limit of the contour tolerance holds behind a filter of that spread") {
-  // Two equal taps 2*d apart have the mean deviation d and the variance d^2. Played through them, the corner is cut by no
-  // more than the tolerance, ramps on both sides included.
+  // Two equal taps 2*d apart have the mean deviation d and the variance d^2. Played through them, the corner is cut by
+  // no more than the tolerance, ramps on both sides included.
   constexpr double period = 1e-4;
   constexpr int d = 40;
   MotionLimits limits = accelerating(1500.0);
@@ -301,9 +305,11 @@ TEST_CASE("look-ahead: axis acceleration acts along the direction of travel") {
   CHECK(plan_speed(plunge, limits).duration_s() == doctest::Approx(1.0 + 0.5).epsilon(1e-12));
 }
 
-// --- Jerk time --------------------------------------------------------------------------------------------------------
+// --- Jerk time
+// --------------------------------------------------------------------------------------------------------
 
-TEST_CASE("look-ahead: the jerk time adds itself to a move from rest to rest and bounds the slope of the acceleration") {
+TEST_CASE(
+    "look-ahead: the jerk time adds itself to a move from rest to rest and bounds the slope of the acceleration") {
   for (const double length : {100.0, 8.0}) {  // a trapezoid, and a triangle whose acceleration turns over at once
     MotionLimits limits = accelerating(1000.0);
     limits.max_jerk_mm_per_s3 = Vector3::Constant(20000.0);
@@ -317,8 +323,8 @@ TEST_CASE("look-ahead: the jerk time adds itself to a move from rest to rest and
     double acceleration = 0.0;
     for (Eigen::Index i = 3; i < p.rows(); ++i) {
       acceleration = std::max(acceleration, std::abs(p(i, 0) - 2.0 * p(i - 1, 0) + p(i - 2, 0)) / (period * period));
-      jerk = std::max(jerk, std::abs(p(i, 0) - 3.0 * p(i - 1, 0) + 3.0 * p(i - 2, 0) - p(i - 3, 0)) /
-                                (period * period * period));
+      jerk = std::max(
+          jerk, std::abs(p(i, 0) - 3.0 * p(i - 1, 0) + 3.0 * p(i - 2, 0) - p(i - 3, 0)) / (period * period * period));
     }
     CAPTURE(length);
     CHECK(acceleration < 1000.0 * (1.0 + 1e-6));
@@ -335,7 +341,8 @@ TEST_CASE("look-ahead: a given jerk time is kept as it is, by both laws") {
   CHECK(plan_speed(straight(100.0, 100.0), constant_time(0.05)).jerk_time_s() == 0.0);
 }
 
-// --- Properties on random paths ---------------------------------------------------------------------------------------
+// --- Properties on random paths
+// ---------------------------------------------------------------------------------------
 
 namespace {
 
@@ -415,8 +422,8 @@ class Judge {
     const Vector3 before = tangent_at(path_[i - 1], path_[i - 1].length_mm);
     const Vector3 after = tangent_at(path_[i], 0.0);
     for (int k = 0; k < 3; ++k) {
-      worst.corner_speed = std::max(worst.corner_speed, std::abs(speed * (after[k] - before[k])) /
-                                                            limits_.corner_speed_difference_mm_per_s[k]);
+      worst.corner_speed = std::max(
+          worst.corner_speed, std::abs(speed * (after[k] - before[k])) / limits_.corner_speed_difference_mm_per_s[k]);
     }
     const double angle = std::acos(std::clamp(before.dot(after), -1.0, 1.0));
     const double bend = angle / (0.5 * (path_[i - 1].length_mm + path_[i].length_mm));
@@ -586,7 +593,8 @@ TEST_CASE("look-ahead: with a jerk time no limit is passed either, at corners an
       judge.at(smooth(time), smooth_speed(time), 0.0, worst);
       steepest = std::max(steepest, std::abs(smooth_acceleration(time) - smooth_acceleration(time - 1e-4)) / 1e-4);
     }
-    for (const SpeedPhase& phase : profile.phases()) strongest = std::max(strongest, std::abs(phase.acceleration_mm_per_s2));
+    for (const SpeedPhase& phase : profile.phases())
+      strongest = std::max(strongest, std::abs(phase.acceleration_mm_per_s2));
     for (std::size_t i = 1; i < path.size(); ++i) {
       double low = 0.0;
       double high = profile.duration_s();
@@ -604,7 +612,8 @@ TEST_CASE("look-ahead: with a jerk time no limit is passed either, at corners an
   }
 }
 
-// --- Refusals and stops -----------------------------------------------------------------------------------------------
+// --- Refusals and stops
+// -----------------------------------------------------------------------------------------------
 
 TEST_CASE("look-ahead: refuses limits that are not positive and segments without feed") {
   const Path path = straight(10.0, 100.0);
@@ -649,13 +658,13 @@ TEST_CASE("look-ahead: forced stops at plunges, retracts and exact stops") {
   const double lean = 15.0 * pi / 180.0;
   const double corner = 45.0 * pi / 180.0;
   std::vector<Segment> segments = {
-      make_line({0, 0, 5}, {0, 0, 0}, 1.0),     // 0: plunge
-      make_line({0, 0, 0}, {10, 0, 0}, 1.0),    // 1: stop before it
-      make_line({10, 0, 0}, {10, 10, 0}, 1.0),  // 2: a corner in the plane is none
-      make_line({10, 10, 0}, {10, 10, 5}, 1.0), // 3: retract: stop before it
-      make_line({10, 10, 5}, {10, 10, 9}, 1.0), // 4: straight on
-      make_line({10, 10, 9}, {10, 12, 19}, 1.0),  // 5: leans by 11.3 degrees, turns by as much: none
-      make_line({10, 12, 19}, {10, 22, 19}, 1.0), // 6: from near the axis by 79 degrees: stop
+      make_line({0, 0, 5}, {0, 0, 0}, 1.0),        // 0: plunge
+      make_line({0, 0, 0}, {10, 0, 0}, 1.0),       // 1: stop before it
+      make_line({10, 0, 0}, {10, 10, 0}, 1.0),     // 2: a corner in the plane is none
+      make_line({10, 10, 0}, {10, 10, 5}, 1.0),    // 3: retract: stop before it
+      make_line({10, 10, 5}, {10, 10, 9}, 1.0),    // 4: straight on
+      make_line({10, 10, 9}, {10, 12, 19}, 1.0),   // 5: leans by 11.3 degrees, turns by as much: none
+      make_line({10, 12, 19}, {10, 22, 19}, 1.0),  // 6: from near the axis by 79 degrees: stop
   };
   CHECK(forced_stops(segments, lean, corner, MotionLimits{}) == std::vector<std::size_t>{1, 3, 6});
   segments[1].stop_at_end = true;
@@ -663,15 +672,16 @@ TEST_CASE("look-ahead: forced stops at plunges, retracts and exact stops") {
   CHECK(forced_stops(segments, lean, corner, MotionLimits{}) == std::vector<std::size_t>{1, 2, 3, 6});
   // 40 degrees off the axis is no plunge.
   const double tan40 = std::tan(40.0 * pi / 180.0);
-  CHECK(forced_stops({make_line({0, 0, 10}, {10 * tan40, 0, 0}, 1.0), make_line({10 * tan40, 0, 0}, {50, 0, 0}, 1.0)}, lean, corner,
-                     MotionLimits{})
+  CHECK(forced_stops({make_line({0, 0, 10}, {10 * tan40, 0, 0}, 1.0), make_line({10 * tan40, 0, 0}, {50, 0, 0}, 1.0)},
+                     lean, corner, MotionLimits{})
             .empty());
   CHECK(forced_stops({}, lean, corner, MotionLimits{}).empty());
   // A filter of 10 ms spread cuts a right angle by sqrt(2)*a*(10 ms)^2/4 = 0.035 mm even if the speed is zero there.
   MotionLimits limits = accelerating(1000.0);
   limits.filter_mean_deviation_s = 0.01;
   limits.filter_variance_s2 = 1e-4;
-  const std::vector<Segment> right_angle = {make_line({0, 0, 0}, {50, 0, 0}, 100.0), make_line({50, 0, 0}, {50, 50, 0}, 100.0)};
+  const std::vector<Segment> right_angle = {make_line({0, 0, 0}, {50, 0, 0}, 100.0),
+                                            make_line({50, 0, 0}, {50, 50, 0}, 100.0)};
   limits.contour_tolerance_mm = 0.035;
   CHECK(forced_stops(right_angle, lean, corner, limits) == std::vector<std::size_t>{1});
   limits.contour_tolerance_mm = 0.036;

@@ -33,8 +33,8 @@ Vector3 on_circle(const Vector3& centre, double radius, double angle, int normal
 
 Segment helix(double radius, double from, double sweep, int normal, double climb) {
   const Vector3 centre(3.0, -7.0, 11.0);
-  return make_arc(on_circle(centre, radius, from, normal, 2.0), on_circle(centre, radius, from + sweep, normal, 2.0 + climb),
-                  centre, sweep, normal, 10.0, 5);
+  return make_arc(on_circle(centre, radius, from, normal, 2.0),
+                  on_circle(centre, radius, from + sweep, normal, 2.0 + climb), centre, sweep, normal, 10.0, 5);
 }
 
 std::vector<Segment> many_arcs() {

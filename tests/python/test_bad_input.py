@@ -27,9 +27,7 @@ GOOD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X10.F600\nY10.\nG0Z50.\nM30\n%\n"
 COMMAND = Path(sys.executable).with_name("shapegcode")
 
 
-def run(
-    folder: Path, *words: str, limit: Callable[[], None] | None = None
-) -> subprocess.CompletedProcess[str]:
+def run(folder: Path, *words: str, limit: Callable[[], None] | None = None) -> subprocess.CompletedProcess[str]:
     """The command as a process of its own, in a folder."""
     return subprocess.run(
         [COMMAND, *words], cwd=folder, capture_output=True, text=True, check=False, preexec_fn=limit, timeout=60
@@ -58,7 +56,9 @@ def refused(done: subprocess.CompletedProcess[str], *parts: str) -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_rejected_program(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_rejected_program(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     program = REJECTED / f"{name}.nc"
     (tmp_path / program.name).write_bytes(program.read_bytes())
     monkeypatch.chdir(tmp_path)
@@ -86,7 +86,7 @@ def test_absolute_centres_are_hinted_at() -> None:
     text = (PROGRAMS / "BOTTLE.NC").read_bytes()
     with pytest.raises(sg.ProgramError, match=r'set input\.arc_centre = "absolute"') as caught:
         sg.Program.from_text(text, machine_with(), source="BOTTLE.NC")
-    assert caught.value.line == 10
+    assert caught.value.line == 12
     assert caught.value.column > 1
 
 
@@ -337,9 +337,7 @@ def mutations(seed: int, count: int, longest: int) -> list[bytes]:
 
 
 def fuzz(seed: int, count: int) -> None:
-    machine = machine_with(
-        {"controller.calculator_decimal_point": True, "controller.arc_radius_tolerance_mm": 1000.0}
-    )
+    machine = machine_with({"controller.calculator_decimal_point": True, "controller.arc_radius_tolerance_mm": 1000.0})
     seen: dict[str, int] = {}
     for data in mutations(seed, count, 4000):
         try:
@@ -368,9 +366,15 @@ def test_binary_never_crashes(data: bytes) -> None:
     survives(data, machine_with())
 
 
-LETTERS = st.sampled_from([*"GGGGXXYYZIJKRFNMSTHDPQLO(%/", "G1", "G2", "G3", "G0", "G91", "G90", "G18", "\n", "\n", " "])
+LETTERS = st.sampled_from(
+    [*"GGGGXXYYZIJKRFNMSTHDPQLO(%/", "G1", "G2", "G3", "G0", "G91", "G90", "G18", "\n", "\n", " "]
+)
 NUMBERS = st.one_of(
-    st.integers(0, 120).map(str), st.floats(-100, 100).map(lambda v: f"{v:.3f}"), st.just(""), st.just("-"), st.just(".")
+    st.integers(0, 120).map(str),
+    st.floats(-100, 100).map(lambda v: f"{v:.3f}"),
+    st.just(""),
+    st.just("-"),
+    st.just("."),
 )
 
 

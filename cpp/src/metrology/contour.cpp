@@ -41,16 +41,18 @@ double DeviationStats::rms_mm() const noexcept {
   return count == 0 ? 0.0 : std::sqrt(sum_of_squares_mm2 / static_cast<double>(count));
 }
 
-ContourTracker::ContourTracker(const Path& path) {
+std::shared_ptr<const ContourTracker::Geometry> ContourTracker::geometry_of(const Path& path) {
+  auto geometry = std::make_shared<Geometry>();
+  auto& [pieces, arc_of, arcs] = *geometry;
   if (path.size() == 0) throw Error(ErrorKind::argument, "contour error needs a path with at least one segment");
-  pieces_.reserve(path.size());
-  arc_of_.reserve(path.size());
+  pieces.reserve(path.size());
+  arc_of.reserve(path.size());
   Vector3 direction = Vector3::Zero();
   for (std::size_t i = 0; i < path.size(); ++i) {
     const Segment& segment = path[i];
     if (segment.length_mm > 0.0) direction = tangent_at(segment, 0.0);
-    pieces_.push_back({segment.start_mm, direction, segment.length_mm, path.distance_mm(i)});
-    arc_of_.push_back(-1);
+    pieces.push_back({segment.start_mm, direction, segment.length_mm, path.distance_mm(i)});
+    arc_of.push_back(-1);
     if (segment.kind != SegmentKind::arc || !(segment.length_mm > 0.0)) continue;
     Arc arc;
     arc.segment = segment;
@@ -68,27 +70,31 @@ ContourTracker::ContourTracker(const Path& path) {
     arc.start_tangent = tangent_at(segment, 0.0);
     arc.end_tangent = tangent_at(segment, segment.length_mm);
     direction = arc.end_tangent;
-    arc_of_.back() = static_cast<std::int32_t>(arcs_.size());
-    arcs_.push_back(arc);
+    arc_of.back() = static_cast<std::int32_t>(arcs.size());
+    arcs.push_back(arc);
   }
   // Pieces without length at the start take the direction that follows.
-  for (std::size_t i = pieces_.size() - 1; i-- > 0;) {
-    if (pieces_[i].direction.isZero(0.0)) pieces_[i].direction = pieces_[i + 1].direction;
+  for (std::size_t i = pieces.size() - 1; i-- > 0;) {
+    if (pieces[i].direction.isZero(0.0)) pieces[i].direction = pieces[i + 1].direction;
   }
-  last_ = pieces_.front().start;
+  return geometry;
 }
 
-Vector3 ContourTracker::start_tangent(std::size_t piece) const noexcept { return pieces_[piece].direction; }
+ContourTracker::ContourTracker(const Path& path) : geometry_(geometry_of(path)) {
+  last_ = geometry_->pieces.front().start;
+}
+
+Vector3 ContourTracker::start_tangent(std::size_t piece) const noexcept { return geometry_->pieces[piece].direction; }
 
 Vector3 ContourTracker::end_tangent(std::size_t piece) const noexcept {
-  const std::int32_t arc = arc_of_[piece];
-  return arc < 0 ? pieces_[piece].direction : arcs_[static_cast<std::size_t>(arc)].end_tangent;
+  const std::int32_t arc = geometry_->arc_of[piece];
+  return arc < 0 ? geometry_->pieces[piece].direction : geometry_->arcs[static_cast<std::size_t>(arc)].end_tangent;
 }
 
 inline ContourTracker::Foot ContourTracker::foot_on(std::size_t piece, const Vector3& p,
                                                     const Window& window) const noexcept {
-  if (arc_of_[piece] >= 0) return foot_on_arc(piece, p, window);
-  const Piece& line = pieces_[piece];
+  if (geometry_->arc_of[piece] >= 0) return foot_on_arc(piece, p, window);
+  const Piece& line = geometry_->pieces[piece];
   Foot foot;
   const Vector3 from_start = p - line.start;
   const double along = std::clamp(from_start.dot(line.direction), 0.0, line.length);
@@ -118,8 +124,8 @@ ContourTracker::Foot ContourTracker::arc_point_foot(const Arc& arc, double u, co
 // Angles `u` count from the arc's start in the sense of its turning, without wrapping.
 ContourTracker::Foot ContourTracker::foot_on_arc(std::size_t piece, const Vector3& p,
                                                  const Window& window) const noexcept {
-  const Piece& base = pieces_[piece];
-  const Arc& arc = arcs_[static_cast<std::size_t>(arc_of_[piece])];
+  const Piece& base = geometry_->pieces[piece];
+  const Arc& arc = geometry_->arcs[static_cast<std::size_t>(geometry_->arc_of[piece])];
   const double rad_per_mm = arc.turn / base.length;
   const double first = std::clamp((window.begin - base.s) * rad_per_mm, 0.0, arc.turn);
   const double last = std::clamp((window.end - base.s) * rad_per_mm, first, arc.turn);
@@ -188,17 +194,18 @@ ContourTracker::Foot ContourTracker::foot_on_arc(std::size_t piece, const Vector
 
 ContourTracker::Found ContourTracker::search(const Vector3& p, double move, const Window& window) const noexcept {
   Found best{foot_on(cursor_, p, window), cursor_, 0.0};
-  const double advance = pieces_[cursor_].s + best.foot.along - s_;
+  const double advance = geometry_->pieces[cursor_].s + best.foot.along - s_;
   bool retreats = advance < 0.0;
   Window forward = window;
   if (advance < 0.5 * move) {
     // A filtered command turns back before it reaches the tip: the return leg lies as far behind the tip.
-    const double to_end = pieces_[cursor_].length - best.foot.along;
+    const double to_end = geometry_->pieces[cursor_].length - best.foot.along;
     if (to_end < longest_turn_mm) {
-      forward.end = std::max(forward.end, pieces_[cursor_].s + pieces_[cursor_].length + to_end + window_margin_mm);
+      forward.end = std::max(
+          forward.end, geometry_->pieces[cursor_].s + geometry_->pieces[cursor_].length + to_end + window_margin_mm);
     }
   }
-  for (std::size_t i = cursor_ + 1; i < pieces_.size() && pieces_[i].s <= forward.end; ++i) {
+  for (std::size_t i = cursor_ + 1; i < geometry_->pieces.size() && geometry_->pieces[i].s <= forward.end; ++i) {
     const Foot foot = foot_on(i, p, forward);
     const double limit = retreats ? best.foot.distance2 * (1.0 + retreat_tie_relative) + retreat_tie_absolute_mm2
                                   : best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
@@ -207,22 +214,22 @@ ContourTracker::Found ContourTracker::search(const Vector3& p, double move, cons
       retreats = false;
     }
   }
-  for (std::size_t i = cursor_; i-- > 0 && pieces_[i].s + pieces_[i].length >= window.begin;) {
+  for (std::size_t i = cursor_; i-- > 0 && geometry_->pieces[i].s + geometry_->pieces[i].length >= window.begin;) {
     const Foot foot = foot_on(i, p, window);
     if (foot.distance2 < best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2) best = {foot, i, 0.0};
   }
-  best.s = pieces_[best.piece].s + best.foot.along;
+  best.s = geometry_->pieces[best.piece].s + best.foot.along;
   return best;
 }
 
 double ContourTracker::sign(const Found& found, double distance) const noexcept {
-  const Piece& piece = pieces_[found.piece];
+  const Piece& piece = geometry_->pieces[found.piece];
   const double from_start = found.foot.along;
-  Vector3 travel = arc_of_[found.piece] < 0 ? piece.direction : found.foot.tangent;
+  Vector3 travel = geometry_->arc_of[found.piece] < 0 ? piece.direction : found.foot.tangent;
   // At a corner one leg alone may see the point on the wrong side: the mean direction decides.
   if (from_start <= 0.0 && found.piece > 0) {
     travel = start_tangent(found.piece) + end_tangent(found.piece - 1);
-  } else if (from_start >= piece.length && found.piece + 1 < pieces_.size()) {
+  } else if (from_start >= piece.length && found.piece + 1 < geometry_->pieces.size()) {
     travel = end_tangent(found.piece) + start_tangent(found.piece + 1);
   }
   const Vector3& offset = found.foot.offset;

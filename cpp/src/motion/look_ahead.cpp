@@ -75,15 +75,18 @@ double polyline_curvature(const Segment& before, const Segment& after, double an
   return reach > 0.0 ? angle / reach : 0.0;
 }
 
-double curvature_speed(double curvature_per_mm, const MotionLimits& limits, double centripetal) noexcept {
+// Of the contour tolerance for one corner: several may fall into one filter, and then they add up.
+constexpr double corner_share = 0.75;
+
+double curvature_speed(double curvature_per_mm, const MotionLimits& limits, double centripetal,
+                       double tolerance_mm) noexcept {
   if (curvature_per_mm <= 0.0) {
     return MotionLimits::none;
   }
   double speed = std::sqrt(centripetal / curvature_per_mm);
   if (limits.filter_variance_s2 > 0.0) {
     // spec section 0: radial error = variance * v^2 * curvature / 2
-    speed =
-        std::min(speed, std::sqrt(2.0 * limits.contour_tolerance_mm / (limits.filter_variance_s2 * curvature_per_mm)));
+    speed = std::min(speed, std::sqrt(2.0 * tolerance_mm / (limits.filter_variance_s2 * curvature_per_mm)));
   }
   return speed;
 }
@@ -283,7 +286,8 @@ double segment_speed_limit(const Segment& segment, const MotionLimits& limits) n
   double speed = segment.feed_mm_per_s;
   if (segment.kind == SegmentKind::arc) {
     speed *= limits.arc_feed_ratio;
-    speed = std::min(speed, curvature_speed(curvature(segment), limits, arc_centripetal_limit(segment, limits)));
+    speed = std::min(speed, curvature_speed(curvature(segment), limits, arc_centripetal_limit(segment, limits),
+                                            limits.contour_tolerance_mm));
   }
   return std::min(speed, tangential_limit(axis_share(segment), limits.max_feed_mm_per_s));
 }
@@ -297,15 +301,16 @@ double corner_speed_limit(const Segment& before, const Segment& after, const Mot
   }
   double speed = tangential_limit(change.cwiseAbs(), limits.corner_speed_difference_mm_per_s);
   const double angle = 2.0 * std::asin(std::min(1.0, 0.5 * size));
+  const double tolerance = corner_share * limits.contour_tolerance_mm;
   speed = std::min(speed, curvature_speed(polyline_curvature(before, after, angle), limits,
-                                          limits.centripetal_acceleration_mm_per_s2));
+                                          limits.centripetal_acceleration_mm_per_s2, tolerance));
   if (limits.filter_mean_deviation_s > 0.0) {
     // A filter of symmetric spread passes the corner at |change| * (v*E|t| + a*E[t^2]/2) / 2: what the speed at the
     // corner and the ramps on both sides of it cost.
     const double acceleration = std::max(segment_acceleration(before, segment_speed_limit(before, limits), limits),
                                          segment_acceleration(after, segment_speed_limit(after, limits), limits));
     const double ramps = std::isfinite(acceleration) ? 0.5 * acceleration * limits.filter_variance_s2 : 0.0;
-    const double room = 2.0 * limits.contour_tolerance_mm / size - ramps;
+    const double room = 2.0 * tolerance / size - ramps;
     speed = std::min(speed, std::max(0.0, room / limits.filter_mean_deviation_s));
   }
   return speed;

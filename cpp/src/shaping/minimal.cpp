@@ -182,9 +182,8 @@ class TwoModeSearch {
              std::pair(std::round(b.y() / cell), std::round(b.x() / cell));
     };
     std::ranges::stable_sort(starts_, order);
-    const auto [first, last] = std::ranges::unique(
-        starts_, [&order](const Vector2& a, const Vector2& b) { return !order(a, b) && !order(b, a); });
-    starts_.erase(first, last);
+    const auto same = [&order](const Vector2& a, const Vector2& b) { return !order(a, b) && !order(b, a); };
+    starts_.erase(std::unique(starts_.begin(), starts_.end(), same), starts_.end());
     return std::move(starts_);
   }
 

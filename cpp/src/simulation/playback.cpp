@@ -13,6 +13,12 @@ namespace {
 
 constexpr double recorded_decay_s = 0.25;
 
+// What the trackers are given where no contour is measured: they refuse a path without segments.
+const Path& a_point() {
+  static const Path point({make_line(Vector3::Zero(), Vector3::Zero(), 0.0)});
+  return point;
+}
+
 // Everything that hangs on one stream of set-points.
 class Recorder {
  public:
@@ -22,11 +28,11 @@ class Recorder {
         plant_(options.modes, options.period_s),
         tracks_contour_(options.measure_contour && path.length_mm() > 0.0),
         tracks_command_(tracks_contour_ && !command_on_path),
-        command_tracker_(path),
-        response_tracker_(path),
+        command_tracker_(tracks_contour_ ? path : a_point()),
+        response_tracker_(tracks_contour_ ? path : a_point()),
         orbit_(path),
         command_reach_(path),
-        response_reach_(path) {
+        response_reach_(command_reach_) {
     for (const Fir& fir : options.axis_filters) {
       filters_.emplace_back(fir, axis_count);
       tail_ += fir.duration_samples();

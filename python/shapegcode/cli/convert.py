@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import importlib
+import threading
 from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
@@ -64,6 +66,8 @@ def run(args: argparse.Namespace) -> int:
     machine = load_machine(args)
     failed = output.with_name(output.name + machine.emission.failed_suffix)
     _refuse_input_as_output(Path(args.input), failed)
+    # The solvers load while the program is read.
+    threading.Thread(target=importlib.import_module, args=("shapegcode.shaping",), daemon=True).start()
     with progress(f"converting {args.input}", args.json) as bar:
         program = Program.read(args.input, machine)
         stages = {"shaping": 0.0, "shaping again, slower": 0.0, "round trip": 0.5}

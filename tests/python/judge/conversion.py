@@ -34,9 +34,7 @@ Vector = npt.NDArray[np.float64]
 Ranges = Sequence[tuple[int, int]]
 
 #: G codes a converter may use freely inside a region (it has to restore what it changes).
-WEAK_G = frozenset(
-    ("G00", "G01", "G02", "G03", "G09", "G17", "G18", "G19", "G61", "G64", "G90", "G91", "G93", "G94")
-)
+WEAK_G = frozenset(("G00", "G01", "G02", "G03", "G09", "G17", "G18", "G19", "G61", "G64", "G90", "G91", "G93", "G94"))
 WEAK_ADDRESSES = frozenset("GFNXYZIJKR")
 METRIC_TOLERANCE_MM = 1.0e-3
 INCH_TOLERANCE_MM = 1.3e-3
@@ -104,9 +102,7 @@ class Gap:
         return [r.text for r in self.lines]
 
 
-def split(
-    program: Interpretation, inserted: frozenset[str] = frozenset()
-) -> tuple[list[LineRecord], list[Gap]]:
+def split(program: Interpretation, inserted: frozenset[str] = frozenset()) -> tuple[list[LineRecord], list[Gap]]:
     """Strong lines, and the gaps before, between and after them (one more than the strong lines)."""
     strong: list[LineRecord] = []
     loose: list[list[LineRecord]] = [[]]
@@ -227,8 +223,7 @@ class _Verdict:
         for a, b in zip(ours.lines, theirs.lines, strict=False):
             if a.text != b.text:
                 self.say(
-                    f"(a) outside every region: original line {a.number} {a.text!r}, "
-                    f"emitted line {b.number} {b.text!r}"
+                    f"(a) outside every region: original line {a.number} {a.text!r}, emitted line {b.number} {b.text!r}"
                 )
                 return
         extra = theirs.texts[len(ours.texts) :] or ours.texts[len(theirs.texts) :]
@@ -388,21 +383,15 @@ def verify_conversion(
     has one digit and no point, (d) every N word is there in order and no more often, (e) no NaN, every run
     ends where it ended, (f) exact stops are still block ends, (g) with `contour_tolerance_um`: the two paths
     of every run are no further apart (each from the other; not in time). `region_line_ranges` are (first,
-    last) 1-based original lines said to be shaped: what lies outside them is then held to the letter too. `inserted` are lines (without line end)
-    that the converter was told to write around every region.
+    last) 1-based original lines said to be shaped: what lies outside them is then held to the letter too.
+    `inserted` are lines (without line end) that the converter was told to write around every region.
     Texts are compared with their line ends (CR included).
 
     Raises JudgeError if the *original* cannot be interpreted.
     """
-    original = interpret(
-        original_text, calculator_decimal_point=calculator_decimal_point, arc_centre=arc_centre
-    )
+    original = interpret(original_text, calculator_decimal_point=calculator_decimal_point, arc_centre=arc_centre)
     try:
-        emitted = interpret(
-            emitted_text, calculator_decimal_point=calculator_decimal_point, arc_centre=arc_centre
-        )
+        emitted = interpret(emitted_text, calculator_decimal_point=calculator_decimal_point, arc_centre=arc_centre)
     except JudgeError as error:
         return [f"(e) the emitted program cannot be interpreted: {error}"]
-    return _Verdict(
-        original, emitted, region_line_ranges, contour_tolerance_um, frozenset(inserted)
-    ).judge()
+    return _Verdict(original, emitted, region_line_ranges, contour_tolerance_um, frozenset(inserted)).judge()

@@ -99,9 +99,7 @@ class _Writer:
         return f"F{feed_mm_per_min:.1f}" if feed_mm_per_min % 1 else f"F{feed_mm_per_min:.0f}."
 
 
-def _on_circle(
-    centre: tuple[int, int], radius: float, angle: float, increment_mm: float
-) -> tuple[int, int] | None:
+def _on_circle(centre: tuple[int, int], radius: float, angle: float, increment_mm: float) -> tuple[int, int] | None:
     """A grid point near this angle of the circle that is within 1 µm of the radius."""
     step = 1.0 / max(radius, 1.0)
     for k in range(60):

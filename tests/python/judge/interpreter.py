@@ -50,9 +50,7 @@ MODAL_GROUPS: dict[str, str] = {
 #: One-shot codes that take the axis words of their block for themselves.
 AXIS_TAKERS = frozenset({"G04", "G10", "G28", "G30", "G52", "G53", "G92", "G92.1"})
 #: Codes that are accepted and change nothing this judge follows.
-INERT = frozenset(
-    {"G05", "G05.1", "G08", "G09", "G11", "G15", "G23", "G50", "G50.1", "G64.1", "G69", "G96", "G97"}
-)
+INERT = frozenset({"G05", "G05.1", "G08", "G09", "G11", "G15", "G23", "G50", "G50.1", "G64.1", "G69", "G96", "G97"})
 INTEGER_ADDRESSES = frozenset("MSTNODHL")
 SCALED_ADDRESSES = frozenset("XYZIJKRQABCUVW")
 ROTARY_ADDRESSES = "ABCUVW"
@@ -245,9 +243,7 @@ def split_line(text: str, number: int) -> tuple[list[tuple[str, str]], list[str]
 class _Interpreter:
     """Carries the modal state from line to line."""
 
-    def __init__(
-        self, calculator: bool, absolute_centre: bool, state: dict[str, Any], arc_tolerance_mm: float
-    ) -> None:
+    def __init__(self, calculator: bool, absolute_centre: bool, state: dict[str, Any], arc_tolerance_mm: float) -> None:
         self.calculator = calculator
         self.absolute_centre = absolute_centre
         self.arc_tolerance_mm = arc_tolerance_mm
@@ -308,9 +304,7 @@ class _Interpreter:
         self.state["drift"] = np.where(known, 0.0, self.state["drift"] + move.delta)
         return move
 
-    def straight(
-        self, kind: Kind, end: Vector, delta: Vector, *, feed: float = math.nan, cycle: bool = False
-    ) -> Move:
+    def straight(self, kind: Kind, end: Vector, delta: Vector, *, feed: float = math.nan, cycle: bool = False) -> Move:
         start = self.state["position"].copy()
         return self.advance(Move(kind, self.line, start, end.copy(), delta.copy(), feed=feed, cycle=cycle))
 
@@ -516,9 +510,7 @@ class _Interpreter:
                 f"arc end is {abs(end_radius - radius):.4f} mm off its radius: start radius {radius:.4f}, "
                 f"end radius {end_radius:.4f}, tolerance {self.arc_tolerance_mm:.4f} (alarm 020)"
             )
-        sweep = (
-            (math.atan2(db - cb, da - ca) - math.atan2(-cb, -ca)) * (-1.0 if clockwise else 1.0) % FULL_TURN
-        )
+        sweep = (math.atan2(db - cb, da - ca) - math.atan2(-cb, -ca)) * (-1.0 if clockwise else 1.0) % FULL_TURN
         if math.hypot(da, db) <= DUST_MM:
             sweep = FULL_TURN
         offset = np.zeros(3)
@@ -538,9 +530,7 @@ class _Interpreter:
         )
         return Move(**{**move.__dict__, "feed": self.block_feed(move.length)})
 
-    def centre_from_words(
-        self, values: Mapping[str, float], a: int, b: int, start: Vector
-    ) -> tuple[float, float]:
+    def centre_from_words(self, values: Mapping[str, float], a: int, b: int, start: Vector) -> tuple[float, float]:
         given = [CENTRE_WORDS[k] for k in (a, b) if CENTRE_WORDS[k] in values]
         if not given:
             raise self.fail("arc without R and without a centre in its plane (alarm 022)")
@@ -596,9 +586,7 @@ class _Interpreter:
             back = level if self.state["return_level"] == "G98" else r_level
             self.plunge("rapid", normal, back, moves)
             if math.isnan(back):
-                self.state["drift"][normal] = level_drift + (
-                    0.0 if self.state["return_level"] == "G98" else r_word
-                )
+                self.state["drift"][normal] = level_drift + (0.0 if self.state["return_level"] == "G98" else r_word)
 
     def plunge(self, kind: Kind, normal: int, level: float, moves: list[Move]) -> None:
         end: Vector = self.state["position"].copy()

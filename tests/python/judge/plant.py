@@ -85,9 +85,7 @@ def response(
     step = period_s / over
     held = np.concatenate([points, np.repeat(points[-1:], math.ceil(rest_s / period_s), axis=0)])
     fine = np.arange((len(held) - 1) * over + 1) / over
-    command = np.stack(
-        [np.interp(fine, np.arange(len(held)), held[:, k]) for k in range(held.shape[1])], axis=1
-    )
+    command = np.stack([np.interp(fine, np.arange(len(held)), held[:, k]) for k in range(held.shape[1])], axis=1)
     moved = command.copy()
     for k, entry in enumerate(modes):
         for mode in _modes_of(entry):

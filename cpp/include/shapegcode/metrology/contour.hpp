@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "shapegcode/path/path.hpp"
@@ -81,9 +82,15 @@ class ContourTracker {
   [[nodiscard]] Vector3 start_tangent(std::size_t piece) const noexcept;
   [[nodiscard]] Vector3 end_tangent(std::size_t piece) const noexcept;
 
-  std::vector<Piece> pieces_;
-  std::vector<std::int32_t> arc_of_;  // -1 for a line
-  std::vector<Arc> arcs_;
+  /// The path as a search wants it; constant, so that copies of a tracker share it.
+  struct Geometry {
+    std::vector<Piece> pieces;
+    std::vector<std::int32_t> arc_of;  // -1 for a line
+    std::vector<Arc> arcs;
+  };
+  [[nodiscard]] static std::shared_ptr<const Geometry> geometry_of(const Path& path);
+
+  std::shared_ptr<const Geometry> geometry_;
   Vector3 last_ = Vector3::Zero();
   std::size_t cursor_ = 0;
   double s_ = 0.0;

@@ -1,0 +1,287 @@
+"""The command as a shell sees it: exit codes, files, JSON."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import shapegcode as sg
+from acceptance import PROGRAMS
+
+COMMAND = Path(sys.executable).with_name("shapegcode")
+GOOD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X20.F6000\nG3X40.Y20.R20.\nG1Y40.\nG0Z50.\nM30\n%\n"
+PAIR = {"original", "emitted"}
+AXES = {"x", "y", "z"}
+
+
+def run(folder: Path, *words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [COMMAND, *words],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+        env={**os.environ, **environment},
+    )
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "part.nc").write_text(GOOD)
+    return tmp_path
+
+
+def files(folder: Path) -> list[str]:
+    return sorted(os.listdir(folder))
+
+
+# ---- convert -----------------------------------------------------------------------------------------------
+
+
+def test_convert_writes_the_program_of_the_api(folder: Path) -> None:
+    done = run(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert files(folder) == ["out.nc", "part.nc"]
+    machine = sg.Machine.load("vx500")
+    assert (folder / "out.nc").read_bytes() == sg.convert(sg.Program.from_text(GOOD, machine), machine).text
+    assert (folder / "part.nc").read_text() == GOOD
+    for said in ("cycle time", "residual vibration X", "within tolerance", "next: ", "wrote out.nc"):
+        assert said in done.stdout
+
+
+def numbers(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def check_report(report: dict[str, Any]) -> None:
+    """The stable keys."""
+    assert set(report["cycle_time_s"]) == PAIR
+    for key in ("residual_vibration_um", "peak_vibration_um"):
+        assert set(report[key]) == PAIR
+        for which in PAIR:
+            assert set(report[key][which]) == AXES
+            assert all(numbers(v) and v >= 0.0 for v in report[key][which].values())
+    assert set(report["contour_error_um"]) == {"command", "response"}
+    for what in ("command", "response"):
+        assert set(report["contour_error_um"][what]) == PAIR
+        for which in PAIR:
+            figures = report["contour_error_um"][what][which]
+            assert {"max", "rms"} <= set(figures)
+            assert 0.0 <= figures["rms"] <= figures["max"]
+    assert all(numbers(v) for v in report["orbit_error_percent"])
+    assert numbers(report["block_period_s"])
+    shaper = report["shaper"]
+    assert {"times_s", "amplitudes"} <= set(shaper)
+    assert len(shaper["times_s"]) == len(shaper["amplitudes"]) > 1
+    assert sum(shaper["amplitudes"]) == pytest.approx(1.0)
+    assert set(report["blocks"]) == {"read", "emitted"}
+    assert isinstance(report["bytes_emitted"], int)
+    for entry in report["override_residual"]:
+        assert {"override", "residual_um"} <= set(entry)
+        assert set(entry["residual_um"]) == AXES
+    assert isinstance(report["within_tolerance"], bool)
+    assert all(isinstance(w, str) for w in report["warnings"])
+
+
+def test_json_file(folder: Path) -> None:
+    done = run(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", "--json", "report.json")
+    assert done.returncode == 0
+    report = json.loads((folder / "report.json").read_text())
+    check_report(report)
+    assert len(report["orbit_error_percent"]) == 1
+    assert report["bytes_emitted"] == (folder / "out.nc").stat().st_size
+    assert report["blocks"]["read"] == 8
+    assert report["output"] == "out.nc"
+    assert report["within_tolerance"]
+    assert [e["override"] for e in report["override_residual"]] == sorted(
+        e["override"] for e in report["override_residual"]
+    )
+    assert min(e["override"] for e in report["override_residual"]) <= 0.8
+    assert max(e["override"] for e in report["override_residual"]) >= 1.2
+    assert report["cycle_time_s"]["emitted"] > report["cycle_time_s"]["original"] > 0.7
+
+
+def test_json_on_standard_output_is_all_there_is(folder: Path) -> None:
+    done = run(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", "--json", "-")
+    assert (done.returncode, done.stderr) == (0, "")
+    check_report(json.loads(done.stdout))
+    again = run(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", "--json", "-")
+    assert again.stdout == done.stdout
+
+
+def test_report_of_a_program_without_cuts(folder: Path) -> None:
+    (folder / "air.nc").write_text("%\nG90G21\nG0X10.Y0Z0\nM30\n%\n")
+    done = run(folder, "convert", "air.nc", "-m", "vx500", "-o", "out.nc", "--json", "-")
+    assert done.returncode == 0
+    report = json.loads(done.stdout)
+    check_report(report)
+    assert report["blocks"]["emitted"] == 0
+    assert (folder / "out.nc").read_bytes() == (folder / "air.nc").read_bytes()
+    assert run(folder, "convert", "air.nc", "-m", "vx500", "-o", "out.nc", "--plots", "plots").returncode == 0
+
+
+def test_plots_are_png_and_svg(folder: Path) -> None:
+    done = run(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", "--plots", "a/b", "--json", "r.json")
+    assert (done.returncode, done.stderr) == (0, "")
+    names = files(folder / "a" / "b")
+    assert names == sorted(f"{name}.{kind}" for name in ("path", "feed", "vibration") for kind in ("png", "svg"))
+    for name in names:
+        begin = (folder / "a" / "b" / name).read_bytes()[:200]
+        assert begin.startswith(b"\x89PNG" if name.endswith("png") else b"<?xml")
+    listed = json.loads((folder / "r.json").read_text())["plots"]
+    assert sorted(Path(path).name for path in listed) == names
+
+
+def test_out_of_tolerance_gets_the_suffix_and_exit_code_1(folder: Path) -> None:
+    words = ("convert", "part.nc", "-m", "vx500", "-o", "out.nc", "--json", "r.json")
+    # A limit that no program with words of 1 um can keep.
+    strict = ("--set", "tolerance.residual_floor_um=0", "--set", "tolerance.residual_ratio=1e-6",
+              "--set", "tolerance.residual_floor_increments=0")  # fmt: skip
+    done = run(folder, *words, *strict)
+    assert done.returncode == 1
+    assert files(folder) == ["out.nc.out-of-tolerance", "part.nc", "r.json"]
+    report = json.loads((folder / "r.json").read_text())
+    check_report(report)
+    assert report["within_tolerance"] is False
+    assert report["output"] == "out.nc.out-of-tolerance"
+    assert any("residual vibration" in w and "limit" in w for w in report["warnings"])
+    assert "OUT OF TOLERANCE" in done.stdout
+    assert "do not run it" in done.stdout
+    other = run(folder, *words, *strict, "--set", "emission.failed_suffix=.bad")
+    assert other.returncode == 1
+    assert "out.nc.bad" in files(folder)
+
+
+def test_options_change_the_result(folder: Path) -> None:
+    def report(*words: str) -> dict[str, Any]:
+        done = run(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", "--json", "-", *words)
+        assert done.returncode in (0, 1), done.stderr
+        return dict(json.loads(done.stdout))
+
+    plain = report()
+    slow = report("--arc-feed", "60%")
+    assert slow["cycle_time_s"]["emitted"] > plain["cycle_time_s"]["emitted"] + 0.1
+    assert slow["orbit_error_percent"][0] < plain["orbit_error_percent"][0]
+    assert report("--arc-feed", "0.6") == slow
+    coarse = report("--block-period", "8ms")
+    assert coarse["block_period_s"] == 0.008
+    assert report("--block-period", "0.008s")["shaper"] == coarse["shaper"]
+    assert report("--set", "emission.block_period_s=0.008")["shaper"] == coarse["shaper"]
+    bare = report("--set", "emission.header=false")
+    assert bare["bytes_emitted"] < plain["bytes_emitted"]
+
+
+def test_sample_with_a_setting_it_needs(folder: Path) -> None:
+    bottle = PROGRAMS / "BOTTLE.NC"
+    refused = run(folder, "convert", bottle, "-m", "vx500", "-o", "out.nc")
+    assert refused.returncode == 2
+    assert 'input.arc_centre = "absolute"' in refused.stderr
+    done = run(folder, "convert", bottle, "-m", "vx500", "-o", "out.nc", "--set", "input.arc_centre=absolute")
+    assert done.returncode == 0, done.stderr
+    assert (folder / "out.nc").stat().st_size > bottle.stat().st_size
+
+
+def test_output_goes_through_links_and_keeps_permissions(folder: Path) -> None:
+    (folder / "real.nc").write_text("old")
+    (folder / "real.nc").chmod(0o640)
+    (folder / "out.nc").symlink_to("real.nc")
+    assert run(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc").returncode == 0
+    assert (folder / "out.nc").is_symlink()
+    assert (folder / "real.nc").stat().st_mode & 0o777 == 0o640
+    assert (folder / "real.nc").read_text().startswith("%\nO1\n(SHAPEGCODE")
+
+
+# ---- simulate ----------------------------------------------------------------------------------------------
+
+
+def test_simulate_says_of_a_shaped_program_what_convert_said(folder: Path) -> None:
+    converted = run(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", "--json", "-")
+    promised = json.loads(converted.stdout)
+    before = json.loads(run(folder, "simulate", "part.nc", "-m", "vx500", "--json", "-").stdout)
+    after = json.loads(run(folder, "simulate", "out.nc", "-m", "vx500", "--shaped", "--json", "-").stdout)
+    for axis in AXES:
+        original, emitted = (promised["residual_vibration_um"][which][axis] for which in ("original", "emitted"))
+        assert before["residual_vibration_um"][axis] == pytest.approx(original)
+        # convert gives the worse of both block ends, simulate the machine's own.
+        assert after["residual_vibration_um"][axis] <= emitted + 1e-9
+    assert before["cycle_time_s"] == pytest.approx(promised["cycle_time_s"]["original"])
+    assert after["cycle_time_s"] == pytest.approx(promised["cycle_time_s"]["emitted"], abs=2e-3)
+    keys = {"cycle_time_s", "residual_vibration_um", "peak_vibration_um", "contour_error_um", "orbit_error_percent"}
+    assert set(before) == set(after) >= keys | {"warnings"}
+
+
+def test_simulate_writes_plots_and_prints_a_table(folder: Path) -> None:
+    done = run(folder, "simulate", "part.nc", "-m", "vx500", "--plots", "plots")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert len(files(folder / "plots")) == 6
+    assert "cycle time" in done.stdout
+    assert files(folder) == ["part.nc", "plots"]
+
+
+# ---- machine, demo, the rest -------------------------------------------------------------------------------
+
+
+def test_machine_init_and_show(folder: Path) -> None:
+    assert run(folder, "machine", "init").returncode == 0
+    assert tomllib.loads((folder / "machine.toml").read_text())["name"] == "VX500"
+    assert run(folder, "machine", "init").returncode == 2
+    assert run(folder, "machine", "init", "--force", "-o", "other.toml").returncode == 0
+    shown = run(folder, "machine", "show", "machine.toml", "--json", "-")
+    assert shown.returncode == 0
+    keys = json.loads(shown.stdout)["keys"]
+    assert keys["controller.interpolation_period_s"]["unit"] == "s"
+    assert run(folder, "machine", "show", "nothing.toml").returncode == 2
+    done = run(folder, "convert", "part.nc", "-m", "machine.toml", "-o", "a.nc")
+    assert done.returncode == 0
+    assert run(folder, "convert", "part.nc", "-m", "vx500", "-o", "b.nc").returncode == 0
+    assert (folder / "a.nc").read_bytes() == (folder / "b.nc").read_bytes()
+
+
+def test_demo_path(folder: Path) -> None:
+    done = run(folder, "demo", "path", "--json", "-")
+    assert (done.returncode, done.stderr) == (0, "")
+    result = json.loads(done.stdout)
+    assert len(result["conditions"]) == 4
+    for row in result["conditions"]:
+        for which in ("ideal", "emitted"):
+            assert numbers(row[which]["orbit_error_percent"])
+            assert numbers(row[which]["time_s"])
+            assert set(row[which]["residual_vibration_um"]) == AXES
+        assert numbers(row["paper"]["orbit_error_percent"])
+    table = run(folder, "demo", "path")
+    assert table.returncode == 0
+    assert "0.0270" in table.stdout
+    assert files(folder) == ["part.nc"]
+
+
+@pytest.mark.parametrize(
+    "words", [(), ("nothing",), ("convert",), ("convert", "part.nc"), ("demo", "nothing"), ("convert", "--bogus")]
+)
+def test_wrong_usage_is_exit_code_2(folder: Path, words: tuple[str, ...]) -> None:
+    done = run(folder, *words)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert "usage: shapegcode" in done.stderr
+    assert files(folder) == ["part.nc"]
+
+
+@pytest.mark.parametrize("command", ["convert", "simulate", "machine", "demo"])
+def test_help(folder: Path, command: str) -> None:
+    done = run(folder, command, "--help", COLUMNS="100")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(f"usage: shapegcode {command}")
+
+
+def test_version_and_debug(folder: Path) -> None:
+    assert re.fullmatch(r"shapegcode \d+\.\d+\.\d+\S*\n", run(folder, "--version").stdout)
+    traced = run(folder, "--debug", "convert", "nothing.nc", "-m", "vx500", "-o", "out.nc")
+    assert "Traceback" in traced.stderr
