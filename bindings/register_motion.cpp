@@ -46,6 +46,8 @@ void register_motion(py::module_& module) {
       .def_readwrite("arc_feed_ratio", &MotionLimits::arc_feed_ratio, "Feed on arcs relative to the programmed one.")
       .def_readwrite("contour_tolerance_mm", &MotionLimits::contour_tolerance_mm,
                      "Deviation allowed to the filter that follows.")
+      .def_readwrite("corner_share", &MotionLimits::corner_share,
+                     "Share of the tolerance for one corner: several may fall into one filter.")
       .def_readwrite("filter_variance_s2", &MotionLimits::filter_variance_s2, "Its second central moment, s^2.")
       .def_readwrite("filter_mean_deviation_s", &MotionLimits::filter_mean_deviation_s,
                      "Its mean absolute deviation, s.");

@@ -456,6 +456,14 @@ class MotionLimits:
     def contour_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def corner_share(self) -> float:
+        """
+        Share of the tolerance for one corner: several may fall into one filter.
+        """
+    @corner_share.setter
+    def corner_share(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def corner_speed_difference_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         Speed step per axis at a corner, shape (3,).

@@ -11,6 +11,7 @@ from shapegcode.program import MM_PER_INCH, Program
 
 _DEGREE = math.pi / 180.0
 _PLUNGE_CORNER_DEG = 45.0
+_CORNER_SHARE = 0.75  # several corners of a polyline may fall into one shaper, and then their deviations add up
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,7 @@ def motion_limits(
         limits.filter_variance_s2 = grid.shaper.variance_s2 + own * own / 12.0
         limits.filter_mean_deviation_s = _mean_deviation_s(grid.shaper) + own / 4.0
         limits.contour_tolerance_mm = contour_tolerance_um * 1e-3
+        limits.corner_share = _CORNER_SHARE
     return limits
 
 

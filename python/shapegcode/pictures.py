@@ -119,7 +119,12 @@ def _write(traces: list[Trace], path: _core.Path, part: str, folder: Path) -> li
         worst = _worst_place(traces, programmed)
         whole, programmed, near = path.polyline(_COARSE_STEP_RAD), worst.piece, worst.traces
         path_part = "; ".join(
-            text for text in (part, f"{2 * _AROUND_S:g} s around the worst place (at {worst.time_s:.2f} s)") if text
+            text
+            for text in (
+                part,
+                f"{2 * _AROUND_S:g} s around the worst place of the {traces[0].label} (at {worst.time_s:.2f} s)",
+            )
+            if text
         )
         views = [View(worst.traces, f"the worst place, at {worst.time_s:.2f} s", "time from the worst place in s")]
         if all(trace.stops for trace in traces):

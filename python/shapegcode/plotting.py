@@ -37,8 +37,10 @@ _FORMATS = (".png", ".svg")
 _MOVES_MM = 1e-9
 # A deflection below this is none.
 _SHOWN_MM = 5e-5
+_FLAT = 0.06  # of an axis in µm or mm/min
 # Pieces of the programmed path among which the nearest one is looked for.
 _PATH_PIECES = 20_000
+_SHORTEST_PIECE_MM = 0.01
 # A millimetre between two places along the path counts as this many mm between a sample and the path.
 _PROGRESS_WEIGHT = 0.03
 _SEGMENTS_ASKED = 3  # on either side of the nearest vertex
@@ -140,6 +142,7 @@ def plot_path(
     size_mm = float(np.linalg.norm(np.ptp(polyline, axis=0)))
     factor = magnification or _round_factor(0.1 * size_mm / largest_mm if largest_mm > 0 else 1.0)
 
+    straight = _only_along(polyline, [deviation for _, _, deviation in drawn])
     figure = _figure(7.2 if whole is None else 10.4, 6.4)
     axes, locator = _path_axes(figure, with_locator=whole is not None)
     across, up = (_AXIS_NAMES.index(name) for name in plane)
@@ -147,6 +150,8 @@ def plot_path(
     for number, (trace, feet, deviation) in enumerate(drawn):
         curve = feet + factor * deviation
         label = _path_label(trace, deviation, quantity, is_part=whole is not None)
+        if straight:
+            curve = curve[:0]  # the label alone
         axes.plot(curve[:, across], curve[:, up], color=_colour(number), linewidth=_width(number), label=label)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.08)
@@ -154,14 +159,14 @@ def plot_path(
     axes.set_ylabel(f"{plane[1]} in mm")
     what = "table" if quantity == "response" else "command"
     _heading(figure, f"Deviation of the {what} from the path, drawn ×{factor:g}", part)
-    if _only_along(polyline, [deviation for _, _, deviation in drawn]):
+    if straight:
         axes.text(
             0.5, 0.3, "The path is straight: the table deviates along it only,\nwhich no drawing of the path shows. "
             "See the picture of the vibration.", transform=axes.transAxes, ha="center", va="center",
         )  # fmt: skip
     else:
         _deviation_scale(axes, factor, largest_mm)
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, borderaxespad=0.2, fontsize=9)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1, frameon=False, borderaxespad=0.2, fontsize=9)
     if whole is not None and locator is not None:
         _locate(locator, whole[:, [across, up]], polyline[:, [across, up]])
     _save(figure, file)
@@ -192,6 +197,8 @@ def plot_feed(file: str | Path, views: Sequence[View], *, part: str = "") -> Non
             curves = [np.linalg.norm(speeds, axis=1), *(speeds[:, axis] for axis in moving)]
             for panel, values in zip(panels, curves, strict=True):
                 _curve(panel, number, trace.label, middles, values)
+        for panel in panels:
+            _spread_flat(panel)
         _column_heading(panels[0], view)
         _legend_above(panels[0])
         # Standstill before and after says nothing about feed.
@@ -235,13 +242,12 @@ def plot_vibration(file: str | Path, views: Sequence[View], *, part: str = "") -
         for panel, axis in zip(panels, shown, strict=True):
             for number, trace in enumerate(view.traces):
                 label = _vibration_label(trace, axis)
-                _curve(panel, number, label, trace.times_s, trace.deflection_mm[:, axis] * 1e3)
+                _curve(panel, number, label, trace.times_s, trace.deflection_mm[:, axis] * 1e3, fine=len(views) > 1)
                 if trace.stops:
                     panel.axvline(trace.rest_s, color=_colour(number), linewidth=1, linestyle=(0, (4, 3)))
             panel.axhline(0, color=_GREY, linewidth=0.6, zorder=0)
             _legend_above(panel)
-            if axis not in swinging:
-                panel.set_ylim(-1, 1)
+            _spread_flat(panel)
         _column_heading(panels[0], view)
         panels[-1].set_xlabel(view.time_label)
     for panel, axis in zip(grid[0], shown, strict=True):
@@ -331,7 +337,7 @@ def follow(
         command_mm: set-points, shape (n, 3).
         points_mm: the samples asked for at the same instants, shape (n, 3).
         polyline_mm: shape (m, 3).
-        complete: the command goes from the beginning to the end of the polyline.
+        complete: the command ends where the polyline ends; where it begins, it begins in any case.
 
     Returns:
         Distance of each foot along the polyline, shape (n,), and the foot itself, shape (n, 3).
@@ -343,12 +349,15 @@ def follow(
     gone = np.concatenate([[0.0], np.cumsum(steps)])
     if complete and gone[-1] > 0:
         gone *= along[-1] / gone[-1]
-    elif not complete and len(vertices) > 1:
-        gone += _feet(command_mm[:1], vertices, None)[0][0]
-    return _feet(points_mm, vertices, gone)
+    return _feet(points_mm, vertices, gone, _PROGRESS_WEIGHT)
 
 
-def _feet(points: FloatArray, vertices: FloatArray, gone: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+def _foot_points(points: FloatArray, polyline: FloatArray) -> FloatArray:
+    """Nearest point of the polyline to each point, wherever on it."""
+    return _feet(points, _refine(polyline), np.zeros(len(points)), 0.0)[1]
+
+
+def _feet(points: FloatArray, vertices: FloatArray, gone: FloatArray, weight: float) -> tuple[FloatArray, FloatArray]:
     """Nearest points of the polyline, as distances along it and places."""
     from scipy.spatial import KDTree
 
@@ -356,11 +365,8 @@ def _feet(points: FloatArray, vertices: FloatArray, gone: FloatArray | None) -> 
         return np.zeros(len(points)), np.broadcast_to(vertices[0], points.shape).copy()
     lengths = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
     distance = np.concatenate([[0.0], np.cumsum(lengths)])
-    if gone is None:
-        nearest = KDTree(vertices).query(points)[1]
-    else:
-        tree = KDTree(np.column_stack([vertices, _PROGRESS_WEIGHT * distance]))
-        nearest = tree.query(np.column_stack([points, _PROGRESS_WEIGHT * gone]), workers=-1)[1]
+    tree = KDTree(np.column_stack([vertices, weight * distance]))
+    nearest = tree.query(np.column_stack([points, weight * gone]), workers=-1)[1]
     feet, best = np.empty_like(points), np.full(len(points), np.inf)
     progress = np.zeros(len(points))
     # The foot lies on a segment near the nearest vertex.
@@ -384,7 +390,7 @@ def _refine(polyline: FloatArray) -> FloatArray:
     lengths = lengths[lengths > 0]
     if not len(lengths):
         return polyline
-    pieces = np.ceil(lengths / (lengths.sum() / _PATH_PIECES)).astype(np.intp)
+    pieces = np.ceil(lengths / max(lengths.sum() / _PATH_PIECES, _SHORTEST_PIECE_MM)).astype(np.intp)
     segment = np.repeat(np.arange(len(pieces)), pieces)
     share = (np.arange(len(segment)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[segment]
     split = polyline[segment] + share[:, None] * (polyline[segment + 1] - polyline[segment])
@@ -430,17 +436,24 @@ def _locate(axes: Axes, whole: FloatArray, piece: FloatArray) -> None:
     """The whole path, small, and where the piece lies on it."""
     axes.plot(whole[:, 0], whole[:, 1], color=_GREY, linewidth=0.8)
     axes.plot(piece[:, 0], piece[:, 1], color="black", linewidth=2)
-    middle = (piece.min(axis=0) + piece.max(axis=0)) / 2
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(piece, axis=0), axis=1))])
+    middle = [float(np.interp(along[-1] / 2, along, piece[:, axis])) for axis in range(2)]
     axes.plot(*middle, marker="o", markersize=16, markerfacecolor="none", markeredgecolor="black")
-    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_aspect("equal", adjustable="box", anchor="N")
     axes.margins(0.08)
     axes.set_title("where that is on the whole path", loc="left", fontsize=9)
     axes.tick_params(labelsize=8)
 
 
-def _curve(panel: Axes, number: int, label: str, times: FloatArray, values: FloatArray) -> None:
+def _curve(panel: Axes, number: int, label: str, times: FloatArray, values: FloatArray, *, fine: bool = False) -> None:
     t, v = thin_min_max(times, values)
-    panel.plot(t, v, color=_colour(number), linewidth=_width(number), label=label)
+    panel.plot(t, v, color=_colour(number), linewidth=_width(number) / (2 if fine else 1), label=label)
+
+
+def _spread_flat(panel: Axes) -> None:
+    """A curve at zero is a line in the middle, not rounding writ large."""
+    if max(map(abs, panel.get_ylim())) < _FLAT:
+        panel.set_ylim(-1, 1)
 
 
 def _heading(figure: Figure, text: str, part: str) -> None:
@@ -473,7 +486,10 @@ def _deviation_scale(axes: Axes, factor: float, largest_mm: float) -> None:
     bar.add_artist(Line2D([0, length_mm], [0, 0], color="black", linewidth=2.5, solid_capstyle="butt"))
     label = TextArea(f"{length_um:g} µm of deviation")
     packed = VPacker(children=[bar, label], align="center", pad=0, sep=4)
-    axes.add_artist(AnchoredOffsetbox("lower right", child=packed, frameon=False, pad=0.4))
+    above = AnchoredOffsetbox(
+        "lower right", child=packed, frameon=False, pad=0.4, bbox_to_anchor=(1.0, 1.0), bbox_transform=axes.transAxes
+    )
+    axes.add_artist(above)
 
 
 def _save(figure: Figure, file: str | Path) -> None:

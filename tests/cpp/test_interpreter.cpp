@@ -825,6 +825,9 @@ TEST_CASE("interpreter: a drilling cycle runs down and back, modal from hole to 
     CHECK(near(moves[i].segment.end_mm, expected[i].end));
     CHECK(moves[i].segment.feed_mm_per_s == doctest::Approx(expected[i].feed));
   }
+  // The initial level is that before the cycle, also for a hole that begins at R.
+  const Program mixed = read("G00 Z10.\nG99 G81 X10. Z-5. R2. F60.\nG98 X20.\nG80\n");
+  CHECK(near(mixed.final_state.position_mm, {20.0, 0.0, 10.0}));
   // G99 returns to R and the next hole starts there; G91 counts R from the level and Z from R; K repeats.
   const Program r_level = read("G00 Z10.\nG99 G81 X10. Z-5. R2. F60.\nG80\n");
   CHECK(near(r_level.final_state.position_mm, {10.0, 0.0, 2.0}));

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import time
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
@@ -13,8 +14,12 @@ import numpy.typing as npt
 import pytest
 from rich.console import Console
 
-from shapegcode.plotting import _foot_points, plot_feed, plot_path, plot_vibration, thin_min_max
-from shapegcode.report import Trace, before_after_rows, before_after_table, next_step
+from shapegcode import pictures
+from shapegcode.converter import convert
+from shapegcode.machine import Machine
+from shapegcode.plotting import View, _foot_points, follow, plot_feed, plot_path, plot_vibration, thin_min_max
+from shapegcode.program import Program
+from shapegcode.report import Trace, before_after_rows, before_after_table, next_step, warning_table
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -34,7 +39,9 @@ REPORT = {
     "block_period_s": 0.005,
     "shaper": {"times_s": [0, 0.005, 0.02], "amplitudes": [0.3, 0.4, 0.3]},
     "blocks": {"read": 16, "emitted": 71},
+    "bytes_read": 800,
     "bytes_emitted": 2100,
+    "limits": {"contour_um": 50.0, "residual_ratio": 0.1, "residual_floor_um": 3.0},
     "override_residual": [{"override": 0.9, "residual_um": {"x": 1.1, "y": 0.6, "z": 0.0}}],
     "within_tolerance": True,
     "warnings": [],
@@ -67,8 +74,8 @@ def traces(samples: int = 900) -> list[Trace]:
 def test_pictures_are_complete_and_the_same_every_time(tmp_path: Path, ending: str) -> None:
     for name, draw in (
         ("path", lambda f: plot_path(f, quarter(200), traces())),
-        ("feed", lambda f: plot_feed(f, traces())),
-        ("vibration", lambda f: plot_vibration(f, traces())),
+        ("feed", lambda f: plot_feed(f, [View(traces())])),
+        ("vibration", lambda f: plot_vibration(f, [View(traces())])),
     ):
         first, second = tmp_path / f"{name}1.{ending}", tmp_path / f"{name}2.{ending}"
         draw(first)
@@ -81,24 +88,94 @@ def test_pictures_are_complete_and_the_same_every_time(tmp_path: Path, ending: s
 
 
 def svg_text(file: Path) -> str:
-    return " ".join(
-        "".join(node.itertext()) for node in ElementTree.parse(file).iter() if node.tag.endswith("text")
-    )
+    return " ".join("".join(node.itertext()) for node in ElementTree.parse(file).iter() if node.tag.endswith("text"))
 
 
 def test_pictures_carry_units_and_figures(tmp_path: Path) -> None:
     factor = plot_path(tmp_path / "path.svg", quarter(500), traces())
     text = svg_text(tmp_path / "path.svg")
     assert f"×{factor:g}" in text
-    for part in ("X in mm", "Y in mm", "programmed path", "original, largest 20.0 µm", "of deviation"):
+    for part in ("X in mm", "Y in mm", "programmed path", "original, largest 20.0 µm in this picture", "of deviation"):
         assert part in text
-    plot_vibration(tmp_path / "v.svg", traces())
+    plot_vibration(tmp_path / "v.svg", [View(traces())])
     text = svg_text(tmp_path / "v.svg")
     for part in ("in µm", "time in s", "original, residual 20.0 µm", "emitted, residual 2.0 µm"):
         assert part in text
-    plot_feed(tmp_path / "f.svg", traces())
+    plot_feed(tmp_path / "f.svg", [View(traces())])
     text = svg_text(tmp_path / "f.svg")
     assert "in mm/min" in text and "Z speed" not in text
+
+
+def test_legends_have_the_figures_of_the_core(tmp_path: Path) -> None:
+    measured = [replace(trace, largest_mm=0.0451, residual_mm=(0.0123, 0.0, 0.0)) for trace in traces()]
+    plot_path(tmp_path / "p.svg", quarter(500), measured)
+    assert "original, largest 45.1 µm" in svg_text(tmp_path / "p.svg")
+    plot_vibration(tmp_path / "v.svg", [View(measured)])
+    text = svg_text(tmp_path / "v.svg")
+    assert "original, residual 12.3 µm" in text
+    assert "Y: rigid" in text and "Y table" not in text
+
+
+def test_a_record_without_the_stop_claims_none(tmp_path: Path) -> None:
+    cut = [replace(trace, stops=False) for trace in traces()]
+    plot_vibration(tmp_path / "v.svg", [View(cut)], part="first 1 s of 9 s")
+    text = svg_text(tmp_path / "v.svg")
+    assert "come to rest" not in text and "residual" not in text
+    assert "first 1 s of 9 s" in text
+
+
+def test_a_straight_path_gets_a_note(tmp_path: Path) -> None:
+    line = np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]])
+    command = np.linspace(line[0], line[1], 500)
+    swing = np.zeros_like(command)
+    swing[:, 0] = 0.02 * np.sin(np.arange(500))
+    plot_path(tmp_path / "p.svg", line, [Trace("original", 1e-3, command, command + swing)])
+    assert "The path is straight" in svg_text(tmp_path / "p.svg")
+
+
+def test_following_keeps_to_its_own_pass() -> None:
+    there_and_back = np.array([[0.0, 0, 0], [50, 0, 0], [50, 0.001, 0], [0, 0.001, 0]])
+    command = np.concatenate([np.linspace(a, b, 2000) for a, b in pairwise(there_and_back)])
+    progress, feet = follow(command, command + [0, 0.0005, 0], there_and_back, complete=True)
+    assert np.abs(np.linalg.norm(command - feet, axis=1)).max() < 0.0011
+    assert progress[1000] == pytest.approx(25, abs=0.1)
+    assert progress[5000] == pytest.approx(75, abs=0.1)
+
+
+def test_a_part_keeps_time_and_says_whether_it_stops() -> None:
+    whole = traces()[0]
+    part = whole.part(0.1, 0.2, 0.15)
+    assert part.times_s[[0, -1]] == pytest.approx([-0.05, 0.05])
+    assert not part.stops
+    end = whole.part(whole.rest_s - 0.1, np.inf, whole.rest_s)
+    assert end.stops and end.rest_s == pytest.approx(0, abs=1e-9)
+    assert len(whole.part(5, 6).command_mm) == 2
+
+
+LONG = "%\nO1\nG21G90G94G17\nG00X0Y0Z0\nG01X20.F200\nG03X40.Y20.I0.J20.\nG01Y40.\nX0.F100\nM30\n%\n"
+
+
+def test_a_long_region_shows_its_worst_place_and_its_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    machine = Machine.load("vx500")
+    conversion = convert(Program.from_text(LONG.encode(), machine, source="long"), machine)
+    assert len(pictures.write_pictures(conversion, machine, tmp_path)) == 6
+    text = svg_text(tmp_path / "path.svg")
+    assert "around the worst place of the original" in text and "on the whole path" in text
+    text = svg_text(tmp_path / "vibration.svg")
+    assert "the worst place, at" in text and "the stop, at" in text and "come to rest" in text
+
+    monkeypatch.setattr(pictures, "_RECORD_SAMPLES", 20_000)
+    pictures.write_pictures(conversion, machine, tmp_path)
+    text = svg_text(tmp_path / "vibration.svg")
+    assert "first 20 s of" in text and "come to rest" not in text and "the stop" not in text
+
+
+def test_polyline_is_close_to_large_arcs() -> None:
+    machine = Machine.load("vx500")
+    text = "%\nO1\nG21G90G94G17\nG00X0Y0Z0\nG02X300.Y-300.I0.J-300.F3000\nM30\n%\n"
+    points = pictures._polyline(Program.from_text(text.encode(), machine, source="arc").regions[0].path)
+    middles = (points[1:] + points[:-1]) / 2
+    assert np.abs(np.linalg.norm(middles - [0, -300, 0], axis=1) - 300).max() < 1.01e-4
 
 
 def test_given_magnification_and_plane_are_used(tmp_path: Path) -> None:
@@ -114,23 +191,25 @@ def test_bad_magnification(tmp_path: Path, magnification: float) -> None:
 
 def test_bad_pictures_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"\.png, \.svg"):
-        plot_feed(tmp_path / "p.jpeg", traces())
+        plot_feed(tmp_path / "p.jpeg", [View(traces())])
     with pytest.raises(ValueError, match="no trace"):
-        plot_feed(tmp_path / "p.png", [])
-    with pytest.raises(ValueError, match="outside the trace"):
-        plot_vibration(tmp_path / "p.png", traces(), rest_s={"original": 99})
+        plot_feed(tmp_path / "p.png", [View([])])
+    with pytest.raises(ValueError, match="no view"):
+        plot_vibration(tmp_path / "p.png", [])
+    with pytest.raises(ValueError, match="whole_mm"):
+        plot_path(tmp_path / "p.png", quarter(20), traces(), whole_mm=np.zeros((1, 3)))
     with pytest.raises(ValueError, match="programmed_mm"):
         plot_path(tmp_path / "p.png", np.zeros((4, 2)), traces())
     with pytest.raises(FileNotFoundError):
-        plot_feed(tmp_path / "no" / "p.png", traces())
+        plot_feed(tmp_path / "no" / "p.png", [View(traces())])
     assert not list(tmp_path.iterdir())
 
 
 def test_machine_at_rest_gives_a_picture(tmp_path: Path) -> None:
     still = [Trace("original", 1e-3, np.zeros((5, 3)), np.zeros((5, 3)))]
     assert plot_path(tmp_path / "p.png", np.zeros((2, 3)), still) == 1
-    plot_feed(tmp_path / "f.png", still)
-    plot_vibration(tmp_path / "v.png", still)
+    plot_feed(tmp_path / "f.png", [View(still)])
+    plot_vibration(tmp_path / "v.png", [View(still)])
 
 
 def test_thinning_keeps_extremes_ends_and_order() -> None:
@@ -174,8 +253,8 @@ def test_long_programs_are_drawn_in_seconds(tmp_path: Path) -> None:
     began = time.perf_counter()
     long = traces(300_000)
     plot_path(tmp_path / "p.png", quarter(20_000), long)
-    plot_feed(tmp_path / "f.png", long)
-    plot_vibration(tmp_path / "v.svg", long)
+    plot_feed(tmp_path / "f.png", [View(long)])
+    plot_vibration(tmp_path / "v.svg", [View(long)])
     assert time.perf_counter() - began < 20
     assert (tmp_path / "v.svg").stat().st_size < 2_000_000
 
@@ -215,19 +294,67 @@ def test_table_sets_original_against_emitted() -> None:
     assert rows["contour error of the command, largest"].change_percent is None
     assert rows["largest orbit error of 2 arcs"].emitted == -0.3
     assert rows["duration of the shaper"].emitted == pytest.approx(20)
-    assert rows["residual vibration X at 90 % override"].emitted == 1.1
+    assert rows["residual X at 90 % override"].emitted == (1.1,)
+    assert rows["size of the program"].original == 800
+    assert rows["contour error of the command, largest"].limit == 50
+    assert "contour error of the table (response), RMS" in rows
 
     stream = io.StringIO()
     Console(file=stream, width=100).print(before_after_table(REPORT))
     text = stream.getvalue()
-    for part in ("+5.0 %", "-94.6 %", "µm", "from 0", "within tolerance"):
+    for part in ("+5.0 %", "-94.6 %", "µm", "limit", "50.0", "within tolerance"):
         assert part in text
 
 
-def test_table_leaves_out_what_the_report_does_not_have() -> None:
-    assert [row.figure for row in before_after_rows({"cycle_time_s": {"original": 0, "emitted": 1}})] == [
-        "cycle time"
+def test_percentages_of_next_to_nothing_are_blank() -> None:
+    report = {"residual_vibration_um": {"original": {"x": 0.4, "y": 2.0}, "emitted": {"x": 1.1, "y": 1.0}}}
+    rows = {row.figure: row for row in before_after_rows(report)}
+    assert rows["residual vibration X"].change_percent is None
+    assert rows["residual vibration Y"].change_percent == -50
+
+
+def test_overrides_and_frequencies_have_one_row_per_axis() -> None:
+    report = {
+        "override_residual": [{"override": o, "residual_um": {"x": o, "y": 0.0}} for o in (0.8, 0.9, 1.1, 1.2)],
+        "frequency_residual": [{"shift": s, "residual_um": {"x": 2.0 + s}} for s in (-1, 1)],
+    }
+    rows = list(before_after_rows(report))
+    assert [row.figure for row in rows] == [
+        "residual X at 80/90/110/120 % override",
+        "residual X with the modes low/high",
     ]
+    assert rows[0].emitted == (0.8, 0.9, 1.1, 1.2)
+
+
+def test_residual_limit_is_that_of_the_region_shown() -> None:
+    def region(emitted: float, limit: float) -> dict[str, object]:
+        return {"residual_vibration_um": {"emitted": {"x": emitted}}, "residual_limit_um": {"x": limit}}
+
+    report = {
+        "residual_vibration_um": {"original": {"x": 50}, "emitted": {"x": 4}},
+        "regions": [region(1, 9), region(4, 5)],
+    }
+    assert next(iter(before_after_rows(report))).limit == 5
+
+
+def test_nothing_to_shape_is_one_line() -> None:
+    report = {**REPORT, "blocks": {"read": 3, "emitted": 0}}
+    stream = io.StringIO()
+    Console(file=stream, width=100).print(before_after_table(report))
+    assert stream.getvalue() == "nothing to shape: the text is unchanged\n"
+    assert next_step(report).startswith("run the original")
+
+
+def test_long_warnings_wrap_under_their_own_text() -> None:
+    stream = io.StringIO()
+    Console(file=stream, width=40).print(warning_table(["one two three four five six seven eight nine ten", "b"]))
+    lines = stream.getvalue().splitlines()
+    assert lines[0].startswith("warning: one") and lines[1].startswith("         ")
+    assert lines[-1].startswith("warning: b")
+
+
+def test_table_leaves_out_what_the_report_does_not_have() -> None:
+    assert [row.figure for row in before_after_rows({"cycle_time_s": {"original": 0, "emitted": 1}})] == ["cycle time"]
     empty = {
         "orbit_error_percent": None,
         "shaper": None,

@@ -75,9 +75,6 @@ double polyline_curvature(const Segment& before, const Segment& after, double an
   return reach > 0.0 ? angle / reach : 0.0;
 }
 
-// Of the contour tolerance for one corner: several may fall into one filter, and then they add up.
-constexpr double corner_share = 0.75;
-
 double curvature_speed(double curvature_per_mm, const MotionLimits& limits, double centripetal,
                        double tolerance_mm) noexcept {
   if (curvature_per_mm <= 0.0) {
@@ -301,7 +298,7 @@ double corner_speed_limit(const Segment& before, const Segment& after, const Mot
   }
   double speed = tangential_limit(change.cwiseAbs(), limits.corner_speed_difference_mm_per_s);
   const double angle = 2.0 * std::asin(std::min(1.0, 0.5 * size));
-  const double tolerance = corner_share * limits.contour_tolerance_mm;
+  const double tolerance = limits.corner_share * limits.contour_tolerance_mm;
   speed = std::min(speed, curvature_speed(polyline_curvature(before, after, angle), limits,
                                           limits.centripetal_acceleration_mm_per_s2, tolerance));
   if (limits.filter_mean_deviation_s > 0.0) {

@@ -14,6 +14,8 @@ from .interpreter import Move
 Vector = npt.NDArray[np.float64]
 BlockEnd = Literal["ceil", "carry"]
 _SECONDS_PER_MINUTE = 60.0
+#: Ticks by which a block may overrun one and still end on it: dust of doubles at large coordinates (1 ns at 1 ms).
+_TICK_DUST = 1e-6
 
 
 def starts(moves: Sequence[Move]) -> Vector:
@@ -54,7 +56,7 @@ def durations(
     out = np.zeros(len(moves))
     for i, (move, speed) in enumerate(zip(moves, _speeds(moves, override), strict=True)):
         ticks = move.length / (speed * period_s)
-        out[i] = math.ceil(ticks - 1e-9) * period_s if block_end == "ceil" else ticks * period_s
+        out[i] = math.ceil(ticks - _TICK_DUST) * period_s if block_end == "ceil" else ticks * period_s
     return out
 
 
@@ -86,7 +88,7 @@ def play(
             rows.append(at + move.offsets(travelled / move.length))
     else:
         border = np.concatenate([[0.0], np.cumsum(times)])
-        ticks = math.ceil(border[-1] / period_s - 1e-9)
+        ticks = math.ceil(border[-1] / period_s - _TICK_DUST)
         clock = np.minimum(np.arange(1, ticks + 1) * period_s, border[-1])
         owner = np.clip(np.searchsorted(border, clock, side="left") - 1, 0, max(len(moves) - 1, 0))
         for i in np.unique(owner):

@@ -28,7 +28,8 @@ struct MotionLimits {
   double arc_feed_ratio = 1.0;                                         ///< feed on arcs relative to the programmed feed
   /// Deviation that a filter with the spread below may cause at corners and on arcs.
   double contour_tolerance_mm = none;
-  double filter_variance_s2 = 0.0;       ///< second central moment of the filter that follows
+  double corner_share = 1.0;        ///< of it for one corner: several may fall into one filter, and then they add up
+  double filter_variance_s2 = 0.0;  ///< second central moment of the filter that follows
   double filter_mean_deviation_s = 0.0;  ///< its mean absolute deviation from the mean delay
 };
 
