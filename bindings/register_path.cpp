@@ -115,6 +115,16 @@ void register_path(py::module_& module) {
           },
           "Smallest programmed feed, mm/s; infinity for an empty path.")
       .def_property_readonly(
+          "programmed_time_s",
+          [](const Path& self) {
+            double time = 0.0;
+            for (const Segment& segment : self.segments()) {
+              time += segment.length_mm > 0.0 ? segment.length_mm / segment.feed_mm_per_s : 0.0;
+            }
+            return time;
+          },
+          "Time at the programmed feeds without any acceleration, s.")
+      .def_property_readonly(
           "fastest_feed_mm_per_s",
           [](const Path& self) {
             double fastest = 0.0;

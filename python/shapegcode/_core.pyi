@@ -369,6 +369,11 @@ class Path:
         Whole length, mm.
         """
     @property
+    def programmed_time_s(self) -> float:
+        """
+        Time at the programmed feeds without any acceleration, s.
+        """
+    @property
     def slowest_feed_mm_per_s(self) -> float:
         """
         Smallest programmed feed, mm/s; infinity for an empty path.

@@ -27,6 +27,7 @@ from shapegcode.verify import (
 )
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
+_MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin
 _ATTEMPTS = 4  # each with less room for the regions that left the contour tolerance
 _COMMENT_WIDTH = 60
 _HEADER_MARK = b"(SHAPEGCODE "
@@ -91,6 +92,8 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
         raise _core.ArgumentError("the machine file gives no vibration mode (axes.x.modes): nothing to shape for")
     controller = machine.controller
     period = block_period_s if block_period_s is not None else machine.emission.block_period_s
+    if period is not None and not (math.isfinite(period) and period > 0.0):
+        raise _core.ArgumentError(f"block period is {period} s, must be finite and above 0")
     if period is None:
         choice = choose_block_period(
             modes, controller.interpolation_period_s, controller.block_time_s,
@@ -150,6 +153,8 @@ def convert(
         )
     grid = choose_grid(machine, block_period_s)
     ratio = machine.shaping.arc_feed_ratio if arc_feed_ratio is None else arc_feed_ratio
+    for region in program.regions:
+        _refuse_endless(program, region, grid)
     room_um = [machine.tolerance.contour_um * _CONTOUR_MARGIN] * len(program.regions)
     # The originals are played on the other cores while this one shapes.
     pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
@@ -251,6 +256,13 @@ def _write(
         on_progress(done, len(regions))
     put(core.slice(position, core.size))
     return _Written(b"".join(parts), placed, blocks, kept, kept_s)
+
+
+def _refuse_endless(program: Program, region: _core.Region, grid: Grid) -> None:
+    time_s = region.path.programmed_time_s
+    if time_s > _MOST_PERIODS * grid.block_period_s:
+        limit = _MOST_PERIODS * grid.block_period_s
+        raise _region_error(program, region, f"{time_s:.0f} s of cutting without a stop (limit {limit:.0f} s)")
 
 
 def _why_kept(region: _core.Region, machine: Machine) -> str:

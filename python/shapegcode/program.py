@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,7 +71,12 @@ class Program:
             ProgramError: the text is no program that can be read; the message starts with ``file:line:column``.
             OSError: the file cannot be read.
         """
-        return cls.from_text(Path(path).read_bytes(), machine, source=str(path))
+        try:
+            text = Path(path).read_bytes()
+        except OSError as error:
+            # A failed read() does not name the file.
+            raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+        return cls.from_text(text, machine, source=str(path))
 
     @classmethod
     def from_text(

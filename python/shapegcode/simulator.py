@@ -15,6 +15,7 @@ from shapegcode.program import Program
 from shapegcode.verify import deviation_um, largest_um, other_time_s, play_emitted, play_original
 
 FloatArray = npt.NDArray[np.float64]
+_MOST_SAMPLES = 100_000_000  # set-points of a region: some ten seconds of computing
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +63,16 @@ class Simulation:
         return _play(run.path, self.machine, self.shaped, record_samples)
 
 
+def _refuse_endless(program: Program, region: _core.Region, period_s: float) -> None:
+    time_s = region.path.programmed_time_s
+    if time_s > _MOST_SAMPLES * period_s:
+        first, last = region.first_line, region.last_line
+        raise _core.ArgumentError(
+            f"{program.source}:{first}:1: lines {first} to {last}: {time_s:.0f} s of cutting without a stop "
+            f"(limit {_MOST_SAMPLES * period_s:.0f} s)"
+        )
+
+
 def simulate(
     program: Program,
     machine: Machine,
@@ -83,6 +94,8 @@ def simulate(
     Raises:
         ArgumentError: a limit of the machine is not usable.
     """
+    for region in program.regions:
+        _refuse_endless(program, region, machine.controller.interpolation_period_s)
     runs = []
     for done, region in enumerate(program.regions, start=1):
         path = region.path

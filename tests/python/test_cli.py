@@ -171,15 +171,14 @@ def test_options_change_the_result(folder: Path) -> None:
     slow = report("--arc-feed", "60%")
     assert slow["cycle_time_s"]["emitted"] > plain["cycle_time_s"]["emitted"] + 0.1
     assert slow["orbit_error_percent"][0] < plain["orbit_error_percent"][0]
-    assert report("--arc-feed", "0.6") == slow
     coarse = report("--block-period", "8ms")
     assert coarse["block_period_s"] == 0.008
-    assert report("--block-period", "0.008s")["shaper"] == coarse["shaper"]
     assert report("--set", "emission.block_period_s=0.008")["shaper"] == coarse["shaper"]
     bare = report("--set", "emission.header=false")
     assert bare["bytes_emitted"] < plain["bytes_emitted"]
 
 
+@pytest.mark.slow
 def test_sample_with_a_setting_it_needs(folder: Path) -> None:
     bottle = PROGRAMS / "BOTTLE.NC"
     refused = run(folder, "convert", bottle, "-m", "vx500", "-o", "out.nc")

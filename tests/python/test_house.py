@@ -38,10 +38,7 @@ INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"]+)[>"]', re.MULTIL
 
 def cpp_files(*folders: str) -> list[Path]:
     return sorted(
-        file
-        for folder in folders
-        for file in (CPP / folder).rglob("*")
-        if file.suffix in {".hpp", ".cpp", ".h"}
+        file for folder in folders for file in (CPP / folder).rglob("*") if file.suffix in {".hpp", ".cpp", ".h"}
     )
 
 
@@ -95,9 +92,7 @@ def test_cpp_folders_use_only_whom_they_may() -> None:
     offenders = []
     for file in cpp_files("include", "src"):
         folder = own_folder(file)
-        assert folder in ALLOWED_FOLDERS, (
-            f"{file.relative_to(ROOT)}: say in ALLOWED_FOLDERS whom {folder} may use"
-        )
+        assert folder in ALLOWED_FOLDERS, f"{file.relative_to(ROOT)}: say in ALLOWED_FOLDERS whom {folder} may use"
         allowed = ALLOWED_FOLDERS[folder] | {folder, ""}
         offenders += [
             f"{file.relative_to(ROOT)} includes {name}"
@@ -130,9 +125,7 @@ def imported_modules(file: Path) -> set[str]:
 
 def test_only_plotting_imports_matplotlib() -> None:
     users = {
-        file.relative_to(PACKAGE).as_posix()
-        for file in PACKAGE.rglob("*.py")
-        if "matplotlib" in imported_modules(file)
+        file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py") if "matplotlib" in imported_modules(file)
     }
     assert users == {"plotting.py"}
 
@@ -170,9 +163,7 @@ def test_plotting_is_loaded_only_when_used() -> None:
 
 def test_versions_agree() -> None:
     pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
-    cmake = re.search(
-        r"project\(shapegcode VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
-    )
+    cmake = re.search(r"project\(shapegcode VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))
     assert cmake is not None
     assert cmake[1] == pyproject
     assert importlib.metadata.version("shapegcode") == pyproject, "installed package is stale"

@@ -302,9 +302,7 @@ def test_moving_average_and_arc() -> None:
     assert np.hypot(points[:, 0] + 10, points[:, 1]) == pytest.approx(np.full(len(points), 10.0))
     line = play(cuts("G1 X10 F6000"), acceleration_samples=50)
     assert len(line) == 101 + 49
-    assert np.diff(line[:, 0])[[0, 49, 98, 99, 148]] == pytest.approx(
-        [0.002, 0.1, 0.1, 0.1, 0.002], abs=2.1e-3
-    )
+    assert np.diff(line[:, 0])[[0, 49, 98, 99, 148]] == pytest.approx([0.002, 0.1, 0.1, 0.1, 0.002], abs=2.1e-3)
     assert np.diff(line[:52, 0], 2)[:48] == pytest.approx(np.full(48, 0.1 / 50))
     assert line[-1, 0] == pytest.approx(10.0)
 
@@ -435,9 +433,7 @@ def test_contour_error_of_displaced_points() -> None:
     moves = cuts("G1 X20 F100\nG3 X40 Y20 J20\nG1 Y40\nG2 X44 Y44 Z7 I4\nG19 G3 Y44 Z7 J.05 K.01")
     for distance in (0.0, 0.0003, 0.02, 1.5):
         angle = np.linspace(-1.5, -0.1, 37)
-        on_arc = np.stack(
-            [20 + (20 + distance) * np.cos(angle), 20 + (20 + distance) * np.sin(angle)], axis=1
-        )
+        on_arc = np.stack([20 + (20 + distance) * np.cos(angle), 20 + (20 + distance) * np.sin(angle)], axis=1)
         on_line = np.stack([np.linspace(0.5, 19, 20), np.full(20, -distance)], axis=1)
         points = np.concatenate([on_arc, on_line])
         error = contour_error_um(np.column_stack([points, np.zeros(len(points))]), moves)

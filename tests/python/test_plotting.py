@@ -136,7 +136,7 @@ def test_a_straight_path_gets_a_note(tmp_path: Path) -> None:
 def test_following_keeps_to_its_own_pass() -> None:
     there_and_back = np.array([[0.0, 0, 0], [50, 0, 0], [50, 0.001, 0], [0, 0.001, 0]])
     command = np.concatenate([np.linspace(a, b, 2000) for a, b in pairwise(there_and_back)])
-    progress, feet = follow(command, command + [0, 0.0005, 0], there_and_back, complete=True)
+    progress, feet = follow(command, command + np.array([0, 0.0005, 0]), there_and_back, complete=True)
     assert np.abs(np.linalg.norm(command - feet, axis=1)).max() < 0.0011
     assert progress[1000] == pytest.approx(25, abs=0.1)
     assert progress[5000] == pytest.approx(75, abs=0.1)

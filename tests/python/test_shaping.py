@@ -203,9 +203,7 @@ def brute_force(first: Mode, second: Mode, max_duration_s: float, points: int) -
     for i, j in minima:
         matrix = np.vstack([terms(grid[i : i + 1], grid[j : j + 1])[0], np.ones(3)])
         start = np.linalg.lstsq(matrix, np.eye(5)[4], rcond=None)[0]
-        x = least_squares(
-            equations, np.append(rate * grid[[i, j]], start), xtol=1e-15, ftol=1e-15, gtol=1e-15
-        ).x
+        x = least_squares(equations, np.append(rate * grid[[i, j]], start), xtol=1e-15, ftol=1e-15, gtol=1e-15).x
         t2, t3 = float(x[0] / rate), float(x[1] / rate)
         if (
             np.abs(equations(x)).max() < 1e-10

@@ -193,7 +193,7 @@ class Fitter {
     }
     const std::int64_t exact =
         std::llround(length_mm / (wanted * options_.interpolation_period_s) / options_.feed_unit_mm_per_s);
-    if (exact >= options_.minimum_feed && std::abs(early(exact)) <= 1e-9 * length_mm) {
+    if (exact >= options_.minimum_feed && early(exact) >= -1e-12 * length_mm && early(exact) <= 1e-9 * length_mm) {
       return exact;
     }
     return std::nullopt;

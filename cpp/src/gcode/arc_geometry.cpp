@@ -56,7 +56,7 @@ Segment resolve_arc(const ArcWords& words, double feed_mm_per_s, std::uint32_t l
   const double start_radius = std::hypot(words.start_mm[a] - centre[a], words.start_mm[b] - centre[b]);
   const double end_radius = std::hypot(words.end_mm[a] - centre[a], words.end_mm[b] - centre[b]);
   const double difference = std::abs(start_radius - end_radius);
-  if (start_radius <= coincident_mm || difference > words.tolerance_mm) {
+  if (start_radius <= coincident_mm || end_radius <= coincident_mm || difference > words.tolerance_mm) {
     constexpr char names[] = "XYZ";
     throw Error(ErrorKind::program,
                 format("arc end is %.4f mm off its radius: start (%c%.4f %c%.4f), end (%c%.4f %c%.4f), centre (%c%.4f "

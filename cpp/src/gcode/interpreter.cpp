@@ -10,7 +10,7 @@
 namespace shapegcode::detail {
 
 void Interpreter::fail(const std::string& message, std::uint32_t column) const {
-  throw Error(ErrorKind::program, message, line_number_, column);
+  throw Error(ErrorKind::program, message, line_number_, std::max<std::uint32_t>(column, 1));
 }
 
 void Interpreter::warn(const std::string& message) { program_.warnings.push_back({line_number_, message}); }
@@ -31,7 +31,9 @@ void Interpreter::frame() {
   if (junk != std::string::npos) {
     const auto at = static_cast<std::uint32_t>(
         1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(junk), '\n'));
-    throw Error(ErrorKind::program, "byte 0x00 at offset " + std::to_string(junk) + ": this is no program text", at, 1);
+    const std::size_t line_start = junk == 0 ? 0 : text.rfind('\n', junk - 1) + 1;
+    throw Error(ErrorKind::program, "byte 0x00: this is no program text", at,
+                static_cast<std::uint32_t>(junk - line_start + 1));
   }
   const auto end_of_line = text.find('\n');
   if (end_of_line != std::string::npos && end_of_line > 0 && text[end_of_line - 1] == '\r') {
@@ -182,7 +184,8 @@ void Interpreter::line(std::string_view text, std::size_t begin, std::size_t end
   if (words_.has('N')) {
     const double n = words_['N'].value;
     if (n < 0.0 || n > 99'999'999.0) {
-      fail("sequence number N outside 0 ... 99999999", words_['N'].column);
+      fail("sequence number N" + std::to_string(static_cast<std::int64_t>(n)) + " outside 0 ... 99999999",
+           words_['N'].column);
     }
   }
   const ModalState before = state_;
@@ -193,7 +196,7 @@ void Interpreter::line(std::string_view text, std::size_t begin, std::size_t end
   if (words_.has('F')) {
     const double feed = words_['F'].value;
     if (feed < 0.0) {
-      fail("feed F is negative", words_['F'].column);
+      fail("feed F" + std::to_string(feed) + " is negative", words_['F'].column);
     }
     const bool hundredths = state_.units == 20 && !words_['F'].has_point && !options_.calculator_decimal_point;
     state_.feed = hundredths ? feed * 0.01 : feed;

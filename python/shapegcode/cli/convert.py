@@ -8,7 +8,7 @@ import threading
 from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, load_machine, ratio, seconds
+from shapegcode.cli.options import add_machine_argument, load_machine, ratio, refuse_same_file, seconds
 
 __all__ = ["add_arguments", "run"]
 
@@ -62,10 +62,14 @@ def run(args: argparse.Namespace) -> int:
     if args.output == "-":
         raise ArgumentError("-o - : the program needs a file of its own; --json - writes the report to standard output")
     output = Path(args.output)
-    _refuse_input_as_output(Path(args.input), output)
+    if not output.name or output.is_dir():
+        raise ArgumentError(f"-o {args.output}: the output must be a file, not a folder")
     machine = load_machine(args)
     failed = output.with_name(output.name + machine.emission.failed_suffix)
-    _refuse_input_as_output(Path(args.input), failed)
+    read = [Path(args.input), Path(args.machine)]
+    refuse_same_file([output, failed], read)
+    if args.json not in (None, "-"):
+        refuse_same_file([Path(args.json)], [*read, output, failed])
     # The solvers load while the program is read.
     threading.Thread(target=importlib.import_module, args=("shapegcode.shaping",), daemon=True).start()
     with progress(f"converting {args.input}", args.json) as bar:
@@ -79,21 +83,20 @@ def run(args: argparse.Namespace) -> int:
             on_progress=lambda stage, done, total: bar.update(stages[stage] + 0.5 * done / total),
         )
         target = output if conversion.within_tolerance else failed
-        write_bytes(target, conversion.text)
         report = {**conversion.report, "output": str(target)}
         if args.plots is not None:
             from shapegcode.pictures import write_pictures
 
             report["plots"] = write_pictures(conversion, machine, args.plots)
-    if args.json is not None:
+        if args.json not in (None, "-"):
+            write_json(report, args.json)
+        # Last of all, so that no program stands there when something else could not be written.
+        write_bytes(target, conversion.text)
+    if args.json == "-":
         write_json(report, args.json)
     print_before_after(report, args.json)
-    output_console(args.json).print(f"wrote {target}", markup=False, soft_wrap=True)
+    console = output_console(args.json)
+    console.print(f"wrote {target}", markup=False, soft_wrap=True)
+    if target == failed and output.exists():
+        console.print(f"{output} is of an earlier run and was left alone", markup=False, soft_wrap=True)
     return ExitCode.OK if conversion.within_tolerance else ExitCode.OUT_OF_TOLERANCE
-
-
-def _refuse_input_as_output(source: Path, target: Path) -> None:
-    from shapegcode._core import ArgumentError
-
-    if target.exists() and source.exists() and target.samefile(source):
-        raise ArgumentError(f"{target} is the input: it is never overwritten, name another output")

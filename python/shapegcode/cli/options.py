@@ -6,6 +6,8 @@ import argparse
 import math
 import re
 import tomllib
+from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -77,6 +79,24 @@ def _toml_value(text: str) -> Any:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return text
+
+
+def refuse_same_file(targets: Iterable[Path], others: Iterable[Path]) -> None:
+    """Refuse to write a file that is read, or written otherwise, in the same run.
+
+    Raises:
+        ArgumentError: a target is one of the others.
+    """
+    from shapegcode._core import ArgumentError
+
+    others = list(others)
+    for target in targets:
+        for other in others:
+            same = target.exists() and other.exists() and target.samefile(other)
+            if same or target.absolute() == other.absolute():
+                raise ArgumentError(
+                    f"{target} would overwrite {other}, which this run reads or writes too: name another file"
+                )
 
 
 def ratio(text: str) -> float:

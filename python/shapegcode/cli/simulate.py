@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, load_machine
+from shapegcode.cli.options import add_machine_argument, load_machine, refuse_same_file
 
 __all__ = ["add_arguments", "run"]
 
@@ -47,6 +48,8 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.simulator import simulate
 
     machine = load_machine(args)
+    if args.json not in (None, "-"):
+        refuse_same_file([Path(args.json)], [Path(args.input), Path(args.machine)])
     with progress(f"playing {args.input}", args.json) as bar:
         program = Program.read(args.input, machine)
         # A program of ours says so; played as an ordinary one it would show figures of nothing.
