@@ -23,7 +23,7 @@ _RECORD_SAMPLES = 1_000_000
 _WHOLE_S = 10.0
 _AROUND_S = 1.5
 _BEFORE_STOP_S = 2.0
-_SAGITTA_MM = 1e-4
+_SAGITTA_MM = 1e-5
 _COARSE_STEP_RAD = 0.05
 
 FloatArray = npt.NDArray[np.float64]
@@ -176,7 +176,7 @@ def _piece(polyline: FloatArray, begin_mm: float, end_mm: float) -> FloatArray:
 
 
 def _polyline(path: _core.Path) -> FloatArray:
-    """The path as a polyline that is nowhere further than a tenth of a micrometre from its arcs."""
+    """The path as a polyline that is nowhere further than a hundredth of a micrometre from its arcs."""
     if path.largest_sweep_rad == 0.0:
         return path.polyline()
     parts = [path.start_mm[None, :]]

@@ -175,7 +175,7 @@ def test_polyline_is_close_to_large_arcs() -> None:
     text = "%\nO1\nG21G90G94G17\nG00X0Y0Z0\nG02X300.Y-300.I0.J-300.F3000\nM30\n%\n"
     points = pictures._polyline(Program.from_text(text.encode(), machine, source="arc").regions[0].path)
     middles = (points[1:] + points[:-1]) / 2
-    assert np.abs(np.linalg.norm(middles - [0, -300, 0], axis=1) - 300).max() < 1.01e-4
+    assert np.abs(np.linalg.norm(middles - [0, -300, 0], axis=1) - 300).max() < 1.01e-5
 
 
 def test_given_magnification_and_plane_are_used(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 #include "shapegcode/gcode/interpreter.hpp"
 
 #include <algorithm>
+#include <cstdio>
 #include <cstring>
 #include <optional>
 
@@ -32,7 +33,7 @@ void Interpreter::frame() {
     const auto at = static_cast<std::uint32_t>(
         1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(junk), '\n'));
     const std::size_t line_start = junk == 0 ? 0 : text.rfind('\n', junk - 1) + 1;
-    throw Error(ErrorKind::program, "byte 0x00: this is no program text", at,
+    throw Error(ErrorKind::program, "byte 0x00 at offset " + std::to_string(junk) + ": this is no program text", at,
                 static_cast<std::uint32_t>(junk - line_start + 1));
   }
   const auto end_of_line = text.find('\n');
@@ -196,7 +197,9 @@ void Interpreter::line(std::string_view text, std::size_t begin, std::size_t end
   if (words_.has('F')) {
     const double feed = words_['F'].value;
     if (feed < 0.0) {
-      fail("feed F" + std::to_string(feed) + " is negative", words_['F'].column);
+      char value[48];
+      std::snprintf(value, sizeof value, "feed F%g is negative", feed);
+      fail(value, words_['F'].column);
     }
     const bool hundredths = state_.units == 20 && !words_['F'].has_point && !options_.calculator_decimal_point;
     state_.feed = hundredths ? feed * 0.01 : feed;
