@@ -347,6 +347,7 @@ def _report(
             "amplitudes": [float(a) for a in grid.shaper.amplitudes],
         },
         "blocks": {"read": program.core.block_count, "emitted": written.blocks},
+        "bytes_read": program.core.size,
         "bytes_emitted": len(written.text),
         **figures,
         "limits": {

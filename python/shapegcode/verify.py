@@ -312,8 +312,8 @@ def _region_summary(figures: RegionFigures, place: Placed, machine: Machine) -> 
     rounding_um = tolerance.residual_floor_increments * increment_um
     before = figures.original.residual_mm * 1e3
     after = np.max([run.residual_mm for run in figures.emitted], axis=0) * 1e3
-    for axis, was, now in zip("XYZ", before, after, strict=True):
-        limit = max(tolerance.residual_ratio * was, tolerance.residual_floor_um, rounding_um)
+    limits = [max(tolerance.residual_ratio * was, tolerance.residual_floor_um, rounding_um) for was in before]
+    for axis, now, limit in zip("XYZ", after, limits, strict=True):
         if now > limit:
             misses.append(f"residual vibration {axis} {now:.2f} um, limit {limit:.2f} um")
     contour = max(run.command.max_abs_mm for run in figures.emitted) * 1e3
@@ -327,6 +327,7 @@ def _region_summary(figures: RegionFigures, place: Placed, machine: Machine) -> 
             "emitted": max(run.duration_s for run in figures.emitted),
         },
         "residual_vibration_um": {"original": _xyz(before), "emitted": _xyz(after)},
+        "residual_limit_um": _xyz(limits),
         "contour_error_um": contour,
         "misses": misses,
     }

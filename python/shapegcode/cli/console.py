@@ -55,12 +55,12 @@ def output_console(json_target: str | None = None, *, file: TextIO | None = None
 
 def print_before_after(report: Mapping[str, Any], json_target: str | None = None) -> None:
     """Print the table original / emitted of a conversion's report, its warnings and the one next step."""
-    from shapegcode.report import before_after_table, next_step
+    from shapegcode.report import before_after_table, next_step, warning_table
 
     console = output_console(json_target)
     console.print(before_after_table(report))
-    for warning in report.get("warnings", ()):
-        console.print(f"warning: {warning}", markup=False)
+    if report.get("warnings"):
+        console.print(warning_table(report["warnings"]))
     console.print(f"next: {next_step(report)}", markup=False)
 
 

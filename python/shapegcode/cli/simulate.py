@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.cli.console import output_console, progress, write_json
     from shapegcode.converter import written_by_shapegcode
     from shapegcode.program import Program
-    from shapegcode.report import simulation_table
+    from shapegcode.report import simulation_table, warning_table
     from shapegcode.simulator import simulate
 
     machine = load_machine(args)
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
             program,
             machine,
             shaped=shaped,
-            record_samples=200_000 if args.plots is not None else 0,
+            record_samples=0,
             on_progress=lambda done, total: bar.update(done / total),
         )
         report = simulation.report
@@ -70,8 +70,8 @@ def run(args: argparse.Namespace) -> int:
         write_json(report, args.json)
     console = output_console(args.json)
     console.print(simulation_table(report))
-    for warning in report["warnings"]:
-        console.print(f"warning: {warning}", markup=False)
+    if report["warnings"]:
+        console.print(warning_table(report["warnings"]))
     if shaped:
         console.print("played block by block at its feed, as a shaped program", markup=False)
     else:
