@@ -1106,7 +1106,7 @@ class BlockMark:
     """
     An N word or comment to be written before the block that begins there.
     """
-    def __init__(self, period: typing.SupportsInt | typing.SupportsIndex, n_number: typing.SupportsInt | typing.SupportsIndex = -1, comment: str = '') -> None:
+    def __init__(self, period: typing.SupportsInt | typing.SupportsIndex, n_number: typing.SupportsInt | typing.SupportsIndex = -1, comment: bytes = b'') -> None:
         ...
 class WriterOptions:
     """

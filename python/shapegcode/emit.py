@@ -127,7 +127,7 @@ def emit_region(
             first_number, number = number, -1
         comment = program.core.slice(note.comment_offset, note.comment_offset + note.comment_length)
         if number >= 0 or comment:
-            marks.append(_core.BlockMark(period, number, comment.decode("latin-1")))
+            marks.append(_core.BlockMark(period, number, comment))
             breaks.add(period)
     fitted = _core.fit_blocks(command, sorted(breaks), fit)
 

@@ -13,9 +13,7 @@ _ROOT = Path(__file__).resolve().parents[2]
 @functools.cache
 def _linuxcnc_folder() -> Path:
     """The unpacked LinuxCNC packages, fetched when missing. Without rs274 a test fails, it does not skip."""
-    fetch = subprocess.run(
-        [_ROOT / "tests" / "tools" / "fetch_rs274.sh"], capture_output=True, text=True, check=False
-    )
+    fetch = subprocess.run([_ROOT / "tests" / "tools" / "fetch_rs274.sh"], capture_output=True, text=True, check=False)
     if fetch.returncode != 0:
         raise RuntimeError(f"rs274 could not be fetched: {fetch.stderr}")
     return Path(fetch.stdout.splitlines()[-1])

@@ -368,15 +368,15 @@ def fuzz(seed: int, count: int) -> None:
 
 
 def test_changed_bytes_never_crash() -> None:
-    fuzz(seed=1, count=150)
+    fuzz(seed=1, count=100)
 
 
 @pytest.mark.slow
 def test_many_changed_bytes_never_crash() -> None:
-    fuzz(seed=2, count=600)
+    fuzz(seed=2, count=400)
 
 
-@settings(max_examples=300, suppress_health_check=list(HealthCheck))
+@settings(max_examples=200, suppress_health_check=list(HealthCheck))
 @given(st.binary(max_size=300))
 def test_binary_never_crashes(data: bytes) -> None:
     survives(data, machine_with())
@@ -394,7 +394,7 @@ NUMBERS = st.one_of(
 )
 
 
-@settings(max_examples=300, suppress_health_check=list(HealthCheck))
+@settings(max_examples=200, suppress_health_check=list(HealthCheck))
 @given(st.lists(st.tuples(LETTERS, NUMBERS), max_size=60))
 def test_words_at_random_never_crash(words: list[tuple[str, str]]) -> None:
     body = "".join(a + b for a, b in words)

@@ -56,7 +56,7 @@ def test_sample_program(name: str) -> None:
     """Text, states, end points, sweeps and N words (in `convert`); then block durations and the report's figures."""
     judged = sample(name)
     whole_periods(judged)
-    check_figures(judged, contour_budget_s=5.0)
+    check_figures(judged, contour_budget_s=3.0)
     report = judged.conversion.report
     assert report["within_tolerance"], report["warnings"]
     assert report["blocks"]["read"] == sum(
@@ -65,7 +65,7 @@ def test_sample_program(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["CONTOUR_R.NC", "PROGRAM2.NC", "TEST_G90.NC"])
+@pytest.mark.parametrize("name", ["CONTOUR_R.NC", "TEST_G90.NC"])
 def test_contour_of_whole_sample(name: str) -> None:
     """Every region's contour error, however long it is."""
     check_figures(sample(name), contour_budget_s=1e9)
@@ -137,7 +137,12 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "G93 to G94": (part("G93G1X10.F30.\nY10.F15.\nG94X0F200\n"), {}),
     "G52": (part("G1X10.F600\nY5.\nG52X100.\nG1X-80.\nG52X0\nG1X0\n"), {}),
     "G92": (part("G1X10.F600\nY5.\nG92X100.\nG1X120.\nG1X0\n"), {}),
-    "idle codes": (part("G1X10.F600\nG54\nY5.\nG21\nX0.\nG40G1Y0.\n"), {}),
+    "idle codes": (part("G1X10.F600\nG54\nY5.\nG21\nX0.\nG49\nG40G1Y0.\n"), {}),
+    "lower case": (part("G1X10.F600\nY5.\n").lower(), {}),
+    "LF CR CR": (part("G1X10.F600\nY5.\n").replace("\n", "\n\r\r"), {}),
+    "R negative": (part("G1X10.F900\nG2X20.Y0R-20.\nG3X10.R-6.\n"), {}),
+    "full circles": (part("G1X10.F900\nG2I-10.\nG3I-10.F300\nG2X10.Y0I5.\n"), {}),
+    "block skip of modes": (part("G1X10.F600\n/N20G1Y5.\nN30X20.Y5.\n/G91\nG90G1X0\nY0\n"), {}),
     "optional skip": (part("G1X10.F600\n/Y5.\nX20.Y0\n/M8\nX30.\n"), {}),
     "dwell": (part("G1X10.F600\nG4P500\nX20.\nG04X.5\nX30.\n"), {}),
     "M S T": (part("G1X10.F600\nX20.M8\nS500\nX30.\nM0\nY5.\nT2\nY0.\n"), {}),
@@ -187,7 +192,7 @@ def case(name: str) -> Judged:
 def test_case(name: str) -> None:
     judged = case(name)
     whole_periods(judged)
-    check_figures(judged, contour_budget_s=5.0)
+    check_figures(judged, contour_budget_s=3.0)
 
 
 CRLF_CASES = ("inch", "G61", "three planes", "comments", "comments around words", "N alone", "tiny", "G93 to G94",
@@ -241,6 +246,15 @@ def test_program_without_cutting_moves_stays_as_it_is(text: str) -> None:
     assert judged.conversion.text == text.encode()
     assert judged.conversion.report["regions"] == []
     assert any("unchanged" in w for w in judged.conversion.report["warnings"])
+
+
+def test_bytes_of_a_comment_are_kept() -> None:
+    """Whatever code page a shop's comments are in: their bytes are not the converter's."""
+    text = part("G1X10.F600(\xe9)\n(\xfc\xb5)\nX0\n").encode("latin-1")
+    machine = machine_with()
+    lines = sg.convert(sg.Program.from_text(text, machine), machine).text.split(b"\n")
+    assert b"(\xe9)" in lines
+    assert b"(\xfc\xb5)" in lines
 
 
 def test_what_is_not_supported_is_kept_with_a_warning() -> None:
@@ -344,7 +358,7 @@ def check_made_up(text: str) -> None:
     check_figures(judged, contour_budget_s=1.0)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
 @given(programs(max_contours=2, max_elements=5))
 def test_made_up_program(text: str) -> None:
     check_made_up(text)

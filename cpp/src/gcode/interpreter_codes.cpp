@@ -221,6 +221,10 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
           const double offset = length_mm(words_[letter]);
           state_.position_mm[axis] -= offset - local_offset_[axis];
           local_offset_[axis] = offset;
+          // Behind a G52 that may not have run the step from the old offset is not known.
+          const auto i = static_cast<std::size_t>(axis);
+          state_.known[i] = state_.known[i] && !local_offset_uncertain_[i];
+          local_offset_uncertain_[i] = block_.optional_skip;
         }
       }
       return;

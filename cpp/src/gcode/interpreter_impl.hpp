@@ -92,8 +92,9 @@ class Interpreter {
   bool distance_given_ = false;
   bool ended_ = false;
   bool look_ahead_ = false;  ///< a look-ahead mode was switched on by the program
-  bool framed_ = false;  ///< has its '%' lines
+  bool framed_ = false;      ///< has its '%' lines
   Vector3 local_offset_ = Vector3::Zero();
+  std::array<bool, axis_count> local_offset_uncertain_ = {false, false, false};  ///< set in a '/' block
   CannedCycle cycle_;
   double cycle_r_ = 0.0;
   double cycle_z_ = 0.0;

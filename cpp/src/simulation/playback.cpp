@@ -164,7 +164,7 @@ std::span<const Segment> last_blocks(std::span<const Segment> blocks, double sec
 
 }  // namespace
 
-PlaybackFigures play_path(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
+PlaybackFigures play_path(const std::shared_ptr<const Path>& path, std::shared_ptr<const SpeedProfile> profile,
                           const PlaybackOptions& options) {
   Interpolator interpolator(path, std::move(profile), options.period_s);
   return play(*path, options, options.axis_filters.empty(),

@@ -45,7 +45,7 @@ _DUST = 1e-6
 
 
 #: Groups whose codes are weak where they change nothing: G40 in a safe line, G21 in a metric program.
-IDLE_GROUPS = frozenset(("comp", "units", "return_level", "wcs"))
+IDLE_GROUPS = frozenset(("comp", "units", "return_level", "wcs", "length_offset"))
 
 
 def is_strong(record: LineRecord, inserted: frozenset[str] = frozenset()) -> bool:

@@ -17,6 +17,9 @@ namespace shapegcode {
 /// under the constant-time law, ramps are stretched to the time constant where a neighbouring steady stretch leaves
 /// room. A jerk time smooths distance over time by a moving average of that length; the slow stretches around corners
 /// are lengthened by half of it on both sides, so that smoothing does not raise the speed at the corner.
+///
+/// Behind a jerk time the acceleration of an axis may exceed its limit where segments of different direction meet at
+/// speed (there the corner limits bound what happens), and jerk on arcs is not bounded.
 [[nodiscard]] SpeedProfile plan_speed(const Path& path, const MotionLimits& limits);
 
 /// Highest speed at which segment `i` may be run under the limits.

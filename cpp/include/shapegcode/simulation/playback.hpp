@@ -43,8 +43,8 @@ struct PlaybackFigures {
 
 /// Plays a path under a speed profile (a controller with look-ahead) through filters and plant. Streams: memory does
 /// not grow with the length of the run.
-[[nodiscard]] PlaybackFigures play_path(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
-                                        const PlaybackOptions& options);
+[[nodiscard]] PlaybackFigures play_path(const std::shared_ptr<const Path>& path,
+                                        std::shared_ptr<const SpeedProfile> profile, const PlaybackOptions& options);
 
 /// Plays blocks at their feed (a controller without look-ahead), measured against the programmed `path`.
 [[nodiscard]] PlaybackFigures play_blocks(std::span<const Segment> blocks, const Path& path, BlockEnd block_end,
