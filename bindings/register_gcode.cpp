@@ -62,7 +62,7 @@ void register_gcode(py::module_& module) {
       .def_readwrite("length_number", &ModalState::length_number, "H.")
       .def_readwrite("cycle", &ModalState::cycle, "Group 09: 73 ... 89, 80 = none.")
       .def_readwrite("cycle_return", &ModalState::cycle_return, "Group 10: 98, 99.")
-      .def_readwrite("coordinate_system", &ModalState::coordinate_system, "Group 14: 54 ... 59.")
+      .def_readwrite("coordinate_system", &ModalState::coordinate_system, "Group 14: 54 ... 59; 541 for G54.1.")
       .def_readwrite("exact_stop", &ModalState::exact_stop, "Group 15: 61 ... 64.")
       .def_readwrite("feed", &ModalState::feed, "F as programmed; 0 before the first.")
       .def_readonly("position_mm", &ModalState::position_mm, "Position in the active work coordinates, shape (3,), mm.")
