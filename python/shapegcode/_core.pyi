@@ -593,7 +593,7 @@ class ModalState:
     @property
     def coordinate_system(self) -> int:
         """
-        Group 14: 54 ... 59.
+        Group 14: 54 ... 59; 541 for G54.1.
         """
     @coordinate_system.setter
     def coordinate_system(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
