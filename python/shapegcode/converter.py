@@ -153,27 +153,25 @@ def convert(
         )
     grid = choose_grid(machine, block_period_s)
     ratio = machine.shaping.arc_feed_ratio if arc_feed_ratio is None else arc_feed_ratio
-    for region in program.regions:
-        _refuse_endless(program, region, grid)
+    program.refuse_endless(_MOST_PERIODS * grid.block_period_s)
+    reasons = [_why_kept(region, machine) for region in program.regions]
     room_um = [machine.tolerance.contour_um * _CONTOUR_MARGIN] * len(program.regions)
     # The originals are played on the other cores while this one shapes.
     pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
     try:
-        originals = [
-            pool.submit(play_original, region.path, machine)
-            for region in program.regions
-            if not _why_kept(region, machine)
-        ]
+        playbacks = [pool.submit(play_original, region.path, machine) for region in program.regions]
+        originals = [playback for playback, reason in zip(playbacks, reasons, strict=True) if not reason]
         for attempt in range(_ATTEMPTS):
             stage = "shaping" if attempt == 0 else "shaping again, slower"
-            written = _write(program, machine, grid, ratio, room_um, partial(on_progress, stage))
+            written = _write(program, machine, grid, ratio, reasons, room_um, partial(on_progress, stage))
             emitted = read_back(written.text, written.placed, machine)
             figures = measure(emitted, written.placed, originals, machine, pool, partial(on_progress, "round trip"))
             if attempt + 1 == _ATTEMPTS or not _tighten(room_um, program, written.placed, figures, machine):
                 break
+        kept_s = sum(play.result().duration_s for play, reason in zip(playbacks, reasons, strict=True) if reason)
     finally:
         pool.shutdown(cancel_futures=True)
-    report = _report(program, machine, grid, written, summarise(figures, written.placed, machine))
+    report = _report(program, machine, grid, written, kept_s, summarise(figures, written.placed, machine))
     verdict = _VERDICT_GOOD if report["within_tolerance"] else _VERDICT_BAD
     text = written.text.replace(_VERDICT_PENDING, verdict, 1)
     return Conversion(text, report, emitted, tuple(written.placed))
@@ -187,7 +185,6 @@ class _Written:
     placed: list[Placed]
     blocks: int
     kept_warnings: list[str]
-    kept_s: float
 
 
 def _tighten(
@@ -213,12 +210,12 @@ def _write(
     machine: Machine,
     grid: Grid,
     arc_feed_ratio: float,
+    reasons: list[str],
     room_um: list[float],
     on_progress: Callable[[int, int], None],
 ) -> _Written:
     core = program.core
     regions = program.regions
-    reasons = [_why_kept(region, machine) for region in regions]
     line_end = core.line_end.encode()
     parts: list[bytes] = []
     line = 1
@@ -234,35 +231,26 @@ def _write(
     position = core.header_offset
     placed: list[Placed] = []
     kept: list[str] = []
-    kept_s = 0.0
     blocks = 0
     for done, (region, reason, room) in enumerate(zip(regions, reasons, room_um, strict=True), start=1):
         put(core.slice(position, region.text_begin))
         position = region.text_end
         if reason:
             kept.append(_keep(program, region, machine, reason))
-            kept_s += play_original(region.path, machine).duration_s
             put(core.slice(region.text_begin, region.text_end))
             continue
         try:
             limits = motion_limits(machine, arc_feed_ratio=arc_feed_ratio, grid=grid, contour_tolerance_um=room)
             shaped = emit_region(program, region, machine, grid, limits)
         except _core.ArgumentError as error:
-            raise _region_error(program, region, str(error)) from error
+            raise program.region_error(region, str(error)) from error
         first = line
         put(shaped.text)
         placed.append(Placed(region, first, line - 1))
         blocks += shaped.blocks
         on_progress(done, len(regions))
     put(core.slice(position, core.size))
-    return _Written(b"".join(parts), placed, blocks, kept, kept_s)
-
-
-def _refuse_endless(program: Program, region: _core.Region, grid: Grid) -> None:
-    time_s = region.path.programmed_time_s
-    if time_s > _MOST_PERIODS * grid.block_period_s:
-        limit = _MOST_PERIODS * grid.block_period_s
-        raise _region_error(program, region, f"{time_s:.0f} s of cutting without a stop (limit {limit:.0f} s)")
+    return _Written(b"".join(parts), placed, blocks, kept)
 
 
 def _why_kept(region: _core.Region, machine: Machine) -> str:
@@ -277,16 +265,9 @@ def _why_kept(region: _core.Region, machine: Machine) -> str:
 def _keep(program: Program, region: _core.Region, machine: Machine, reason: str) -> str:
     """The warning for a region that keeps its text."""
     if machine.input.arc_centre == "absolute" and region.path.largest_sweep_rad > 0.0:
-        raise _region_error(program, region, f"{reason}; its arcs have absolute centres and cannot be kept as they are")
+        raise program.region_error(region, f"{reason}; its arcs have absolute centres and cannot be kept as they are")
     first, last = region.first_line, region.last_line
     return f"{program.source}:{first}: lines {first} to {last} kept untouched: {reason}"
-
-
-def _region_error(program: Program, region: _core.Region, message: str) -> _core.ProgramError:
-    first, last = region.first_line, region.last_line
-    error = _core.ProgramError(f"{program.source}:{first}:1: lines {first} to {last}: {message}")
-    error.__dict__.update(line=first, column=1)
-    return error
 
 
 def _header(machine: Machine, grid: Grid) -> list[str]:
@@ -314,14 +295,14 @@ def _plain(text: str) -> str:
 
 
 def _report(
-    program: Program, machine: Machine, grid: Grid, written: _Written, figures: dict[str, Any]
+    program: Program, machine: Machine, grid: Grid, written: _Written, kept_s: float, figures: dict[str, Any]
 ) -> dict[str, Any]:
     placed = written.placed
     warnings = [*program.warnings, *written.kept_warnings]
     cutting = {
         which: sum(region["time_s"][which] for region in figures["regions"]) for which in ("original", "emitted")
     }
-    other = written.kept_s + other_time_s(program.core.other_moves, machine)
+    other = kept_s + other_time_s(program.core.other_moves, machine)
     prefill = machine.emission.prefill_dwell_s * len(placed)
     if not placed:
         warnings.append(f"{program.source}: no cutting moves that can be shaped: the text is unchanged")

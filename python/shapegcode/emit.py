@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.program import MM_PER_INCH, Program
+from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 
 _DEGREE = math.pi / 180.0
 _PLUNGE_CORNER_DEG = 45.0
@@ -103,7 +103,7 @@ def emit_region(
 
     inch = region.exit.units == 20
     unit = MM_PER_INCH if inch else 1.0
-    increment = (machine.controller.least_increment_inch if inch else machine.controller.least_increment_mm) * unit
+    increment = least_increment_mm(machine, region.exit.units)
     feed_decimals = machine.controller.feed_decimals_inch if inch else machine.controller.feed_decimals_mm
     fit = _core.FitOptions()
     fit.increment_mm = increment

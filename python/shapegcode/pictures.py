@@ -44,10 +44,9 @@ def write_pictures(conversion: Conversion, machine: Machine, folder: str | Path)
     place = conversion.placed[int(np.argmax(residuals))]
     path = place.region.path
     blocks = conversion.emitted.core.cutting_path(place.first_line, place.last_line)
-    rule = getattr(_core.BlockEnd, machine.controller.block_end)
     runs = {
         "original": play_original(path, machine, record_samples=_RECORD_SAMPLES),
-        "emitted": play_emitted(blocks, path, machine, rule, record_samples=_RECORD_SAMPLES),
+        "emitted": play_emitted(blocks, path, machine, record_samples=_RECORD_SAMPLES),
     }
     traces = [_trace(label, run, machine) for label, run in runs.items()]
     part = _part(place.region.first_line, place.region.last_line, len(residuals), runs["original"], traces[0])

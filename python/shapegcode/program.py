@@ -102,9 +102,7 @@ class Program:
             return cls(_core.read_program(data, options), source)
         except ProgramError as error:
             hint = _absolute_centre_hint(data, options) if _ARC_OFF_RADIUS in str(error) else ""
-            located = ProgramError(f"{source}:{error.line}:{error.column}: {error}{hint}")
-            located.__dict__.update(line=error.line, column=error.column)
-            raise located from None
+            raise _located(source, error.line, error.column, f"{error}{hint}") from None
 
     @property
     def regions(self) -> list[_core.Region]:
@@ -115,6 +113,34 @@ class Program:
     def warnings(self) -> list[str]:
         """What the reader noticed, each ``source:line: text``."""
         return [f"{self.source}:{line}: {message}" for line, message in self.core.warnings]
+
+    def region_error(self, region: _core.Region, message: str) -> ProgramError:
+        """An error that names the file and the lines of a region."""
+        first, last = region.first_line, region.last_line
+        return _located(self.source, first, 1, f"lines {first} to {last}: {message}")
+
+    def refuse_endless(self, limit_s: float) -> None:
+        """Refuse a region that cuts for longer than can be computed.
+
+        Raises:
+            ProgramError: a region takes more than `limit_s` at its programmed feeds.
+        """
+        for region in self.regions:
+            time_s = region.path.programmed_time_s
+            if time_s > limit_s:
+                raise self.region_error(region, f"{time_s:.0f} s of cutting without a stop (limit {limit_s:.0f} s)")
+
+
+def least_increment_mm(machine: Machine, units: int) -> float:
+    """Least increment of the words of a program in G20 or G21, mm."""
+    controller = machine.controller
+    return controller.least_increment_inch * MM_PER_INCH if units == 20 else controller.least_increment_mm
+
+
+def _located(source: str, line: int, column: int, message: str) -> ProgramError:
+    error = ProgramError(f"{source}:{line}:{column}: {message}")
+    error.__dict__.update(line=line, column=column)
+    return error
 
 
 def _absolute_centre_hint(text: bytes, options: _core.ReaderOptions) -> str:

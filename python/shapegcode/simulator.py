@@ -63,16 +63,6 @@ class Simulation:
         return _play(run.path, self.machine, self.shaped, record_samples)
 
 
-def _refuse_endless(program: Program, region: _core.Region, period_s: float) -> None:
-    time_s = region.path.programmed_time_s
-    if time_s > _MOST_SAMPLES * period_s:
-        first, last = region.first_line, region.last_line
-        raise _core.ArgumentError(
-            f"{program.source}:{first}:1: lines {first} to {last}: {time_s:.0f} s of cutting without a stop "
-            f"(limit {_MOST_SAMPLES * period_s:.0f} s)"
-        )
-
-
 def simulate(
     program: Program,
     machine: Machine,
@@ -92,10 +82,10 @@ def simulate(
         on_progress: called with regions done and regions in all.
 
     Raises:
+        ProgramError: a region takes longer than can be computed.
         ArgumentError: a limit of the machine is not usable.
     """
-    for region in program.regions:
-        _refuse_endless(program, region, machine.controller.interpolation_period_s)
+    program.refuse_endless(_MOST_SAMPLES * machine.controller.interpolation_period_s)
     runs = []
     for done, region in enumerate(program.regions, start=1):
         path = region.path
@@ -142,5 +132,4 @@ def simulate(
 def _play(path: _core.Path, machine: Machine, shaped: bool, record_samples: int) -> _core.PlaybackFigures:
     if not shaped:
         return play_original(path, machine, record_samples=record_samples)
-    rule = getattr(_core.BlockEnd, machine.controller.block_end)
-    return play_emitted(path, path, machine, rule, record_samples=record_samples)
+    return play_emitted(path, path, machine, record_samples=record_samples)

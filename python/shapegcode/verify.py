@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.emit import motion_limits
 from shapegcode.machine import Machine
-from shapegcode.program import MM_PER_INCH, Program
+from shapegcode.program import Program, least_increment_mm
 
 OVERRIDES = (0.8, 0.9, 1.1, 1.2)
 _BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
@@ -102,6 +103,11 @@ def playback_options(machine: Machine, *, time_constant_s: float = 0.0, shift: f
     return options
 
 
+def _own_rule(machine: Machine) -> _core.BlockEnd:
+    rule: _core.BlockEnd = getattr(_core.BlockEnd, machine.controller.block_end)
+    return rule
+
+
 def play_original(path: _core.Path, machine: Machine, *, record_samples: int = 0) -> _core.PlaybackFigures:
     """A programmed path as the controller plays an ordinary program."""
     controller = machine.controller
@@ -116,14 +122,14 @@ def play_original(path: _core.Path, machine: Machine, *, record_samples: int = 0
             _core.Fir.moving_average(max(1, round(controller.bell_time_s / controller.interpolation_period_s))),
         ]
     options.record_samples = record_samples
-    return _core.play_blocks(path, path, getattr(_core.BlockEnd, controller.block_end), 1.0, options)
+    return _core.play_blocks(path, path, _own_rule(machine), 1.0, options)
 
 
 def play_emitted(
     blocks: _core.Path,
     path: _core.Path,
     machine: Machine,
-    block_end: _core.BlockEnd,
+    block_end: _core.BlockEnd | None = None,
     *,
     override: float = 1.0,
     contour: bool = True,
@@ -131,12 +137,12 @@ def play_emitted(
     shift: float = 0.0,
     record_samples: int = 0,
 ) -> _core.PlaybackFigures:
-    """Emitted blocks as the controller plays them, measured against the programmed path."""
+    """Emitted blocks as the controller plays them (None: by its own rule), measured against the programmed path."""
     options = playback_options(machine, time_constant_s=machine.controller.shaped_time_constant_s, shift=shift)
     options.measure_contour = contour
     options.last_seconds = last_seconds
     options.record_samples = record_samples
-    return _core.play_blocks(blocks, path, block_end, override, options)
+    return _core.play_blocks(blocks, path, block_end or _own_rule(machine), override, options)
 
 
 def read_back(text: bytes, placed: Sequence[Placed], machine: Machine) -> Program:
@@ -149,10 +155,11 @@ def read_back(text: bytes, placed: Sequence[Placed], machine: Machine) -> Progra
     emitted = Program.from_text(text, machine, source="emitted program", emitted=True, probe_lines=probes)
     states = emitted.core.probed
     for index, place in enumerate(placed):
-        _compare_states(states[2 * index], place.region.entry, place.first_line - 1, place.region.incremental)
-        _compare_states(states[2 * index + 1], place.region.exit, place.last_line, place.region.incremental)
+        region = place.region
+        _compare_states(states[2 * index], region.entry, place.first_line - 1, region.incremental, machine)
+        _compare_states(states[2 * index + 1], region.exit, place.last_line, region.incremental, machine)
         blocks = emitted.core.cutting_path(place.first_line, place.last_line)
-        _compare_ends(blocks, place)
+        _compare_ends(blocks, place, machine)
         if blocks.largest_sweep_rad >= _LARGEST_SWEEP_RAD:
             raise RoundTripError(
                 f"emitted arc between lines {place.first_line} and {place.last_line} sweeps "
@@ -179,29 +186,20 @@ def measure(
         pool: runs the playbacks.
         on_step: called with regions done and regions in all.
     """
-    controller_rule = getattr(_core.BlockEnd, machine.controller.block_end)
-    corner = [value / 60.0 for value in machine.controller.corner_speed_difference_mm_per_min.as_tuple()]
-    feeds = [axis.max_feed_mm_per_min / 60.0 for axis in machine.axes.as_tuple()]
+    limits = motion_limits(machine)
     memory_s = _vibration_memory_s(machine)
     running = []
     for place in placed:
         path = place.region.path
         blocks = emitted.core.cutting_path(place.first_line, place.last_line)
         runs = [pool.submit(play_emitted, blocks, path, machine, rule) for rule in _BLOCK_ENDS]
-        overrides = [
-            pool.submit(
-                play_emitted, blocks, path, machine, controller_rule,
-                override=ratio, contour=False, last_seconds=memory_s,
-            )
-            for ratio in OVERRIDES
-        ]  # fmt: skip
-        shifted = [
-            pool.submit(
-                play_emitted, blocks, path, machine, controller_rule, shift=shift, contour=False, last_seconds=memory_s
-            )
-            for shift in mode_shifts(machine)
-        ]
-        running.append((runs, overrides, shifted, pool.submit(_core.count_slowed_blocks, blocks, corner, feeds)))
+        residual = partial(play_emitted, blocks, path, machine, contour=False, last_seconds=memory_s)
+        overrides = [pool.submit(residual, override=ratio) for ratio in OVERRIDES]
+        shifted = [pool.submit(residual, shift=shift) for shift in mode_shifts(machine)]
+        slowed = pool.submit(
+            _core.count_slowed_blocks, blocks, limits.corner_speed_difference_mm_per_s, limits.max_feed_mm_per_s
+        )
+        running.append((runs, overrides, shifted, slowed))
     results: list[RegionFigures] = []
     for original, (runs, overrides, shifted, slowed) in zip(originals, running, strict=True):
         results.append(
@@ -306,9 +304,7 @@ def summarise(figures: Sequence[RegionFigures], placed: Sequence[Placed], machin
 def _region_summary(figures: RegionFigures, place: Placed, machine: Machine) -> dict[str, Any]:
     tolerance = machine.tolerance
     misses = []
-    inch = place.region.exit.units == 20
-    controller = machine.controller
-    increment_um = (controller.least_increment_inch * MM_PER_INCH if inch else controller.least_increment_mm) * 1e3
+    increment_um = least_increment_mm(machine, place.region.exit.units) * 1e3
     rounding_um = tolerance.residual_floor_increments * increment_um
     before = figures.original.residual_mm * 1e3
     after = np.max([run.residual_mm for run in figures.emitted], axis=0) * 1e3
@@ -333,7 +329,9 @@ def _region_summary(figures: RegionFigures, place: Placed, machine: Machine) -> 
     }
 
 
-def _compare_states(emitted: _core.ModalState, original: _core.ModalState, line: int, incremental: bool) -> None:
+def _compare_states(
+    emitted: _core.ModalState, original: _core.ModalState, line: int, incremental: bool, machine: Machine
+) -> None:
     for field in _STATE_FIELDS:
         was, now = getattr(original, field), getattr(emitted, field)
         if was != now and not (field == "feed" and original.feed_mode == 93):
@@ -342,18 +340,18 @@ def _compare_states(emitted: _core.ModalState, original: _core.ModalState, line:
         raise RoundTripError(f"emitted line {line}: known axes {emitted.known}, the original has {original.known}")
     if incremental:
         return
-    limit = _end_tolerance_mm(original.units)
+    limit = _end_tolerance_mm(machine, original.units)
     for axis, known, was, now in zip("XYZ", original.known, original.position_mm, emitted.position_mm, strict=True):
         if known and abs(was - now) > limit:
             raise RoundTripError(f"emitted line {line}: {axis} is at {now:.6f} mm, the original at {was:.6f} mm")
 
 
-def _compare_ends(blocks: _core.Path, place: Placed) -> None:
+def _compare_ends(blocks: _core.Path, place: Placed, machine: Machine) -> None:
     path = place.region.path
     travel = path.end_mm - path.start_mm
     gap = float(np.abs((blocks.end_mm - blocks.start_mm) - travel).max())
     # Start and end are rounded to the increment, each once.
-    limit = 2.0 * _end_tolerance_mm(place.region.exit.units)
+    limit = 2.0 * _end_tolerance_mm(machine, place.region.exit.units)
     if gap > limit:
         raise RoundTripError(
             f"shaped blocks of lines {place.region.first_line} to {place.region.last_line} end {gap * 1e3:.2f} um off "
@@ -361,9 +359,9 @@ def _compare_ends(blocks: _core.Path, place: Placed) -> None:
         )
 
 
-def _end_tolerance_mm(units: int) -> float:
+def _end_tolerance_mm(machine: Machine, units: int) -> float:
     # Half an increment: a program may carry more digits than the controller resolves.
-    return (0.5e-3 if units == 21 else 0.5e-4 * MM_PER_INCH) + 1e-9
+    return 0.5 * least_increment_mm(machine, units) + 1e-9
 
 
 def _xyz(values: Iterable[float]) -> dict[str, float]:

@@ -249,7 +249,9 @@ class Fitter {
       }
       if (end != position_ && (inside || !best)) {
         const double length = (to_mm(end) - to_mm(position_)).norm();
-        if (!best || feed(length, j - k + lent_)) {
+        if (const auto f = feed(length, j - k + lent_)) {
+          best = Candidate{{end, 0, *f, k, j - k + lent_, BlockKind::line, 2}, j - k};
+        } else if (!best) {
           best = line_to(end, length, k, j - k);
         }
       }

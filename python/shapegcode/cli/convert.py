@@ -8,7 +8,14 @@ import threading
 from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, load_machine, ratio, refuse_same_file, seconds
+from shapegcode.cli.options import (
+    add_machine_argument,
+    add_plots_argument,
+    load_machine,
+    ratio,
+    refuse_same_file,
+    seconds,
+)
 
 __all__ = ["add_arguments", "run"]
 
@@ -37,12 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="duration of the shortest block, for example 5ms (default: chosen for the modes)",
     )
-    parser.add_argument(
-        "--plots",
-        metavar="DIR",
-        default=None,
-        help="write pictures (PNG and SVG) of the region that vibrates most into this folder",
-    )
+    add_plots_argument(parser)
     add_json_argument(parser)
 
 

@@ -35,6 +35,16 @@ def add_machine_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_plots_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--plots DIR``."""
+    parser.add_argument(
+        "--plots",
+        metavar="DIR",
+        default=None,
+        help="write pictures (PNG and SVG) of the region that vibrates most into this folder",
+    )
+
+
 def load_machine(args: argparse.Namespace) -> Machine:
     """The machine of ``-m`` with the values of ``--set``.
 

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, load_machine, refuse_same_file
+from shapegcode.cli.options import add_machine_argument, add_plots_argument, load_machine, refuse_same_file
 
 __all__ = ["add_arguments", "run"]
 
@@ -24,12 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="IN was written by shapegcode: play its blocks at their feed, without look-ahead",
     )
-    parser.add_argument(
-        "--plots",
-        metavar="DIR",
-        default=None,
-        help="write pictures (PNG and SVG) of the region that vibrates most into this folder",
-    )
+    add_plots_argument(parser)
     add_json_argument(parser)
 
 
