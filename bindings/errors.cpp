@@ -47,6 +47,8 @@ void raise(const Error& error) {
   if (error.kind() == ErrorKind::program) {
     instance.attr("line") = error.line();
     instance.attr("column") = error.column();
+    instance.attr("alarm") = error.alarm();
+    instance.attr("file") = error.file();
   }
   PyErr_SetObject(type, instance.ptr());
 }
@@ -60,9 +62,12 @@ void register_errors(py::module_& module) {
       make_type(module, "ShapegcodeError", py::make_tuple(exception), "Base of every error that shapegcode raises."));
   base.inc_ref();
   types().program = make_type(module, "ProgramError", py::make_tuple(base),
-                              "The CNC program cannot be read; `line` and `column` count from 1, 0 if not known.");
+                              "The CNC program cannot be read; `line` and `column` count from 1, 0 if not known; "
+                              "`alarm`: FANUC's number, 0 if it has none; `file`: the text it speaks of, if another.");
   module.attr("ProgramError").attr("line") = 0;
   module.attr("ProgramError").attr("column") = 0;
+  module.attr("ProgramError").attr("alarm") = 0;
+  module.attr("ProgramError").attr("file") = "";
   types().design = make_type(module, "DesignError", py::make_tuple(base),
                              "The shaper asked for does not exist, or not on this grid.");
   types().argument =

@@ -13,9 +13,11 @@ class ShapegcodeError(Exception):
     """
 class ProgramError(ShapegcodeError):
     """
-    The CNC program cannot be read; `line` and `column` count from 1, 0 if not known.
+    The CNC program cannot be read; `line` and `column` count from 1, 0 if not known; `alarm`: FANUC's number, 0 if it has none; `file`: the text it speaks of, if another.
     """
+    alarm: typing.ClassVar[int] = 0
     column: typing.ClassVar[int] = 0
+    file: typing.ClassVar[str] = ''
     line: typing.ClassVar[int] = 0
 class DesignError(ShapegcodeError):
     """

@@ -170,10 +170,24 @@ void Interpreter::close_region() {
   region_->notes.resize(notes_kept_);
   if (!segments_.empty()) {
     region_->path = std::make_shared<const Path>(std::move(segments_));
+    add_step(StepKind::region, program_.regions.size());
+    program_.steps.back().line = region_->first_line;
     program_.regions.push_back(std::move(region_));
   }
   segments_ = {};
   region_.reset();
+}
+
+void Interpreter::add_step(StepKind kind, std::size_t index) {
+  program_.steps.push_back({kind, static_cast<std::uint32_t>(index), line_number_});
+}
+
+void Interpreter::add_move(const OtherMove& move) {
+  close_region();
+  if (move.dwell_s > 0.0 || move.segment.length_mm > 0.0) {
+    add_step(StepKind::move, program_.other_moves.size());
+    program_.other_moves.push_back(move);
+  }
 }
 
 void Interpreter::line(std::string_view text, std::size_t begin, std::size_t end) {

@@ -198,7 +198,7 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
       if (seconds < 0.0) {
         fail("dwell G04 is negative");
       }
-      program_.other_moves.push_back({make_line(state_.position_mm, state_.position_mm, 0.0, line_number_), seconds});
+      add_move({make_line(state_.position_mm, state_.position_mm, 0.0, line_number_), seconds});
       return;
     }
     case 920:
@@ -310,6 +310,20 @@ void Interpreter::change_coordinates(int number) {
 }
 
 void Interpreter::m_codes(LineFlow& flow) {
+  if (words_.has_any(letter_mask("MST"))) {
+    close_region();
+    MachineFunction function;
+    function.m_codes = words_.m_codes;
+    function.m_count = words_.m_count;
+    if (words_.has('T')) {
+      function.tool = static_cast<std::int64_t>(words_['T'].value);
+    }
+    if (words_.has('S')) {
+      function.spindle_rev_per_min = words_['S'].value;
+    }
+    add_step(StepKind::function, program_.functions.size());
+    program_.functions.push_back(function);
+  }
   for (int k = 0; k < words_.m_count; ++k) {
     flow.stop = true;
     switch (words_.m_codes[static_cast<std::size_t>(k)]) {

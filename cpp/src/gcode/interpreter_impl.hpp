@@ -61,6 +61,8 @@ class Interpreter {
   void look_ahead_switch(int g_tenths);
   void change_coordinates(int number);
   void close_region();
+  void add_move(const OtherMove& move);
+  void add_step(StepKind kind, std::size_t index);
   void note(std::size_t segment);
   void warn(const std::string& message);
   void warn_once(std::uint32_t& seen, const std::string& message);

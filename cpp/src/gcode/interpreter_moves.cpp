@@ -129,9 +129,7 @@ void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t beg
     if (foreign_ == 0) {
       OtherMove rapid{make_line(measurable ? state_.position_mm : to, to, 0.0, line_number_), 0.0};
       rapid.segment.kind = SegmentKind::rapid;
-      if (rapid.segment.length_mm > 0.0) {
-        program_.other_moves.push_back(rapid);
-      }
+      add_move(rapid);
       state_.position_mm = to;
       state_.known = known_after;
     }
@@ -189,7 +187,7 @@ void Interpreter::cut(const char* why_kept, const ModalState& before, std::size_
         segment = cutting_segment(to);
       }
       if (target(to, known_after, relative) && segment.feed_mm_per_s > 0.0 && segment.length_mm > 0.0) {
-        program_.other_moves.push_back({segment, 0.0});
+        add_move({segment, 0.0});
       }
       state_.position_mm = to;
       state_.known = known_after;
@@ -277,11 +275,13 @@ void Interpreter::cycle_block() {
     }
     OtherMove approach{make_line(state_.position_mm, hole, 0.0, line_number_), 0.0};
     approach.segment.kind = SegmentKind::rapid;
-    if (approach.segment.length_mm > 0.0) {
-      program_.other_moves.push_back(approach);
-    }
+    add_move(approach);
     if (state_.known[z] && rate > 0.0) {
-      state_.position_mm = expand_cycle(cycle_, hole, axis, rate, line_number_, program_.other_moves);
+      std::vector<OtherMove> moves;
+      state_.position_mm = expand_cycle(cycle_, hole, axis, rate, line_number_, moves);
+      for (const OtherMove& move : moves) {
+        add_move(move);
+      }
     } else {
       state_.position_mm = hole;
       if (cycle_.return_to_r) {

@@ -61,6 +61,23 @@ struct OtherMove {
   double dwell_s = 0.0;  ///< a wait instead of a move when > 0
 };
 
+/// M, S and T words of one block: what the clock may charge for, and which tool is in use.
+struct MachineFunction {
+  std::array<int, 6> m_codes = {};
+  int m_count = 0;
+  std::int64_t tool = -1;             ///< T, -1 if the block has none
+  double spindle_rev_per_min = -1.0;  ///< S, -1 if the block has none
+};
+
+enum class StepKind : std::uint8_t { region, move, function };
+
+/// What the machine does, in order: a region, another move or dwell, or machine functions.
+struct ProgramStep {
+  StepKind kind = StepKind::move;
+  std::uint32_t index = 0;  ///< into Program::regions, other_moves or functions
+  std::uint32_t line = 0;
+};
+
 /// A program read: the text to the letter, its regions, and everything between them.
 struct Program {
   std::string text;
@@ -71,6 +88,8 @@ struct Program {
   std::int64_t program_number = -1;  ///< O number, -1 if none
   std::vector<std::shared_ptr<Region>> regions;
   std::vector<OtherMove> other_moves;
+  std::vector<MachineFunction> functions;
+  std::vector<ProgramStep> steps;  ///< all of the three in the order in which they happen
   std::vector<Finding> warnings;
   ModalState final_state;
   std::vector<ModalState> probed;  ///< state behind each of ReaderOptions::probe_lines
