@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,13 +18,24 @@ MM_PER_INCH = 25.4
 _ARC_OFF_RADIUS = "off its radius"
 
 
-def reader_options(machine: Machine, *, emitted: bool = False, probe_lines: Sequence[int] = ()) -> _core.ReaderOptions:
+def reader_options(
+    machine: Machine,
+    *,
+    emitted: bool = False,
+    probe_lines: Sequence[int] = (),
+    program_number: int | None = None,
+    expand_compensation: bool = True,
+    collect_alarms: bool = False,
+) -> _core.ReaderOptions:
     """Settings with which the core reads a program of this machine.
 
     Args:
         machine: whose controller reads the text.
         emitted: the text was written by shapegcode: its arcs are FANUC's, whatever the original's were.
         probe_lines: ascending line numbers behind which the modal state is kept.
+        program_number: O number to play of a file that holds several; None: the first.
+        expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
+        collect_alarms: go on behind an alarm.
     """
     options = _core.ReaderOptions()
     options.calculator_decimal_point = machine.controller.calculator_decimal_point
@@ -37,6 +48,22 @@ def reader_options(machine: Machine, *, emitted: bool = False, probe_lines: Sequ
     offsets = machine.input.work_offsets
     if offsets:
         options.work_offsets_mm = [offsets.get(f"G{code}", (0.0, 0.0, 0.0)) for code in range(54, 60)]
+        options.extra_work_offsets_mm = {
+            int(name[6:]): offset for name, offset in offsets.items() if name.startswith("G54.1P")
+        }
+    options.tool_offsets = _tool_offsets(machine)
+    options.offset_memory = getattr(machine.controller, "offset_memory", "C")
+    options.retained_variables = {int(name): value for name, value in machine.input.variables.items()}
+    options.bindings = _bindings(machine)
+    options.program = -1 if program_number is None else program_number
+    options.opaque_programs = list(machine.input.opaque_programs)
+    options.subprogram_nesting = getattr(machine.controller, "nesting_limit_subprogram", 10)
+    options.max_steps = getattr(machine.controller, "max_program_steps", 10_000_000)
+    options.block_skip = [{"unknown": None, "on": True, "off": False}[machine.input.block_skip]] * 9
+    options.expand_compensation = expand_compensation
+    options.compensation_start_up = machine.input.compensation_start_up
+    options.scale_unit = machine.input.scale_unit
+    options.collect_alarms = collect_alarms
     state = _core.ModalState()
     state.motion = int(machine.power_on.motion[1:])
     state.plane = int(machine.power_on.plane[1:])
@@ -49,6 +76,51 @@ def reader_options(machine: Machine, *, emitted: bool = False, probe_lines: Sequ
     options.power_on = state
     options.probe_lines = list(probe_lines)
     return options
+
+
+def _tool_offsets(machine: Machine) -> dict[int, _core.ToolOffset]:
+    offsets: dict[int, _core.ToolOffset] = {}
+    tables = machine.input
+    for table, field in (
+        (tables.tool_length_mm, "length_mm"),
+        (tables.tool_length_wear_mm, "length_wear_mm"),
+        (tables.tool_radius_mm, "radius_mm"),
+        (tables.tool_radius_wear_mm, "radius_wear_mm"),
+    ):
+        for name, value in table.items():
+            setattr(offsets.setdefault(int(name), _core.ToolOffset()), field, value)
+    return offsets
+
+
+def _bindings(machine: Machine) -> _core.CodeBindings:
+    bindings = _core.CodeBindings()
+    bindings.g_macros = {round(float(name) * 10): program for name, program in machine.input.g_macros.items()}
+    bindings.m_macros = {int(name): program for name, program in machine.input.m_macros.items()}
+    bindings.m_subprograms = {int(name): program for name, program in machine.input.m_subprograms.items()}
+    bindings.tool_program = machine.input.tool_program or -1
+    return bindings
+
+
+_SUFFIXES = ("", ".nc", ".NC", ".cnc", ".CNC", ".txt", ".TXT", ".tap", ".TAP", ".prg", ".PRG", ".ngc")
+
+
+def program_loader(folders: Sequence[Path]) -> Callable[[int], tuple[str, bytes] | None]:
+    """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix.
+
+    Args:
+        folders: where to look, in this order.
+    """
+
+    def load(number: int) -> tuple[str, bytes] | None:
+        for folder in folders:
+            for stem in (f"O{number:04d}", f"O{number}", f"o{number:04d}", f"{number:04d}", f"O{number:08d}"):
+                for suffix in _SUFFIXES:
+                    path = folder / (stem + suffix)
+                    if path.is_file():
+                        return str(path), path.read_bytes()
+        return None
+
+    return load
 
 
 @dataclass(frozen=True)
@@ -64,8 +136,25 @@ class Program:
     source: str
 
     @classmethod
-    def read(cls, path: str | Path, machine: Machine | None = None) -> Program:
+    def read(
+        cls,
+        path: str | Path,
+        machine: Machine | None = None,
+        *,
+        program_number: int | None = None,
+        expand_compensation: bool = True,
+        collect_alarms: bool = False,
+    ) -> Program:
         """Read a program file as the controller of `machine` would (None: as that of the built-in ``vx500``).
+
+        Programs that it calls are looked for in the file, beside it, and in `input.program_folders`.
+
+        Args:
+            path: the file.
+            machine: whose controller reads it.
+            program_number: O number to play of a file that holds several; None: the first.
+            expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
+            collect_alarms: go on behind an alarm and keep all in `core.alarms`.
 
         Raises:
             ProgramError: the text is no program that can be read; the message starts with ``file:line:column``.
@@ -76,7 +165,15 @@ class Program:
         except OSError as error:
             # A failed read() does not name the file.
             raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
-        return cls.from_text(text, machine, source=str(path))
+        return cls.from_text(
+            text,
+            machine,
+            source=str(path),
+            program_number=program_number,
+            expand_compensation=expand_compensation,
+            collect_alarms=collect_alarms,
+            folder=Path(path).parent,
+        )
 
     @classmethod
     def from_text(
@@ -87,8 +184,14 @@ class Program:
         source: str = "<text>",
         emitted: bool = False,
         probe_lines: Sequence[int] = (),
+        program_number: int | None = None,
+        expand_compensation: bool = True,
+        collect_alarms: bool = False,
+        folder: Path | None = None,
     ) -> Program:
         """Read a program text; `source` names it in messages.
+
+        Programs that it calls are looked for in the text, in `folder` and in `input.program_folders`.
 
         Raises:
             ProgramError: the text is no program that can be read; the message starts with ``source:line:column``.
@@ -97,12 +200,23 @@ class Program:
 
         machine = machine or Machine.load("vx500")
         data = text.encode() if isinstance(text, str) else text
-        options = reader_options(machine, emitted=emitted, probe_lines=probe_lines)
+        options = reader_options(
+            machine,
+            emitted=emitted,
+            probe_lines=probe_lines,
+            program_number=program_number,
+            expand_compensation=expand_compensation,
+            collect_alarms=collect_alarms,
+        )
+        folders = [folder] if folder is not None else []
+        folders += [Path(name).expanduser() for name in machine.input.program_folders]
+        if folders:
+            options.load_program = program_loader(folders)
         try:
             return cls(_core.read_program(data, options), source)
         except ProgramError as error:
             hint = _absolute_centre_hint(data, options) if _ARC_OFF_RADIUS in str(error) else ""
-            raise _located(source, error.line, error.column, f"{error}{hint}") from None
+            raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
 
     @property
     def regions(self) -> list[_core.Region]:
@@ -112,12 +226,25 @@ class Program:
     @property
     def warnings(self) -> list[str]:
         """What the reader noticed, each ``source:line: text``."""
-        return [f"{self.source}:{line}: {message}" for line, message in self.core.warnings]
+        return [f"{file or self.source}:{line}: {message}" for line, _, _, message, file in self.core.warnings]
+
+    @property
+    def expanded_text(self) -> bytes:
+        """The plain program: calls, macros, coordinate modes and (unless kept) cutter compensation worked out.
+
+        The text to the letter where the program holds none of them.
+        """
+        return self.core.text
+
+    def place(self, line: int) -> str:
+        """``file:line`` of the source from which a line of the expanded text comes."""
+        number, file = self.core.origin(line)
+        return f"{file or self.source}:{number}"
 
     def region_error(self, region: _core.Region, message: str) -> ProgramError:
         """An error that names the file and the lines of a region."""
-        first, last = region.first_line, region.last_line
-        return _located(self.source, first, 1, f"lines {first} to {last}: {message}")
+        (first, file), (last, _) = self.core.origin(region.first_line), self.core.origin(region.last_line)
+        return located_error(file or self.source, first, 1, f"lines {first} to {last}: {message}")
 
     def refuse_endless(self, limit_s: float) -> None:
         """Refuse a region that cuts for longer than can be computed.
@@ -137,9 +264,10 @@ def least_increment_mm(machine: Machine, units: int) -> float:
     return controller.least_increment_inch * MM_PER_INCH if units == 20 else controller.least_increment_mm
 
 
-def _located(source: str, line: int, column: int, message: str) -> ProgramError:
+def located_error(source: str, line: int, column: int, message: str, alarm: int = 0) -> ProgramError:
+    """A ProgramError whose message starts with ``source:line:column``."""
     error = ProgramError(f"{source}:{line}:{column}: {message}")
-    error.__dict__.update(line=line, column=column)
+    error.__dict__.update(line=line, column=column, alarm=alarm, file=source)
     return error
 
 

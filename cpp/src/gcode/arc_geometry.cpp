@@ -40,11 +40,11 @@ Segment resolve_arc(const ArcWords& words, double feed_mm_per_s, std::uint32_t l
     const double half = 0.5 * chord;
     const double excess = half - std::abs(radius);
     if (radius == 0.0 || excess > 0.5 * words.tolerance_mm) {
-      throw Error(ErrorKind::program,
-                  format("arc radius R%.4f cannot span its chord of %.4f mm: half the chord is %.4f mm, tolerance %.4f "
-                         "(alarm 0020)",
-                         radius, chord, half, words.tolerance_mm),
-                  line, column);
+      throw alarm_error(
+          20,
+          format("arc radius R%.4f cannot span its chord of %.4f mm: half the chord is %.4f mm, tolerance %.4f", radius,
+                 chord, half, words.tolerance_mm),
+          line, column);
     }
     const double height = std::sqrt(std::max(0.0, radius * radius - half * half));
     // Counter-clockwise with R > 0 has its centre on the left of the chord; each sign change swaps the side.
@@ -58,13 +58,14 @@ Segment resolve_arc(const ArcWords& words, double feed_mm_per_s, std::uint32_t l
   const double difference = std::abs(start_radius - end_radius);
   if (start_radius <= coincident_mm || end_radius <= coincident_mm || difference > words.tolerance_mm) {
     constexpr char names[] = "XYZ";
-    throw Error(ErrorKind::program,
-                format("arc end is %.4f mm off its radius: start (%c%.4f %c%.4f), end (%c%.4f %c%.4f), centre (%c%.4f "
-                       "%c%.4f), start radius %.4f, end radius %.4f, tolerance %.4f mm (alarm 0020)",
-                       difference, names[a], words.start_mm[a], names[b], words.start_mm[b], names[a], words.end_mm[a],
-                       names[b], words.end_mm[b], names[a], centre[a], names[b], centre[b], start_radius, end_radius,
-                       words.tolerance_mm),
-                line, column);
+    throw alarm_error(
+        20,
+        format("arc end is %.4f mm off its radius: start (%c%.4f %c%.4f), end (%c%.4f %c%.4f), centre (%c%.4f "
+               "%c%.4f), start radius %.4f, end radius %.4f, tolerance %.4f mm",
+               difference, names[a], words.start_mm[a], names[b], words.start_mm[b], names[a], words.end_mm[a],
+               names[b], words.end_mm[b], names[a], centre[a], names[b], centre[b], start_radius, end_radius,
+               words.tolerance_mm),
+        line, column);
   }
 
   double sweep = two_pi;

@@ -60,6 +60,7 @@ Group group_of(int g_tenths) noexcept {
     case 570:
     case 580:
     case 590:
+    case 541:
       return Group::coordinates;
     case 610:
     case 620:
@@ -67,6 +68,7 @@ Group group_of(int g_tenths) noexcept {
     case 640:
       return Group::exact_stop;
     case 40:   // dwell
+    case 100:  // offsets by program
     case 90:   // exact stop, one block
     case 280:  // reference return
     case 300:
@@ -74,14 +76,18 @@ Group group_of(int g_tenths) noexcept {
     case 530:  // machine coordinates
     case 920:  // coordinate setting
       return Group::none;
-    case 150:  // polar coordinates off
+    case 150:
     case 160:
-    case 500:  // scaling off
-    case 501:  // mirror off
+      return Group::polar;
+    case 500:
     case 510:
+      return Group::scaling;
+    case 501:
     case 511:
-    case 680:  // rotation
+      return Group::mirror;
+    case 680:
     case 690:
+      return Group::rotation;
     case 121:  // polar interpolation
     case 131:
     case 431:
@@ -99,17 +105,16 @@ Group group_of(int g_tenths) noexcept {
     case 960:
     case 970:
       return Group::harmless;
-    case 100:  // offsets by program
     case 110:
     case 270:
     case 290:
     case 310:
-    case 541:
       return Group::unknown_position;
     case 650:
     case 660:
     case 661:
     case 670:
+      return Group::call;
     case 71:
       return Group::refused;
     default:
@@ -120,8 +125,10 @@ Group group_of(int g_tenths) noexcept {
 void sort_words(const Block& block, std::uint32_t line, BlockWords& words) {
   words.present = 0;
   words.g_count = 0;
+  words.groups = 0;
   words.m_count = 0;
   words.corner = nullptr;
+  words.duplicate = nullptr;
   for (const Word& word : block) {
     switch (word.letter) {
       case 'G': {
@@ -132,6 +139,9 @@ void sort_words(const Block& block, std::uint32_t line, BlockWords& words) {
         }
         words.g_tenths[static_cast<std::size_t>(words.g_count)] = code;
         words.g_column[static_cast<std::size_t>(words.g_count)] = word.column;
+        const Group group = group_of(code);
+        words.g_group[static_cast<std::size_t>(words.g_count)] = group;
+        words.groups |= group_bit(group);
         ++words.g_count;
         break;
       }
@@ -150,8 +160,7 @@ void sort_words(const Block& block, std::uint32_t line, BlockWords& words) {
       default: {
         const auto index = static_cast<std::size_t>(word.letter - 'A');
         if ((words.present >> index) & 1U) {
-          throw Error(ErrorKind::program, "address " + std::string(1, word.letter) + " is given twice in one block",
-                      line, word.column);
+          words.duplicate = words.duplicate != nullptr ? words.duplicate : &word;
         }
         words.present |= 1U << index;
         words.by_letter[index] = &word;

@@ -22,12 +22,19 @@ enum class Group : std::uint8_t {
   cycle_return = 10,
   coordinates = 14,
   exact_stop = 15,
+  mirror = 18,    ///< G50.1, G51.1
+  polar = 17,     ///< G15, G16
+  scaling = 11,   ///< G50, G51
+  rotation = 19,  ///< G68, G69 (group 16 of the control)
   foreign = 20,   ///< switches a mode that this reader passes through untouched
   harmless = 21,  ///< no effect on position or path
   unknown_position = 22,
   refused = 23,
   invalid = 24,
+  call = 25,  ///< macro calls G65, G66, G66.1, G67
 };
+
+constexpr std::uint32_t group_bit(Group group) noexcept { return 1U << static_cast<unsigned>(group); }
 
 /// Group of a G code given in tenths (G54.1 = 541).
 [[nodiscard]] Group group_of(int g_tenths) noexcept;
@@ -37,11 +44,14 @@ struct BlockWords {
   std::array<const Word*, 26> by_letter;
   std::array<int, 12> g_tenths;
   std::array<std::uint32_t, 12> g_column;
+  std::array<Group, 12> g_group;
+  std::uint32_t groups = 0;  ///< group_bit of every G code
   int g_count = 0;
   bool has_m = false;
   std::array<int, 6> m_codes;
   int m_count = 0;
-  const Word* corner = nullptr;  ///< ,R or ,C
+  const Word* corner = nullptr;     ///< ,R or ,C
+  const Word* duplicate = nullptr;  ///< of an address that stands twice: only a macro call may hold one
 
   [[nodiscard]] bool has(char letter) const noexcept { return (present >> (letter - 'A')) & 1U; }
   [[nodiscard]] bool has_any(std::uint32_t mask) const noexcept { return (present & mask) != 0; }
@@ -58,7 +68,7 @@ constexpr std::uint32_t letter_mask(const char* letters) {
   return mask;
 }
 
-/// Sorts the words. Throws Error(program) on an address given twice (G and M may repeat), too many G or M codes.
+/// Sorts the words (G and M may repeat). Throws Error(program) on too many G or M codes.
 void sort_words(const Block& block, std::uint32_t line, BlockWords& words);
 
 }  // namespace shapegcode::detail

@@ -1,9 +1,5 @@
-#include "shapegcode/gcode/interpreter.hpp"
-
 #include <algorithm>
 #include <cstdio>
-#include <cstring>
-#include <optional>
 
 #include "interpreter_impl.hpp"
 #include "shapegcode/error.hpp"
@@ -14,111 +10,18 @@ void Interpreter::fail(const std::string& message, std::uint32_t column) const {
   throw Error(ErrorKind::program, message, line_number_, std::max<std::uint32_t>(column, 1));
 }
 
-void Interpreter::warn(const std::string& message) { program_.warnings.push_back({line_number_, message}); }
+void Interpreter::alarm(int number, const std::string& message, std::uint32_t column) const {
+  throw alarm_error(number, message, line_number_, std::max<std::uint32_t>(column, 1));
+}
+
+void Interpreter::warn(const std::string& message) {
+  program_.warnings.push_back({origin_.line, message, 0, 0, program_.files[origin_.file]});
+}
 
 void Interpreter::warn_once(std::uint32_t& seen, const std::string& message) {
   if (seen++ == 0) {
     warn(message);
   }
-}
-
-// Where the program text proper begins and ends: between the first '%' and the next one.
-void Interpreter::frame() {
-  const std::string& text = program_.text;
-  if (text.find_first_not_of(" \t\r\n") == std::string::npos) {
-    throw Error(ErrorKind::program, "the file is empty", 1, 1);
-  }
-  const auto junk = text.find('\0');
-  if (junk != std::string::npos) {
-    const auto at = static_cast<std::uint32_t>(
-        1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(junk), '\n'));
-    const std::size_t line_start = junk == 0 ? 0 : text.rfind('\n', junk - 1) + 1;
-    throw Error(ErrorKind::program, "byte 0x00 at offset " + std::to_string(junk) + ": this is no program text", at,
-                static_cast<std::uint32_t>(junk - line_start + 1));
-  }
-  const auto end_of_line = text.find('\n');
-  if (end_of_line != std::string::npos && end_of_line > 0 && text[end_of_line - 1] == '\r') {
-    program_.line_end = "\r\n";
-  }
-  // Offsets of lines that start with '%'.
-  const auto percent_line = [&](std::size_t from) {
-    for (std::size_t at = text.find('%', from); at != std::string::npos; at = text.find('%', at + 1)) {
-      std::size_t k = at;
-      while (k > 0 && (text[k - 1] == ' ' || text[k - 1] == '\t' || text[k - 1] == '\r')) {
-        --k;
-      }
-      if (k == 0 || text[k - 1] == '\n') {
-        return at;
-      }
-    }
-    return std::string::npos;
-  };
-  const std::size_t first = percent_line(0);
-  const bool leads = first != std::string::npos && text.find_first_not_of(" \t\r\n") == first;
-  const std::size_t second = first == std::string::npos ? first : percent_line(first + 1);
-  const auto last_line = static_cast<std::uint32_t>(1 + std::count(text.begin(), text.end(), '\n'));
-  framed_ = first != std::string::npos;
-  // One '%' alone is half a tape: the other half is missing. None at all is a text without tape marks; then M30 or M02
-  // must show that it is whole.
-  if (framed_ && second == std::string::npos) {
-    if (leads) {
-      throw Error(ErrorKind::program, "no line '%' at the end of the program: truncated?", last_line, 1);
-    }
-    throw Error(ErrorKind::program, "a line '%' at the end of the program, but none at its start", 1, 1);
-  }
-  body_begin_ = 0;
-  body_end_ = text.size();
-  if (framed_) {
-    body_begin_ = std::min(text.find('\n', first), text.size() - 1) + 1;
-    body_end_ = second;
-  }
-  first_body_line_ = static_cast<std::uint32_t>(
-      1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(body_begin_), '\n'));
-  program_.header_offset = body_begin_;
-  program_.line_count = last_line - (text.back() == '\n' ? 1U : 0U);
-}
-
-Program Interpreter::run() {
-  frame();
-  const char* data = program_.text.data();
-  line_number_ = first_body_line_ - 1;
-  std::size_t begin = body_begin_;
-  const auto& probes = options_.probe_lines;
-  program_.probed.reserve(probes.size());
-  const auto probe = [&](std::uint32_t line_done) {
-    while (program_.probed.size() < probes.size() && probes[program_.probed.size()] <= line_done) {
-      program_.probed.push_back(state_);
-    }
-  };
-  probe(line_number_);
-  while (begin < body_end_) {
-    const void* hit = std::memchr(data + begin, '\n', body_end_ - begin);
-    const std::size_t next =
-        hit == nullptr ? body_end_ : static_cast<std::size_t>(static_cast<const char*>(hit) - data) + 1;
-    std::size_t stop = next;
-    while (stop > begin && (data[stop - 1] == '\n' || data[stop - 1] == '\r')) {
-      --stop;
-    }
-    ++line_number_;
-    if (!ended_) {
-      line(std::string_view(data + begin, stop - begin), begin, next);
-    }
-    probe(line_number_);
-    begin = next;
-  }
-  close_region();
-  if (!ended_ && !framed_) {
-    throw Error(ErrorKind::program, "the program has neither '%' lines nor an end M30 or M02: truncated?",
-                program_.line_count, 1);
-  }
-  if (!ended_) {
-    warn("the program does not end with M30 or M02");
-  } else if (!framed_) {
-    warn("the program has no '%' lines; a control that reads it over a line or from a tape needs them");
-  }
-  program_.final_state = state_;
-  program_.probed.resize(probes.size(), state_);
-  return std::move(program_);
 }
 
 double Interpreter::length_mm(const Word& word) const noexcept {
@@ -136,7 +39,8 @@ double Interpreter::feed_mm_per_s(double move_length_mm) const {
     }
     return state_.feed * move_length_mm / 60.0;
   }
-  return state_.feed * (state_.units == 20 ? mm_per_inch : 1.0) / 60.0;
+  const double per_turn = state_.feed_mode == 95 ? state_.spindle_rev_per_min : 1.0;
+  return state_.feed * per_turn * (state_.units == 20 ? mm_per_inch : 1.0) / 60.0;
 }
 
 void Interpreter::forget_axes(std::uint32_t letters) noexcept {
@@ -190,9 +94,30 @@ void Interpreter::add_move(const OtherMove& move) {
   }
 }
 
-void Interpreter::line(std::string_view text, std::size_t begin, std::size_t end) {
-  scan_block(text, line_number_, options_.max_line_length, block_);
-  detail::sort_words(block_, line_number_, words_);
+void Interpreter::scan(std::string_view text, std::uint32_t line) {
+  scan_block(text, line, options_.max_line_length, block_);
+  if (!block_.macro) {
+    detail::sort_words(block_, line, words_);
+  }
+}
+
+void Interpreter::require_single_words(std::uint32_t line) const {
+  if (words_.duplicate != nullptr) {
+    throw Error(ErrorKind::program,
+                "address " + std::string(1, words_.duplicate->letter) + " is given twice in one block", line,
+                words_.duplicate->column);
+  }
+}
+
+void Interpreter::finish() {
+  close_region();
+  program_.final_state = state_;
+}
+
+void Interpreter::execute(std::uint32_t line, const LineOrigin& origin, std::size_t begin, std::size_t end) {
+  line_number_ = line;
+  origin_ = origin;
+  require_single_words(line);
   if (block_.word_count > 0) {
     ++program_.block_count;
   }
@@ -219,15 +144,8 @@ void Interpreter::line(std::string_view text, std::size_t begin, std::size_t end
     state_.feed = hundredths ? feed * 0.01 : feed;
     state_.uncertain_groups &= ~feed_bit;
   }
-  if (words_.has('O')) {
-    const auto number = static_cast<std::int64_t>(words_['O'].value);
-    if (program_.program_number >= 0) {
-      fail("second program O" + std::to_string(number) + " in one file is not supported yet", words_['O'].column);
-    }
-    program_.program_number = number;
-    if (program_.regions.empty() && region_ == nullptr) {
-      program_.header_offset = end;
-    }
+  if (words_.has('S')) {
+    state_.spindle_rev_per_min = words_['S'].value;
   }
   flow.motion = words_.has_any(axis_letters | centre_letters) && !one_shot_axes_;
   if (words_.has_any(other_axis_letters)) {
@@ -244,18 +162,10 @@ void Interpreter::line(std::string_view text, std::size_t begin, std::size_t end
     note(segments_.size());
   }
   m_codes(flow);
-  if (block_.optional_skip) {
+  if (block_.optional_skip && !options_.block_skip[static_cast<std::size_t>(block_.skip_switch - 1)]) {
     optional_skip_block(before);
     foreign_ |= foreign_before;
   }
 }
 
 }  // namespace shapegcode::detail
-
-namespace shapegcode {
-
-Program read_program(std::string text, const ReaderOptions& options) {
-  return detail::Interpreter(std::move(text), options).run();
-}
-
-}  // namespace shapegcode

@@ -44,7 +44,7 @@ void Interpreter::read_codes(LineFlow& flow) {
     const int g = words_.g_tenths[static_cast<std::size_t>(k)];
     const std::uint32_t column = words_.g_column[static_cast<std::size_t>(k)];
     const int whole = g / 10;
-    const Group group = detail::group_of(g);
+    const Group group = words_.g_group[static_cast<std::size_t>(k)];
     // A no-op (G40 where nothing is compensated) leaves a block inside its region; a change ends it.
     const auto set = [&](int& field, bool keeps_region) {
       if (field != whole && !keeps_region) {
@@ -85,23 +85,15 @@ void Interpreter::read_codes(LineFlow& flow) {
             state_.known[static_cast<std::size_t>(i)] = false;
           }
         }
-        if (whole != 40 && state_.compensation == 40) {
-          warn("cutter compensation G" + std::to_string(whole) + " is not supported yet: passed through untouched");
-        }
         set(state_.compensation, false);
         break;
-      case Group::length_offset: {
-        const int number = words_.has('H') ? static_cast<int>(words_['H'].value) : state_.length_number;
-        if (whole != state_.length_offset || (whole != 49 && number != state_.length_number)) {
+      case Group::length_offset:
+        if (whole != state_.length_offset || words_.has('H')) {
           flow.stop = true;
-          state_.known[2] = false;
         }
-        if (whole == 49) {
-          foreign_ &= ~4U;
-        }
-        set(state_.length_offset, false);
+        length_offset(whole);
+        state_.uncertain_groups &= ~bit(group);
         break;
-      }
       case Group::cycle:
         flow.stop = true;
         if (whole == 80) {
@@ -118,12 +110,18 @@ void Interpreter::read_codes(LineFlow& flow) {
       case Group::cycle_return:
         set(state_.cycle_return, false);
         break;
-      case Group::coordinates:
-        if (whole != state_.coordinate_system) {
-          change_coordinates(whole);
+      case Group::coordinates: {
+        const int system = g == 541 ? g : whole;
+        const int extra = g != 541 ? 0 : words_.has('P') ? static_cast<int>(words_['P'].value) : 1;
+        if (system != state_.coordinate_system || extra != state_.coordinate_number) {
+          change_coordinates(system, extra);
+          flow.stop = true;
         }
-        set(state_.coordinate_system, false);
+        state_.coordinate_system = system;
+        state_.coordinate_number = extra;
+        state_.uncertain_groups &= ~bit(group);
         break;
+      }
       case Group::exact_stop:
         set(state_.exact_stop, false);
         break;
@@ -141,13 +139,8 @@ void Interpreter::read_codes(LineFlow& flow) {
         break;
       case Group::unknown_position:
         flow.stop = true;
-        if (g == 541) {  // G54.1 leaves G54 ... G59; X Y Z beside it are a move
-          state_.coordinate_system = g;
-          state_.uncertain_groups &= ~bit(Group::coordinates);
-        } else {
-          one_shot_axes_ = true;
-        }
-        if (words_.has_any(axis_letters) && g != 100 && g != 541) {
+        one_shot_axes_ = true;
+        if (words_.has_any(axis_letters)) {
           forget_axes(words_.present);
         } else {
           forget_all();
@@ -157,19 +150,169 @@ void Interpreter::read_codes(LineFlow& flow) {
         break;
       case Group::refused:
         fail("G" + std::to_string(whole) + (g % 10 != 0 ? "." + std::to_string(g % 10) : "") +
-                 " is not supported yet (macro call or cylindrical interpolation)",
+                 ": cylindrical interpolation is not supported",
              column);
       case Group::invalid:
       default:
-        fail("unknown G code G" + std::to_string(whole) + (g % 10 != 0 ? "." + std::to_string(g % 10) : ""), column);
+        alarm(10, "unknown G code G" + std::to_string(whole) + (g % 10 != 0 ? "." + std::to_string(g % 10) : ""),
+              column);
     }
   }
-  if (words_.has('H')) {
-    const int number = static_cast<int>(words_['H'].value);
-    if (state_.length_offset != 49 && number != state_.length_number) {
+  if (words_.has('H') && (words_.groups & group_bit(Group::length_offset)) == 0 && state_.length_offset != 49 &&
+      (words_.groups & group_bit(Group::none)) == 0) {
+    length_offset(state_.length_offset);  // H alone changes the offset in force
+  }
+}
+
+// G43 adds the offset of H to Z, G44 takes it away; the tip's coordinate shifts by the difference, where both are
+// known.
+void Interpreter::length_offset(int whole) {
+  const int number = whole == 49 ? 0 : words_.has('H') ? static_cast<int>(words_['H'].value) : state_.length_number;
+  const auto shift = [&](int code, int h) -> std::optional<double> {
+    const auto value = code == 49 ? std::optional<double>(0.0) : offsets_.length(h);
+    return value && code == 44 ? std::optional<double>(-*value) : value;
+  };
+  const auto before = shift(state_.length_offset, state_.length_number);
+  const auto after = shift(whole, number);
+  if (whole != state_.length_offset || (whole != 49 && number != state_.length_number)) {
+    if (before && after) {
+      state_.position_mm[2] += *before - *after;
+    } else {
       state_.known[2] = false;
     }
+  }
+  if (whole == 49) {
+    foreign_ &= ~4U;
+  } else {
     state_.length_number = number;
+  }
+  state_.length_offset = whole;
+}
+
+void Interpreter::dwell() {
+  double seconds = 0.0;
+  if (words_.has('P')) {
+    const Word& p = words_['P'];
+    if (p.has_point) {
+      alarm(7, "G04 P takes whole milliseconds: no decimal point", p.column);
+    }
+    seconds = p.value * 1e-3;
+  } else if (words_.has('X') || words_.has('U')) {
+    const Word& x = words_[words_.has('X') ? 'X' : 'U'];
+    seconds = x.has_point || options_.calculator_decimal_point ? x.value : x.value * 1e-3;
+  } else {
+    fail("G04 needs P (milliseconds) or X (seconds)");
+  }
+  if (seconds < 0.0) {
+    fail("dwell G04 is negative");
+  }
+  add_move({make_line(state_.position_mm, state_.position_mm, 0.0, line_number_), seconds});
+}
+
+// G10: offsets by program. What it sets is known from then on.
+void Interpreter::data_setting() {
+  const int kind = words_.has('L') ? static_cast<int>(words_['L'].value) : -1;
+  const int number = words_.has('P') ? static_cast<int>(words_['P'].value) : 0;
+  switch (kind) {
+    case 2:
+      if (number < 0 || number > 6) {
+        alarm(31, "G10 L2 P" + std::to_string(number) + ": P is 1 ... 6 for G54 ... G59, or 0", words_['P'].column);
+      }
+      if (number == 0) {
+        forget_all();  // the external offset moves every system
+        warn("G10 L2 P0 shifts all work offsets: position not known afterwards");
+        return;
+      }
+      data_work_offset(53 + number, 0);
+      return;
+    case 20:
+      if (number < 1 || number > 300) {
+        alarm(31, "G10 L20 P" + std::to_string(number) + ": P is 1 ... 300 for G54.1 P1 ... P300",
+              words_.has('P') ? words_['P'].column : 0);
+      }
+      data_work_offset(541, number);
+      return;
+    case -1:
+    case 1:
+    case 3:
+    case 10:
+    case 11:
+    case 12:
+    case 13:
+      if (kind != 3 && words_.has('P') && words_.has('R')) {
+        set_tool_offset(kind);
+        return;
+      }
+      break;
+    default:
+      break;
+  }
+  if (kind == -1 || kind == 50 || kind == 52 || kind == 3) {
+    return;  // parameters, tool life: nothing that moves an axis
+  }
+  forget_all();
+  warn("G10 is passed through untouched: position not known afterwards");
+}
+
+void Interpreter::data_work_offset(int coordinate_system, int number) {
+  for (int axis = 0; axis < axis_count; ++axis) {
+    const char letter = static_cast<char>('X' + axis);
+    if (words_.has(letter)) {
+      set_work_offset(coordinate_system, number, axis, length_mm(words_[letter]), state_.distance == 91);
+    }
+  }
+}
+
+void Interpreter::set_work_offset(int coordinate_system, int number, int axis, double value_mm, bool incremental) {
+  const auto i = static_cast<std::size_t>(axis);
+  const std::optional<double> before = offsets_.work(coordinate_system, number)[i];
+  std::optional<double> after = value_mm;
+  if (incremental) {
+    after = before ? std::optional<double>(*before + value_mm) : std::nullopt;
+  }
+  if (coordinate_system == state_.coordinate_system && number == state_.coordinate_number) {
+    if (incremental) {
+      state_.position_mm[axis] -= value_mm;
+    } else if (before) {
+      state_.position_mm[axis] -= value_mm - *before;
+    } else {
+      state_.known[i] = false;
+    }
+  }
+  offsets_.set_work(coordinate_system, number, axis, after);
+}
+
+void Interpreter::set_tool_offset(int kind) {
+  const int number = static_cast<int>(words_['P'].value);
+  if (number < 1 || number > 999) {
+    alarm(30, "G10: offset number P" + std::to_string(number) + " outside 1 ... 999", words_['P'].column);
+  }
+  ToolOffset offset = offsets_.tool(number);
+  const double value = length_mm(words_['R']);
+  const auto set = [&](std::optional<double>& field) {
+    field = state_.distance == 91 ? (field ? std::optional<double>(*field + value) : std::nullopt) : value;
+  };
+  // Memory A has one value for length and radius, B geometry and wear, C both for length (H) and radius (D).
+  const bool one = options_.offset_memory == 'A';
+  const bool shared = options_.offset_memory != 'C';
+  if (one || kind == 10 || (shared && kind != 11)) {
+    set(offset.length_mm);
+    if (shared) {
+      offset.radius_mm = offset.length_mm;
+    }
+  } else if (kind == 11 || kind == 1 || kind == -1) {
+    set(offset.length_wear_mm);
+    if (shared) {
+      offset.radius_wear_mm = offset.length_wear_mm;
+    }
+  } else if (kind == 12) {
+    set(offset.radius_mm);
+  } else if (kind == 13) {
+    set(offset.radius_wear_mm);
+  }
+  offsets_.set_tool(number, offset);
+  if (state_.length_offset != 49 && state_.length_number == number) {
+    state_.known[2] = false;  // whether the new value acts at once depends on the control
   }
 }
 
@@ -179,28 +322,16 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
       explicit_exact_stop_ = true;
       flow.stop = flow.stop || !words_.has_any(axis_letters | centre_letters);
       return;
-    case 40: {
+    case 40:
       flow.stop = true;
       one_shot_axes_ = true;
-      double seconds = 0.0;
-      if (words_.has('P')) {
-        const Word& p = words_['P'];
-        if (p.has_point) {
-          fail("G04 P takes whole milliseconds: no decimal point (alarm 0007)", p.column);
-        }
-        seconds = p.value * 1e-3;
-      } else if (words_.has('X')) {
-        const Word& x = words_['X'];
-        seconds = x.has_point || options_.calculator_decimal_point ? x.value : x.value * 1e-3;
-      } else {
-        fail("G04 needs P (milliseconds) or X (seconds)");
-      }
-      if (seconds < 0.0) {
-        fail("dwell G04 is negative");
-      }
-      add_move({make_line(state_.position_mm, state_.position_mm, 0.0, line_number_), seconds});
+      dwell();
       return;
-    }
+    case 100:
+      flow.stop = true;
+      one_shot_axes_ = true;
+      data_setting();
+      return;
     case 920:
       flow.stop = true;
       one_shot_axes_ = true;
@@ -241,30 +372,6 @@ void Interpreter::foreign_switch(int g_tenths) {
   bool on = true;
   const char* name = "";
   switch (g_tenths) {
-    case 150:
-    case 160:
-      mode = 1;
-      on = g_tenths == 160;
-      name = "polar coordinates G16";
-      break;
-    case 500:
-    case 510:
-      mode = 2;
-      on = g_tenths == 510;
-      name = "scaling G51";
-      break;
-    case 501:
-    case 511:
-      mode = 8;
-      on = g_tenths == 511;
-      name = "mirror G51.1";
-      break;
-    case 680:
-    case 690:
-      mode = 16;
-      on = g_tenths == 680;
-      name = "rotation G68";
-      break;
     case 121:
     case 131:
       mode = 32;
@@ -276,8 +383,8 @@ void Interpreter::foreign_switch(int g_tenths) {
       name = "tool axis offset G43.x";
       state_.known[2] = false;
   }
-  // G69, G50, G15, G13.1 have no axis words of their own: X Y Z beside them are a move. G50.1 has.
-  one_shot_axes_ = one_shot_axes_ || on || g_tenths == 501;
+  // G13.1 has no axis words of its own: X Y Z beside it are a move.
+  one_shot_axes_ = one_shot_axes_ || on;
   if (on && (foreign_ & mode) == 0) {
     warn(std::string(name) + " is not supported yet: passed through untouched until it is cancelled");
   }
@@ -296,16 +403,15 @@ void Interpreter::look_ahead_switch(int g_tenths) {
   }
 }
 
-void Interpreter::change_coordinates(int number) {
-  const auto& offsets = options_.work_offsets_mm;
-  const auto index = [](int g) { return static_cast<std::size_t>(g - 54); };
-  if (index(number) < offsets.size() && index(state_.coordinate_system) < offsets.size()) {
-    for (std::size_t axis = 0; axis < axis_count; ++axis) {
-      state_.position_mm[static_cast<Eigen::Index>(axis)] +=
-          offsets[index(state_.coordinate_system)][axis] - offsets[index(number)][axis];
+void Interpreter::change_coordinates(int number, int extra) {
+  const AxisOffsets before = offsets_.work(state_.coordinate_system, state_.coordinate_number);
+  const AxisOffsets after = offsets_.work(number, extra);
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    if (before[axis] && after[axis]) {
+      state_.position_mm[static_cast<Eigen::Index>(axis)] += *before[axis] - *after[axis];
+    } else {
+      state_.known[axis] = false;
     }
-  } else {
-    forget_all();
   }
 }
 
@@ -339,11 +445,6 @@ void Interpreter::m_codes(LineFlow& flow) {
           }
         }
         break;
-      case 98:
-      case 99:
-      case 198:
-        fail("subprograms (M" + std::to_string(words_.m_codes[static_cast<std::size_t>(k)]) + ") are not supported yet",
-             words_['M'].column);
       default:
         break;
     }

@@ -1,6 +1,5 @@
-// Private to gcode: the state of one reading of a program text. Its functions are spread over three files: the frame of
-// the text and its lines (interpreter.cpp), codes that change the modal state (interpreter_codes.cpp), and moves
-// (interpreter_moves.cpp).
+// Private to gcode: the reading of plain blocks. Its functions are spread over three files: lines and regions
+// (interpreter.cpp), codes that change the modal state (interpreter_codes.cpp), and moves (interpreter_moves.cpp).
 #pragma once
 
 #include <array>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "block_words.hpp"
+#include "offsets.hpp"
 #include "shapegcode/gcode/canned_cycle.hpp"
 #include "shapegcode/gcode/lexer.hpp"
 #include "shapegcode/gcode/program.hpp"
@@ -31,14 +31,37 @@ inline std::uint32_t bit(Group group) noexcept { return 1U << static_cast<unsign
 
 inline int plane_normal(int plane) noexcept { return plane == 17 ? 2 : plane == 18 ? 1 : 0; }
 
+/// Reads a plain program line by line into regions, moves and functions. Plain: no calls, macro statements or
+/// coordinate modes; those are expanded by the Reader before.
 class Interpreter {
  public:
-  Interpreter(std::string text, const ReaderOptions& options) : options_(options) {
-    program_.text = std::move(text);
-    state_ = options.power_on;
-  }
+  Interpreter(Program& program, const ReaderOptions& options)
+      : options_(options), program_(program), state_(options.power_on), offsets_(options) {}
 
-  Program run();
+  /// Splits a line into words: `block()` and `words()`.
+  void scan(std::string_view text, std::uint32_t line);
+  /// Throws where an address stands twice among the words that were scanned.
+  void require_single_words(std::uint32_t line) const;
+  /// Executes the words that were scanned. The text of the line stands at [begin, end) of the program's text.
+  void execute(std::uint32_t line, const LineOrigin& origin, std::size_t begin, std::size_t end);
+  /// Ends an open region: the next line is not part of it.
+  void close_region();
+  void warn(const std::string& message);
+  /// After something whose effect is not known.
+  void forget_all() noexcept { state_.known = {false, false, false}; }
+  /// How the program ended.
+  void finish();
+
+  /// A work offset set by the program: one that is in force shifts the position.
+  void set_work_offset(int coordinate_system, int number, int axis, double value_mm, bool incremental = false);
+
+  [[nodiscard]] const Block& block() const noexcept { return block_; }
+  [[nodiscard]] const BlockWords& words() const noexcept { return words_; }
+  [[nodiscard]] const ModalState& state() const noexcept { return state_; }
+  [[nodiscard]] bool ended() const noexcept { return ended_; }
+  void end() noexcept { ended_ = true; }
+  [[nodiscard]] Offsets& offsets() noexcept { return offsets_; }
+  [[nodiscard]] double length_mm(const Word& word) const noexcept;
 
  private:
   struct LineFlow {
@@ -46,12 +69,15 @@ class Interpreter {
     bool motion = false;  ///< the block moves axes
   };
 
-  void frame();
-  void line(std::string_view text, std::size_t begin, std::size_t end);
   void optional_skip_block(const ModalState& before);
   void read_codes(LineFlow& flow);
   void one_shot(int g_tenths, LineFlow& flow);
+  void dwell();
+  void data_setting();
+  void data_work_offset(int coordinate_system, int number);
+  void set_tool_offset(int kind);
   void m_codes(LineFlow& flow);
+  void length_offset(int whole);
   void move(LineFlow& flow, const ModalState& before, std::size_t begin, std::size_t end);
   void cut(const char* why_kept, const ModalState& before, std::size_t begin, std::size_t end);
   void forget_uncertain_end() noexcept;
@@ -59,42 +85,36 @@ class Interpreter {
   void cycle_block();
   void foreign_switch(int g_tenths);
   void look_ahead_switch(int g_tenths);
-  void change_coordinates(int number);
-  void close_region();
+  void change_coordinates(int number, int extra);
   void add_move(const OtherMove& move);
   void add_step(StepKind kind, std::size_t index);
   void note(std::size_t segment);
-  void warn(const std::string& message);
   void warn_once(std::uint32_t& seen, const std::string& message);
   [[noreturn]] void fail(const std::string& message, std::uint32_t column = 0) const;
+  [[noreturn]] void alarm(int number, const std::string& message, std::uint32_t column = 0) const;
 
-  [[nodiscard]] double length_mm(const Word& word) const noexcept;
   [[nodiscard]] double feed_mm_per_s(double move_length_mm) const;
   [[nodiscard]] bool target(Vector3& end, std::array<bool, 3>& known_after, bool& relative) const noexcept;
   [[nodiscard]] Segment cutting_segment(const Vector3& end) const;
   void forget_axes(std::uint32_t letters) noexcept;
-  void forget_all() noexcept { state_.known = {false, false, false}; }
 
   const ReaderOptions& options_;
-  Program program_;
+  Program& program_;
   ModalState state_;
+  Offsets offsets_;
   Block block_;
   BlockWords words_;
   std::uint32_t line_number_ = 0;
-  std::size_t body_begin_ = 0;
-  std::size_t body_end_ = 0;
-  std::uint32_t first_body_line_ = 1;
+  LineOrigin origin_;
   std::shared_ptr<Region> region_;
   std::vector<Segment> segments_;  ///< of the open region
   std::size_t notes_kept_ = 0;
-  std::uint32_t foreign_ = 0;    ///< modes passed through untouched that are on
-  bool corner_pending_ = false;  ///< the block before carried ,R or ,C
+  std::uint32_t foreign_ = 0;  ///< modes passed through untouched that are on
   bool explicit_exact_stop_ = false;
   bool one_shot_axes_ = false;  ///< axis words belong to a one-shot code
   bool distance_given_ = false;
   bool ended_ = false;
   bool look_ahead_ = false;  ///< a look-ahead mode was switched on by the program
-  bool framed_ = false;      ///< has its '%' lines
   Vector3 local_offset_ = Vector3::Zero();
   std::array<bool, axis_count> local_offset_uncertain_ = {false, false, false};  ///< set in a '/' block
   CannedCycle cycle_;

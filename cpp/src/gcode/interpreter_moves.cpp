@@ -94,12 +94,13 @@ Segment Interpreter::cutting_segment(const Vector3& end) const {
       }
     }
     if (!given) {
-      fail("arc without R or I J K in its plane G" + std::to_string(state_.plane) + " (alarm 0022)",
-           words_.g_count > 0 ? words_.g_column[0] : 1);
+      alarm(22, "arc without R or I J K in its plane G" + std::to_string(state_.plane),
+            words_.g_count > 0 ? words_.g_column[0] : 1);
     }
   }
   Segment segment = resolve_arc(arc, 0.0, line_number_, column);
-  segment.feed_mm_per_s = feed_mm_per_s(segment.length_mm);
+  // In G93 an arc's F counts its radius, not its length (operator's manual, inverse time feed).
+  segment.feed_mm_per_s = feed_mm_per_s(segment.start_radius_mm);
   return segment;
 }
 
@@ -133,7 +134,6 @@ void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t beg
       state_.position_mm = to;
       state_.known = known_after;
     }
-    corner_pending_ = false;
     return;
   }
   const char* why_kept = nullptr;
@@ -145,26 +145,23 @@ void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t beg
   } else if (foreign_ != 0) {
     why_kept = "a coordinate mode that is not supported yet is on";
   } else if (state_.compensation != 40) {
-    why_kept = "cutter compensation is not supported yet";
-  } else if (state_.feed_mode == 95) {
-    why_kept = "feed per revolution G95 is not supported yet";
+    why_kept = "cutter compensation is on and not expanded";
+    ++program_.kept_compensated_moves;
+  } else if (state_.feed_mode == 95 && !(state_.spindle_rev_per_min > 0.0)) {
+    why_kept = "feed per revolution G95, and no spindle speed S was given";
   } else if (state_.exact_stop == 63 || state_.exact_stop == 62) {
     why_kept = state_.exact_stop == 63 ? "tapping mode G63 is not supported yet"
                                        : "automatic corner override G62 is not supported yet";
-  } else if (words_.corner != nullptr || corner_pending_) {
-    why_kept = "corner words ,R ,C are not supported yet";
   } else if (state_.uncertain_groups != 0) {
     why_kept = "the modal state depends on the block-skip switch";
   }
   cut(why_kept, before, begin, end);
-  corner_pending_ = words_.corner != nullptr;
 }
 
 void Interpreter::cut(const char* why_kept, const ModalState& before, std::size_t begin, std::size_t end) {
   if (!(state_.feed > 0.0)) {
-    fail(words_.has('F') ? "cutting move with feed F0 (alarm 0011)"
-                         : "cutting move, but no feed F was given (alarm 0011)",
-         words_.has('F') ? words_['F'].column : 1);
+    alarm(11, words_.has('F') ? "cutting move with feed F0" : "cutting move, but no feed F was given",
+          words_.has('F') ? words_['F'].column : 1);
   }
   check_range();
   Vector3 to;
@@ -181,7 +178,7 @@ void Interpreter::cut(const char* why_kept, const ModalState& before, std::size_
     // Kept to the letter. Its length is known only where start and path are.
     if (foreign_ == 0) {
       const bool plain = state_.motion == 1 || state_.compensation != 40 || state_.motion == 33;
-      const double rate = state_.feed_mode == 94 ? feed_mm_per_s(0.0) : 0.0;
+      const double rate = state_.feed_mode != 93 ? feed_mm_per_s(0.0) : 0.0;
       Segment segment = make_line(state_.position_mm, to, rate, line_number_);
       if (!plain && target(to, known_after, relative)) {
         segment = cutting_segment(to);
@@ -254,12 +251,12 @@ void Interpreter::cycle_block() {
     }
   }
   if (!(state_.feed > 0.0) && repeats > 0) {
-    fail("drilling cycle G" + std::to_string(state_.cycle) + " without a feed F (alarm 0011)");
+    alarm(11, "drilling cycle G" + std::to_string(state_.cycle) + " without a feed F");
   }
   const double level = cycle_.initial_mm;
   cycle_.r_mm = incremental ? level + cycle_r_ : cycle_r_;
   cycle_.bottom_mm = incremental ? cycle_.r_mm + cycle_z_ : cycle_z_;
-  const double rate = state_.feed_mode == 94 ? feed_mm_per_s(0.0) : 0.0;
+  const double rate = state_.feed_mode != 93 ? feed_mm_per_s(0.0) : 0.0;
   for (int k = 0; k < repeats && foreign_ == 0; ++k) {
     Vector3 hole = state_.position_mm;
     for (int i = 0; i < axis_count; ++i) {

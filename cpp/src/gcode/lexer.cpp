@@ -1,5 +1,6 @@
 #include "shapegcode/gcode/lexer.hpp"
 
+#include <algorithm>
 #include <string>
 
 #include "shapegcode/error.hpp"
@@ -47,22 +48,25 @@ std::string quoted(char c) {
   return std::string("byte 0x") + hex[byte >> 4] + hex[byte & 15];
 }
 
-// A letter run such as GOTO or WHILE is a macro statement, not a word without a number.
-[[noreturn]] void fail_at_letter(std::string_view text, std::size_t i, std::uint32_t line) {
-  std::string run;
-  for (std::size_t k = i; k < text.size() && is_letter(text[k]); ++k) {
-    run += upper(text[k]);
+bool is_macro_keyword(std::string_view text, std::size_t i) noexcept {
+  std::array<char, 5> run{};
+  std::size_t size = 0;
+  for (std::size_t k = i; k < text.size() && is_letter(text[k]) && size < run.size(); ++k) {
+    run[size++] = upper(text[k]);
   }
-  for (const char* keyword : {"IF", "THEN", "GOTO", "WHILE", "DO", "END", "POPEN", "DPRNT", "PCLOS", "BPRNT"}) {
-    if (run.starts_with(keyword) && run.size() > 1) {
-      fail("custom macro statement '" + run + "' is not supported yet", line, i);
+  const std::string_view word(run.data(), size);
+  for (const std::string_view keyword :
+       {"IF", "THEN", "GOTO", "WHILE", "DO", "END", "POPEN", "DPRNT", "PCLOS", "BPRNT"}) {
+    if (word.starts_with(keyword)) {
+      return true;
     }
   }
-  fail("address " + std::string(1, upper(text[i])) + " has no number", line, i);
+  return false;
 }
 
-// Reads the number behind a letter; i stands on its first character and ends behind it.
-void scan_number(std::string_view text, std::uint32_t line, std::size_t& i, std::size_t letter_at, Word& word) {
+// Reads the number behind a letter; i stands on its first character and ends behind it. False at a macro expression or
+// keyword.
+bool scan_number(std::string_view text, std::uint32_t line, std::size_t& i, std::size_t letter_at, Word& word) {
   const std::size_t n = text.size();
   while (i < n && (text[i] == ' ' || text[i] == '\t')) {
     ++i;
@@ -96,12 +100,11 @@ void scan_number(std::string_view text, std::uint32_t line, std::size_t& i, std:
     }
   }
   if (seen == 0) {
-    if (i < n && (text[i] == '#' || text[i] == '[')) {
-      fail("custom macro expression '" + std::string(1, word.letter) + std::string(1, text[i]) +
-               "' is not supported yet",
-           line, letter_at);
+    if ((i < n && (text[i] == '#' || text[i] == '[')) || is_macro_keyword(text, letter_at)) {
+      return false;
     }
-    fail_at_letter(text, letter_at, line);
+    throw alarm_error(5, "address " + std::string(1, upper(text[letter_at])) + " has no number", line,
+                      static_cast<std::uint32_t>(letter_at + 1));
   }
   if (significant > max_digits) {
     fail("too many digits in address " + std::string(1, word.letter) + ": " + std::to_string(significant) + " (limit " +
@@ -118,6 +121,8 @@ void scan_number(std::string_view text, std::uint32_t line, std::size_t& i, std:
   const double magnitude = static_cast<double>(mantissa) / powers_of_ten[decimals];
   word.value = negative ? -magnitude : magnitude;
   word.digits = static_cast<std::uint8_t>(significant);
+  word.end = static_cast<std::uint32_t>(i);
+  return true;
 }
 
 }  // namespace
@@ -126,6 +131,7 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
   block.word_count = 0;
   block.comment_count = 0;
   block.optional_skip = false;
+  block.macro = false;
   const std::size_t n = text.size();
   if (n > max_length) {
     fail("line of " + std::to_string(n) + " characters (limit " + std::to_string(max_length) + ")", line, max_length);
@@ -143,7 +149,10 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
       word.letter = upper(c);
       word.column = static_cast<std::uint32_t>(i + 1);
       ++i;
-      scan_number(text, line, i, letter_at, word);
+      if (!scan_number(text, line, i, letter_at, word)) {
+        block.macro = true;
+        return;
+      }
       ++block.word_count;
     } else if (c == ' ' || c == '\t' || c == '\r' || c == ';') {
       ++i;
@@ -162,12 +171,15 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
         fail("'/' inside a block: only a block skip at its start is supported", line, i);
       }
       block.optional_skip = true;
+      block.skip_switch = 1;
       ++i;
       if (i < n && is_digit(text[i])) {  // /1 ... /9
+        block.skip_switch = std::max(1, text[i] - '0');
         ++i;
       }
     } else if (c == '#' || c == '[' || c == ']' || c == '=') {
-      fail("custom macro statement ('" + std::string(1, c) + "') is not supported yet", line, i);
+      block.macro = true;
+      return;
     } else if (c == ',') {
       // ",R" ",C" corner words: read as a word of their own so that they can be named.
       if (i + 1 < n && is_letter(text[i + 1]) && block.word_count < Block::max_words) {
@@ -177,7 +189,10 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
         word.letter = upper(text[letter_at]) == 'R' ? '<' : '>';
         word.column = static_cast<std::uint32_t>(i + 1);
         i += 2;
-        scan_number(text, line, i, letter_at, word);
+        if (!scan_number(text, line, i, letter_at, word)) {
+          block.macro = true;
+          return;
+        }
         ++block.word_count;
       } else {
         fail("',' without R or C", line, i);

@@ -17,6 +17,8 @@ constexpr int last_local = 33;
 
 bool is_retained(int number) noexcept { return number >= first_retained && number <= last_retained; }
 
+bool is_common(int number) noexcept { return number >= first_common && number <= last_common; }
+
 std::string name_of(int number) { return "#" + std::to_string(number); }
 
 }  // namespace
@@ -41,7 +43,7 @@ MacroValue* MacroVariables::find(int number) noexcept {
   if (number >= 1 && number <= last_local) {
     return &locals_[level_][static_cast<std::size_t>(number)];
   }
-  if (number >= first_common && number <= last_common) {
+  if (is_common(number)) {
     return &common_[static_cast<std::size_t>(number - first_common)];
   }
   return nullptr;
@@ -51,17 +53,21 @@ MacroValue MacroVariables::read(int number, std::uint32_t line, std::uint32_t co
   if (number == 0) {
     return std::nullopt;
   }
+  if (is_common(number) && common_forgotten_[static_cast<std::size_t>(number - first_common)]) {
+    throw UnknownValue(number, "the value of variable " + name_of(number) + " is known to the control only", line,
+                       column);
+  }
   if (const MacroValue* value = find(number)) {
     return *value;
   }
   if (is_retained(number)) {
     const Retained& retained = retained_[static_cast<std::size_t>(number - first_retained)];
     if (!retained.known) {
-      throw Error(ErrorKind::program,
-                  "variable " + name_of(number) +
-                      " is retained by the control and its value is not known here: give it in the machine file "
-                      "(input.variables)",
-                  line, column);
+      throw UnknownValue(number,
+                         "variable " + name_of(number) +
+                             " is retained by the control and its value is not known here: give it in the machine "
+                             "file (input.variables)",
+                         line, column);
     }
     return retained.value;
   }
@@ -78,6 +84,9 @@ void MacroVariables::write(int number, MacroValue value, std::uint32_t line, std
   }
   if (MacroValue* place = find(number)) {
     *place = value;
+    if (is_common(number)) {
+      common_forgotten_[static_cast<std::size_t>(number - first_common)] = false;
+    }
     return;
   }
   if (is_retained(number)) {
@@ -94,6 +103,17 @@ void MacroVariables::write(int number, MacroValue value, std::uint32_t line, std
     }
   }
   throw alarm_error(115, "there is no variable " + name_of(number), line, column);
+}
+
+void MacroVariables::forget(int number) noexcept {
+  if (number == 0) {
+    common_forgotten_.fill(true);
+    retained_.fill({std::nullopt, false});
+  } else if (is_common(number)) {
+    common_forgotten_[static_cast<std::size_t>(number - first_common)] = true;
+  } else if (is_retained(number)) {
+    retained_[static_cast<std::size_t>(number - first_retained)] = {std::nullopt, false};
+  }
 }
 
 void MacroVariables::push_level(const std::array<MacroValue, 34>& arguments, std::uint32_t line, std::uint32_t column) {

@@ -13,6 +13,7 @@ struct Word {
   char letter = 0;           ///< upper case
   bool has_point = false;
   std::uint8_t digits = 0;  ///< digits written, leading zeros not counted
+  std::uint32_t end = 0;    ///< index behind the word in its line
 };
 
 /// What one line of program text holds. Views point into the text handed to `scan_block`.
@@ -24,6 +25,8 @@ struct Block {
   std::array<std::string_view, max_comments> comments;  ///< each with its parentheses
   std::size_t comment_count = 0;
   bool optional_skip = false;
+  int skip_switch = 1;  ///< of "/" or "/1" ... "/9"
+  bool macro = false;   ///< a custom macro statement, or words with expressions: words and comments are not complete
 
   [[nodiscard]] const Word* begin() const noexcept { return words.data(); }
   [[nodiscard]] const Word* end() const noexcept { return words.data() + word_count; }
@@ -31,9 +34,9 @@ struct Block {
 
 /// Splits one line (without its line end) into words. `line` counts from 1 and goes into errors.
 /// Throws Error(program) with line and column on: a byte that is no program character, a letter without a number, a
-/// comment that does not close, more than 40 words
-/// or 8 comments, more than 8 digits in a number, a custom macro statement, a
-/// decimal point in an address that takes whole numbers, a line longer than `max_length` characters.
+/// comment that does not close, more than 40 words or 8 comments, more than 8 digits in a number, a decimal point in an
+/// address that takes whole numbers, a line longer than `max_length` characters. Stops with `block.macro` at the first
+/// sign of a custom macro statement.
 void scan_block(std::string_view text, std::uint32_t line, std::size_t max_length, Block& block);
 
 }  // namespace shapegcode

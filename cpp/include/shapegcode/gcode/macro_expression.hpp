@@ -3,12 +3,26 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
+
+#include "shapegcode/error.hpp"
 
 namespace shapegcode {
 
 /// Value of a custom macro variable; std::nullopt: <vacant>, which is not 0.
 using MacroValue = std::optional<double>;
+
+/// The value of a variable is in the control only: a program that needs it cannot be foreseen.
+class UnknownValue : public Error {
+ public:
+  UnknownValue(int number, const std::string& message, std::uint32_t line = 0, std::uint32_t column = 0)
+      : Error(ErrorKind::program, message, line, column), number_(number) {}
+  [[nodiscard]] int number() const noexcept { return number_; }
+
+ private:
+  int number_;
+};
 
 /// What expressions read and assignments write. `line` and `column` count from 1 and go into errors.
 class VariableAccess {

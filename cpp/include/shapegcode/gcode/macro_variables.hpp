@@ -29,8 +29,8 @@ class MacroVariables : public VariableAccess {
   /// Error(argument) on a number outside 500 ... 999 or a value that is not finite.
   explicit MacroVariables(const std::map<int, double>& retained = {}, SystemVariables* system = nullptr);
 
-  /// Beyond what VariableAccess says: a retained variable that was neither given nor written throws Error(program),
-  /// because its value is in the control only.
+  /// Beyond what VariableAccess says: a retained variable that was neither given nor written, or one that was
+  /// forgotten, throws UnknownValue, because its value is in the control only.
   [[nodiscard]] MacroValue read(int number, std::uint32_t line, std::uint32_t column) override;
   void write(int number, MacroValue value, std::uint32_t line, std::uint32_t column) override;
   [[nodiscard]] bool signed_angles() const noexcept override { return signed_angles_; }
@@ -41,6 +41,8 @@ class MacroVariables : public VariableAccess {
   void push_level(const std::array<MacroValue, 34>& arguments, std::uint32_t line = 0, std::uint32_t column = 0);
   /// Back to the caller's locals. Throws Error(argument) on the level of the main program.
   void pop_level();
+  /// The value of a common variable is not known any more, until it is written; 0: of all of them.
+  void forget(int number = 0) noexcept;
   /// 0: main program.
   [[nodiscard]] std::size_t level() const noexcept { return level_; }
 
@@ -54,6 +56,7 @@ class MacroVariables : public VariableAccess {
 
   std::array<std::array<MacroValue, 34>, max_levels> locals_{};
   std::array<MacroValue, 100> common_{};
+  std::array<bool, 100> common_forgotten_{};
   std::array<Retained, 500> retained_{};
   SystemVariables* system_;
   std::size_t level_ = 0;

@@ -2,7 +2,10 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +13,28 @@
 #include "shapegcode/path/path.hpp"
 
 namespace shapegcode {
+
+/// A program file that a call refers to, found by whoever knows about files.
+struct SourceText {
+  std::string name;  ///< for messages
+  std::string text;
+};
+
+/// Offsets of one tool, mm; what is not given is not known.
+struct ToolOffset {
+  std::optional<double> length_mm;
+  std::optional<double> length_wear_mm;
+  std::optional<double> radius_mm;
+  std::optional<double> radius_wear_mm;
+};
+
+/// Codes that the machine builder bound to programs (parameters 6050 ... 6089).
+struct CodeBindings {
+  std::map<int, std::int64_t> g_macros;       ///< G code in tenths -> program, called like G65
+  std::map<int, std::int64_t> m_macros;       ///< M code -> program, called like G65
+  std::map<int, std::int64_t> m_subprograms;  ///< M code -> program, called like M98
+  std::int64_t tool_program = -1;             ///< T calls it with T in #149; -1: none
+};
 
 /// How a program text is to be read: the controller's settings that change its meaning.
 struct ReaderOptions {
@@ -20,8 +45,23 @@ struct ReaderOptions {
   double arc_tolerance_mm = 0.01;        ///< largest difference of start and end radius
   std::size_t max_line_length = 250;     ///< characters
   std::array<bool, axis_count> unknown_after_tool_change = {true, true, true};
-  std::vector<std::array<double, axis_count>> work_offsets_mm;  ///< G54 ... G59, empty if not known
-  ModalState power_on;                                          ///< state at the first block
+  std::vector<std::array<double, axis_count>> work_offsets_mm;          ///< G54 ... G59, empty if not known
+  std::map<int, std::array<double, axis_count>> extra_work_offsets_mm;  ///< G54.1 P1 ...
+  std::map<int, ToolOffset> tool_offsets;                               ///< by H and D number
+  char offset_memory = 'C';                                             ///< A, B or C: see SystemVariables
+  std::map<int, double> retained_variables;                             ///< #500 ... #999
+  CodeBindings bindings;
+  std::int64_t program = -1;  ///< O number to play of a file that holds several; -1: the first
+  std::function<std::optional<SourceText>(std::int64_t)> load_program;  ///< programs that the file does not hold
+  std::array<std::int64_t, 2> opaque_programs = {9000, 9999};           ///< if not found: called, but not looked into
+  int subprogram_nesting = 10;
+  std::uint64_t max_steps = 10'000'000;           ///< blocks executed behind the first call or jump
+  std::array<std::optional<bool>, 9> block_skip;  ///< switch on, off, or not known, of / ... /9
+  bool expand_compensation = true;                ///< G41/G42 become plain moves; false: kept as they stand
+  char compensation_start_up = 'A';               ///< type A or B (parameter 5003)
+  double scale_unit = 0.001;                      ///< of P, I, J, K of G51 without a point (parameter 5400#7)
+  bool collect_alarms = false;                    ///< go on behind an alarm, and keep all in Program::alarms
+  ModalState power_on;                            ///< state at the first block
   std::vector<std::uint32_t> probe_lines;  ///< ascending lines behind which the modal state is kept (Program::probed)
 };
 
@@ -29,6 +69,15 @@ struct ReaderOptions {
 struct Finding {
   std::uint32_t line = 0;
   std::string message;
+  std::uint32_t column = 0;
+  int alarm = 0;     ///< the control's number, 0: none
+  std::string file;  ///< name of the text, empty: the program's own
+};
+
+/// Where a line of an expanded program comes from.
+struct LineOrigin {
+  std::uint32_t line = 0;  ///< from 1
+  std::uint32_t file = 0;  ///< into Program::files
 };
 
 /// A block's N word or comment inside a region, and the segment before which it stood.
@@ -80,7 +129,17 @@ struct ProgramStep {
 
 /// A program read: the text to the letter, its regions, and everything between them.
 struct Program {
-  std::string text;
+  std::string text;  ///< as handed over, or expanded
+  /// The text holds calls, macro statements or coordinate modes: `text` is the plain program that they come to, and
+  /// line numbers of regions and steps count its lines; `origins` leads back.
+  bool expanded = false;
+  std::vector<LineOrigin> origins;            ///< one per line of `text`; empty if not expanded
+  std::vector<std::string> files;             ///< names; the first is empty and stands for the program's own file
+  std::vector<std::int64_t> program_numbers;  ///< all O numbers in the file
+  std::vector<Finding> alarms;                ///< with ReaderOptions::collect_alarms
+  std::map<int, double> expanded_radii_mm;    ///< D number -> radius, where cutter compensation was expanded
+  std::uint32_t compensated_moves = 0;        ///< cutting moves under G41/G42 that were expanded
+  std::uint32_t kept_compensated_moves = 0;   ///< and those that are kept as they stand
   std::string line_end = "\n";
   std::uint32_t line_count = 0;
   std::uint32_t block_count = 0;     ///< lines with at least one word

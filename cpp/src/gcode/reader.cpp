@@ -1,0 +1,325 @@
+// Texts, lines, and where they end.
+#include <algorithm>
+
+#include "reader_impl.hpp"
+#include "shapegcode/error.hpp"
+#include "shapegcode/gcode/interpreter.hpp"
+
+namespace shapegcode::detail {
+namespace {
+
+constexpr std::size_t most_alarms = 200;  // collected in one reading
+
+}  // namespace
+
+Reader::Reader(std::string text, const ReaderOptions& options)
+    : options_(options),
+      interpreter_(program_, options),
+      rewriter_(options, program_, interpreter_,
+                [this](std::string_view flat, const LineOrigin& origin) { put(flat, origin); }),
+      control_(options, interpreter_, rewriter_),
+      variables_(options.retained_variables, &control_) {
+  program_.text = std::move(text);
+  program_.files.emplace_back();
+}
+
+void Reader::fail(const std::string& message, std::uint32_t column) const {
+  throw Error(ErrorKind::program, message, here_.line, column);
+}
+
+void Reader::alarm(int number, const std::string& message, std::uint32_t column) const {
+  throw alarm_error(number, message, here_.line, column);
+}
+
+void Reader::load_main() {
+  const TapeFrame frame = find_frame(program_.text);
+  framed_ = frame.framed;
+  const std::string& text = program_.text;
+  const auto end_of_line = text.find('\n');
+  if (end_of_line != std::string::npos && end_of_line > 0 && text[end_of_line - 1] == '\r') {
+    program_.line_end = "\r\n";
+  }
+  program_.header_offset = frame.begin;
+  program_.line_count =
+      static_cast<std::uint32_t>(1 + std::count(text.begin(), text.end(), '\n')) - (text.back() == '\n' ? 1U : 0U);
+  store_.add(text, frame, 0);
+  for (const auto& unit : store_.units()) {
+    if (unit->number >= 0) {
+      program_.program_numbers.push_back(unit->number);
+    }
+  }
+  ProgramUnit* main = options_.program < 0 ? store_.units().front().get() : store_.find(options_.program);
+  if (main == nullptr) {
+    std::string known;
+    for (const std::int64_t number : program_.program_numbers) {
+      known += (known.empty() ? "" : ", ") + std::string("O") + std::to_string(number);
+    }
+    throw alarm_error(78,
+                      "program O" + std::to_string(options_.program) + " is not in the file (it holds " +
+                          (known.empty() ? "no O number" : known) + ")",
+                      1, 1);
+  }
+  program_.program_number = main->number;
+  control_.program = main->number;
+  frames_.push_back({main, main->first, {}, false, false, false, 1, {}});
+  here_ = main->first;
+  if (program_.program_numbers.size() > 1) {
+    origin_ = {main->first.line, 0};
+    program_.warnings.push_back({main->first.line,
+                                 "the file holds " + std::to_string(program_.program_numbers.size()) + " programs: O" +
+                                     std::to_string(main->number) + " is played",
+                                 0, 0, ""});
+  }
+  if (main != store_.units().front().get()) {
+    // Another program than the first: what is written is this one alone.
+    expand_from(0);
+    if (framed_) {
+      put_raw("%", {1, 0});
+    }
+    program_.header_offset = program_.text.size();
+  }
+}
+
+// From here on the text is written anew; so far it is as handed over.
+void Reader::expand_from(std::size_t begin) {
+  if (program_.expanded) {
+    return;
+  }
+  program_.expanded = true;
+  sources_.push_back({"", std::move(program_.text)});
+  const std::string& original = sources_.back().text;
+  program_.text = original.substr(0, begin);
+  for (const auto& unit : store_.units()) {
+    unit->text = &original;
+  }
+  const auto lines = static_cast<std::size_t>(
+      std::count(original.begin(), original.begin() + static_cast<std::ptrdiff_t>(begin), '\n'));
+  program_.origins.reserve(lines + 1000);
+  for (std::size_t i = 0; i < lines; ++i) {
+    program_.origins.push_back({static_cast<std::uint32_t>(i + 1), 0});
+  }
+}
+
+void Reader::put_raw(std::string_view flat, const LineOrigin& origin) {
+  program_.text += flat;
+  program_.text += program_.line_end;
+  program_.origins.push_back(origin);
+}
+
+void Reader::put(std::string_view flat, const LineOrigin& origin) {
+  const std::size_t begin = program_.text.size();
+  put_raw(flat, origin);
+  const auto number = static_cast<std::uint32_t>(program_.origins.size());
+  const std::size_t end = program_.text.size();
+  interpreter_.scan(std::string_view(program_.text).substr(begin, flat.size()), origin.line);
+  interpreter_.execute(number, origin, begin, end);
+}
+
+Error Reader::located(const Error& error) const {
+  // Errors of the interpreter count the lines of the expanded text.
+  Error result(error.kind(), error.what() + call_stack(), program_.expanded ? here_.line : error.line(), error.column(),
+               error.alarm());
+  result.set_file(program_.files[frames_.empty() ? 0 : frames_.back().unit->file]);
+  return result;
+}
+
+std::string Reader::call_stack() const {
+  std::string stack;
+  for (std::size_t k = frames_.size(); k-- > 1;) {
+    const Frame& caller = frames_[k - 1];
+    const std::string& file = program_.files[caller.unit->file];
+    stack += "; called by " +
+             (caller.unit->number >= 0 ? "O" + std::to_string(caller.unit->number) : std::string("the main program")) +
+             " line " + std::to_string(caller.place.line - 1) + (file.empty() ? "" : " of " + file);
+  }
+  return stack;
+}
+
+bool Reader::record(const Error& error) {
+  if (!options_.collect_alarms || error.kind() != ErrorKind::program) {
+    return false;
+  }
+  const Error at = located(error);
+  program_.alarms.push_back({at.line(), at.what(), at.column(), at.alarm(), at.file()});
+  return program_.alarms.size() < most_alarms;
+}
+
+Program Reader::run() {
+  try {
+    load_main();
+  } catch (const Error& error) {
+    if (!record(error)) {
+      throw;
+    }
+    return std::move(program_);
+  }
+  const auto& probes = options_.probe_lines;
+  program_.probed.reserve(probes.size());
+  const auto probe = [&](std::uint32_t line_done) {
+    while (program_.probed.size() < probes.size() && probes[program_.probed.size()] <= line_done) {
+      program_.probed.push_back(interpreter_.state());
+    }
+  };
+  probe(here_.line - 1);
+  bool running = true;
+  while (running) {
+    try {
+      running = step();
+    } catch (const Error& error) {
+      if (!options_.collect_alarms) {
+        throw located(error);
+      }
+      running = record(error);
+    }
+    probe(program_.expanded ? static_cast<std::uint32_t>(program_.origins.size()) : here_.line);
+  }
+  finish();
+  return std::move(program_);
+}
+
+// Executes the next line. False at the end of the program.
+bool Reader::step() {
+  Frame& frame = frames_.back();
+  std::string_view text;
+  std::size_t begin = 0;
+  here_ = frame.place;
+  if (interpreter_.ended()) {
+    return false;
+  }
+  if (!frame.unit->next_line(frame.place, text, begin)) {
+    if (frames_.size() == 1) {
+      return false;
+    }
+    interpreter_.warn("program O" + std::to_string(frame.unit->number) + " ends without M99");
+    leave();
+    return true;
+  }
+  origin_ = {here_.line, frame.unit->file};
+  if (program_.expanded && ++steps_ > options_.max_steps) {
+    steps_ = 0;
+    interpreter_.end();
+    fail("more than " + std::to_string(options_.max_steps) +
+         " blocks executed (controller.max_program_steps): the program does not seem to end");
+  }
+  line(text, begin, frame.place.at);
+  return true;
+}
+
+void Reader::line(std::string_view text, std::size_t begin, std::size_t end) {
+  interpreter_.scan(text, here_.line);
+  const Block& block = interpreter_.block();
+  if (block.optional_skip && options_.block_skip[static_cast<std::size_t>(block.skip_switch - 1)].value_or(false)) {
+    interpreter_.close_region();  // the switch is on: the control does not run it
+    if (program_.expanded) {
+      rewriter_.flush();
+      put_raw(text, origin_);
+    }
+    return;
+  }
+  if (block.macro) {
+    macro_line(text, begin);
+  } else if (interpreter_.words().has('O')) {
+    program_line(begin, end);
+  } else {
+    plain_line(text, begin, end);
+  }
+}
+
+// The O line at a program's head: that of a called program becomes a comment.
+void Reader::program_line(std::size_t begin, std::size_t end) {
+  const Block& block = interpreter_.block();
+  const auto number = static_cast<std::int64_t>(interpreter_.words()['O'].value);
+  std::string comments;
+  for (std::size_t i = 0; i < block.comment_count; ++i) {
+    comments += block.comments[i];
+  }
+  interpreter_.close_region();
+  ++program_.block_count;
+  if (frames_.size() > 1) {
+    std::string digits = std::to_string(number);
+    digits.insert(0, digits.size() < 4 ? 4 - digits.size() : 0, '0');
+    put_raw("(O" + digits + ")" + comments, origin_);
+  } else if (program_.expanded) {
+    const std::string line(frames_.back().unit->text->substr(begin, end - begin));
+    put_raw(std::string_view(line).substr(0, line.find_first_of("\r\n")), origin_);
+  }
+  if (frames_.size() == 1 && program_.regions.empty()) {
+    program_.header_offset = program_.expanded ? program_.text.size() : end;
+  }
+}
+
+void Reader::plain_line(std::string_view text, std::size_t begin, std::size_t end) {
+  const BlockWords& words = interpreter_.words();
+  const Block& block = interpreter_.block();
+  if (words.has('N')) {
+    control_.last_n = static_cast<std::int64_t>(words['N'].value);
+  }
+  if (is_call(words)) {
+    expand_from(begin);
+    // The text may have moved: read the words again from where it stands now.
+    const std::string line(text.empty() ? std::string_view()
+                                        : std::string_view(*frames_.back().unit->text).substr(begin, text.size()));
+    interpreter_.scan(line, here_.line);
+    call_block(line, line);
+    return;
+  }
+  moved_ = words.has_any(axis_letters) && (words.groups & (group_bit(Group::none) | group_bit(Group::call))) == 0;
+  if (rewriter_.wants(words)) {
+    std::string line(text);
+    expand_from(begin);
+    interpreter_.scan(line, here_.line);
+    rewriter_.block(block, words, line, origin_);
+  } else if (program_.expanded) {
+    put(text, origin_);
+  } else {
+    interpreter_.execute(here_.line, origin_, begin, end);
+  }
+  if (words.m_count > 0) {
+    control_.last_m = words.m_codes[static_cast<std::size_t>(words.m_count - 1)];
+  }
+  if (!modal_calls_.empty()) {
+    modal_calls();
+  }
+}
+
+void Reader::finish() {
+  try {
+    rewriter_.flush();
+  } catch (const Error& error) {
+    if (!record(error)) {
+      throw located(error);
+    }
+  }
+  interpreter_.finish();
+  if (program_.expanded) {
+    if (framed_) {
+      put_raw("%", {program_.line_count, 0});
+    }
+    program_.line_count = static_cast<std::uint32_t>(program_.origins.size());
+  }
+  const std::uint32_t last = here_.line;
+  if (!interpreter_.ended() && !framed_) {
+    const Error error(ErrorKind::program, "the program has neither '%' lines nor an end M30 or M02: truncated?",
+                      program_.line_count, 1);
+    if (!record(error)) {
+      throw error;
+    }
+  } else if (!interpreter_.ended()) {
+    program_.warnings.push_back({last, "the program does not end with M30 or M02", 0, 0, ""});
+  } else if (!framed_) {
+    program_.warnings.push_back(
+        {last, "the program has no '%' lines; a control that reads it over a line or from a tape needs them", 0, 0,
+         ""});
+  }
+  program_.probed.resize(options_.probe_lines.size(), interpreter_.state());
+}
+
+}  // namespace shapegcode::detail
+
+namespace shapegcode {
+
+Program read_program(std::string text, const ReaderOptions& options) {
+  return detail::Reader(std::move(text), options).run();
+}
+
+}  // namespace shapegcode
