@@ -84,20 +84,17 @@ Corner inner_corner(const OffsetCurve& before, const OffsetCurve& after, const E
   return {{crossing->point}, ends.before.circle ? crossing->before : 0.0, ends.after.circle ? crossing->after : 0.0};
 }
 
-// The tool changes sides: through the intersection nearest to the corner that leaves both blocks their direction.
+// The tool changes sides: through the intersection nearest to the corner that leaves both blocks their direction. A
+// line may be prolonged, by no more than the other block is long; an arc ends where it ends.
 Corner crossover(const OffsetCurve& before, const OffsetCurve& after, const Ends& ends) {
-  const auto allowed = [](const Locus& locus, const Curve& curve, const Curve& other, double& way) {
-    if (locus.circle) {
-      way = std::remainder(way, 2.0 * pi);
-      return way <= std::abs(curve.sweep_rad) && way >= -0.5 * pi;
-    }
-    return way <= curve.length_mm && way >= -other.length_mm;
+  const auto allowed = [](const Locus& locus, const Curve& curve, const Curve& other, double way) {
+    return locus.circle ? way <= std::abs(curve.sweep_rad) : way <= curve.length_mm && way >= -other.length_mm;
   };
   Corner best;
   double nearest = 0.0;
   for (const Vector2& point : intersections(ends.before, ends.after)) {
-    double back = travel(ends.before, point, -1.0);
-    double on = travel(ends.after, point, 1.0);
+    const double back = travel(ends.before, point, -1.0);
+    const double on = travel(ends.after, point, 1.0);
     if (!allowed(ends.before, before.curve, after.curve, back) || !allowed(ends.after, after.curve, before.curve, on)) {
       continue;
     }

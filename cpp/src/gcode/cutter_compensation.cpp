@@ -22,32 +22,41 @@ constexpr double join_mm = 1e-6;
 // A block reversed by less than this has only been used up by its corners.
 constexpr double used_up_mm = 1e-9;
 
-void require(bool fine, const std::string& what, std::uint32_t line = 0) {
-  if (!fine) {
-    throw Error(ErrorKind::argument, what, line);
-  }
+[[noreturn]] void refuse(const std::string& what, std::uint32_t line = 0) {
+  throw Error(ErrorKind::argument, what, line);
+}
+
+bool finite(const CompensationBlock& block) {
+  const Segment& segment = block.segment;
+  return std::isfinite(block.radius_mm) && segment.start_mm.allFinite() && segment.end_mm.allFinite() &&
+         (segment.kind != SegmentKind::arc || (segment.centre_mm.allFinite() && std::isfinite(segment.sweep_rad)));
 }
 
 void check(std::span<const CompensationBlock> blocks, int plane_normal, const CompensationOptions& options) {
-  require(plane_normal >= 0 && plane_normal <= 2,
-          format_message("plane normal %d: 0, 1 or 2 is expected", plane_normal));
-  require(options.start_up == 'A' || options.start_up == 'B', "start-up type: A or B is expected");
-  require(options.ignorable_corner_mm >= 0.0 && std::isfinite(options.ignorable_corner_mm),
-          format_message("ignorable corner %g mm: zero or more is expected", options.ignorable_corner_mm));
-  require(options.blocks_read >= 3 && options.blocks_read <= 8,
-          format_message("blocks read in compensation: %d, 3 to 8 is expected", options.blocks_read));
+  if (plane_normal < 0 || plane_normal > 2) {
+    refuse(format_message("plane normal %d: 0, 1 or 2 is expected", plane_normal));
+  }
+  if (options.start_up != 'A' && options.start_up != 'B') {
+    refuse("start-up type: A or B is expected");
+  }
+  if (!(options.ignorable_corner_mm >= 0.0) || !std::isfinite(options.ignorable_corner_mm)) {
+    refuse(format_message("ignorable corner %g mm: zero or more is expected", options.ignorable_corner_mm));
+  }
+  if (options.blocks_read < 3 || options.blocks_read > 8) {
+    refuse(format_message("blocks read in compensation: %d, 3 to 8 is expected", options.blocks_read));
+  }
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const CompensationBlock& block = blocks[i];
-    const Segment& segment = block.segment;
-    require(block.mode >= 40 && block.mode <= 42, format_message("compensation mode %d: 40, 41 or 42", block.mode),
-            segment.line);
-    require(
-        std::isfinite(block.radius_mm) && segment.start_mm.allFinite() && segment.end_mm.allFinite() &&
-            (segment.kind != SegmentKind::arc || (segment.centre_mm.allFinite() && std::isfinite(segment.sweep_rad))),
-        "cutter compensation needs finite values", segment.line);
-    if (i > 0) {
-      const double gap = (segment.start_mm - blocks[i - 1].segment.end_mm).norm();
-      require(gap <= join_mm, format_message("block starts %.6f mm off the end of the one before", gap), segment.line);
+    if (block.mode < 40 || block.mode > 42) {
+      refuse(format_message("compensation mode %d: 40, 41 or 42 is expected", block.mode), block.segment.line);
+    }
+    if (!finite(block)) {
+      refuse("cutter compensation needs finite values", block.segment.line);
+    }
+    const double gap = i == 0 ? 0.0 : (block.segment.start_mm - blocks[i - 1].segment.end_mm).norm();
+    if (gap > join_mm) {
+      refuse(format_message("block starts %.6f mm off the end of the one before, limit %.6f mm", gap, join_mm),
+             block.segment.line);
     }
   }
 }
