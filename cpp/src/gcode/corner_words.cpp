@@ -90,6 +90,54 @@ void require_fillet_arc(const Curve& curve, bool at_end, double left_mm, const W
   }
 }
 
+// What lies between the two blocks.
+struct Inserted {
+  Cut from;
+  Cut to;
+  double length_mm = 0.0;
+  Vector2 centre = Vector2::Zero();  // rounding only
+  double sweep_rad = 0.0;            // rounding only
+};
+
+Inserted chamfer_of(const Curve& a, const Curve& b, const Word& word) {
+  Inserted chamfer;
+  chamfer.from = chamfer_cut(a, true, word);
+  chamfer.to = chamfer_cut(b, false, word);
+  chamfer.length_mm = (chamfer.to.point - chamfer.from.point).norm();
+  return chamfer;
+}
+
+Inserted rounding_of(const Curve& a, const Curve& b, double turn, const Word& word) {
+  const double left = turn > 0.0 ? word.size_mm : -word.size_mm;
+  require_fillet_arc(a, true, left, word);
+  require_fillet_arc(b, false, left, word);
+  const auto no_arc = [&] {
+    return word.refusal(
+        55, format_message("no arc of this radius touches both blocks, which turn by %.3f degrees", turn * 180.0 / pi));
+  };
+  const auto crossing = plane::inner_crossing(plane::offset_at_end(a, left), plane::offset_at_start(b, left));
+  if (!crossing) {
+    throw no_arc();
+  }
+  Inserted rounding;
+  rounding.centre = crossing->point;
+  rounding.from = {foot(a, true, rounding.centre), crossing->before};
+  rounding.to = {foot(b, false, rounding.centre), crossing->after};
+  require_room(a, rounding.from.taken, "before", word);
+  require_room(b, rounding.to.taken, "after", word);
+  // It turns by what the corner turns, less what the two blocks turn in the parts it replaces.
+  const double about =
+      turn - (a.arc ? a.sense() * rounding.from.taken : 0.0) - (b.arc ? b.sense() * rounding.to.taken : 0.0);
+  const double between =
+      plane::angle_of(rounding.to.point - rounding.centre) - plane::angle_of(rounding.from.point - rounding.centre);
+  rounding.sweep_rad = about + std::remainder(between - about, 2.0 * pi);
+  if (rounding.sweep_rad * turn < 0.0 || std::abs(rounding.sweep_rad) >= 2.0 * pi) {
+    throw no_arc();
+  }
+  rounding.length_mm = std::abs(rounding.sweep_rad) * word.size_mm;
+  return rounding;
+}
+
 Segment shortened(const Segment& segment, const Curve& curve, const Vector3& start, const Vector3& end, double taken) {
   Segment result;
   const double left = available(curve) - taken;
@@ -148,53 +196,20 @@ CornerResult insert_corner(const Segment& before, const Segment& after, bool cha
     return {before, std::nullopt, after};
   }
 
-  Cut from;
-  Cut to;
-  Vector2 centre = Vector2::Zero();
-  if (chamfer) {
-    from = chamfer_cut(a, true, word);
-    to = chamfer_cut(b, false, word);
-  } else {
-    const double left = turn > 0.0 ? size_mm : -size_mm;
-    require_fillet_arc(a, true, left, word);
-    require_fillet_arc(b, false, left, word);
-    const auto crossing = plane::inner_crossing(plane::offset_at_end(a, left), plane::offset_at_start(b, left));
-    if (!crossing) {
-      throw word.refusal(55, format_message("no arc of this radius touches both blocks, which turn by %.3f degrees",
-                                            turn * 180.0 / pi));
-    }
-    centre = crossing->point;
-    from = {foot(a, true, centre), crossing->before};
-    to = {foot(b, false, centre), crossing->after};
-    require_room(a, from.taken, "before", word);
-    require_room(b, to.taken, "after", word);
-  }
-
-  const Vector3 corner_start = plane::in_space(from.point, before.end_mm, plane_normal);
-  const Vector3 corner_end = plane::in_space(to.point, after.start_mm, plane_normal);
+  const Inserted corner = chamfer ? chamfer_of(a, b, word) : rounding_of(a, b, turn, word);
+  const Vector3 corner_start = plane::in_space(corner.from.point, before.end_mm, plane_normal);
+  Vector3 corner_end = plane::in_space(corner.to.point, before.end_mm, plane_normal);
   CornerResult result;
-  result.before = shortened(before, a, before.start_mm, corner_start, from.taken);
-  result.after = shortened(after, b, corner_end, after.end_mm, to.taken);
-  if (chamfer) {
-    if ((to.point - from.point).norm() > plane::coincident_mm) {
-      result.inserted = make_line(corner_start, corner_end, before.feed_mm_per_s, before.line);
-    }
-    return result;
+  if (corner.length_mm <= plane::coincident_mm) {
+    corner_end = corner_start;  // both blocks are shortened to one point
+  } else if (chamfer) {
+    result.inserted = make_line(corner_start, corner_end, before.feed_mm_per_s, before.line);
+  } else {
+    result.inserted = make_arc(corner_start, corner_end, plane::in_space(corner.centre, before.end_mm, plane_normal),
+                               corner.sweep_rad, plane_normal, before.feed_mm_per_s, before.line);
   }
-  // The rounding turns by what the corner turns, less what the two blocks turned in the parts it replaces.
-  const double about = turn - (a.arc ? a.sense() * from.taken : 0.0) - (b.arc ? b.sense() * to.taken : 0.0);
-  const double between = plane::angle_of(to.point - centre) - plane::angle_of(from.point - centre);
-  const double sweep = about + std::remainder(between - about, 2.0 * pi);
-  if (sweep * turn < 0.0) {
-    throw word.refusal(55, format_message("no arc of this radius touches both blocks in their direction, which turn by "
-                                          "%.3f degrees",
-                                          turn * 180.0 / pi));
-  }
-  if (std::abs(sweep) * size_mm > plane::coincident_mm) {
-    const Vector3 centre_in_space = plane::in_space(centre, before.end_mm, plane_normal);
-    result.inserted =
-        make_arc(corner_start, corner_end, centre_in_space, sweep, plane_normal, before.feed_mm_per_s, before.line);
-  }
+  result.before = shortened(before, a, before.start_mm, corner_start, corner.from.taken);
+  result.after = shortened(after, b, corner_end, after.end_mm, corner.to.taken);
   return result;
 }
 
