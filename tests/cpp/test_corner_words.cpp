@@ -175,6 +175,9 @@ TEST_CASE("corner words: a rounding is tangent to both blocks, its centre at the
       CHECK(a.length_mm < corner.before.length_mm);
       CHECK(b.length_mm < corner.after.length_mm);
       CHECK((arc.sweep_rad > 0.0) == (corner.turn > 0.0));
+      // Rounded or not, the path turns by the same angle from its start to its end.
+      CHECK(a.sweep_rad + arc.sweep_rad + b.sweep_rad ==
+            doctest::Approx(corner.before.sweep_rad + corner.turn + corner.after.sweep_rad).epsilon(1e-9));
       // The arc's own formula, just before its end, and the tangents across both joins.
       worst_join = std::max(worst_join, (point_at(arc, arc.length_mm * (1 - 1e-13)) - arc.end_mm).norm());
       if (a.length_mm > 1e-3 && b.length_mm > 1e-3) {
@@ -288,6 +291,10 @@ TEST_CASE("corner words: arbitrary corners end in finite blocks or a refusal") {
         const bool fine = s.start_mm.allFinite() && s.end_mm.allFinite() && std::isfinite(s.length_mm) &&
                           std::isfinite(s.sweep_rad) && std::abs(s.sweep_rad) <= 2.0 * pi;
         bad += fine ? 0 : 1;
+      }
+      if (result.inserted && round % 2 == 1 && std::abs(turn) < 3.14 && scale > 0.1) {
+        const double turned = result.before.sweep_rad + middle.sweep_rad + result.after.sweep_rad;
+        bad += std::abs(turned - (before.sweep_rad + turn + after.sweep_rad)) < 1e-6 ? 0 : 1;
       }
       bad += result.before.end_mm == middle.start_mm && middle.end_mm == result.after.start_mm ? 0 : 1;
     } catch (const Error& error) {

@@ -498,3 +498,41 @@ TEST_CASE("cutter compensation: corner vectors nearer than the ignorable length 
     CHECK(ends(program.run(options)) == "0(10.000 -2.000) 1(22.000 0.000) 2(38.000 0.000)");
   }
 }
+
+TEST_CASE("cutter compensation: back along the same line in any direction the tool goes round the line's end") {
+  for (int degrees = 0; degrees < 360; degrees += 7) {
+    const Vector3 along(std::cos(degrees * pi / 180), std::sin(degrees * pi / 180), 0.0);
+    const Vector3 left(-along.y(), along.x(), 0.0);
+    for (const double side : {1.0, -1.0}) {
+      for (const double aside : {0.0, 5e-6, -5e-6}) {  // mm, as numbers read in inches may leave
+        Program program;
+        program.mode = side > 0.0 ? 41 : 42;
+        program.line(5.0 * along.x(), 5.0 * along.y());
+        program.line(20.0 * along.x(), 20.0 * along.y());
+        program.line(8.0 * along.x() + aside * left.x(), 8.0 * along.y() + aside * left.y());
+        const auto moves = program.run();
+        REQUIRE(moves.size() == 4);
+        CHECK((moves[1].segment.end_mm - (22.0 * along + 2.0 * side * left)).norm() < 1e-5);
+        CHECK((moves[2].segment.end_mm - (22.0 * along - 2.0 * side * left)).norm() < 1e-5);
+        CHECK((moves[3].segment.end_mm - (8.0 * along - 2.0 * side * left)).norm() < 1e-5);
+      }
+    }
+  }
+}
+
+TEST_CASE("cutter compensation: a nearly tangent arc hardly larger than the cutter keeps its radius") {
+  // The centre's circle of 1 um bends away from the common tangent at once: one vector for both would leave it.
+  for (const double turn : {1e-5, 1e-4, 5e-4, 9e-4}) {
+    Program program;
+    program.line(10, 0);
+    program.line(20, 0);
+    const double radius = 2.001;
+    const Vector3 centre(20 - radius * std::sin(turn), radius * std::cos(turn), 0);
+    const double end = turn + pi / 2;
+    program.arc(centre.x() + radius * std::sin(end), centre.y() - radius * std::cos(end), centre.x(), centre.y(), 90);
+    const auto moves = program.run();
+    REQUIRE(moves.size() == 3);
+    CHECK(std::abs(moves[1].segment.end_mm.y() - 2.0) < 1e-9);
+    CHECK(std::abs((moves[1].segment.end_mm - centre).norm() - 0.001) < 2e-7);
+  }
+}

@@ -125,9 +125,9 @@ Inserted rounding_of(const Curve& a, const Curve& b, double turn, const Word& wo
   rounding.to = {foot(b, false, rounding.centre), crossing->after};
   require_room(a, rounding.from.taken, "before", word);
   require_room(b, rounding.to.taken, "after", word);
-  // It turns by what the corner turns, less what the two blocks turn in the parts it replaces.
+  // It turns by what the corner turns and by what the two blocks turn in the parts it replaces.
   const double about =
-      turn - (a.arc ? a.sense() * rounding.from.taken : 0.0) - (b.arc ? b.sense() * rounding.to.taken : 0.0);
+      turn + (a.arc ? a.sense() * rounding.from.taken : 0.0) + (b.arc ? b.sense() * rounding.to.taken : 0.0);
   const double between =
       plane::angle_of(rounding.to.point - rounding.centre) - plane::angle_of(rounding.from.point - rounding.centre);
   rounding.sweep_rad = about + std::remainder(between - about, 2.0 * pi);
