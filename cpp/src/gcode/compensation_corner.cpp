@@ -1,7 +1,9 @@
 #include "compensation_corner.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "message.hpp"
 #include "shapegcode/error.hpp"

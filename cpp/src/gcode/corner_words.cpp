@@ -1,8 +1,8 @@
 #include "shapegcode/gcode/corner_words.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "message.hpp"
 #include "plane_geometry.hpp"

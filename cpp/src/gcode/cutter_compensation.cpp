@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <string>
 
 #include "compensation_corner.hpp"
 #include "message.hpp"
@@ -71,10 +72,10 @@ class Compensator {
       if (i == 0) {
         at_ = blocks_[0].segment.start_mm;
       }
-      if (!moves(i)) {
-        rest(i);
-      } else if (!offset_ && !active(i)) {
+      if (!offset_ && !(moves(i) && active(i))) {
         keep(i);
+      } else if (!moves(i)) {
+        rest(i);
       } else {
         move(i);
       }
