@@ -47,10 +47,16 @@ class Fir {
   void apply_rows(const double* in, Eigen::Index rows, int n_axes, double* out) const;
 
  private:
+  friend class FirStream;
+
   std::vector<int> delays_;
   std::vector<double> taps_;
   bool moving_average_ = false;
-  double decay_ = 0.0;  // exponential only
+  // Exponential only: ratio of successive taps, that ratio to the power of their number, and the taps' sum before
+  // scaling.
+  double decay_ = 0.0;
+  double leaving_ = 0.0;
+  double weight_sum_ = 0.0;
 };
 
 /// Real-time form: one sample of every axis per step; no allocation, no exception, bounded work.
@@ -70,8 +76,9 @@ class FirStream {
   int n_axes_ = 0;
   std::vector<double> ring_;  // one row of n_axes values per sample; the number of rows is a power of two
   std::size_t row_mask_ = 0;
-  std::size_t row_ = 0;                  // samples since reset; its low bits are the row of the next sample
-  std::vector<double> sum_, sum_error_;  // moving average only: running sum of each axis and what its rounding lost
+  std::size_t row_ = 0;  // samples since reset; its low bits are the row of the next sample
+  std::vector<double> sum_,
+      sum_error_;  // of each axis: running sum and what its rounding lost; exponential: see fir.cpp
 };
 
 }  // namespace shapegcode

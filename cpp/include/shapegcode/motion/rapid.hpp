@@ -16,7 +16,8 @@ struct RapidShape {
   std::array<int, axis_count> travel = {};
   std::array<int, axis_count> ramp = {};
   int bell = 0;
-  double rate_mm_per_s = 0.0;  ///< linear: tangential; non-linear: of the axis that takes longest
+  double even_s = 0.0;         ///< what the way would take at its rate all along; non-linear: of the slowest axis
+  double rate_mm_per_s = 0.0;  ///< reached; linear: tangential; non-linear: of the axis that takes longest
 };
 
 /// Paper 004, eq. 6 to 16, with rates and accelerations per axis: linear v = min_i(1420_i L/d_i) and
@@ -42,19 +43,20 @@ class RapidPlayer {
   RapidPlayer(const Vector3& start_mm, const Vector3& end_mm, const ControllerModel& model);
   /// Next set-point; false once the end was given.
   bool step(Vector3& position) noexcept;
+  /// Periods from rest to rest.
+  [[nodiscard]] int period_count() const noexcept { return count_; }
 
  private:
   struct Axis {
-    double increment_mm = 0.0;
     int travel = 0;
-    int index = 0;
     std::vector<FirStream> filters;
   };
   Vector3 start_mm_;
+  Vector3 travel_mm_;
   Vector3 end_mm_;
   std::array<Axis, axis_count> axes_;
   int index_ = 0;
-  int count_ = 0;  // periods in all
+  int count_ = 0;
 };
 
 /// All set-points of a rapid, (n, 3).

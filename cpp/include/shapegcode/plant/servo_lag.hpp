@@ -13,6 +13,8 @@ class ServoLag {
   ServoLag(const Vector3& position_gain_per_s, const Vector3& feed_forward_ratio, double period_s);
   /// Rest at `position`.
   void reset(const Vector3& position) noexcept;
+  /// Moves set-point and position alike: a change of coordinates.
+  void shift(const Vector3& by_mm) noexcept { setpoint_ += by_mm; }
   /// Position of the axes at the set-point's instant.
   Vector3 step(const Vector3& setpoint) noexcept;
   /// Set-point minus position, as of the last step.
