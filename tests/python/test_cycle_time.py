@@ -174,23 +174,23 @@ def test_rapid_set_points_keep_rate_and_acceleration_and_take_the_closed_time(
     np.testing.assert_allclose(points[[0, -1]], [start, start + travel], atol=1e-9)
     speed = np.abs(np.diff(points, axis=0)).max(axis=0) / 1e-3
     assert (speed <= np.array(rates) * override * (1 + 1e-6) + 1e-9).all()
-    # The ramp is a whole number of periods, to the nearest: half a period off.
     change = np.abs(np.diff(np.diff(points, axis=0, prepend=[start]), axis=0)).max(axis=0) / 1e-6
-    shortest = np.array(ramps).min() * override
-    assert (change <= np.array(rates) / np.array(ramps) * (1.0 + 0.6e-3 / shortest) + 1e-3).all()
+    # A ramp is a whole number of periods, to the nearest: it may be half a period short.
+    shortened = 1.0 - 0.5e-3 / (min(ramps) * override)
+    assert (change <= np.array(rates) / np.array(ramps) / shortened * (1.0 + 1e-6) + 1e-3).all()
     if linear:
         unit = np.array(travel) / np.linalg.norm(travel)
         aside = (points - start) - np.outer((points - start) @ unit, unit)
         assert np.abs(aside).max() < 1e-9
-    # Neither slower than the limits ask for: constant acceleration to the rate, plus bell, plus rounding to periods.
-    needed = max(
-        longest / rate / override + ramp * override
-        if longest >= rate * override * ramp * override
-        else 2.0 * math.sqrt(longest * ramp / rate)
-        for longest, rate, ramp in zip(map(abs, travel), rates, ramps, strict=True)
-        if longest
-    )
-    if not linear:
+    else:
+        # Not slower than the axes ask for: constant acceleration to the rate, plus bell, plus rounding to periods.
+        needed = max(
+            way / rate / override + ramp * override
+            if way >= rate * override * ramp * override
+            else 2.0 * math.sqrt(way * ramp / rate)
+            for way, rate, ramp in zip(map(abs, travel), rates, ramps, strict=True)
+            if way
+        )
         assert len(points) - 1 <= needed / 1e-3 + bell + 2.5
 
 
