@@ -492,6 +492,14 @@ class MotionLimits:
     def corner_speed_difference_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
         ...
     @property
+    def feed_override(self) -> float:
+        """
+        Scales the programmed feeds.
+        """
+    @feed_override.setter
+    def feed_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def filter_mean_deviation_s(self) -> float:
         """
         Its mean absolute deviation, s.

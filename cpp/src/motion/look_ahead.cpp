@@ -65,7 +65,7 @@ double segment_acceleration(const Segment& segment, double speed_limit, const Mo
     axes = std::sqrt(std::max(0.19 * axes * axes, axes * axes - turning * turning));
   }
   if (limits.law == AccelerationLaw::constant_time) {
-    return std::min(axes, segment.feed_mm_per_s / limits.time_constant_s);
+    return std::min(axes, segment.feed_mm_per_s * limits.feed_override / limits.time_constant_s);
   }
   return axes;
 }
@@ -294,7 +294,7 @@ double axis_feed_limit(const Segment& segment, const MotionLimits& limits) noexc
 }
 
 double segment_speed_limit(const Segment& segment, const MotionLimits& limits) noexcept {
-  double speed = segment.feed_mm_per_s;
+  double speed = segment.feed_mm_per_s * limits.feed_override;
   if (segment.kind == SegmentKind::arc) {
     speed *= limits.arc_feed_ratio;
     speed = std::min(speed, curvature_speed(curvature(segment), limits, arc_centripetal_limit(segment, limits),
@@ -330,6 +330,7 @@ double corner_speed_limit(const Segment& before, const Segment& after, const Mot
 
 SpeedProfile plan_speed(const Path& path, const MotionLimits& limits) {
   require_positive(limits.time_constant_s, "acceleration time constant (s)");
+  require_positive(limits.feed_override, "feed override");
   require_positive(limits.arc_feed_ratio, "arc feed ratio");
   if (!(limits.jerk_time_s >= 0.0) || !std::isfinite(limits.jerk_time_s)) {
     throw Error(ErrorKind::argument,

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <span>
 #include <string>
 
@@ -21,6 +20,7 @@ class Clock {
       : program_(program),
         model_(model),
         per_block_(per_block),
+        limits_(detail::overridden_limits(model)),
         filters_(acceleration_filters(model)),
         filter_periods_(filter_periods(filters_)),
         changes_by_t_(!detail::has_tool_change(program)) {}
@@ -55,7 +55,7 @@ class Clock {
     row.tool = time_.tools[tool_].tool;
     row.start_s = now_s();
     row.length_mm = region.path->length_mm();
-    const TimeParts parts = cutting_run(region.path, region.exact_stop_at_end);
+    const TimeParts parts = cutting_run(*region.path, region.exact_stop_at_end);
     row.cutting_s = parts.cutting_s;
     row.acceleration_s = parts.acceleration_s;
     row.in_position_s = parts.in_position_s;
@@ -71,7 +71,7 @@ class Clock {
       std::vector<Segment> run;
       at = detail::gather_run(program_, at, run);
       const bool stop = run.back().stop_at_end;
-      add(cutting_run(std::make_shared<const Path>(std::move(run)), stop));
+      add(cutting_run(Path(std::move(run)), stop));
       return at;
     }
     const Segment& segment = move.segment;
@@ -111,9 +111,9 @@ class Clock {
     }
   }
 
-  TimeParts cutting_run(const std::shared_ptr<const Path>& path, bool exact_stop) {
-    time_.cutting_length_mm += path->length_mm();
-    return model_.motion == MotionKind::look_ahead ? planned_run(path, exact_stop) : overlapped_run(*path, exact_stop);
+  TimeParts cutting_run(const Path& path, bool exact_stop) {
+    time_.cutting_length_mm += path.length_mm();
+    return model_.motion == MotionKind::look_ahead ? planned_run(path, exact_stop) : overlapped_run(path, exact_stop);
   }
 
   // Paper 004: a block's successor starts ceil(l / (F T_I)) T_I behind it, and the filters end the run.
@@ -147,25 +147,25 @@ class Clock {
     return parts;
   }
 
-  TimeParts planned_run(const std::shared_ptr<const Path>& programmed, bool exact_stop) {
+  TimeParts planned_run(const Path& path, bool exact_stop) {
     TimeParts parts;
-    if (!(programmed->length_mm() > 0.0)) {
+    if (!(path.length_mm() > 0.0)) {
       return parts;
     }
-    const std::shared_ptr<const Path> path = detail::overridden(programmed, model_);
-    for (const Segment& segment : path->segments()) {
+    for (const Segment& segment : path.segments()) {
       if (segment.length_mm > 0.0) {
-        parts.cutting_s += segment.length_mm / std::min(segment.feed_mm_per_s, axis_feed_limit(segment, model_.limits));
+        parts.cutting_s += segment.length_mm / detail::checked_feed(segment, model_);
       }
     }
-    const SpeedProfile profile = plan_speed(*path, model_.limits);
+    const SpeedProfile profile = plan_speed(path, limits_);
     const detail::PlannedEnd end = detail::planned_end(profile, filters_, model_);
+    parts.cutting_s = std::min(parts.cutting_s, end.duration_s);  // rounding only
     parts.acceleration_s = end.duration_s - parts.cutting_s;
     if (exact_stop) {
-      parts.in_position_s = detail::wait_behind_profile(*path, profile, end, model_);
+      parts.in_position_s = detail::wait_behind_profile(path, profile, end, model_);
     }
     if (per_block_) {
-      detail::append_rows(*path, profile, now_s(), time_.blocks);
+      detail::append_rows(path, profile, now_s(), time_.blocks);
       BlockTime& last = time_.blocks.back();
       last.duration_s = now_s() + parts.total_s() - last.start_s;
     }
@@ -198,6 +198,7 @@ class Clock {
   const Program& program_;
   const ControllerModel& model_;
   bool per_block_;
+  MotionLimits limits_;
   std::vector<Fir> filters_;
   int filter_periods_;
   bool changes_by_t_;

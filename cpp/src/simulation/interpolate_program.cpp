@@ -100,9 +100,9 @@ class Machine {
       return;
     }
     if (model_.motion == MotionKind::look_ahead) {
-      const auto path = detail::overridden(programmed, model_);
-      const auto profile = std::make_shared<const SpeedProfile>(plan_speed(*path, model_.limits));
-      Interpolator interpolator(path, profile, model_.period_s);
+      const auto profile =
+          std::make_shared<const SpeedProfile>(plan_speed(*programmed, detail::overridden_limits(model_)));
+      Interpolator interpolator(programmed, profile, model_.period_s);
       play([&](Vector3& position) { return interpolator.step(position); },
            profile->jerk_time_s() > 1.5 * model_.period_s || !filters_.empty());
     } else {

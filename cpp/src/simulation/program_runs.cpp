@@ -103,15 +103,10 @@ double checked_feed(const Segment& segment, const ControllerModel& model) {
   return controlled_feed_mm_per_s(segment, model);
 }
 
-std::shared_ptr<const Path> overridden(const std::shared_ptr<const Path>& path, const ControllerModel& model) {
-  if (model.feed_override == 1.0) {
-    return path;
-  }
-  std::vector<Segment> segments = path->segments();
-  for (Segment& segment : segments) {
-    segment.feed_mm_per_s *= model.feed_override;
-  }
-  return std::make_shared<const Path>(std::move(segments));
+MotionLimits overridden_limits(const ControllerModel& model) {
+  MotionLimits limits = model.limits;
+  limits.feed_override *= model.feed_override;
+  return limits;
 }
 
 PlannedEnd planned_end(const SpeedProfile& profile, const std::vector<Fir>& filters, const ControllerModel& model) {

@@ -27,9 +27,8 @@ inline constexpr int tool_change_code = 6;
 /// Controlled feed of a block; throws Error(argument) where a move has none.
 [[nodiscard]] double checked_feed(const Segment& segment, const ControllerModel& model);
 
-/// The path with the feed override in its feeds: the same object where it is 1.
-[[nodiscard]] std::shared_ptr<const Path> overridden(const std::shared_ptr<const Path>& path,
-                                                     const ControllerModel& model);
+/// Limits of look-ahead with the model's feed override in them.
+[[nodiscard]] MotionLimits overridden_limits(const ControllerModel& model);
 
 /// How a look-ahead run ends: whole duration and everything that smooths the profile.
 struct PlannedEnd {
