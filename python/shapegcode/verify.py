@@ -226,6 +226,13 @@ def _vibration_memory_s(machine: Machine) -> float:
     return math.log(1e6) / slowest if slowest > 0.01 else 0.0
 
 
+def _rapid_time_s(length_mm: float, rate_mm_per_s: float, ramp_s: float, tick_s: float) -> float:
+    """Time of a rapid along a straight way, in whole ticks (paper 004, eq. 7-16)."""
+    if length_mm >= rate_mm_per_s * ramp_s:
+        return math.ceil(length_mm / rate_mm_per_s / tick_s) * tick_s + ramp_s
+    return 2.0 * math.ceil(math.sqrt(length_mm * ramp_s / rate_mm_per_s) / tick_s) * tick_s
+
+
 def other_time_s(moves: Iterable[tuple[_core.Segment, float]], machine: Machine) -> float:
     """Time of everything between the regions: rapids with in-position wait, dwells, kept feed moves.
 
@@ -236,7 +243,7 @@ def other_time_s(moves: Iterable[tuple[_core.Segment, float]], machine: Machine)
     tick = controller.interpolation_period_s
     rapids = np.array([axis.rapid_mm_per_min / 60.0 for axis in machine.axes.as_tuple()])
     waits = np.array(controller.in_position_s.as_tuple())
-    ramp = controller.rapid_time_constant_s
+    ramps = np.array(controller.rapid_time_constant_s.as_tuple())
     total = 0.0
     for segment, dwell_s in moves:
         if dwell_s > 0.0:
@@ -248,14 +255,16 @@ def other_time_s(moves: Iterable[tuple[_core.Segment, float]], machine: Machine)
             continue
         travel = np.abs(segment.end_mm - segment.start_mm)
         axes_time = travel / rapids
-        rate = length / axes_time.max()
         if controller.rapid_path == "non_linear":
-            length = float(travel[axes_time.argmax()])
-            rate = float(rapids[axes_time.argmax()])
-        if length >= rate * ramp:
-            moving = math.ceil(length / rate / tick) * tick + ramp
+            moving = max(
+                _rapid_time_s(float(way), float(rate), float(ramp), tick)
+                for way, rate, ramp in zip(travel, rapids, ramps, strict=True)
+                if way > 0.0
+            )
         else:
-            moving = 2.0 * math.ceil(math.sqrt(length * ramp / rate) / tick) * tick
+            # The acceleration along the way is the largest that asks of no axis more than its rapid over its ramp.
+            ramp = float((axes_time * ramps).max() / axes_time.max())
+            moving = _rapid_time_s(length, length / float(axes_time.max()), ramp, tick)
         total += moving + controller.rapid_bell_time_s + float(waits[travel > 0.0].max())
     return total
 
