@@ -428,6 +428,37 @@ def test_contour_acceleration_slows_arcs_and_polylines() -> None:
     assert slow <= feeds[60:660].max() <= 1.25 * slow  # in the diagonal both axes share the turn
 
 
+def test_machine_file_reaches_the_model() -> None:
+    keys = {
+        "controller.motion": "after_interpolation", "controller.after_interpolation_shape": "exponential",
+        "controller.time_constant_s": 0.07, "controller.bell_time_s": 0.03, "controller.block_end": "carry",
+        "controller.look_ahead_filter_time_constant_s": 0.024, "controller.interpolation_period_s": 0.002,
+        "controller.block_time_s": 0.004, "controller.contour_acceleration_mm_s2": {"x": 1.0, "y": 2.0, "z": 3.0},
+        "controller.rapid_time_constant_s": {"x": 0.1, "y": 0.2, "z": 0.3}, "controller.rapid_bell_time_s": 0.04,
+        "controller.rapid_path": "non_linear", "controller.in_position": "servo_lag",
+        "controller.in_position_s": {"x": 0.01, "y": 0.02, "z": 0.03}, "controller.in_position_width_um": 5.0,
+        "controller.position_gain_per_s": 42.0, "controller.feed_forward_ratio": 0.9, "times.tool_change_s": 6.0,
+        "times.m_function_s": 0.4,
+    }  # fmt: skip
+    made = controller_model(machine_with(keys), feed_override=0.8, rapid_override=0.25)
+    assert (made.motion, made.filter_shape) == (AFTER, _core.FilterShape.exponential)
+    assert (made.rapid_path, made.in_position) == (_core.RapidPath.non_linear, LAG)
+    assert made.block_end == _core.BlockEnd.carry
+    single = {
+        "period_s": 0.002, "time_constant_s": 0.07, "bell_time_s": 0.03, "look_ahead_filter_time_constant_s": 0.024,
+        "rapid_bell_time_s": 0.04, "feed_override": 0.8, "rapid_override": 0.25, "tool_change_s": 6.0,
+        "m_function_s": 0.4,
+    }  # fmt: skip
+    assert {name: getattr(made, name) for name in single} == single
+    per_axis = {
+        "rapid_time_constant_s": [0.1, 0.2, 0.3], "in_position_s": [0.01, 0.02, 0.03],
+        "in_position_width_mm": [0.005] * 3, "position_gain_per_s": [42.0] * 3, "feed_forward_ratio": [0.9] * 3,
+    }  # fmt: skip
+    for name, values in per_axis.items():
+        assert list(getattr(made, name)) == values
+    assert list(made.limits.contour_acceleration_mm_per_s2) == [1.0, 2.0, 3.0]
+
+
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [

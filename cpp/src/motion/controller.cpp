@@ -10,7 +10,8 @@
 namespace shapegcode {
 namespace {
 
-constexpr double longest_time_s = 100.0;
+constexpr double longest_ramp_s = 100.0;
+constexpr double longest_wait_s = 3600.0;
 
 void require(bool holds, const char* name, double value, const char* range) {
   if (!holds) {
@@ -18,8 +19,12 @@ void require(bool holds, const char* name, double value, const char* range) {
   }
 }
 
-void require_time(const char* name, double value) {
-  require(value >= 0.0 && value <= longest_time_s, name, value, "0 to 100 s");
+void require_ramp(const char* name, double value) {
+  require(value >= 0.0 && value <= longest_ramp_s, name, value, "0 to 100 s");
+}
+
+void require_wait(const char* name, double value) {
+  require(value >= 0.0 && value <= longest_wait_s, name, value, "0 to 3600 s");
 }
 
 void require_positive(const char* name, double value) {
@@ -37,12 +42,12 @@ void add_average(std::vector<Fir>& filters, double time_s, double period_s) {
 
 void check(const ControllerModel& model) {
   require_positive("interpolation period (s)", model.period_s);
-  require_time("acceleration time constant (s)", model.time_constant_s);
-  require_time("bell time (s)", model.bell_time_s);
-  require_time("look-ahead filter time constant (s)", model.look_ahead_filter_time_constant_s);
-  require_time("rapid bell time (s)", model.rapid_bell_time_s);
-  require_time("tool change (s)", model.tool_change_s);
-  require_time("M function (s)", model.m_function_s);
+  require_ramp("acceleration time constant (s)", model.time_constant_s);
+  require_ramp("bell time (s)", model.bell_time_s);
+  require_ramp("look-ahead filter time constant (s)", model.look_ahead_filter_time_constant_s);
+  require_ramp("rapid bell time (s)", model.rapid_bell_time_s);
+  require_wait("tool change (s)", model.tool_change_s);
+  require_wait("M function (s)", model.m_function_s);
   require(model.exponential_rest > 0.0 && model.exponential_rest < 1.0, "share left of the exponential",
           model.exponential_rest, "between 0 and 1");
   require_positive("feed override", model.feed_override);
@@ -51,8 +56,8 @@ void check(const ControllerModel& model) {
     require(model.limits.max_feed_mm_per_s[i] > 0.0, "axis feed limit (mm/s)", model.limits.max_feed_mm_per_s[i],
             "> 0");
     require_positive("rapid rate (mm/s)", model.rapid_rate_mm_per_s[i]);
-    require_time("rapid time constant (s)", model.rapid_time_constant_s[i]);
-    require_time("in-position wait (s)", model.in_position_s[i]);
+    require_ramp("rapid time constant (s)", model.rapid_time_constant_s[i]);
+    require_wait("in-position wait (s)", model.in_position_s[i]);
     require_positive("position gain (1/s)", model.position_gain_per_s[i]);
     require_positive("in-position width (mm)", model.in_position_width_mm[i]);
     require(model.feed_forward_ratio[i] >= 0.0 && model.feed_forward_ratio[i] <= 1.0, "feed-forward ratio",
