@@ -23,6 +23,7 @@ CircleFigures simulate_circle(double radius_mm, double feed_mm_per_s, const Cont
   }
   const std::vector<Fir> designs = acceleration_filters(model);
   std::vector<FirStream> filters;
+  filters.reserve(designs.size());
   for (const Fir& design : designs) {
     filters.emplace_back(design, axis_count);
   }
