@@ -91,6 +91,16 @@ TEST_CASE(
   }
 }
 
+TEST_CASE("rapid: refuses what cannot be counted or given") {
+  ControllerModel model = paper_machine();
+  model.rapid_rate_mm_per_s = Vector3::Constant(1e-9);
+  CHECK_THROWS_AS((void)rapid_time_s({100.0, 0.0, 0.0}, model), Error);
+  CHECK_THROWS_AS(RapidPlayer(Vector3::Zero(), {100.0, 0.0, 0.0}, model), Error);
+  model = paper_machine();
+  model.rapid_time_constant_s.y() = -0.1;
+  CHECK_THROWS_AS(RapidPlayer(Vector3::Zero(), {100.0, 0.0, 0.0}, model), Error);
+}
+
 TEST_CASE("rapid: set-points end in the end, and go on giving it") {
   const ControllerModel model = paper_machine();
   RapidPlayer player({0.0, 0.0, 0.0}, {0.1, -3.0, 7.0}, model);

@@ -41,7 +41,7 @@ void add_average(std::vector<Fir>& filters, double time_s, double period_s) {
 }  // namespace
 
 void check(const ControllerModel& model) {
-  require_positive("interpolation period (s)", model.period_s);
+  require(model.period_s >= 1e-5 && model.period_s <= 1.0, "interpolation period (s)", model.period_s, "1e-5 to 1");
   require_ramp("acceleration time constant (s)", model.time_constant_s);
   require_ramp("bell time (s)", model.bell_time_s);
   require_ramp("look-ahead filter time constant (s)", model.look_ahead_filter_time_constant_s);

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+
+#include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
@@ -40,24 +43,32 @@ struct Counts {
   int ramp = 0;
 };
 
-int full_ramp(const Way& way, double period_s) noexcept {
-  return static_cast<int>(std::lround(way.rate_mm_per_s / way.acceleration_mm_per_s2 / period_s));
+int countable(double periods) {
+  constexpr double most_periods = 1e8;
+  if (!(periods <= most_periods)) {
+    throw Error(ErrorKind::argument, "rapid takes " + std::to_string(periods) + " periods, at most 1e8 are possible");
+  }
+  return static_cast<int>(periods);
+}
+
+int full_ramp(const Way& way, double period_s) {
+  return countable(std::round(way.rate_mm_per_s / way.acceleration_mm_per_s2 / period_s));
 }
 
 // Paper 004: eq. 6 for a rapid that reaches its rate, eq. 9 to 11 for a short one.
-Counts counts_in_closed_form(const Way& way, double period_s) noexcept {
-  const Counts full{static_cast<int>(whole_periods(way.length_mm / way.rate_mm_per_s / period_s)),
-                    full_ramp(way, period_s)};
+Counts counts_in_closed_form(const Way& way, double period_s) {
+  const Counts full{countable(whole_periods(way.length_mm / way.rate_mm_per_s / period_s)), full_ramp(way, period_s)};
   if (full.travel >= full.ramp) {
     return full;
   }
   const double half_s = std::sqrt(way.length_mm / way.acceleration_mm_per_s2);
-  const int half = std::max(1, static_cast<int>(whole_periods(half_s / period_s)));
+  const int half = std::max(1, countable(whole_periods(half_s / period_s)));
   return {half, half};
 }
 
 // The same by trial: the fewest periods in which neither the rate nor the acceleration is exceeded.
-Counts counts_by_trial(const Way& way, double period_s) noexcept {
+Counts counts_by_trial(const Way& way, double period_s) {
+  countable(way.length_mm / way.rate_mm_per_s / period_s);
   constexpr double slack = 1.0 + 1e-7;  // a rapid that ends on a tick to within rounding ends there
   Counts counts{1, full_ramp(way, period_s)};
   while (way.length_mm / (counts.travel * period_s) > way.rate_mm_per_s * slack) {

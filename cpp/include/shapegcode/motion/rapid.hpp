@@ -21,7 +21,8 @@ struct RapidShape {
 };
 
 /// Paper 004, eq. 6 to 16, with rates and accelerations per axis: linear v = min_i(1420_i L/d_i) and
-/// a = min_i(1420_i/1620_i L/d_i); non-linear each axis for itself. Axes without travel have 0 periods.
+/// a = min_i(1420_i/1620_i L/d_i); non-linear each axis for itself. Axes without travel have 0 periods. Throws
+/// Error(argument) on a rapid of more than 1e8 periods.
 [[nodiscard]] RapidShape rapid_shape(const Vector3& travel_mm, const ControllerModel& model);
 
 /// Time of a rapid from rest to rest without the wait for in-position; 0 without travel.
