@@ -96,6 +96,10 @@ class _Importer:
             self._miss(number, "given again (another path): the first one counts", line)
         for line, text in self._dump.strange:
             self._miss("", f'not understood: "{text}"', line)
+        held = {number for number, _ in self._dump.entries}
+        for number in (1401, 1420, 1430, 1620, 1622, 1660, 1735, 1783, 1825, 1826, 3401, 3402, 3410):
+            if number not in held:
+                self._miss(number, "not in the dump")
         if not self._dump.complete:
             self._miss("", "no % at the end: the dump may be cut")
         if self._problems:
@@ -174,11 +178,11 @@ class _Importer:
             self._assume(key, value, note)
         for number in numbers:
             axes = self._axes if axis is None else (axis,)
-            entries = [e for a in axes if (e := self._dump.get(number, a))] or [self._dump.get(number)]
-            for entry in entries:
-                if entry is not None:
-                    row = {"parameter": number, "axis": entry.target, "raw": entry.letter + entry.text}
-                    self._read.append({**row, "line": entry.line, "key": key, "value": value})
+            entries = [entry for a in axes if (entry := self._dump.get(number, a))]
+            path = self._dump.get(number)
+            for entry in entries or ([path] if path else []):
+                row = {"parameter": number, "axis": entry.target, "raw": entry.letter + entry.text}
+                self._read.append({**row, "line": entry.line, "key": key, "value": value})
 
     # The machine, part by part.
 
