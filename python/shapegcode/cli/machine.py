@@ -1,4 +1,4 @@
-"""``shapegcode machine``: write a machine file to start from, or explain the values of one."""
+"""``shapegcode machine``: write a machine file to start from, import one, or explain the values of one."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ _DEFAULT_MACHINE = "vx500"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare ``init``, ``import`` and ``show``."""
+    parser.epilog = "example: shapegcode machine import CNC-PARA.TXT --from vx500 -o machine.toml"
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True, title="actions")
 
     init = actions.add_parser("init", help="write a commented machine file to start from")
