@@ -7,6 +7,7 @@ Both grammars are read: ``N01420Q1A1P24000.0A2P24000.0`` (30i, 0i-D, 0i-F; the 1
 from __future__ import annotations
 
 import re
+from collections.abc import Container
 from dataclasses import dataclass, field
 
 from shapegcode.machine_errors import MachineError, Problem
@@ -66,8 +67,8 @@ class Dump:
         return next((self.entries[number, name] for name in targets if (number, name) in self.entries), None)
 
 
-def read_dump(data: bytes, file: str) -> Dump:
-    """Read a dump; *file* names it in messages.
+def read_dump(data: bytes, file: str, wanted: Container[int]) -> Dump:
+    """Read the *wanted* parameters of a dump, and check the form of all; *file* names it in messages.
 
     Raises:
         MachineError: not a dump, a record that is cut or not numeric, a value given twice in one record.
@@ -104,7 +105,10 @@ def read_dump(data: bytes, file: str) -> Dump:
             if not dump.records and not re.search(r"[PMI]", record[3]):
                 raise bad(f'"{words[:60]}": not a parameter record; is this a CNC-PARA.TXT?', line)
             raise bad(f'"{words[:60]}": cut or not numeric; values are P, M or I and a number', line)
-        _take(dump, record, line)
+        dump.records += 1
+        dump.with_q |= record[2] is not None
+        if int(record[1]) in wanted:
+            _take(dump, record, line)
     if not dump.records:
         raise bad("no parameter record (N01420Q1A1P24000.0 or N01825 A1 P 3000); is this a CNC-PARA.TXT?")
     return dump
@@ -112,8 +116,6 @@ def read_dump(data: bytes, file: str) -> Dump:
 
 def _take(dump: Dump, record: re.Match[str], line: int) -> None:
     number = int(record[1])
-    dump.records += 1
-    dump.with_q |= record[2] is not None
     seen: set[str] = set()
     again = False
     for letter, index, kind, text in _VALUE.findall(record[3]):

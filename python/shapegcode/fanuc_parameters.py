@@ -17,6 +17,10 @@ from shapegcode.machine import Machine, MachineError, Problem
 
 __all__ = ["ParameterImport", "import_parameters", "read_parameters"]
 
+_WANTED = frozenset(
+    (103, 1020, 1401, 1420, 1422, 1430, 1432, 1603, 1610, 1620, 1621, 1622, 1623, 1660, 1730, 1731, 1732, 1735, 1737)
+    + (1769, 1770, 1771, 1772, 1773, 1774, 1783, 1825, 1826, 2005, 2068, 2092, 3401, 3402, *range(3410, 3433))
+)
 _MM_PER_INCH = 25.4
 _LONGEST_MS = 10_000.0
 _LARGEST = 1e7
@@ -67,7 +71,7 @@ def import_parameters(data: bytes, file: str, base: Machine | None = None) -> Pa
     Raises:
         MachineError: no dump, a value that is not plausible, or a limit of an axis that neither dump nor base has.
     """
-    return _Importer(read_dump(data, file), base).run()
+    return _Importer(read_dump(data, file, _WANTED), base).run()
 
 
 class _Importer:
