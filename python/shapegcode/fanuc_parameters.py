@@ -17,10 +17,9 @@ from shapegcode.machine import Machine, MachineError, Problem
 
 __all__ = ["ParameterImport", "import_parameters", "read_parameters"]
 
-_WANTED = frozenset(
-    (103, 1020, 1401, 1420, 1422, 1430, 1432, 1603, 1610, 1620, 1621, 1622, 1623, 1660, 1730, 1731, 1732, 1735, 1737)
-    + (1769, 1770, 1771, 1772, 1773, 1774, 1783, 1825, 1826, 2005, 2068, 2092, 3401, 3402, *range(3410, 3433))
-)
+_MOTION = (1401, 1420, 1422, 1430, 1432, 1603, 1610, 1620, 1621, 1622, 1623, 1660, 1730, 1731, 1732, 1735, 1737)
+_AHEAD = (1769, 1770, 1771, 1772, 1773, 1774, 1783)
+_WANTED = frozenset((103, 1020, *_MOTION, *_AHEAD, 1825, 1826, 2005, 2068, 2092, 3401, 3402, *range(3410, 3433)))
 _MM_PER_INCH = 25.4
 _LONGEST_MS = 10_000.0
 _LARGEST = 1e7
@@ -322,7 +321,10 @@ class _Importer:
             fine, coarse = self._per_axis(2092, 10_000, "0.01 %"), self._per_axis(2068, 100, "%")
             ratios = [0.0, 0.0, 0.0]
             for k, entry in enumerate(on):
-                if entry is not None and entry.text.zfill(8)[6] == "1":
+                if entry is not None and (len(entry.text) != 8 or set(entry.text) - {"0", "1"}):
+                    name = f"parameter 2005 {entry.target}"
+                    self._problems.append(Problem(name, entry.text, "must be eight bits, 0 or 1", entry.line))
+                elif entry is not None and entry.text[6] == "1":
                     ratios[k] = fine[k] / 1e4 if fine and fine[k] else (coarse[k] / 100 if coarse else 0.0)
             self._set("controller.feed_forward_ratio", ratios, 2005, 2092 if fine else 2068)
 
