@@ -1,4 +1,4 @@
-"""``shapegcode machine``: write a machine file to start from, or explain the values of one."""
+"""``shapegcode machine``: write a machine file to start from, import one, or explain the values of one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ _DEFAULT_MACHINE = "vx500"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare ``init`` and ``show``."""
+    """Declare ``init``, ``import`` and ``show``."""
+    parser.epilog = "example: shapegcode machine import CNC-PARA.TXT --from vx500 -o machine.toml"
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True, title="actions")
 
     init = actions.add_parser("init", help="write a commented machine file to start from")
@@ -34,6 +35,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     init.add_argument("--force", action="store_true", help="overwrite an existing file")
 
+    take = actions.add_parser(
+        "import",
+        help="make a machine file from a controller's parameter dump (CNC-PARA.TXT)",
+        description="Make a machine file from a FANUC parameter dump, and say what was read, assumed and missing.",
+        epilog="example: shapegcode machine import CNC-PARA.TXT --from vx500 -o machine.toml",
+    )
+    take.add_argument("dump", metavar="DUMP", help="parameter dump as the controller punches it")
+    take.add_argument(
+        "-o", "--output", metavar="FILE", default=_DEFAULT_FILE, help="file to write (default: %(default)s)"
+    )
+    take.add_argument(
+        "--from", dest="base", metavar="MACHINE", help="machine for what the dump does not say, such as the modes"
+    )
+    take.add_argument("--force", action="store_true", help="overwrite an existing file")
+    add_json_argument(take)
+
     show = actions.add_parser(
         "show",
         help="print every value with its unit, origin and meaning",
@@ -51,7 +68,40 @@ def run(args: argparse.Namespace) -> int:
         MachineError: the machine file is bad, or there is no built-in machine of that name.
         OSError: a file cannot be read or written.
     """
-    return _init(args) if args.action == "init" else _show(args)
+    actions = {"init": _init, "import": _import, "show": _show}
+    return actions[args.action](args)
+
+
+def _import(args: argparse.Namespace) -> int:
+    from rich.text import Text
+
+    from shapegcode.cli import ExitCode
+    from shapegcode.cli.console import output_console, write_json, write_text
+    from shapegcode.fanuc_parameters import read_parameters
+    from shapegcode.machine import Machine
+
+    found = read_parameters(args.dump, Machine.load(args.base) if args.base else None)
+    try:
+        write_text(args.output, found.to_toml(), overwrite=args.force)
+    except FileExistsError:
+        print(f"shapegcode: {args.output} exists; --force overwrites it, -o FILE writes another one", file=sys.stderr)
+        return ExitCode.BAD_INPUT
+    if args.json is not None:
+        write_json({"read": found.read, "assumed": found.assumed, "missing": found.missing}, args.json)
+    console = output_console(args.json)
+    console.print(f"read from {args.dump}:", markup=False)
+    for row in found.read:
+        where = f"line {row['line']}: {row['parameter']} {row['axis']}".rstrip()
+        console.print(Text(f"  {where} = {row['raw']} -> {row['key']} = {row['value']}"))
+    console.print("assumed:")
+    for row in found.assumed:
+        console.print(Text(f"  {row['key']} = {row['value']}: {row['why']}"))
+    console.print("missing or not understood:")
+    for row in found.missing:
+        line = f"line {row['line']}: " if row["line"] else ""
+        console.print(Text(f"  {line}{row['parameter']} {row['why']}".replace(":  ", ": ")))
+    console.print(f"wrote {args.output}", markup=False)
+    return ExitCode.OK
 
 
 def _init(args: argparse.Namespace) -> int:
