@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode import canvas
-from shapegcode.timing import PARTS, CycleTime
 from shapegcode.time_table import LABELS, slowest_regions, tool_name
+from shapegcode.timing import PARTS, CycleTime
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -191,9 +191,7 @@ def cycle_time(
     Raises:
         ArgumentError: a value that no controller can have, or a program too long to interpolate.
     """
-    model = controller_model(machine)
-    model.feed_override = feed_override
-    model.rapid_override = rapid_override
+    model = controller_model(machine, feed_override=feed_override, rapid_override=rapid_override)
     timed = _core.time_program(program.core, model, per_block)
     return CycleTime(
         **_parts(timed),

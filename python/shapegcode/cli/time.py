@@ -14,9 +14,9 @@ __all__ = ["add_arguments", "run"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Predicts the cycle time of a program as it is, in closed form, and checks it by giving every set-point: total, "
+        "Predicts the cycle time of a program as it is, in closed form, and checks it by giving every set-point: "
         "cutting, rapids, in-position, dwells, acceleration, tool changes; by tool; the slowest regions and blocks. "
-        "Exit code 1 if closed form and full interpolation differ by more than 0.5 %%."
+        "Exit code 1 if closed form and full interpolation differ by more than 0.5 %."
     )
     parser.add_argument("input", metavar="PROGRAM", help="CNC program")
     add_machine_argument(parser)
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=override,
         default=1.0,
         metavar="RATIO",
-        help="feed override, for example 80%% (0 excluded, up to 254%%)",
+        help="feed override, for example 80%% (at most 254%%)",
     )
     parser.add_argument(
         "--rapid-override",
@@ -51,10 +51,10 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode._core import ArgumentError
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json, write_text
-    from shapegcode.timing import cycle_time
     from shapegcode.program import Program
     from shapegcode.report import warning_table
     from shapegcode.time_table import blocks_csv, next_step, parts_table, slowest_table, tools_table
+    from shapegcode.timing import cycle_time
 
     if args.csv == "-" and args.json == "-":
         raise ArgumentError("--csv - and --json -: only one of them can have standard output")
@@ -92,5 +92,8 @@ def run(args: argparse.Namespace) -> int:
         console.print(slowest_table(time))
     if time.warnings:
         console.print(warning_table(time.warnings))
+    free = sum(block.kind in ("tool_change", "function") and block.duration_s <= 0.0 for block in time.blocks)
+    if free:
+        console.print(f"{free} blocks with tool changes or M codes count 0 s on this machine", markup=False)
     console.print(f"next: {next_step(time)}", markup=False)
     return ExitCode.OK if time.agrees else ExitCode.OUT_OF_TOLERANCE
