@@ -105,6 +105,12 @@ def next_step(time: CycleTime) -> str:
         )
     if time.total_s <= 0.0:
         return "nothing in the program takes time: is it the right one?"
+    cutting, programmed = sum(r.cutting_s for r in time.regions), sum(r.programmed_s for r in time.regions)
+    if cutting - programmed > _NOTABLE * time.total_s:
+        return (
+            f"cutting takes {cutting / programmed:.2f} times what its feeds say: look for feeds above the limits of the "
+            "axes, and for blocks of a few interpolation periods, which are rounded up to whole ones."
+        )
     losses = {
         "acceleration_s": "join short blocks, or look at the time constants and corner limits of the machine file",
         "rapid_s": "shorten the rapids, or take tools in an order that needs fewer of them",

@@ -80,7 +80,8 @@ class RegionTime:
         tool: T number in use; None where it is not known.
         start_s: since the start of the program.
         duration_s: from rest to rest, the wait of an exact stop at its end included.
-        cutting_s: its blocks at their feed.
+        programmed_s: its length at the programmed feeds and the override, nothing rounded or limited.
+        cutting_s: its blocks at their feed, in whole interpolation periods.
         acceleration_s: what acceleration adds.
         in_position_s: wait of an exact stop at its end.
         length_mm: length of its path.
@@ -90,6 +91,7 @@ class RegionTime:
     tool: int | None
     start_s: float
     duration_s: float
+    programmed_s: float
     cutting_s: float
     acceleration_s: float
     in_position_s: float
@@ -201,7 +203,7 @@ def cycle_time(
         tools=tuple(
             ToolTime(**_parts(tool), tool=_tool(tool.tool), first_line=tool.first_line) for tool in timed.tools
         ),
-        regions=tuple(_regions(timed.regions)),
+        regions=tuple(_regions(timed.regions, program, feed_override)),
         blocks=tuple(_blocks(timed.blocks, program)) if per_block else (),
         warnings=tuple(program.warnings),
     )
@@ -215,11 +217,15 @@ def _tool(number: int) -> int | None:
     return None if number < 0 else number
 
 
-def _regions(rows: npt.NDArray[Any]) -> Iterator[RegionTime]:
+def _regions(rows: npt.NDArray[Any], program: Program, feed_override: float) -> Iterator[RegionTime]:
+    programmed: dict[tuple[int, int], deque[float]] = defaultdict(deque)
+    for region in program.regions:
+        programmed[region.first_line, region.last_line].append(region.path.programmed_time_s / feed_override)
     names = ("start_s", "duration_s", "cutting_s", "acceleration_s", "in_position_s", "length_mm")
     for row in rows:
         times = {name: float(row[name]) for name in names}
-        yield RegionTime((int(row["first_line"]), int(row["last_line"])), _tool(int(row["tool"])), **times)
+        lines = int(row["first_line"]), int(row["last_line"])
+        yield RegionTime(lines, _tool(int(row["tool"])), **times, programmed_s=programmed[lines].popleft())
 
 
 def _blocks(rows: npt.NDArray[Any], program: Program) -> Iterator[BlockTime]:

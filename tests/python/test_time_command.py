@@ -81,6 +81,7 @@ def test_a_tiny_program_by_hand() -> None:
     assert time.full_interpolation_s == pytest.approx(time.total_s, abs=1e-9)
     assert [region.lines for region in time.regions] == [(9, 11)]
     assert time.regions[0].duration_s == pytest.approx(0.821, abs=1e-9)
+    assert time.regions[0].programmed_s == pytest.approx(12.845 / (1000 / 60), abs=1e-9)
     assert time.regions[0].start_s == pytest.approx(0.805 + 0.340, abs=1e-9)
 
 
@@ -272,7 +273,7 @@ def test_the_table_says_where_the_time_goes(folder: Path, capsys: pytest.Capture
     assert (code, err) == (0, "")
     for said in (
         "cycle time", "lost to acceleration", "in-position", "tool change", "T1", "9 to 11", "full interpolation",
-        "count 0 s", "next: ",
+        "count 0 s on this machine (3 in the program)", "next: ",
     ):  # fmt: skip
         assert said in out
     code, out, _ = run(capsys, "part.nc", "-m", "kimm004", "--set", "controller.time_constant_s=0.1", "--no-full")
@@ -341,6 +342,14 @@ def test_a_difference_is_an_exit_code(
     code, out, _ = run(capsys, "part.nc", "-m", "kimm004")
     assert code == 1
     assert "-0.50 %" in out
+
+
+def test_short_blocks_that_are_rounded_up_are_named() -> None:
+    """0.02 mm at 1000 mm/min are 1.2 ms, which take 2."""
+    steps = "".join(f"X{0.02 * k:.2f}\n" for k in range(1, 1001))
+    time = timed(f"%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1F1000.\n{steps}M30\n%\n")
+    assert time.total_s == pytest.approx(2.05, abs=1e-9)
+    assert "1.67 times what its feeds say" in next_step(time)
 
 
 def test_python_entry_and_its_module_do_not_hide_each_other() -> None:

@@ -10,6 +10,9 @@ from shapegcode.cli.options import add_machine_argument, add_plots_argument, loa
 
 __all__ = ["add_arguments", "run"]
 
+# A table of more blocks is built only where it is written.
+_MOST_BLOCKS_SHOWN = 100_000
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -66,10 +69,11 @@ def run(args: argparse.Namespace) -> int:
     with progress(f"timing {args.input}", stdout) as bar:
         bar.wait()
         program = Program.read(args.input, machine)
+        wanted = args.csv is not None or args.blocks
         time = cycle_time(
             program,
             machine,
-            per_block=True,
+            per_block=wanted or program.core.block_count <= _MOST_BLOCKS_SHOWN,
             full=not args.no_full,
             feed_override=args.override,
             rapid_override=args.rapid_override,
@@ -88,12 +92,12 @@ def run(args: argparse.Namespace) -> int:
     console.print(parts_table(time))
     if time.tools:
         console.print(tools_table(time))
-    if time.blocks:
+    if time.regions or time.blocks:
         console.print(slowest_table(time))
     if time.warnings:
         console.print(warning_table(time.warnings))
     free = sum(block.kind in ("tool_change", "function") and block.duration_s <= 0.0 for block in time.blocks)
     if free:
-        console.print(f"{free} blocks with tool changes or M codes count 0 s on this machine", markup=False)
+        console.print(f"tool changes and M codes count 0 s on this machine ({free} in the program)", markup=False)
     console.print(f"next: {next_step(time)}", markup=False)
     return ExitCode.OK if time.agrees else ExitCode.OUT_OF_TOLERANCE
