@@ -108,8 +108,8 @@ def next_step(time: CycleTime) -> str:
     cutting, programmed = sum(r.cutting_s for r in time.regions), sum(r.programmed_s for r in time.regions)
     if cutting - programmed > _NOTABLE * time.total_s:
         return (
-            f"cutting takes {cutting / programmed:.2f} times what its feeds say: look for feeds above the limits of the "
-            "axes, and for blocks of a few interpolation periods, which are rounded up to whole ones."
+            f"cutting takes {cutting / programmed:.2f} times what its feeds say: look for feeds above the limits of "
+            "the axes, and for blocks of a few interpolation periods, which are rounded up to whole ones."
         )
     losses = {
         "acceleration_s": "join short blocks, or look at the time constants and corner limits of the machine file",
