@@ -117,7 +117,7 @@ def ratio(text: str) -> float:
 
 
 def override(text: str) -> float:
-    """A feed or rapid override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control can be given)."""
+    """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control takes)."""
     value = _number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
     if not 0.0 < value <= _LARGEST_OVERRIDE:
         raise argparse.ArgumentTypeError(f"{text!r}: must be above 0 and at most {_LARGEST_OVERRIDE:.0%}")

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, add_plots_argument, load_machine, override, refuse_same_file
+from shapegcode.cli.options import add_machine_argument, add_plots_argument, load_machine, override, ratio, refuse_same_file
 
 __all__ = ["add_arguments", "run"]
 
@@ -32,10 +32,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--rapid-override",
-        type=override,
+        type=ratio,
         default=1.0,
         metavar="RATIO",
-        help="rapid override, for example 25%%; the acceleration of rapids stays what it is",
+        help="rapid override, for example 25%% (at most 100%%); the acceleration of rapids stays what it is",
     )
     parser.add_argument("--no-full", action="store_true", help="closed form only, no full interpolation")
     parser.add_argument("--blocks", action="store_true", help="put every block into the JSON")
