@@ -46,9 +46,10 @@ int full_ramp(const Way& way, double period_s) noexcept {
 
 // Paper 004: eq. 6 for a rapid that reaches its rate, eq. 9 to 11 for a short one.
 Counts counts_in_closed_form(const Way& way, double period_s) noexcept {
-  const double ramp_s = way.rate_mm_per_s / way.acceleration_mm_per_s2;
-  if (way.length_mm >= way.rate_mm_per_s * ramp_s) {
-    return {static_cast<int>(whole_periods(way.length_mm / way.rate_mm_per_s / period_s)), full_ramp(way, period_s)};
+  const Counts full{static_cast<int>(whole_periods(way.length_mm / way.rate_mm_per_s / period_s)),
+                    full_ramp(way, period_s)};
+  if (full.travel >= full.ramp) {
+    return full;
   }
   const double half_s = std::sqrt(way.length_mm / way.acceleration_mm_per_s2);
   const int half = std::max(1, static_cast<int>(whole_periods(half_s / period_s)));
