@@ -6,7 +6,14 @@ import argparse
 from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, add_plots_argument, load_machine, override, ratio, refuse_same_file
+from shapegcode.cli.options import (
+    add_machine_argument,
+    add_plots_argument,
+    load_machine,
+    override,
+    ratio,
+    refuse_same_file,
+)
 
 __all__ = ["add_arguments", "run"]
 
