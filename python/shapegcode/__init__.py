@@ -76,6 +76,8 @@ if TYPE_CHECKING:
     )
     from shapegcode.simulator import Simulation as Simulation
     from shapegcode.simulator import simulate as simulate
+    from shapegcode.timing import CycleTime as CycleTime
+    from shapegcode.timing import cycle_time as cycle_time
 
 _HOME = {
     **dict.fromkeys(
@@ -91,6 +93,7 @@ _HOME = {
     "Program": "program",
     **dict.fromkeys(("choose_block_period", "shortest_non_negative"), "shaping"),
     **dict.fromkeys(("Simulation", "simulate"), "simulator"),
+    **dict.fromkeys(("CycleTime", "cycle_time"), "timing"),
 }  # fmt: skip
 
 __all__ = sorted(_HOME)  # noqa: PLE0605

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from shapegcode import canvas
 from shapegcode.report import Trace
 
 if TYPE_CHECKING:
@@ -29,11 +30,8 @@ FloatArray = npt.NDArray[np.float64]
 Plane = Literal["XY", "ZX", "YZ"]
 
 _AXIS_NAMES = "XYZ"
-_COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7")
 _WIDTHS = (2.4, 0.9, 0.9, 0.9)
-_GREY = "#8a8a8a"
 _MAX_POINTS = 4000
-_FORMATS = (".png", ".svg")
 _MOVES_MM = 1e-9
 # A deflection below this is none.
 _SHOWN_MM = 5e-5
@@ -143,10 +141,10 @@ def plot_path(
     factor = magnification or _round_factor(0.1 * size_mm / largest_mm if largest_mm > 0 else 1.0)
 
     straight = _only_along(polyline, [deviation for _, _, deviation in drawn])
-    figure = _figure(7.2 if whole is None else 10.4, 6.4)
+    figure = canvas.figure(7.2 if whole is None else 10.4, 6.4)
     axes, locator = _path_axes(figure, with_locator=whole is not None)
     across, up = (_AXIS_NAMES.index(name) for name in plane)
-    axes.plot(polyline[:, across], polyline[:, up], color=_GREY, linewidth=3, alpha=0.55, label="programmed path")
+    axes.plot(polyline[:, across], polyline[:, up], color=canvas.GREY, linewidth=3, alpha=0.55, label="programmed path")
     for number, (trace, feet, deviation) in enumerate(drawn):
         curve = feet + factor * deviation
         label = _path_label(trace, deviation, quantity, is_part=whole is not None)
@@ -158,7 +156,7 @@ def plot_path(
     axes.set_xlabel(f"{plane[0]} in mm")
     axes.set_ylabel(f"{plane[1]} in mm")
     what = "table" if quantity == "response" else "command"
-    _heading(figure, f"Deviation of the {what} from the path, drawn ×{factor:g}", part)
+    canvas.heading(figure, f"Deviation of the {what} from the path, drawn ×{factor:g}", part)
     if straight:
         axes.text(
             0.5, 0.3, "The path is straight: the table deviates along it only,\nwhich no drawing of the path shows. "
@@ -169,7 +167,7 @@ def plot_path(
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1, frameon=False, borderaxespad=0.2, fontsize=9)
     if whole is not None and locator is not None:
         _locate(locator, whole[:, [across, up]], polyline[:, [across, up]])
-    _save(figure, file)
+    canvas.save(figure, file)
     return factor
 
 
@@ -187,8 +185,8 @@ def plot_feed(file: str | Path, views: Sequence[View], *, part: str = "") -> Non
     """
     _check_views(views)
     moving = _moving_axes([trace for view in views for trace in view.traces])
-    figure = _figure(8.0 + 4.0 * (len(views) - 1), 1.8 + 1.7 * (1 + len(moving)))
-    grid = _panels(figure, 1 + len(moving), len(views))
+    figure = canvas.figure(8.0 + 4.0 * (len(views) - 1), 1.8 + 1.7 * (1 + len(moving)))
+    grid = canvas.panels(figure, 1 + len(moving), len(views))
     for view, panels in zip(views, grid, strict=True):
         for number, trace in enumerate(view.traces):
             speeds = np.diff(trace.command_mm, axis=0) / trace.period_s * 60
@@ -200,7 +198,7 @@ def plot_feed(file: str | Path, views: Sequence[View], *, part: str = "") -> Non
         for panel in panels:
             _spread_flat(panel)
         _column_heading(panels[0], view)
-        _legend_above(panels[0])
+        canvas.legend_above(panels[0])
         # Standstill before and after says nothing about feed.
         begin = min(trace.departure_s for trace in view.traces)
         end = max(trace.rest_s if trace.stops else float(trace.times_s[-1]) for trace in view.traces)
@@ -210,9 +208,9 @@ def plot_feed(file: str | Path, views: Sequence[View], *, part: str = "") -> Non
     grid[0][0].set_ylabel("path feed\nin mm/min")
     for panel, axis in zip(grid[0][1:], moving, strict=True):
         panel.set_ylabel(f"{_AXIS_NAMES[axis]} speed\nin mm/min")
-    _heading(figure, "Feed of the command", part)
+    canvas.heading(figure, "Feed of the command", part)
     figure.align_ylabels(grid[0])
-    _save(figure, file)
+    canvas.save(figure, file)
 
 
 def plot_vibration(file: str | Path, views: Sequence[View], *, part: str = "") -> None:
@@ -236,8 +234,8 @@ def plot_vibration(file: str | Path, views: Sequence[View], *, part: str = "") -
     swinging = [axis for axis in moving if swing_mm[axis] >= _SHOWN_MM]
     still = [axis for axis in moving if axis not in swinging]
     shown = swinging or still[:1]
-    figure = _figure(8.0 + 4.0 * (len(views) - 1), 1.8 + 2.2 * len(shown))
-    grid = _panels(figure, len(shown), len(views))
+    figure = canvas.figure(8.0 + 4.0 * (len(views) - 1), 1.8 + 2.2 * len(shown))
+    grid = canvas.panels(figure, len(shown), len(views))
     for view, panels in zip(views, grid, strict=True):
         for panel, axis in zip(panels, shown, strict=True):
             for number, trace in enumerate(view.traces):
@@ -245,8 +243,8 @@ def plot_vibration(file: str | Path, views: Sequence[View], *, part: str = "") -
                 _curve(panel, number, label, trace.times_s, trace.deflection_mm[:, axis] * 1e3, fine=len(views) > 1)
                 if trace.stops:
                     panel.axvline(trace.rest_s, color=_colour(number), linewidth=1, linestyle=(0, (4, 3)))
-            panel.axhline(0, color=_GREY, linewidth=0.6, zorder=0)
-            _legend_above(panel)
+            panel.axhline(0, color=canvas.GREY, linewidth=0.6, zorder=0)
+            canvas.legend_above(panel)
             _spread_flat(panel)
         _column_heading(panels[0], view)
         panels[-1].set_xlabel(view.time_label)
@@ -256,9 +254,9 @@ def plot_vibration(file: str | Path, views: Sequence[View], *, part: str = "") -
     notes += (
         [f"{', '.join(_AXIS_NAMES[axis] for axis in still)}: rigid (below {_SHOWN_MM * 1e3:g} µm)"] if still else []
     )
-    _heading(figure, "; ".join(["Vibration", *notes]), part)
+    canvas.heading(figure, "; ".join(["Vibration", *notes]), part)
     figure.align_ylabels(grid[0])
-    _save(figure, file)
+    canvas.save(figure, file)
 
 
 def _checked_polyline(name: str, points: npt.ArrayLike) -> FloatArray:
@@ -313,7 +311,7 @@ def _only_along(polyline: FloatArray, deviations: Sequence[FloatArray]) -> bool:
 
 
 def _colour(number: int) -> str:
-    return _COLOURS[number % len(_COLOURS)]
+    return canvas.COLOURS[number % len(canvas.COLOURS)]
 
 
 def _width(number: int) -> float:
@@ -405,26 +403,6 @@ def _round_factor(factor: float) -> float:
     return max(step * decade for step in (1, 2, 5) if step * decade <= factor * (1 + 1e-9))
 
 
-def _figure(width_inch: float, height_inch: float) -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width_inch, height_inch), layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def _panels(figure: Figure, rows: int, columns: int) -> list[list[Axes]]:
-    """Columns of panels that share their time axis."""
-    grid: Any = figure.subplots(rows, columns, sharex="col", squeeze=False)
-    for panel in grid.flat:
-        panel.grid(True, color="#e4e4e4", linewidth=0.6)
-        panel.set_axisbelow(True)
-        panel.margins(x=0.01)
-        panel.spines[["top", "right"]].set_visible(False)
-    return [list(grid[:, column]) for column in range(columns)]
-
-
 def _path_axes(figure: Figure, *, with_locator: bool) -> tuple[Axes, Axes | None]:
     if not with_locator:
         return figure.add_subplot(), None
@@ -434,7 +412,7 @@ def _path_axes(figure: Figure, *, with_locator: bool) -> tuple[Axes, Axes | None
 
 def _locate(axes: Axes, whole: FloatArray, piece: FloatArray) -> None:
     """The whole path, small, and where the piece lies on it."""
-    axes.plot(whole[:, 0], whole[:, 1], color=_GREY, linewidth=0.8)
+    axes.plot(whole[:, 0], whole[:, 1], color=canvas.GREY, linewidth=0.8)
     axes.plot(piece[:, 0], piece[:, 1], color="black", linewidth=2)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(piece, axis=0), axis=1))])
     middle = [float(np.interp(along[-1] / 2, along, piece[:, axis])) for axis in range(2)]
@@ -456,19 +434,9 @@ def _spread_flat(panel: Axes) -> None:
         panel.set_ylim(-1, 1)
 
 
-def _heading(figure: Figure, text: str, part: str) -> None:
-    """Title of the whole picture, and which part of the program it shows."""
-    figure.suptitle(text + (f"\n{part}" if part else ""), x=0.01, ha="left", fontsize=11)
-
-
 def _column_heading(panel: Axes, view: View) -> None:
     if view.heading:
         panel.set_title(view.heading, loc="left", fontsize=10, pad=22)
-
-
-def _legend_above(panel: Axes) -> None:
-    """Legend between the panel and what is above it, where it hides no curve."""
-    panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.2, fontsize=9)
 
 
 def _deviation_scale(axes: Axes, factor: float, largest_mm: float) -> None:
@@ -490,18 +458,3 @@ def _deviation_scale(axes: Axes, factor: float, largest_mm: float) -> None:
         "lower right", child=packed, frameon=False, pad=0.4, bbox_to_anchor=(1.0, 1.0), bbox_transform=axes.transAxes
     )
     axes.add_artist(above)
-
-
-def _save(figure: Figure, file: str | Path) -> None:
-    """Write the picture; the same data gives the same bytes."""
-    import matplotlib
-
-    path = Path(file)
-    suffix = path.suffix.lower()
-    if suffix not in _FORMATS:
-        raise ValueError(f"{path}: the ending of a picture must be one of {', '.join(_FORMATS)}")
-    if suffix == ".svg":
-        with matplotlib.rc_context({"svg.hashsalt": "shapegcode", "svg.fonttype": "none"}):
-            figure.savefig(path, format="svg", metadata={"Date": None})
-    else:
-        figure.savefig(path, format="png", dpi=150, metadata={"Software": None})

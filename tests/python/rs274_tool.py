@@ -19,17 +19,19 @@ def _linuxcnc_folder() -> Path:
     return Path(fetch.stdout.splitlines()[-1])
 
 
-def run_rs274(program_text: str, tmp_path: Path) -> list[str]:
+def run_rs274(program_text: str, tmp_path: Path, *, tools: str = "", variables: str = "") -> list[str]:
     """The canonical lines that rs274 prints for the program, as they come: `1 N..... STRAIGHT_FEED(...)`.
+
+    `tools` is the text of a tool table, `variables` that of a parameter file; their lengths are inches.
 
     Raises RuntimeError with rs274's message when it rejects the program.
     """
     linuxcnc = _linuxcnc_folder()
     program = tmp_path / "program.ngc"
     program.write_text(program_text)
-    tool_table, variables = tmp_path / "tools.tbl", tmp_path / "variables.var"
-    tool_table.write_text("")
-    variables.write_text("")  # rs274 rewrites it: every run starts from an empty one
+    tool_table, parameters = tmp_path / "tools.tbl", tmp_path / "variables.var"
+    tool_table.write_text(tools)
+    parameters.write_text(variables)  # rs274 rewrites it: every run starts from this one
     # PYTHON* variables of our own interpreter must not reach the one inside rs274.
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     environment |= {
@@ -37,7 +39,7 @@ def run_rs274(program_text: str, tmp_path: Path) -> list[str]:
         "LD_LIBRARY_PATH": f"{linuxcnc}/usr/lib:{linuxcnc}/usr/lib/x86_64-linux-gnu",
     }
     run = subprocess.run(
-        [linuxcnc / "usr/bin/rs274", "-g", "-t", tool_table, "-v", variables, program],
+        [linuxcnc / "usr/bin/rs274", "-g", "-t", tool_table, "-v", parameters, program],
         env=environment,
         cwd=tmp_path,
         stdin=subprocess.DEVNULL,

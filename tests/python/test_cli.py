@@ -273,7 +273,7 @@ def test_wrong_usage_is_exit_code_2(folder: Path, words: tuple[str, ...]) -> Non
     assert files(folder) == ["part.nc"]
 
 
-@pytest.mark.parametrize("command", ["convert", "simulate", "machine", "demo"])
+@pytest.mark.parametrize("command", ["convert", "simulate", "time", "machine", "demo"])
 def test_help(folder: Path, command: str) -> None:
     done = run(folder, command, "--help", COLUMNS="100")
     assert (done.returncode, done.stderr) == (0, "")

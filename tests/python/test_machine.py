@@ -114,10 +114,11 @@ def test_vx500_does_not_limit_the_path_of_paper_000() -> None:
     assert machine.axes.z.modes == ()
 
 
-def test_builtin_file_names_every_key_and_the_origin_of_every_machine_value() -> None:
-    text = Machine.builtin_text("vx500")
+@pytest.mark.parametrize("builtin", Machine.builtin_names())
+def test_builtin_file_names_every_key_and_the_origin_of_every_machine_value(builtin: str) -> None:
+    text = Machine.builtin_text(builtin)
     lines = text.splitlines()
-    for value in Machine.load("vx500").values():
+    for value in Machine.load(builtin).values():
         name = value.info.key.rpartition(".")[2]
         if name == "modes":
             continue
@@ -130,6 +131,17 @@ def test_builtin_file_names_every_key_and_the_origin_of_every_machine_value() ->
         is_value = " = " in line and not line.startswith("#")
         if is_value and section.startswith(("[axes", "[[axes", "[controller", "[power_on")):
             assert line.count("#") == 1 and any(w in line for w in ("assumed", "paper", "measured")), line
+
+
+def test_kimm004_has_the_first_set_of_constants_of_paper_004() -> None:
+    machine = Machine.load("kimm004")
+    controller = machine.controller
+    assert controller.motion == "after_interpolation"
+    assert (controller.rapid_time_constant_s, controller.rapid_bell_time_s) == (0.15, 0.03)
+    assert controller.time_constant_s == 0.05
+    assert controller.rapid_path == "linear"
+    assert controller.in_position_s.as_tuple() == (0.025, 0.025, 0.12)
+    assert {axis.rapid_mm_per_min for axis in machine.axes.as_tuple()} == {10_000.0}
 
 
 def test_written_file_loads_back_to_an_equal_machine() -> None:
@@ -360,7 +372,7 @@ def test_file_that_is_not_text(tmp_path: Path) -> None:
 
 
 def test_unknown_name_lists_the_builtin_machines() -> None:
-    with pytest.raises(MachineError, match="no such file and no built-in machine; built in: vx500"):
+    with pytest.raises(MachineError, match="no such file and no built-in machine; built in: kimm004, vx500"):
         Machine.load("vx600")
     with pytest.raises(FileNotFoundError):
         Machine.load("vx600.toml")
@@ -443,7 +455,7 @@ def test_show_json_is_alone_on_standard_output(capsys: pytest.CaptureFixture[str
             ["machine", "show", "no/such/machine.toml"],
             ["no/such/machine.toml: the folder no/such does not exist"],
         ),
-        (["machine", "show", "vx600"], ["vx600", "built in: vx500"]),
+        (["machine", "show", "vx600"], ["vx600", "built in: kimm004, vx500"]),
         (["machine", "show", "vx500", "--json", "no/x.json"], ["no/x.json: the folder no does not exist"]),
         (["machine", "init", "-o", "no/x.toml"], ["no/x.toml: the folder no does not exist"]),
         (["machine", "init", "-o", "/dev/full", "--force"], ["/dev/full: No space left on device"]),

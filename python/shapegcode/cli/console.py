@@ -9,6 +9,7 @@ import json
 import os
 import stat
 import sys
+import threading
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -148,6 +149,9 @@ class ProgressBar:
         self._description = description
         self._enabled = enabled
         self._began = time.monotonic()
+        self._lock = threading.Lock()
+        self._timer: threading.Timer | None = None
+        self._closed = False
         self._bar: Progress | None = None
         self._task: TaskID | None = None
 
@@ -162,13 +166,29 @@ class ProgressBar:
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=min(max(fraction, 0.0), 1.0))
 
+    def wait(self) -> None:
+        """Show from the first second on that work goes on which cannot tell how much of it is done."""
+        if self._enabled:
+            self._timer = threading.Timer(_PROGRESS_DELAY_S, self._open_endless)
+            self._timer.daemon = True
+            self._timer.start()
+
     def close(self) -> None:
         """Remove the bar from the screen."""
-        if self._bar is not None:
-            self._bar.stop()
-            self._bar = None
+        if self._timer is not None:
+            self._timer.cancel()
+        with self._lock:
+            self._closed = True
+            if self._bar is not None:
+                self._bar.stop()
+                self._bar = None
 
-    def _open(self) -> None:
+    def _open_endless(self) -> None:
+        with self._lock:
+            if not self._closed and self._bar is None:
+                self._open(total=None)
+
+    def _open(self, total: float | None = 1.0) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -179,7 +199,7 @@ class ProgressBar:
             console=Console(stderr=True),
             transient=True,
         )
-        self._task = self._bar.add_task(self._description, total=1.0)
+        self._task = self._bar.add_task(self._description, total=total)
         self._bar.start()
 
 

@@ -15,8 +15,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "name",
         metavar="NAME",
-        choices=("path",),
-        help="path: line, arc, line of paper 000 at both feeds and reductions",
+        choices=("path", "cycle-time"),
+        help="path: line, arc, line of paper 000 at both feeds and reductions; "
+        "cycle-time: a test piece with the features of ISO 10791-7 with both sets of constants of paper 004",
     )
     add_json_argument(parser)
 
@@ -27,17 +28,21 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         OSError: the JSON file cannot be written.
     """
+    return _cycle_time(args.json) if args.name == "cycle-time" else _path(args.json)
+
+
+def _path(json_target: str | None) -> int:
     from rich.table import Table
 
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
     from shapegcode.demos import path_demo
 
-    with progress("paper 000", args.json):
+    with progress("paper 000", json_target):
         result = path_demo()
-    if args.json is not None:
-        write_json(result, args.json)
-    console = output_console(args.json)
+    if json_target is not None:
+        write_json(result, json_target)
+    console = output_console(json_target)
     table = Table(title="Paper 000: line, quarter arc R20, line on a machine with 46 Hz (X) and 131 Hz (Y)")
     table.add_column("feed, arc reduction")
     table.add_column("figure")
@@ -65,3 +70,43 @@ def run(args: argparse.Namespace) -> int:
     console.print("next: shapegcode convert YOUR.NC -m vx500 -o SHAPED.NC --plots plots", markup=False)
     within = all(row["emitted"]["within_tolerance"] for row in result["conditions"])
     return ExitCode.OK if within else ExitCode.OUT_OF_TOLERANCE
+
+
+def _cycle_time(json_target: str | None) -> int:
+    from rich.table import Table
+
+    from shapegcode.cli import ExitCode
+    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.demos import cycle_time_demo
+
+    with progress("paper 004", json_target) as bar:
+        bar.wait()
+        result = cycle_time_demo()
+    if json_target is not None:
+        write_json(result, json_target)
+    console = output_console(json_target)
+    table = Table(
+        title=f"Paper 004: {result['program']} on {result['machine']}; the paper's times are of its own program"
+    )
+    table.add_column("rapid, bell, cutting ms")
+    for column in (
+        "closed form s",
+        "full interpolation s",
+        "difference",
+        "computing s",
+        "paper predicted / measured s",
+    ):
+        table.add_column(column, justify="right")
+    for row in result["sets"]:
+        keys = ("rapid_time_constant_s", "rapid_bell_time_s", "time_constant_s")
+        computing, paper = row["computing_s"], row["paper"]
+        table.add_row(
+            " / ".join(f"{row[key] * 1e3:.0f}" for key in keys),
+            f"{row['closed_form_s']:.3f}", f"{row['full_interpolation_s']:.3f}", f"{row['difference_percent']:+.4f} %",
+            f"{computing['closed_form']:.3f} + {computing['full_interpolation']:.3f}",
+            f"{paper['predicted_s']:.1f} / {paper['measured_s']:.1f}",
+        )  # fmt: skip
+    console.print(table)
+    console.print(result["remark"], markup=False)
+    console.print("next: shapegcode time YOUR.NC -m YOUR_MACHINE.toml", markup=False)
+    return ExitCode.OK if result["agrees"] else ExitCode.OUT_OF_TOLERANCE

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
+_LARGEST_OVERRIDE = 2.54
 _TIME_UNITS = {"ms": 1e-3, "us": 1e-6, "s": 1.0}
 
 
@@ -35,14 +36,12 @@ def add_machine_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_plots_argument(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--plots DIR``."""
-    parser.add_argument(
-        "--plots",
-        metavar="DIR",
-        default=None,
-        help="write pictures (PNG and SVG) of the region that vibrates most into this folder",
-    )
+def add_plots_argument(
+    parser: argparse.ArgumentParser,
+    what: str = "write pictures (PNG and SVG) of the region that vibrates most into this folder",
+) -> None:
+    """Declare ``--plots DIR``; *what* is its help."""
+    parser.add_argument("--plots", metavar="DIR", default=None, help=what)
 
 
 def load_machine(args: argparse.Namespace) -> Machine:
@@ -114,6 +113,14 @@ def ratio(text: str) -> float:
     value = _number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
     if not 0.0 < value <= 1.0:
         raise argparse.ArgumentTypeError(f"{text!r}: must be above 0 and at most 100%")
+    return value
+
+
+def override(text: str) -> float:
+    """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control takes)."""
+    value = _number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    if not 0.0 < value <= _LARGEST_OVERRIDE:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be above 0 and at most {_LARGEST_OVERRIDE:.0%}")
     return value
 
 
