@@ -64,6 +64,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("convert", "convert a CNC program into an input-shaped FANUC program, and check the result"),
     Command("simulate", "play a program on the machine's model: cycle time, vibration, contour error"),
     Command("machine", "write or explain a machine file"),
+    Command("characterize", "measure a controller with test programs, and fit the machine file to the results"),
     Command("demo", "repeat the figures of a paper beside the published ones"),
 )
 """Every sub-command, in the order of the help text. A new one needs a row here and a module of its name."""
