@@ -23,8 +23,9 @@ _FIRST_NUMBER = 7001  # 8000 and 9000 are often locked
 _STOP_S = 0.032  # a whole multiple of every usual interpolation period
 _LOG_STOP_S = 0.160
 _STOP_DWELL_S = 0.008
-_LOG_DWELL_S = 0.1
+_LOG_DWELL_S = 0.096
 _LOG_PAUSE_S = 0.5
+_STEPS_WAY_S = 0.8  # at full feed: longer than the ramps at both ends
 _LOG_SHARES = (1.0, 0.5, 0.25, 0.1, 0.05)
 _HEADER = "G21 G17 G91 G94 G64"
 _PER_MINUTE = 60.0
@@ -47,7 +48,7 @@ class _Maker:
     def _length(self, axis: str, duration_s: float, feed: float, side: int = 0) -> float:
         """Signed length for a duration; *side* -1 and +1: just below and just above it, whatever the increment."""
         exact = duration_s * feed / _PER_MINUTE
-        margin = max(self._step, 0.002 * exact) if side else 0.0
+        margin = max(self._step, 0.0005 * exact) if side else 0.0
         units = round((exact + side * margin) / self._step)
         if side and (units * self._step - exact) * side <= 0.0:
             units += side
@@ -82,7 +83,8 @@ class _Maker:
     def feed_steps(self, axis: str, length_mm: float) -> list[Part]:
         """Pieces of one length, alternately fast and slow, and back."""
         room = int((abs(self._box.travel_mm(axis)) + 1e-9) / length_mm)
-        stride = min(8, room - room % 2)
+        wanted = max(8, 2 * math.ceil(_STEPS_WAY_S * self.feed / _PER_MINUTE / (2.0 * length_mm)))
+        stride = min(wanted, room - room % 2)
         if stride < 4:
             return []
         length = math.copysign(round(round(length_mm / self._step) * self._step, 9), self._box.travel_mm(axis))
@@ -145,8 +147,8 @@ def make_tests(machine: Machine, box: Box) -> list[Test]:
 
     log("log_cutting", "TIME CONSTANT, PERIOD", [make.stops("dwell", "X", 10, side, log=True) for side in (-1, +1)])
     log("log_exact", "IN-POSITION TIMES", [make.stops("exact", axis, 10, -1, log=True) for axis in AXES])
-    log("log_run", "CEIL OR CARRY", [make.run("X", 80, _STOP_S, +1)])
-    log("log_blocks", "BLOCK TIME", [make.run("X", 600, 0.0002), make.run("X", 200, 0.0041)])
+    log("log_run", "CEIL OR CARRY", [make.run("X", 160, _STOP_S, +1)])
+    log("log_blocks", "BLOCK TIME", [make.run("X", 1200, 0.0002)])
     for axis in AXES:
         log(f"log_rapid_{axis.lower()}", f"RAPID OF {axis}", [make.rapids(axis, share, 6) for share in _LOG_SHARES])
     lengths = (20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2)
