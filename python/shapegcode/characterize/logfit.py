@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -31,6 +32,9 @@ _SOURCE = "log"
 _ODD_SHAPE = 0.002  # of the way: a fit that leaves more is no fit
 _BELL_GAIN = 0.8  # a second moving average must lower the variance below this share
 _FOLLOWED = 0.9
+_SERVO_SLACK = 0.02
+_GAINS = (2.0, 1000.0)  # 1/s
+_RUN_SETTLE_S = 0.45
 _STEPS_SETTLE_S = 0.3
 
 
@@ -78,15 +82,24 @@ def _period(state: _State, logs: Mapping[str, ServoLog], parts: Mapping[str, lis
             note = f"moves of {short * 1e3:.2f} and {long * 1e3:.2f} ms differ by {step * 1e3:.2f} ms"
             state.findings.append(known(name, fits[0], half, "s", key, _SOURCE, note))
             return
-        why = (
-            f"the command is not held between samples, and moves of {short * 1e3:.2f} and {long * 1e3:.2f} ms differ by "
-            f"{step * 1e3:.2f} ms, as with {len(fits)} of the usual periods"
-        )
-        state.findings.append(unknown(name, "s", _SOURCE, why))
-        return
-    state.findings.append(
-        unknown(name, "s", _SOURCE, f"a command is seen every {sampling * 1e3:g} ms; log_cutting is needed")
-    )
+    run = parts.get("log_run", [])
+    steady = line_slope(run[0], _RUN_SETTLE_S) if run else None
+    if run and steady is not None:
+        part = run[0].part
+        lasts = abs(part.length_mm) / steady[0]
+        slack = lasts * steady[1] / steady[0] + 2e-5
+        fits = [
+            t for t in PERIODS_S if abs(whole_periods(part.duration_s, t) - lasts) <= slack and t <= 1.01 * sampling
+        ]
+        if lasts - part.duration_s > 2.0 * slack and len(fits) == 1:
+            state.period = fits[0]
+            note = f"blocks of {part.duration_s * 1e3:.2f} ms last {lasts * 1e3:.2f} ms, and no longer period shows"
+            state.findings.append(known(name, fits[0], slack, "s", key, _SOURCE, note))
+            return
+    why = f"not longer than the {sampling * 1e3:g} ms between samples, or interpolated between periods"
+    if len(stops) < 2 or not run:
+        why += "; log_cutting and log_run together may tell"
+    state.findings.append(unknown(name, "s", _SOURCE, why))
 
 
 def _cutting(state: _State, stops: list[PartLog]) -> None:
@@ -119,9 +132,7 @@ def _cutting(state: _State, stops: list[PartLog]) -> None:
         state.findings += [unknown(name, "s", _SOURCE, why) for name in names]
         return
     chosen = fits[best]
-    pairs = [
-        sorted(zip(fit.values[1:].tolist(), fit.half[1:].tolist(), strict=True), reverse=True) for fit in chosen
-    ]
+    pairs = [sorted(zip(fit.values[1:].tolist(), fit.half[1:].tolist(), strict=True), reverse=True) for fit in chosen]
     value, half = mean([pair[0][0] for pair in pairs], [pair[0][1] for pair in pairs])
     note = {"linear": "linear", "bell": "the longer of two moving averages", "exponential": "exponential"}[best]
     key = "" if best == "exponential" else "controller.time_constant_s"
@@ -137,7 +148,9 @@ def _cutting(state: _State, stops: list[PartLog]) -> None:
         state.cutting, state.cutting_half = value + second, math.hypot(half, second_half)
     elif best == "linear":
         note = "no second moving average shows"
-        state.findings.append(Finding(names[1], 0.0, 0.0, max(fine, 0.002), "s", "controller.bell_time_s", _SOURCE, note))
+        state.findings.append(
+            Finding(names[1], 0.0, 0.0, max(fine, 0.002), "s", "controller.bell_time_s", _SOURCE, note)
+        )
 
 
 def _dwells(state: _State, stops: list[PartLog]) -> None:
@@ -188,8 +201,8 @@ def _rapid(part: PartLog, period: float) -> _Rapid:
     nominal = part.part.duration_s
     rectangle = whole_periods(nominal, period)
     found: list[tuple[ShapeFit, bool, bool]] = []
-    begin = math.sqrt(nominal * 0.1)
-    for bell in (None, 0.005, 0.03):
+    for bell, ramp_guess in itertools.product((None, 0.005, 0.03, 0.08), (0.06, 0.15)):
+        begin = math.sqrt(nominal * ramp_guess)
         tail, low, high = ([], [], []) if bell is None else ([bell], [1e-5], [0.5])
         fit = fit_shape(
             part,
@@ -238,8 +251,12 @@ def _rapids(state: _State, axis: str, parts: list[PartLog]) -> list[tuple[float,
         state.findings.append(known(name, value, half, "s", key, _SOURCE, "ramp of rapids that reach the rate"))
     else:
         # half the move lasts ceil(sqrt(nominal * A) / T) T
-        low = max((fit.ramp[0] - fit.ramp[1] - period) ** 2 / fit.nominal for fit in fits)
-        high = min((fit.ramp[0] + fit.ramp[1]) ** 2 / fit.nominal for fit in fits)
+        halves = [(whole_periods(fit.ramp[0] - 0.3 * period, period), fit) for fit in fits]
+        sure = [(half, fit) for half, fit in halves if abs(half - fit.ramp[0]) + fit.ramp[1] < 0.3 * period]
+        slack = 0.0 if sure and state.period else 1e-4
+        pairs = sure if slack == 0.0 else [(fit.ramp[0], fit) for fit in fits]
+        low = max((half - slack - period) ** 2 / fit.nominal for half, fit in pairs)
+        high = min((half + slack) ** 2 / fit.nominal for half, fit in pairs)
         if low <= high:
             note = "no rapid reaches the rate: from their acceleration, in whole periods"
             state.findings.append(Finding(name, (low + high) / 2.0, low, high, "s", key, _SOURCE, note))
@@ -295,10 +312,12 @@ def _runs(state: _State, run: list[PartLog], blocks: list[PartLog]) -> None:
         lasts = abs(part.length_mm) / speed
         note = f"blocks of {nominal * 1e3:.2f} ms last {lasts * 1e3:.2f} ms"
         full = whole_periods(nominal, state.period) - nominal if state.period else None
-        slack = lasts * half / speed
-        share = (lasts - nominal) / full if full else None
-        if share is not None and full is not None and slack < 0.3 * full and min(abs(share), abs(share - 1.0)) < 0.3:
-            state.end = "ceil" if share > 0.5 else "carry"
+        slack = lasts * half / speed + 1e-5
+        if lasts - nominal > 3.0 * slack and (full is None or abs(lasts - nominal - full) < 0.3 * full + slack):
+            state.end = "ceil"
+        elif full is not None and abs(lasts - nominal) < 0.3 * full and slack < 0.3 * full:
+            state.end = "carry"
+        if state.end:
             state.findings.append(Finding(rule, state.end, None, None, "", "controller.block_end", _SOURCE, note))
         else:
             state.findings.append(unknown(rule, "", _SOURCE, note + ": neither fits, or the period is not known"))
@@ -321,6 +340,8 @@ def _runs(state: _State, run: list[PartLog], blocks: list[PartLog]) -> None:
         why = f"blocks of {part.duration_s * 1e3:.2f} ms last {lasts * 1e3:.2f} ms: it hides behind the period"
         state.findings.append(unknown(name, "s", _SOURCE, why, high=lasts + slack))
         return
+    if state.exponential:
+        slack += 0.005 * lasts  # the tail of the start
     note = f"blocks of {part.duration_s * 1e3:.2f} ms last so long"
     state.findings.append(known(name, lasts, slack, "s", "controller.block_time_s", _SOURCE, note))
 
@@ -359,42 +380,69 @@ def _feed_steps(state: _State, parts: list[PartLog]) -> None:
 
 
 def _servo(state: _State, logs: Mapping[str, ServoLog]) -> None:
-    """Position gain and feed-forward: e = −K ∫e dt + (1 − f) x, fitted to following error and command."""
+    """Position gain K and feed-forward f: e = −K ∫e dt + (1 − f) x + c, fitted to following error e and command x."""
     done = False
     for index, axis in enumerate(AXES):
-        gains, forwards = [], []
-        for log in logs.values():
-            if log.actual_mm is None or np.isnan(log.actual_mm[0, index]) or np.isnan(log.command_mm[0, index]):
-                continue
-            count, first = held_samples(log)
-            n = (len(log.times_s) - first) // count
-
-            # One row for each held command, so that its stairs do not count as following error.
-            def rows(values: Array, first: int = first, n: int = n, count: int = count) -> Array:
-                return np.asarray(values[first : first + n * count].reshape(n, count).mean(axis=1))
-
-            way = rows(log.command_mm[:, index] - log.command_mm[0, index])
-            if np.ptp(way) < 1.0:
-                continue
-            error = way - rows(log.actual_mm[:, index] - log.actual_mm[0, index])
-            steps = np.diff(rows(log.times_s), prepend=0.0)
-            summed = np.cumsum((error + np.roll(error, 1)) / 2.0 * steps)
-            design = np.stack([-summed, way, np.ones_like(way)], axis=1)
-            solution, *_ = np.linalg.lstsq(design, error, rcond=None)
-            if solution[0] > 1.0:
-                gains.append(float(solution[0]))
-                forwards.append(float(1.0 - solution[1]))
-        if not gains:
+        records = [each for log in logs.values() if (each := _servo_rows(log, index)) is not None]
+        if not records:
             continue
         done = True
-        half = 1.96 * float(np.std(gains)) + 0.02 * float(np.mean(gains))
+        name = f"position gain {axis}"
+        gain, rest = _lag_of(records)
+        if rest < 0.02 or not 2.0 * _GAINS[0] < gain < 0.5 * _GAINS[1]:
+            why = "the actual position follows the command without a lag that tells it"
+            state.findings.append(unknown(name, "1/s", _SOURCE, why))
+            continue
+        spread = np.std(np.array([_lag_of([record]) for record in records]), axis=0) / math.sqrt(len(records))
+        # Command and actual position may be sampled up to half a sample apart, which looks like lag.
+        apart = 0.5 * min(log.sampling_s for log in logs.values()) * gain
         key = f"controller.position_gain_per_s.{axis.lower()}"
-        value = float(np.mean(gains))
-        state.findings.append(known(f"position gain {axis}", value, half, "1/s", key, _SOURCE))
-        half = 1.96 * float(np.std(forwards)) + 0.02
-        state.findings.append(known(f"feed-forward {axis}", float(np.mean(forwards)), half, "1", "", _SOURCE))
+        half = float(spread[0]) + (_SERVO_SLACK + apart / rest) * gain
+        state.findings.append(known(name, gain, half, "1/s", key, _SOURCE))
+        half = float(spread[1]) + _SERVO_SLACK + apart
+        state.findings.append(known(f"feed-forward {axis}", max(0.0, 1.0 - rest), half, "1", "", _SOURCE))
     if not done:
         state.findings.append(unknown("position gain", "1/s", _SOURCE, "no actual positions in the logs"))
+
+
+def _servo_rows(log: ServoLog, index: int) -> tuple[Array, Array, float] | None:
+    """Command, following error and time step, one row for each held command so that its stairs are no error."""
+    if log.actual_mm is None or np.isnan(log.actual_mm[0, index]) or np.isnan(log.command_mm[0, index]):
+        return None
+    count, first = held_samples(log)
+    n = (len(log.times_s) - first) // count
+
+    def rows(values: Array) -> Array:
+        return np.asarray(values[first : first + n * count].reshape(n, count).mean(axis=1))
+
+    way = rows(log.command_mm[:, index] - log.command_mm[0, index])
+    if np.ptp(way) < 1.0:
+        return None
+    error = way - rows(log.actual_mm[:, index] - log.actual_mm[0, index])
+    step = count * log.sampling_s
+    return way, error - np.median(error[: max(3, round(0.1 / step))]), step
+
+
+def _lag_of(records: list[tuple[Array, Array, float]]) -> tuple[float, float]:
+    """Position gain in 1/s and what feed-forward leaves (1 − f), from all records: least squares of the error."""
+    from scipy.optimize import minimize_scalar
+    from scipy.signal import lfilter
+
+    def solve(gain: float) -> tuple[float, float]:
+        cross = square = power = 0.0
+        for way, error, step in records:
+            kept = math.exp(-gain * step)
+            part = (1.0 - kept) / (gain * step)  # of a ramp over one step
+            model = lfilter([part, -part], [1.0, -kept], way)
+            cross, square, power = cross + model @ error, square + model @ model, power + error @ error
+        rest = cross / square
+        return power - rest * cross, rest
+
+    found = minimize_scalar(
+        lambda log_gain: solve(math.exp(log_gain))[0], bounds=tuple(np.log(_GAINS)), method="bounded"
+    )
+    gain = math.exp(float(found.x))
+    return gain, float(solve(gain)[1])
 
 
 def fit_logs(tests: Mapping[str, Test], logs: Mapping[str, ServoLog]) -> list[Finding]:

@@ -18,13 +18,24 @@ from shapegcode._core import ArgumentError
 from shapegcode.characterize.log import ServoLog
 from shapegcode.characterize.plan import AXES, Part, Test
 
-__all__ = ["PartLog", "ShapeFit", "fit_shape", "held_samples", "lagged_share", "line_slope", "parts_of", "smoothed_share"]
+__all__ = [
+    "PartLog",
+    "ShapeFit",
+    "fit_shape",
+    "held_samples",
+    "lagged_share",
+    "line_slope",
+    "parts_of",
+    "smoothed_share",
+]
 
 Array = npt.NDArray[np.float64]
 _PAUSE_S = 0.3  # a rest of a part is shorter, the pause between two parts is 0.5 s
 _SHORTEST_BOX_S = 2e-5
 _HOLD_SHARE = 0.9
 _LONGEST_HOLD = 64
+_STAMP = 0.03
+_MOST_SAMPLES = 1500
 
 
 @dataclass(frozen=True)
@@ -63,9 +74,13 @@ class PartLog:
         for k in turns:
             i, j = known[k], known[k + 1]
             window = slice(i, j + 1)
-            slope, offset = np.polyfit(self.times_s[window] - self.times_s[i], u[window], 1) if j - i > 1 else (
-                (u[j] - u[i]) / (self.times_s[j] - self.times_s[i]),
-                u[i],
+            slope, offset = (
+                np.polyfit(self.times_s[window] - self.times_s[i], u[window], 1)
+                if j - i > 1
+                else (
+                    (u[j] - u[i]) / (self.times_s[j] - self.times_s[i]),
+                    u[i],
+                )
             )
             middles.append(self.times_s[i] - offset / slope)
         return np.array(middles)
@@ -76,7 +91,10 @@ def held_samples(log: ServoLog) -> tuple[int, int]:
 
     A command that changes only once per interpolation period has all its increments there.
     """
-    increments = np.nan_to_num(np.diff(log.command_mm, axis=0))
+    command = np.nan_to_num(log.command_mm)
+    increments = np.diff(command, axis=0)
+    noise = np.maximum(command[: max(3, round(0.1 / log.sampling_s))].std(axis=0), 5e-4)
+    increments = np.where(np.abs(increments) > 8.0 * noise, increments, 0.0)
     energy = (increments**2).sum(axis=1)
     total = float(energy.sum())
     best = (1, 0)
@@ -205,7 +223,7 @@ def fit_shape(
 
     middles = log.middles_s()
     length = abs(log.part.length_mm)
-    pieces_t, pieces_y, which = [], [], []
+    pieces_t, pieces_y = [], []
     edges = (middles[1:] + middles[:-1]) / 2.0
     bounds = [log.times_s[0], *edges, log.times_s[-1]]
     for k, middle in enumerate(middles):
@@ -213,33 +231,31 @@ def fit_shape(
         way = log.way_mm[inside] / length
         pieces_t.append(log.times_s[inside] - middle)
         pieces_y.append(way if k % 2 == 0 else 1.0 - way)
-        which.append(np.full(int(inside.sum()), k))
-    t, y, move = np.concatenate(pieces_t), np.concatenate(pieces_y), np.concatenate(which)
-    count = len(middles)
+    t, y = np.concatenate(pieces_t), np.concatenate(pieces_y)
+    every = -(-len(t) // _MOST_SAMPLES)
+    t, y = t[::every], y[::every]
 
     def residual(p: Array) -> Array:
-        starts = p[len(guess) :][move]
-        return (share(t - starts, p[: len(guess)]) - y) * length
+        return (share(t - p[-1], p[:-1]) - y) * length
 
-    def middle_of(p: Sequence[float]) -> float:
-        grid = np.linspace(0.0, 2.0, 20001)
-        return float(grid[np.searchsorted(share(grid, np.array(p)), 0.5)])
-
-    begin = np.array([*guess, *np.full(count, -middle_of(guess))])
-    free = np.full(count, 1.0)
+    grid = np.linspace(0.0, 2.0, 20001)
+    middle = float(grid[np.searchsorted(share(grid, np.array(guess)), 0.5)])
+    begin = np.array([*guess, -middle])
     found = least_squares(
         residual,
         begin,
-        bounds=(np.array([*low, *-free]), np.array([*high, *free])),
+        bounds=(np.array([*low, -2.0]), np.array([*high, 2.0])),
         x_scale=np.maximum(np.abs(begin), 1e-3),
-        method="trf",
+        max_nfev=60,
     )
     n = len(guess)
     freedom = max(1, len(t) - len(begin))
     variance = float(found.fun @ found.fun) / freedom
     normal = found.jac.T @ found.jac
     covariance = variance * np.linalg.pinv(normal)
-    half = 1.96 * np.sqrt(np.maximum(np.diag(covariance)[:n], 0.0))
+    # Time stamps are no better than a part of the sampling time, however many samples agree.
+    stamp = _STAMP * float(np.median(np.diff(log.times_s)))
+    half = np.hypot(1.96 * np.sqrt(np.maximum(np.diag(covariance)[:n], 0.0)), stamp)
     return ShapeFit(found.x[:n], half, math.sqrt(variance))
 
 
