@@ -29,6 +29,8 @@ _STEPS_WAY_S = 0.8  # at full feed: longer than the ramps at both ends
 _LOG_SHARES = (1.0, 0.5, 0.25, 0.1, 0.05)
 _MORE_SHARES = (0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.45, 0.4, 0.35)
 _LONG_RAPID_S = 0.2
+_LONG_RAPIDS = ((1.0, 100), (0.5, 100), (0.2, 60), (0.14, 60), (0.1, 60), (0.07, 60), (0.05, 60), (0.03, 60))
+_SHORT_RAPIDS = ((1.0, 100), (0.85, 60), (0.7, 60), (0.55, 60), (0.4, 60), (0.3, 60), (0.2, 60), (0.1, 60), (0.05, 60))
 _HEADER = "G21 G17 G91 G94 G64"
 _PER_MINUTE = 60.0
 
@@ -84,9 +86,19 @@ class _Maker:
 
     def rapid_series(self, axis: str) -> list[Part]:
         """Rapids over several lengths for a log; more where none may reach the rate, since each gives only a bracket."""
-        reached = abs(self._box.travel_mm(axis)) > _LONG_RAPID_S * self.rapid[axis] / _PER_MINUTE
+        reached = self._rate_is_reached(axis)
         shares = _LOG_SHARES if reached else (*_LOG_SHARES, *_MORE_SHARES)
         return [self.rapids(axis, share, 6 if reached else 4) for share in shares]
+
+    def rapid_shares(self, axis: str) -> tuple[tuple[float, int], ...]:
+        """Shares of the box and counts of rapids for a stopwatch.
+
+        Half a short rapid lasts whole periods: lengths that round differently tell the time constant.
+        """
+        return _LONG_RAPIDS if self._rate_is_reached(axis) else _SHORT_RAPIDS
+
+    def _rate_is_reached(self, axis: str) -> bool:
+        return abs(self._box.travel_mm(axis)) > _LONG_RAPID_S * self.rapid[axis] / _PER_MINUTE
 
     def feed_steps(self, axis: str, length_mm: float) -> list[Part]:
         """Pieces of one length, alternately fast and slow, and back."""
@@ -140,10 +152,10 @@ def make_tests(machine: Machine, box: Box) -> list[Test]:
     stopwatch("blocks_tiny", "BLOCK TIME", make.run("X", 2000, 0.0002))
     stopwatch("blocks_short", "BLOCK TIME, KNEE", make.run("X", 1000, 0.0041))
     stopwatch("blocks_medium", "BLOCK TIME, KNEE", make.run("X", 1000, 0.0121))
-    for axis, shares in (("X", (1.0, 0.5, 0.1, 0.05)), ("Y", (1.0, 0.5, 0.05)), ("Z", (1.0, 0.75, 0.5, 0.25, 0.05))):
-        for share in shares:
+    for axis in AXES:
+        for share, count in make.rapid_shares(axis):
             name = f"rapid_{axis.lower()}_{share * 100:.0f}"
-            stopwatch(name, f"RAPID OF {axis}, {share * 100:.0f} PERCENT OF THE BOX", make.rapids(axis, share, 100))
+            stopwatch(name, f"RAPID OF {axis}, {share * 100:.0f} PERCENT OF THE BOX", make.rapids(axis, share, count))
     override_run = make.run("X", 20, min(1.0, abs(box.travel_mm("X")) / make.feed * _PER_MINUTE))
     for percent in (50, 100, 120):
         stopwatch(f"override_{percent}", "FEED OVERRIDE", override_run, percent, same=percent != 50)
