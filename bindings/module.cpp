@@ -14,4 +14,5 @@ PYBIND11_MODULE(_core, module) {
   register_gcode(module);
   register_emission(module);
   register_simulation(module);
+  register_timing(module);
 }

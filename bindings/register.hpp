@@ -14,5 +14,6 @@ void register_gcode(pybind11::module_& module);
 void register_motion(pybind11::module_& module);
 void register_emission(pybind11::module_& module);
 void register_simulation(pybind11::module_& module);
+void register_timing(pybind11::module_& module);
 
 }  // namespace shapegcode::bindings

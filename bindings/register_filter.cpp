@@ -67,6 +67,10 @@ void register_filter(py::module_& module) {
            "Taps at whole-sample delays, ascending, adding up to 1. Raises ArgumentError otherwise.")
       .def_static("moving_average", &Fir::moving_average, py::arg("length"),
                   "Equal weights over `length` samples; costs the same for any length. Raises ArgumentError below 1.")
+      .def_static("exponential", &Fir::exponential, py::arg("time_constant_samples"), py::arg("rest") = 1e-6,
+                  "Geometric weights exp(-k / time_constant), cut off where less than the share `rest` of them is left "
+                  "and scaled to a sum of 1; costs the same for any length. Raises ArgumentError on a time constant "
+                  "that is not > 0 or a share outside 0 ... 1.")
       .def_property_readonly("delays", &Fir::delays, "Delays in samples.")
       .def_property_readonly("taps", &Fir::taps, "Weights, adding up to 1.")
       .def_property_readonly("duration_samples", &Fir::duration_samples, "Largest delay in samples.")

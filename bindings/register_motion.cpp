@@ -43,6 +43,9 @@ void register_motion(py::module_& module) {
                      "Speed step per axis at a corner, shape (3,).")
       .def_readwrite("centripetal_acceleration_mm_per_s2", &MotionLimits::centripetal_acceleration_mm_per_s2,
                      "Across the path on arcs and along polylines.")
+      .def_readwrite("contour_acceleration_mm_per_s2", &MotionLimits::contour_acceleration_mm_per_s2,
+                     "Of a change of direction, per axis, on arcs and along polylines, shape (3,).")
+      .def_readwrite("feed_override", &MotionLimits::feed_override, "Scales the programmed feeds.")
       .def_readwrite("arc_feed_ratio", &MotionLimits::arc_feed_ratio, "Feed on arcs relative to the programmed one.")
       .def_readwrite("contour_tolerance_mm", &MotionLimits::contour_tolerance_mm,
                      "Deviation allowed to the filter that follows.")

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockMark', 'DesignError', 'DeviationStats', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'Interpolator', 'ModalState', 'Mode', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'ReaderOptions', 'Region', 'RegionNote', 'Segment', 'SegmentKind', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'WriterOptions', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'fit_blocks', 'grid_polynomial', 'interpolate', 'minimal_two_mode', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'read_program', 'shape_path', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'InPosition', 'InterpolatedTime', 'Interpolator', 'ModalState', 'Mode', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'ToolTime', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'interpolate', 'interpolate_program', 'minimal_two_mode', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'shape_path', 'simulate_circle', 'time_program', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -158,6 +158,11 @@ class Fir:
     """
     Weights on the sample grid that add up to one: an acceleration filter (moving average) or an input shaper. One filter type for both (spec section 0).
     """
+    @staticmethod
+    def exponential(time_constant_samples: typing.SupportsFloat | typing.SupportsIndex, rest: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> Fir:
+        """
+        Geometric weights exp(-k / time_constant), cut off where less than the share `rest` of them is left and scaled to a sum of 1; costs the same for any length. Raises ArgumentError on a time constant that is not > 0 or a share outside 0 ... 1.
+        """
     @staticmethod
     def moving_average(length: typing.SupportsInt | typing.SupportsIndex) -> Fir:
         """
@@ -455,6 +460,14 @@ class MotionLimits:
     def centripetal_acceleration_mm_per_s2(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def contour_acceleration_mm_per_s2(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Of a change of direction, per axis, on arcs and along polylines, shape (3,).
+        """
+    @contour_acceleration_mm_per_s2.setter
+    def contour_acceleration_mm_per_s2(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
     def contour_tolerance_mm(self) -> float:
         """
         Deviation allowed to the filter that follows.
@@ -477,6 +490,14 @@ class MotionLimits:
         """
     @corner_speed_difference_mm_per_s.setter
     def corner_speed_difference_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def feed_override(self) -> float:
+        """
+        Scales the programmed feeds.
+        """
+    @feed_override.setter
+    def feed_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def filter_mean_deviation_s(self) -> float:
@@ -1353,6 +1374,652 @@ class PlaybackFigures:
         """
         Deviation of the response from the path.
         """
+class MotionKind:
+    """
+    Where the controller accelerates a cutting move.
+    
+    Members:
+    
+      look_ahead
+    
+      after_interpolation
+    """
+    __members__: typing.ClassVar[dict[str, MotionKind]]
+    after_interpolation: typing.ClassVar[MotionKind]
+    look_ahead: typing.ClassVar[MotionKind]
+    @typing.overload
+    def __eq__(self, other: MotionKind) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: MotionKind) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class FilterShape:
+    """
+    Shape of the acceleration after interpolation.
+    
+    Members:
+    
+      linear
+    
+      exponential
+    """
+    __members__: typing.ClassVar[dict[str, FilterShape]]
+    exponential: typing.ClassVar[FilterShape]
+    linear: typing.ClassVar[FilterShape]
+    @typing.overload
+    def __eq__(self, other: FilterShape) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: FilterShape) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class RapidPath:
+    """
+    Way of a rapid (1401#1).
+    
+    Members:
+    
+      linear
+    
+      non_linear
+    """
+    __members__: typing.ClassVar[dict[str, RapidPath]]
+    linear: typing.ClassVar[RapidPath]
+    non_linear: typing.ClassVar[RapidPath]
+    @typing.overload
+    def __eq__(self, other: RapidPath) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: RapidPath) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class InPosition:
+    """
+    Where the wait for in-position comes from.
+    
+    Members:
+    
+      measured
+    
+      servo_lag
+    """
+    __members__: typing.ClassVar[dict[str, InPosition]]
+    measured: typing.ClassVar[InPosition]
+    servo_lag: typing.ClassVar[InPosition]
+    @typing.overload
+    def __eq__(self, other: InPosition) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: InPosition) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class ControllerModel:
+    """
+    What decides how long a program takes, and what acceleration does to the path.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def bell_time_s(self) -> float:
+        """
+        After interpolation, linear: second moving average, s; 0: none.
+        """
+    @bell_time_s.setter
+    def bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def block_end(self) -> BlockEnd:
+        """
+        When a block's successor starts.
+        """
+    @block_end.setter
+    def block_end(self, arg0: BlockEnd) -> None:
+        ...
+    @property
+    def exponential_rest(self) -> float:
+        """
+        Share of the exponential's weights that is cut off at its end.
+        """
+    @exponential_rest.setter
+    def exponential_rest(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def feed_forward_ratio(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Per axis, 0 ... 1, shape (3,) (2092).
+        """
+    @feed_forward_ratio.setter
+    def feed_forward_ratio(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def feed_override(self) -> float:
+        """
+        Scales every programmed feed.
+        """
+    @feed_override.setter
+    def feed_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def filter_shape(self) -> FilterShape:
+        """
+        After interpolation: linear or exponential.
+        """
+    @filter_shape.setter
+    def filter_shape(self, arg0: FilterShape) -> None:
+        ...
+    @property
+    def in_position(self) -> InPosition:
+        """
+        Measured or from the servo lag.
+        """
+    @in_position.setter
+    def in_position(self, arg0: InPosition) -> None:
+        ...
+    @property
+    def in_position_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Measured wait, per axis, s, shape (3,).
+        """
+    @in_position_s.setter
+    def in_position_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def in_position_width_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Per axis, mm, shape (3,) (1826).
+        """
+    @in_position_width_mm.setter
+    def in_position_width_mm(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def limits(self) -> MotionLimits:
+        """
+        Look-ahead; the axes' feed limits hold always.
+        """
+    @limits.setter
+    def limits(self, arg0: MotionLimits) -> None:
+        ...
+    @property
+    def look_ahead_filter_time_constant_s(self) -> float:
+        """
+        Moving average behind look-ahead, s (1769); 0: none.
+        """
+    @look_ahead_filter_time_constant_s.setter
+    def look_ahead_filter_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def m_function_s(self) -> float:
+        """
+        Every other M code, s.
+        """
+    @m_function_s.setter
+    def m_function_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def motion(self) -> MotionKind:
+        """
+        Where a cutting move is accelerated.
+        """
+    @motion.setter
+    def motion(self, arg0: MotionKind) -> None:
+        ...
+    @property
+    def period_s(self) -> float:
+        """
+        Interpolation period, s.
+        """
+    @period_s.setter
+    def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_gain_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Per axis, 1/s, shape (3,) (1825).
+        """
+    @position_gain_per_s.setter
+    def position_gain_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def rapid_bell_time_s(self) -> float:
+        """
+        s (1621); 0: none.
+        """
+    @rapid_bell_time_s.setter
+    def rapid_bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rapid_override(self) -> float:
+        """
+        Scales the rapid rates; the acceleration of a rapid stays.
+        """
+    @rapid_override.setter
+    def rapid_override(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rapid_path(self) -> RapidPath:
+        """
+        Straight or every axis for itself.
+        """
+    @rapid_path.setter
+    def rapid_path(self, arg0: RapidPath) -> None:
+        ...
+    @property
+    def rapid_rate_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Per axis, shape (3,) (1420).
+        """
+    @rapid_rate_mm_per_s.setter
+    def rapid_rate_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def rapid_time_constant_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        From rest to the rate, per axis, s, shape (3,) (1620).
+        """
+    @rapid_time_constant_s.setter
+    def rapid_time_constant_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def time_constant_s(self) -> float:
+        """
+        After interpolation, s (1622).
+        """
+    @time_constant_s.setter
+    def time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def tool_change_s(self) -> float:
+        """
+        M06, s.
+        """
+    @tool_change_s.setter
+    def tool_change_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class ServoLag:
+    """
+    Position loop of each axis as a first-order lag with feed-forward: x' = K (r - x) + a r'.
+    """
+    def __init__(self, position_gain_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], feed_forward_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], period_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        At rest at zero. Raises ArgumentError on a period or gain <= 0 or a ratio outside 0 ... 1.
+        """
+    def reset(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        """
+        Rest at `position`, shape (3,).
+        """
+    def step(self, setpoint: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Position of the axes at the set-point's instant, shape (3,).
+        """
+    @property
+    def error_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Set-point minus position, shape (3,), mm.
+        """
+class CircleFigures:
+    """
+    What acceleration and servo lag make of a circle.
+    """
+    @property
+    def command_error_mm(self) -> float:
+        """
+        Programmed radius minus radius of the set-points behind the filters, mm.
+        """
+    @property
+    def radial_error_mm(self) -> float:
+        """
+        Programmed radius minus radius of the axes behind the servo loop, mm.
+        """
+class BlockKind:
+    """
+    What a row of the block table is; the table holds the number.
+    
+    Members:
+    
+      cutting
+    
+      rapid
+    
+      dwell
+    
+      tool_change
+    
+      function
+    """
+    __members__: typing.ClassVar[dict[str, BlockKind]]
+    cutting: typing.ClassVar[BlockKind]
+    dwell: typing.ClassVar[BlockKind]
+    function: typing.ClassVar[BlockKind]
+    rapid: typing.ClassVar[BlockKind]
+    tool_change: typing.ClassVar[BlockKind]
+    @typing.overload
+    def __eq__(self, other: BlockKind) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: BlockKind) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class ToolTime:
+    """
+    All uses of one tool.
+    """
+    @property
+    def acceleration_s(self) -> float:
+        """
+        What acceleration adds to cutting blocks and rapids; in look-ahead also what its limits add, s.
+        """
+    @property
+    def cutting_s(self) -> float:
+        """
+        Cutting blocks at their feed, s.
+        """
+    @property
+    def dwell_s(self) -> float:
+        """
+        G04 and dwells of cycles, s.
+        """
+    @property
+    def first_line(self) -> int:
+        """
+        Line of its first use, from 1.
+        """
+    @property
+    def function_s(self) -> float:
+        """
+        Other M codes, s.
+        """
+    @property
+    def in_position_s(self) -> float:
+        """
+        Waits behind rapids and exact stops, s.
+        """
+    @property
+    def rapid_s(self) -> float:
+        """
+        Rapids at their rate, s.
+        """
+    @property
+    def tool(self) -> int:
+        """
+        T number; -1: before the first tool is known.
+        """
+    @property
+    def tool_change_s(self) -> float:
+        """
+        M06, s.
+        """
+    @property
+    def total_s(self) -> float:
+        """
+        Sum of the parts below, s.
+        """
+class CycleTime:
+    """
+    How long a program takes, and where.
+    """
+    @property
+    def acceleration_s(self) -> float:
+        """
+        What acceleration adds to cutting blocks and rapids; in look-ahead also what its limits add, s.
+        """
+    @property
+    def blocks(self) -> numpy.ndarray:
+        """
+        One row per block, structured and read-only: line, kind (a BlockKind number), start_s, duration_s, feed_mm_per_s reached; empty unless asked for.
+        """
+    @property
+    def cutting_length_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def cutting_s(self) -> float:
+        """
+        Cutting blocks at their feed, s.
+        """
+    @property
+    def dwell_s(self) -> float:
+        """
+        G04 and dwells of cycles, s.
+        """
+    @property
+    def function_s(self) -> float:
+        """
+        Other M codes, s.
+        """
+    @property
+    def in_position_s(self) -> float:
+        """
+        Waits behind rapids and exact stops, s.
+        """
+    @property
+    def outside_regions_s(self) -> float:
+        """
+        Whole time without cutting and acceleration of the regions, s.
+        """
+    @property
+    def rapid_length_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def rapid_s(self) -> float:
+        """
+        Rapids at their rate, s.
+        """
+    @property
+    def regions(self) -> numpy.ndarray:
+        """
+        One row per region, structured and read-only: first_line, last_line, tool, start_s, duration_s (cutting_s + acceleration_s + in_position_s), length_mm.
+        """
+    @property
+    def tool_change_s(self) -> float:
+        """
+        M06, s.
+        """
+    @property
+    def tools(self) -> list[ToolTime]:
+        """
+        ToolTime in the order of first use.
+        """
+    @property
+    def total_s(self) -> float:
+        """
+        Sum of the parts below, s.
+        """
+class InterpolatedTime:
+    """
+    Time of a program by giving every set-point.
+    """
+    @property
+    def cutting_s(self) -> float:
+        """
+        Runs of cutting blocks with their acceleration, s.
+        """
+    @property
+    def dwell_s(self) -> float:
+        """
+        s.
+        """
+    @property
+    def function_s(self) -> float:
+        """
+        s.
+        """
+    @property
+    def in_position_s(self) -> float:
+        """
+        Waits behind rapids and exact stops, s.
+        """
+    @property
+    def rapid_s(self) -> float:
+        """
+        Rapids with their acceleration, s.
+        """
+    @property
+    def region_s(self) -> list[float]:
+        """
+        Per region, wait included, s.
+        """
+    @property
+    def set_points(self) -> int:
+        """
+        Set-points given.
+        """
+    @property
+    def tool_change_s(self) -> float:
+        """
+        s.
+        """
+    @property
+    def total_s(self) -> float:
+        """
+        Sum of the parts below, s.
+        """
+def acceleration_filters(model: ControllerModel) -> list[Fir]:
+    """
+    Filters behind interpolation in order, none, one or two.
+    """
+def block_overlap_time_s(lengths_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], model: ControllerModel) -> float:
+    """
+    Time of a run of overlapping cutting blocks, s: sum of ceil(l / (F T)) T plus the length of the filters (paper 004). No override. Raises ArgumentError on unequal sizes or a feed <= 0.
+    """
 def convolve(first: Shaper, second: Shaper) -> Shaper:
     """
     The two shapers in series: cancels what either cancels, lasts as long as both together.
@@ -1409,9 +2076,17 @@ def grid_polynomial(modes: collections.abc.Sequence[Mode], period_s: typing.Supp
     
     Source: this project (spec 2, grid-exact shapers).
     """
+def in_position_wait_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: ControllerModel) -> float:
+    """
+    Wait for in-position behind a rapid, s. Raises ArgumentError on a model that no controller can have.
+    """
 def interpolate(path: Path, profile: SpeedProfile, period_s: typing.SupportsFloat | typing.SupportsIndex) -> numpy.ndarray:
     """
     All set-points of a path, (n_samples, 3), mm, read-only. Raises ArgumentError on a period <= 0.
+    """
+def interpolate_program(program: ProgramText, model: ControllerModel) -> InterpolatedTime:
+    """
+    The same by full interpolation, every set-point of every step. Raises ArgumentError on a model that no controller can have, or a program of more than 4e9 set-points.
     """
 def minimal_two_mode(first: Mode, second: Mode, max_duration_s: typing.SupportsFloat | typing.SupportsIndex, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> list[Shaper]:
     """
@@ -1456,6 +2131,14 @@ def play_samples(positions_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.fl
     """
     Play set-points (n, 3), measured against the programmed path. Raises ArgumentError on another shape.
     """
+def rapid_samples(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: ControllerModel) -> numpy.ndarray:
+    """
+    Set-points of a rapid, one per period, (n, 3), mm, read-only. Raises ArgumentError on an unusable model.
+    """
+def rapid_time_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: ControllerModel) -> float:
+    """
+    Time of a rapid from rest to rest without the wait for in-position, s (paper 004, eq. 6 to 16). `travel_mm`: signed way of each axis, shape (3,). Raises ArgumentError on a model that no controller can have.
+    """
 def read_program(text: bytes, options: ReaderOptions = ...) -> ProgramText:
     """
     Read a program text (bytes). Raises ProgramError with line and column.
@@ -1463,6 +2146,14 @@ def read_program(text: bytes, options: ReaderOptions = ...) -> ProgramText:
 def shape_path(path: Path, shaper: Fir, marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> ShapedCommand:
     """
     Split at forced stops, plan, sample on half the block grid and shape. `shaper` has its taps in whole block periods. Raises ArgumentError if the block period is no multiple of the interpolation period.
+    """
+def simulate_circle(radius_mm: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, model: ControllerModel) -> CircleFigures:
+    """
+    Run circles in XY at a constant feed and measure the mean radius over whole turns. Raises ArgumentError on a radius or feed <= 0.
+    """
+def time_program(program: ProgramText, model: ControllerModel, per_block: bool = False) -> CycleTime:
+    """
+    Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in look-ahead. Raises ArgumentError on a model that no controller can have.
     """
 def write_blocks(blocks: FittedBlocks, start: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"], marks: collections.abc.Sequence[BlockMark], options: WriterOptions) -> tuple[bytes, int, int]:
     """

@@ -302,7 +302,7 @@ def _report(
     cutting = {
         which: sum(region["time_s"][which] for region in figures["regions"]) for which in ("original", "emitted")
     }
-    other = kept_s + other_time_s(program.core.other_moves, machine)
+    other = kept_s + other_time_s(program.core, machine)
     prefill = machine.emission.prefill_dwell_s * len(placed)
     if not placed:
         warnings.append(f"{program.source}: no cutting moves that can be shaped: the text is unchanged")

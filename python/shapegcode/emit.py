@@ -74,6 +74,8 @@ def motion_limits(
         max(value / 60.0, 1e-3) for value in controller.corner_speed_difference_mm_per_min.as_tuple()
     ]
     limits.centripetal_acceleration_mm_per_s2 = controller.centripetal_acceleration_mm_s2
+    if controller.contour_acceleration_mm_s2 is not None:
+        limits.contour_acceleration_mm_per_s2 = controller.contour_acceleration_mm_s2.as_tuple()
     limits.arc_feed_ratio = arc_feed_ratio
     if grid is not None:
         own = controller.shaped_time_constant_s

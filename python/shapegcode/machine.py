@@ -21,6 +21,8 @@ from pydantic import Field, Strict, ValidationError, field_validator, model_vali
 
 from shapegcode.machine_errors import MachineError, Problem, problems_of, syntax_problem
 from shapegcode.machine_keys import (
+    AxisRatios,
+    AxisTimes,
     AxisValues,
     Bool,
     Count,
@@ -30,6 +32,7 @@ from shapegcode.machine_keys import (
     NonNegative,
     PerAxis,
     Positive,
+    PositiveAxisValues,
     Table,
     Text,
     key,
@@ -52,6 +55,7 @@ __all__ = [
     "PowerOn",
     "Problem",
     "Shaping",
+    "Times",
     "Tolerance",
     "key_documentation",
 ]
@@ -133,9 +137,10 @@ class Controller(Table):
         assumed=True,
     )
     time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
-        "duration of a speed change (look-ahead, constant time) or length of the moving average (after interpolation)",
+        "duration of a speed change (look-ahead, constant time), or length of the moving average or time constant "
+        "of the exponential (after interpolation)",
         unit="s",
-        fanuc="1622, 1769",
+        fanuc="1622, 1771",
         default=0.05,
         assumed=True,
     )
@@ -143,6 +148,20 @@ class Controller(Table):
         "time over which the acceleration itself is built up; length of the second moving average; 0: none",
         unit="s",
         fanuc="1772",
+        default=0.0,
+        assumed=True,
+    )
+    after_interpolation_shape: Literal["linear", "exponential"] = key(
+        'how each axis is smoothed after interpolation. "linear": moving averages of the lengths time_constant_s '
+        'and bell_time_s; "exponential": a first-order lag of time_constant_s',
+        fanuc="1610#0, #1",
+        default="linear",
+        assumed=True,
+    )
+    look_ahead_filter_time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
+        "length of the moving average after interpolation in look-ahead mode; 0: none",
+        unit="s",
+        fanuc="1769",
         default=0.0,
         assumed=True,
     )
@@ -160,19 +179,30 @@ class Controller(Table):
         default=1000.0,
         assumed=True,
     )
+    contour_acceleration_mm_s2: PositiveAxisValues | None = key(
+        "largest acceleration of an axis along a contour, corners and curves alike; left out: not limited. One "
+        "number, or x, y, z",
+        unit="mm/s²",
+        fanuc="1737",
+        default=None,
+    )
     rapid_path: Literal["linear", "non_linear"] = key(
         '"linear": a rapid goes straight; "non_linear": each axis travels at its own speed',
         fanuc="1401#1",
         default="linear",
         assumed=True,
     )
-    rapid_time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
-        "time in which a rapid reaches its speed", unit="s", fanuc="1620", default=0.15, assumed=True
+    rapid_time_constant_s: AxisTimes = key(
+        "time in which a rapid reaches its speed. One number, or x, y, z",
+        unit="s",
+        fanuc="1620, 1773",
+        default=0.15,
+        assumed=True,
     )
     rapid_bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
         "time over which the acceleration of a rapid is built up; 0: none",
         unit="s",
-        fanuc="1621",
+        fanuc="1621, 1774",
         default=0.0,
         assumed=True,
     )
@@ -181,6 +211,32 @@ class Controller(Table):
         "number, or x, y, z",
         unit="s",
         default={"x": 0.025, "y": 0.025, "z": 0.12},
+        assumed=True,
+    )
+    in_position: Literal["measured", "servo_lag"] = key(
+        'where the wait after a rapid or an exact stop comes from. "measured": in_position_s; "servo_lag": the time '
+        "in which the lag left by position_gain_per_s and feed_forward_ratio falls to in_position_width_um",
+        default="measured",
+    )
+    in_position_width_um: PositiveAxisValues = key(
+        "an axis has arrived when it lags by less than this. One number, or x, y, z",
+        unit="µm",
+        fanuc="1826",
+        default=20.0,
+        assumed=True,
+    )
+    position_gain_per_s: PositiveAxisValues = key(
+        "gain of the position loop (the parameter counts 0.01/s); the servo lag is feed / gain. One number, or x, y, z",
+        unit="1/s",
+        fanuc="1825",
+        default=30.0,
+        assumed=True,
+    )
+    feed_forward_ratio: AxisRatios = key(
+        "share of the servo lag that the feed-forward takes away; 0: none. One number, or x, y, z",
+        unit="1",
+        fanuc="2005#1, 2068, 2092",
+        default=0.0,
         assumed=True,
     )
     shaped_time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
@@ -233,6 +289,30 @@ class Controller(Table):
     minimum_feed_mm_per_min: Positive = key(
         "smallest feed written in a block", unit="mm/min", default=1.0, assumed=True
     )
+    no_buffer_m_codes: tuple[Annotated[int, Strict(), Field(ge=0, le=99_999_999)], ...] = key(
+        "M codes at which the controller stops reading ahead, besides M00, M01, M02 and M30",
+        fanuc="3411-3432",
+        default=(),
+    )
+    offset_memory: Literal["A", "B", "C"] = key(
+        'which system variables hold the tool offsets. "A": one value for each; "B": geometry and wear; "C": '
+        "geometry and wear, length and radius apart",
+        default="C",
+        assumed=True,
+    )
+    nesting_limit_subprogram: Annotated[int, Strict(), Field(ge=1, le=100)] = key(
+        "how deep subprograms may call one another; 4 on old controls", unit="levels", default=10, assumed=True
+    )
+    max_program_steps: Annotated[int, Strict(), Field(ge=1, le=10**12)] = key(
+        "a program that executes more blocks than this counts as endless", unit="blocks", default=10_000_000
+    )
+
+
+class Times(Table):
+    """What takes time beside the motion."""
+
+    tool_change_s: Annotated[NonNegative, Field(le=3600)] = key("an M06", unit="s", default=0.0, assumed=True)
+    m_function_s: Annotated[NonNegative, Field(le=3600)] = key("any other M code", unit="s", default=0.0, assumed=True)
 
 
 class PowerOn(Table):
@@ -403,6 +483,7 @@ class Machine(Table):
     description: Text = key("what machine this is and where its numbers come from", default="")
     axes: Axes = key("limits and vibration modes of the axes")
     controller: Controller = key("how the controller moves the axes and what it accepts", default={})
+    times: Times = key("what takes time beside the motion", default={})
     power_on: PowerOn = key("modal state before the first block", default={})
     input: Input = key("how programs are read", default={})
     emission: Emission = key("how shaped programs are written", default={})

@@ -54,7 +54,34 @@ def _spread(value: object) -> object:
     return value
 
 
+class PositivePerAxis(PerAxis):
+    """One value per axis, greater than 0."""
+
+    x: Positive = key("value of the X axis")
+    y: Positive = key("value of the Y axis")
+    z: Positive = key("value of the Z axis")
+
+
+class TimePerAxis(PerAxis):
+    """One time per axis in seconds, 0 to 10."""
+
+    x: Annotated[NonNegative, Field(le=10)] = key("value of the X axis")
+    y: Annotated[NonNegative, Field(le=10)] = key("value of the Y axis")
+    z: Annotated[NonNegative, Field(le=10)] = key("value of the Z axis")
+
+
+class RatioPerAxis(PerAxis):
+    """One ratio per axis, 0 to 1."""
+
+    x: Annotated[NonNegative, Field(le=1)] = key("value of the X axis")
+    y: Annotated[NonNegative, Field(le=1)] = key("value of the Y axis")
+    z: Annotated[NonNegative, Field(le=1)] = key("value of the Z axis")
+
+
 AxisValues = Annotated[PerAxis, BeforeValidator(_spread)]
+PositiveAxisValues = Annotated[PositivePerAxis, BeforeValidator(_spread)]
+AxisTimes = Annotated[TimePerAxis, BeforeValidator(_spread)]
+AxisRatios = Annotated[RatioPerAxis, BeforeValidator(_spread)]
 
 
 @dataclass(frozen=True)

@@ -173,7 +173,7 @@ def _documented(model: type[Table], prefix: str) -> Iterator[tuple[str, str, lis
     below: list[tuple[str, str, type[Table]]] = []
     for name, field in model.model_fields.items():
         sub, key = table_type(field), f"{prefix}{name}"
-        if sub is None or sub is PerAxis:
+        if sub is None or issubclass(sub, PerAxis):
             keys.append(key_info(field, key))
             continue
         alike = [other for other, inner in model.model_fields.items() if table_type(inner) is sub]

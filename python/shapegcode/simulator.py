@@ -107,7 +107,7 @@ def simulate(
     report = {
         "program": program.source,
         "machine": machine.name,
-        "cycle_time_s": cutting + other_time_s(program.core.other_moves, machine),
+        "cycle_time_s": cutting + other_time_s(program.core, machine),
         "cutting_time_s": cutting,
         "residual_vibration_um": largest_um(figures.residual_mm for figures in played),
         "peak_vibration_um": largest_um(figures.peak_mm for figures in played),

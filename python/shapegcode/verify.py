@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.controller import controller_model
 from shapegcode.emit import motion_limits
 from shapegcode.machine import Machine
 from shapegcode.program import Program, least_increment_mm
@@ -110,19 +111,13 @@ def _own_rule(machine: Machine) -> _core.BlockEnd:
 
 def play_original(path: _core.Path, machine: Machine, *, record_samples: int = 0) -> _core.PlaybackFigures:
     """A programmed path as the controller plays an ordinary program."""
-    controller = machine.controller
-    if controller.motion == "look_ahead":
-        options = playback_options(machine)
-        options.record_samples = record_samples
-        return _core.play_path(path, _core.plan_speed(path, motion_limits(machine)), options)
-    options = playback_options(machine, time_constant_s=controller.time_constant_s)
-    if controller.bell_time_s > 0.0:
-        options.axis_filters = [
-            *options.axis_filters,
-            _core.Fir.moving_average(max(1, round(controller.bell_time_s / controller.interpolation_period_s))),
-        ]
+    model = controller_model(machine)
+    options = playback_options(machine)
+    options.axis_filters = _core.acceleration_filters(model)
     options.record_samples = record_samples
-    return _core.play_blocks(path, path, _own_rule(machine), 1.0, options)
+    if model.motion == _core.MotionKind.look_ahead:
+        return _core.play_path(path, _core.plan_speed(path, model.limits), options)
+    return _core.play_blocks(path, path, model.block_end, 1.0, options)
 
 
 def play_emitted(
@@ -226,38 +221,12 @@ def _vibration_memory_s(machine: Machine) -> float:
     return math.log(1e6) / slowest if slowest > 0.01 else 0.0
 
 
-def other_time_s(moves: Iterable[tuple[_core.Segment, float]], machine: Machine) -> float:
-    """Time of everything between the regions: rapids with in-position wait, dwells, kept feed moves.
+def other_time_s(program: _core.ProgramText, machine: Machine) -> float:
+    """Time of everything between the regions, s: rapids, waits for in-position, dwells, kept moves, functions.
 
-    Rapids after paper 004, eq. 7-16: T = ceil(l/(F_r T_I)) T_I + A_R, a short one 2 sqrt(l/a); moves of which an axis'
-    position is not known count with what is known of them.
+    Moves of which an axis' position is not known count with what is known of them.
     """
-    controller = machine.controller
-    tick = controller.interpolation_period_s
-    rapids = np.array([axis.rapid_mm_per_min / 60.0 for axis in machine.axes.as_tuple()])
-    waits = np.array(controller.in_position_s.as_tuple())
-    ramp = controller.rapid_time_constant_s
-    total = 0.0
-    for segment, dwell_s in moves:
-        if dwell_s > 0.0:
-            total += dwell_s
-            continue
-        length = segment.length_mm
-        if segment.kind != _core.SegmentKind.rapid:
-            total += math.ceil(length / segment.feed_mm_per_s / tick) * tick + controller.time_constant_s
-            continue
-        travel = np.abs(segment.end_mm - segment.start_mm)
-        axes_time = travel / rapids
-        rate = length / axes_time.max()
-        if controller.rapid_path == "non_linear":
-            length = float(travel[axes_time.argmax()])
-            rate = float(rapids[axes_time.argmax()])
-        if length >= rate * ramp:
-            moving = math.ceil(length / rate / tick) * tick + ramp
-        else:
-            moving = 2.0 * math.ceil(math.sqrt(length * ramp / rate) / tick) * tick
-        total += moving + controller.rapid_bell_time_s + float(waits[travel > 0.0].max())
-    return total
+    return _core.time_program(program, controller_model(machine)).outside_regions_s
 
 
 def summarise(figures: Sequence[RegionFigures], placed: Sequence[Placed], machine: Machine) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from table import Row, Sample, comparison_table, markdown
 
 import shapegcode as sg
 from shapegcode import _core
+from shapegcode.controller import controller_model
 from shapegcode.converter import choose_grid
 from shapegcode.emit import emit_region, motion_limits
 
@@ -61,6 +62,7 @@ def main() -> int:
         size = program.stat().st_size
         print(f"program: {arguments.lines} G01 lines, {size / arguments.lines:.1f} bytes each", end="\n\n")
         rows = _program_rows(folder, program, arguments.lines, arguments.repetitions)
+        rows += _timing_rows(program, arguments.repetitions)
         rows += _filter_rows()
         steps = _step_times(program)
     cores_taken = others.cores_taken()
@@ -123,6 +125,32 @@ def _program_rows(folder: Path, program: Path, lines: int, repetitions: int) -> 
         Row("emission", "emission alone: fit of blocks and text", unit, rate(emission), peer, peer_rate),
         Row("shape_region", "look-ahead, sampling, filter, emission", unit, rate(shaping), peer, peer_rate),
     ]  # fmt: skip
+
+
+def _timing_rows(program: Path, repetitions: int) -> list[Row]:
+    """Cycle time in closed form beside the same question answered by giving every set-point."""
+    machine = sg.Machine.load("vx500")
+    read = sg.Program.read(program, machine).core
+    rows = []
+    for motion in (_core.MotionKind.after_interpolation, _core.MotionKind.look_ahead):
+        model = controller_model(machine)
+        model.motion = motion
+        closed, full = [], []
+        for _ in range(repetitions):
+            closed_s, cycle = _timed(lambda model=model: _core.time_program(read, model))
+            full_s, interpolated = _timed(lambda model=model: _core.interpolate_program(read, model))
+            np.testing.assert_allclose(cycle.total_s, interpolated.total_s, rtol=0.005)
+            closed.append(closed_s)
+            full.append(full_s)
+        # In look-ahead both sides plan the speed, and most of the time is the plan.
+        target = 0.2 if motion == _core.MotionKind.after_interpolation else None
+        what = f"cycle time, {motion.name.replace('_', ' ')}"
+        key = f"cycle_time_{motion.name}"
+        rows += [
+            Row(key, what, "s", Sample.of(closed), at_most=0.2),
+            Row(f"{key}_full", what, "s", Sample.of(closed), "full interpolation", Sample.of(full), at_most=target),
+        ]
+    return rows
 
 
 def _filter_rows() -> list[Row]:

@@ -13,7 +13,9 @@
 #include "shapegcode/motion/block_player.hpp"
 #include "shapegcode/motion/interpolator.hpp"
 #include "shapegcode/motion/look_ahead.hpp"
+#include "shapegcode/motion/rapid.hpp"
 #include "shapegcode/plant/modal.hpp"
+#include "shapegcode/plant/servo_lag.hpp"
 
 namespace {
 
@@ -118,7 +120,8 @@ int main() {
     });
   }
 
-  for (const Fir& fir : {Fir::moving_average(50), Fir({0, 3, 7}, {0.5, 0.2, 0.3}), Fir({0}, {1.0})}) {
+  for (const Fir& fir :
+       {Fir::moving_average(50), Fir({0, 3, 7}, {0.5, 0.2, 0.3}), Fir({0}, {1.0}), Fir::exponential(50.0)}) {
     FirStream stream(fir, 3);
     expect_none("FirStream::step", [&] {
       position = Vector3(1.0, 2.0, 3.0);
@@ -131,6 +134,23 @@ int main() {
       return 5000L;
     });
   }
+
+  ControllerModel controller;
+  controller.rapid_bell_time_s = 0.03;
+  RapidPlayer rapid({0.0, 0.0, 0.0}, {300.0, -20.0, 5.0}, controller);
+  expect_none("RapidPlayer::step", [&] {
+    long steps = 0;
+    for (; rapid.step(position); ++steps) sink += position.sum();
+    rapid.step(position);
+    return steps;
+  });
+
+  ServoLag servo(Vector3::Constant(30.0), Vector3::Constant(0.5), 1e-3);
+  expect_none("ServoLag::step", [&] {
+    servo.reset(Vector3::Zero());
+    for (int i = 0; i < 5000; ++i) sink += servo.step(Vector3(0.1 * i, 0.001 * i * i, 0.0)).sum();
+    return 5000L;
+  });
 
   AxisModes modes;
   modes[0] = {{46.0, 0.02, 1.0}, {210.0, 0.05, 0.2}};

@@ -74,6 +74,8 @@ TEST_CASE("fir: refuses what is not a filter") {
   CHECK_THROWS_AS(Fir({0, 1}, {0.5, 0.5 + 2e-9}), Error);
   CHECK_NOTHROW(Fir({0, 1}, {0.5, 0.5 + 0.5e-9}));
   CHECK_THROWS_AS(Fir::moving_average(0), Error);
+  for (const double constant : {0.0, -1.0, nan, 1e300}) CHECK_THROWS_AS(Fir::exponential(constant), Error);
+  for (const double rest : {0.0, 1.0, -0.1, nan}) CHECK_THROWS_AS(Fir::exponential(5.0, rest), Error);
   CHECK_THROWS_AS(FirStream(Fir::moving_average(2), 0), Error);
   std::vector<double> in(3, 1.0);
   std::vector<double> out(3);
@@ -119,11 +121,17 @@ TEST_CASE("fir: batch and stream agree to the last bit") {
       CAPTURE(length);
       CHECK(same_bits(filtered(Fir::moving_average(length), in), streamed(Fir::moving_average(length), in)));
     }
+    for (const double constant : {0.05, 1.0, 7.3, 60.0, 400.0}) {
+      CAPTURE(rows);
+      CAPTURE(constant);
+      const Fir fir = Fir::exponential(constant, 1e-3);
+      CHECK(same_bits(filtered(fir, in), streamed(fir, in)));
+    }
   }
 }
 
 TEST_CASE("fir: every form gives the same, all axes at once") {
-  for (const Fir& fir : {spread_taps(3, 7), spread_taps(20, 2), Fir::moving_average(50)}) {
+  for (const Fir& fir : {spread_taps(3, 7), spread_taps(20, 2), Fir::moving_average(50), Fir::exponential(12.5)}) {
     Samples in{1e-3, Eigen::MatrixXd(4000, 3)};
     for (int axis = 0; axis < 3; ++axis) {
       const std::vector<double> walk = random_walk(4000, static_cast<unsigned>(axis));
@@ -156,6 +164,23 @@ TEST_CASE("fir: a moving average is its taps") {
   const std::vector<double> b = filtered(Fir(fast.delays(), fast.taps()), in);
   for (std::size_t i = 0; i < a.size(); ++i) CHECK(std::abs(a[i] - b[i]) < 1e-12);
   CHECK(std::abs(a.back() - in.back()) < 1e-13);
+}
+
+TEST_CASE("fir: an exponential is its taps, cut off where the share is left, and rests exactly behind them") {
+  const std::vector<double> in = random_walk(3000, 6);
+  for (const double constant : {0.3, 4.0, 50.0}) {
+    const Fir fast = Fir::exponential(constant, 1e-3);
+    CHECK(fast.taps().size() == static_cast<std::size_t>(std::ceil(constant * std::log(1e3))));
+    for (std::size_t k = 1; k < fast.taps().size(); ++k) {
+      CHECK(fast.taps()[k] / fast.taps()[k - 1] == doctest::Approx(std::exp(-1.0 / constant)));
+    }
+    const std::vector<double> a = filtered(fast, in);
+    const std::vector<double> b = filtered(Fir(fast.delays(), fast.taps()), in);
+    for (std::size_t i = 0; i < a.size(); ++i) CHECK(std::abs(a[i] - b[i]) < 1e-10);
+    CHECK(a.back() == in.back());
+  }
+  // Spec section 0: the variance of an exponential acceleration is A^2.
+  CHECK(Fir::exponential(200.0, 1e-9).variance_samples2() == doctest::Approx(200.0 * 200.0).epsilon(1e-5));
 }
 
 TEST_CASE("fir: a moving average does not drift in 1e8 real-time steps") {

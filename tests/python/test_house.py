@@ -25,7 +25,7 @@ ALLOWED_FOLDERS: dict[str, set[str]] = {
     "path": set(),
     "motion": {"path", "filter"},
     "emission": {"path", "filter", "motion", "gcode"},
-    "simulation": {"path", "filter", "motion", "plant", "metrology"},
+    "simulation": {"path", "filter", "motion", "plant", "metrology", "gcode"},
     "filter": set(),
     "shaping": {"filter"},
     "plant": {"filter"},

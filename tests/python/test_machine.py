@@ -54,6 +54,28 @@ def test_minimal_file_gets_the_documented_defaults() -> None:
     assert machine.emission.block_period_s is None
 
 
+def test_keys_that_describe_the_controller_have_their_documented_defaults() -> None:
+    machine = Machine.from_toml(MINIMAL)
+    controller = machine.controller
+    assert controller.after_interpolation_shape == "linear"
+    assert controller.look_ahead_filter_time_constant_s == 0
+    assert controller.contour_acceleration_mm_s2 is None
+    assert controller.position_gain_per_s.as_tuple() == (30, 30, 30)
+    assert controller.feed_forward_ratio.as_tuple() == (0, 0, 0)
+    assert (controller.in_position, controller.in_position_width_um.as_tuple()) == ("measured", (20, 20, 20))
+    assert (controller.offset_memory, controller.nesting_limit_subprogram) == ("C", 10)
+    assert controller.max_program_steps == 10_000_000
+    assert controller.no_buffer_m_codes == ()
+    assert (machine.times.tool_change_s, machine.times.m_function_s) == (0, 0)
+
+
+def test_one_number_or_one_per_axis() -> None:
+    for text, values in (("0.2", (0.2, 0.2, 0.2)), ("{ x = 0.1, y = 0.2, z = 0.3 }", (0.1, 0.2, 0.3))):
+        machine = Machine.from_toml(f"{MINIMAL}[controller]\nrapid_time_constant_s = {text}\n")
+        assert machine.controller.rapid_time_constant_s.as_tuple() == values
+        assert Machine.from_toml(machine.to_toml()) == machine
+
+
 def test_zero_is_a_value_and_not_a_missing_one() -> None:
     machine = Machine.from_toml(
         MINIMAL
@@ -229,6 +251,31 @@ def test_message_has_file_line_key_value_and_limit(old: str, new: str, message: 
             "16: controller.in_position_s.z: required, but missing (unit: s)",
         ),
         (
+            "[controller]\nrapid_time_constant_s = 11\n",
+            "16: controller.rapid_time_constant_s = 11: must be 10 or less (unit: s)",
+        ),
+        (
+            "[controller]\nfeed_forward_ratio = {x = 0, y = 1.1, z = 0}\n",
+            "16: controller.feed_forward_ratio.y = 1.1: must be 1 or less",
+        ),
+        (
+            "[controller]\nposition_gain_per_s = 0\n",
+            "16: controller.position_gain_per_s = 0: must be greater than 0 (unit: 1/s)",
+        ),
+        (
+            "[controller]\ncontour_acceleration_mm_s2 = {x = 1, y = 1, z = 0}\n",
+            "16: controller.contour_acceleration_mm_s2.z = 0: must be greater than 0 (unit: mm/s²)",
+        ),
+        (
+            "[controller]\nno_buffer_m_codes = [46, -1]\n",
+            "16: controller.no_buffer_m_codes.2 = -1: must be 0 or more",
+        ),
+        (
+            "[controller]\nnesting_limit_subprogram = 0\n",
+            "16: controller.nesting_limit_subprogram = 0: must be 1 or more (unit: levels)",
+        ),
+        ("[times]\ntool_change_s = -1\n", "16: times.tool_change_s = -1: must be 0 or more (unit: s)"),
+        (
             "[controller]\ninterpolation_period_s = 1\n",
             "16: controller.interpolation_period_s = 1: must be 0.1 or less (unit: s)",
         ),
@@ -334,6 +381,7 @@ def test_every_key_has_a_meaning_and_every_dimensioned_key_a_unit_that_agrees_wi
         "_percent": "%",
         "_deg": "degrees",
         "_bytes": "bytes",
+        "_per_s": "1/s",
         "_s": "s",
         "_mm": "mm",
         "_inch": "inch",

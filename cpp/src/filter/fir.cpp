@@ -49,6 +49,13 @@ struct RunningSum {
   [[nodiscard]] double mean(double length) const noexcept { return (sum + error) / length; }
 };
 
+/// Geometric weights in O(1): `lag` is sum over the n taps q^j (x[i-j] - x[i]), the filtered value newest + lag / G
+/// with G = sum q^j. Held as a difference, it is exactly zero at rest, and its rounding dies out with q.
+inline double lag_behind(double lag, double newest, double previous, double leaving, double decay,
+                         double leaving_weight, double weight_sum) noexcept {
+  return decay * lag - (weight_sum - 1.0) * (newest - previous) + leaving_weight * (previous - leaving);
+}
+
 /// out[i] (+)= sum of taps[k] * in[i - delays[k]], left to right, for begin <= i < end. One store per output.
 template <int n_taps, bool accumulate>
 void weigh(const double* in, const int* delays, const double* taps, double* __restrict out, Index begin, Index end) {
@@ -170,6 +177,19 @@ void average_column(const double* in, Index rows, Index length, double* out) {
   }
 }
 
+void decay_column(const double* in, Index rows, Index length, double decay, double leaving_weight, double weight_sum,
+                  double* out) {
+  double lag = 0.0;
+  double previous = in[0];
+  for (Index i = 0; i < rows + length - 1; ++i) {
+    const double newest = in[std::min(i, rows - 1)];
+    lag = lag_behind(lag, newest, previous, in[std::clamp<Index>(i - length, 0, rows - 1)], decay, leaving_weight,
+                     weight_sum);
+    out[i] = newest + lag / weight_sum;
+    previous = newest;
+  }
+}
+
 }  // namespace
 
 void Fir::apply_rows(const double* in, Index rows, int n_axes, double* out) const {
@@ -177,7 +197,7 @@ void Fir::apply_rows(const double* in, Index rows, int n_axes, double* out) cons
     throw Error(ErrorKind::argument, "filter input of " + std::to_string(rows) + " samples and " +
                                          std::to_string(n_axes) + " axes, at least 1 of each needed");
   }
-  if (!moving_average_) {
+  if (!moving_average_ && decay_ == 0.0) {
     weigh_rows(in, rows, n_axes, delays_, taps_, out);
     return;
   }
@@ -224,6 +244,37 @@ Fir Fir::moving_average(int length) {
   for (std::size_t k = 0; k < delays.size(); ++k) delays[k] = static_cast<int>(k);
   Fir fir(std::move(delays), std::vector<double>(static_cast<std::size_t>(length), 1.0 / length));
   fir.moving_average_ = true;
+  return fir;
+}
+
+Fir Fir::exponential(double time_constant_samples, double rest) {
+  if (!(time_constant_samples > 0.0) || !std::isfinite(time_constant_samples)) {
+    throw Error(ErrorKind::argument, "exponential time constant is " + std::to_string(time_constant_samples) +
+                                         " samples, must be > 0 and finite");
+  }
+  if (!(rest > 0.0 && rest < 1.0)) {
+    throw Error(ErrorKind::argument,
+                "share of the exponential that is cut off is " + std::to_string(rest) + ", must be between 0 and 1");
+  }
+  constexpr double most_taps = 1e7;
+  const double length = std::max(1.0, std::ceil(-std::log(rest) * time_constant_samples));
+  if (!(length <= most_taps)) {
+    throw Error(ErrorKind::argument,
+                "exponential filter of " + std::to_string(length) + " taps, at most 10000000 are possible");
+  }
+  const double decay = std::exp(-1.0 / time_constant_samples);
+  const double leaving = std::exp(-length / time_constant_samples);
+  const double weight_sum = std::expm1(-length / time_constant_samples) / std::expm1(-1.0 / time_constant_samples);
+  std::vector<int> delays(static_cast<std::size_t>(length));
+  std::vector<double> taps(delays.size());
+  for (std::size_t k = 0; k < taps.size(); ++k) {
+    delays[k] = static_cast<int>(k);
+    taps[k] = std::exp(-static_cast<double>(k) / time_constant_samples) / weight_sum;
+  }
+  Fir fir(std::move(delays), std::move(taps));
+  fir.decay_ = decay;
+  fir.leaving_ = leaving;
+  fir.weight_sum_ = weight_sum;
   return fir;
 }
 
@@ -274,6 +325,8 @@ void Fir::apply(const double* in, Index in_rows, int n_axes, double* out) const 
     double* column_out = out + axis * out_rows;
     if (moving_average_) {
       average_column(column_in, in_rows, duration_samples() + 1, column_out);
+    } else if (decay_ > 0.0) {
+      decay_column(column_in, in_rows, duration_samples() + 1, decay_, leaving_, weight_sum_, column_out);
     } else {
       weigh_column(column_in, in_rows, delays_, taps_, column_out);
     }
@@ -304,7 +357,7 @@ void FirStream::reset(std::span<const double> position) noexcept {
   for (std::size_t axis = 0; axis < axes; ++axis) {
     RunningSum running;
     running.start(position[axis], static_cast<double>(fir_.duration_samples() + 1));
-    sum_[axis] = running.sum;
+    sum_[axis] = fir_.decay_ > 0.0 ? 0.0 : running.sum;
     sum_error_[axis] = running.error;
   }
 }
@@ -324,6 +377,15 @@ void FirStream::step(std::span<double> position) noexcept {
       if (block_ends) running.normalise();
       sum_[axis] = running.sum;
       sum_error_[axis] = running.error;
+    }
+  } else if (fir_.decay_ > 0.0) {
+    const auto length = static_cast<std::size_t>(fir_.duration_samples()) + 1;
+    const double* const previous = &ring_[((row_ - 1) & row_mask_) * axes];
+    const double* const leaving = &ring_[((row_ - length) & row_mask_) * axes];
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      sum_[axis] = lag_behind(sum_[axis], newest[axis], previous[axis], leaving[axis], fir_.decay_, fir_.leaving_,
+                              fir_.weight_sum_);
+      position[axis] = newest[axis] + sum_[axis] / fir_.weight_sum_;
     }
   } else {
     const std::vector<int>& delays = fir_.delays();

@@ -14,6 +14,16 @@ constexpr double tick_tolerance = 1e-6;
 
 }  // namespace
 
+double whole_periods(double periods) noexcept { return std::ceil(periods - tick_tolerance); }
+
+double block_periods(double length_mm, double feed_mm_per_s, double period_s, BlockEnd block_end) noexcept {
+  if (length_mm <= 0.0) {
+    return 0.0;
+  }
+  const double exact = length_mm / feed_mm_per_s / period_s;
+  return block_end == BlockEnd::carry ? exact : whole_periods(exact);
+}
+
 BlockPlayer::BlockPlayer(std::span<const Segment> blocks, double period_s, BlockEnd block_end, double override_ratio)
     : blocks_(blocks), period_s_(period_s), ratio_(override_ratio), block_end_(block_end) {
   if (!(period_s > 0.0) || !(override_ratio > 0.0)) {
@@ -31,11 +41,7 @@ BlockPlayer::BlockPlayer(std::span<const Segment> blocks, double period_s, Block
 }
 
 double BlockPlayer::block_duration_s(const Segment& segment) const noexcept {
-  if (segment.length_mm <= 0.0) {
-    return 0.0;
-  }
-  const double exact = segment.length_mm / (segment.feed_mm_per_s * ratio_);
-  return block_end_ == BlockEnd::carry ? exact : std::ceil(exact / period_s_ - tick_tolerance) * period_s_;
+  return block_periods(segment.length_mm, segment.feed_mm_per_s * ratio_, period_s_, block_end_) * period_s_;
 }
 
 void BlockPlayer::open_block() noexcept { duration_s_ = block_duration_s(blocks_[block_]); }

@@ -52,7 +52,7 @@ double arc_centripetal_limit(const Segment& segment, const MotionLimits& limits)
   double limit = limits.centripetal_acceleration_mm_per_s2;
   for (int i = 0; i < axis_count; ++i) {
     if (i != segment.normal) {
-      limit = std::min(limit, 0.9 * limits.max_acceleration_mm_per_s2[i]);
+      limit = std::min({limit, 0.9 * limits.max_acceleration_mm_per_s2[i], limits.contour_acceleration_mm_per_s2[i]});
     }
   }
   return limit;
@@ -65,14 +65,24 @@ double segment_acceleration(const Segment& segment, double speed_limit, const Mo
     axes = std::sqrt(std::max(0.19 * axes * axes, axes * axes - turning * turning));
   }
   if (limits.law == AccelerationLaw::constant_time) {
-    return std::min(axes, segment.feed_mm_per_s / limits.time_constant_s);
+    return std::min(axes, segment.feed_mm_per_s * limits.feed_override / limits.time_constant_s);
   }
   return axes;
 }
 
+double polyline_reach(const Segment& before, const Segment& after) noexcept {
+  return 0.5 * (before.length_mm + after.length_mm);
+}
+
 double polyline_curvature(const Segment& before, const Segment& after, double angle) noexcept {
-  const double reach = 0.5 * (before.length_mm + after.length_mm);
+  const double reach = polyline_reach(before, after);
   return reach > 0.0 ? angle / reach : 0.0;
+}
+
+// Speed at which the turn of the direction by `change`, spread over the way between the middles of both blocks, costs
+// no axis more than its contour acceleration: a = |change| v^2 / reach.
+double contour_speed(const Vector3& change, double reach, const MotionLimits& limits) noexcept {
+  return std::sqrt(tangential_limit(change.cwiseAbs(), limits.contour_acceleration_mm_per_s2) * reach);
 }
 
 double curvature_speed(double curvature_per_mm, const MotionLimits& limits, double centripetal,
@@ -279,14 +289,18 @@ std::vector<SpeedPhase> stretch_ramps(const std::vector<SpeedPhase>& phases, dou
 
 }  // namespace
 
+double axis_feed_limit(const Segment& segment, const MotionLimits& limits) noexcept {
+  return tangential_limit(axis_share(segment), limits.max_feed_mm_per_s);
+}
+
 double segment_speed_limit(const Segment& segment, const MotionLimits& limits) noexcept {
-  double speed = segment.feed_mm_per_s;
+  double speed = segment.feed_mm_per_s * limits.feed_override;
   if (segment.kind == SegmentKind::arc) {
     speed *= limits.arc_feed_ratio;
     speed = std::min(speed, curvature_speed(curvature(segment), limits, arc_centripetal_limit(segment, limits),
                                             limits.contour_tolerance_mm));
   }
-  return std::min(speed, tangential_limit(axis_share(segment), limits.max_feed_mm_per_s));
+  return std::min(speed, axis_feed_limit(segment, limits));
 }
 
 double corner_speed_limit(const Segment& before, const Segment& after, const MotionLimits& limits) noexcept {
@@ -301,6 +315,7 @@ double corner_speed_limit(const Segment& before, const Segment& after, const Mot
   const double tolerance = limits.corner_share * limits.contour_tolerance_mm;
   speed = std::min(speed, curvature_speed(polyline_curvature(before, after, angle), limits,
                                           limits.centripetal_acceleration_mm_per_s2, tolerance));
+  speed = std::min(speed, contour_speed(change, polyline_reach(before, after), limits));
   if (limits.filter_mean_deviation_s > 0.0) {
     // A filter of symmetric spread passes the corner at |change| * (v*E|t| + a*E[t^2]/2) / 2: what the speed at the
     // corner and the ramps on both sides of it cost.
@@ -315,6 +330,7 @@ double corner_speed_limit(const Segment& before, const Segment& after, const Mot
 
 SpeedProfile plan_speed(const Path& path, const MotionLimits& limits) {
   require_positive(limits.time_constant_s, "acceleration time constant (s)");
+  require_positive(limits.feed_override, "feed override");
   require_positive(limits.arc_feed_ratio, "arc feed ratio");
   if (!(limits.jerk_time_s >= 0.0) || !std::isfinite(limits.jerk_time_s)) {
     throw Error(ErrorKind::argument,
@@ -327,6 +343,7 @@ SpeedProfile plan_speed(const Path& path, const MotionLimits& limits) {
     require_positive(limits.max_acceleration_mm_per_s2[i], "axis acceleration limit (mm/s2)");
     require_positive(limits.max_jerk_mm_per_s3[i], "axis jerk limit (mm/s3)");
     require_positive(limits.corner_speed_difference_mm_per_s[i], "corner speed difference (mm/s)");
+    require_positive(limits.contour_acceleration_mm_per_s2[i], "contour acceleration (mm/s2)");
   }
   const std::size_t n = path.size();
   if (n == 0 || path.length_mm() <= 0.0) {

@@ -9,7 +9,7 @@
 namespace shapegcode {
 
 /// The one filter type: weights on the sample grid that add up to one. An acceleration filter is a moving average, an
-/// input shaper a few unequal taps; a cascade of both is a list of Fir.
+/// input shaper a few unequal taps, an exponential acceleration geometric ones; a cascade of them is a list of Fir.
 class Fir {
  public:
   /// Taps at whole-sample delays, ascending, first >= 0. Throws Error(argument) on an empty list, unequal lengths, a
@@ -17,10 +17,16 @@ class Fir {
   Fir(std::vector<int> delays, std::vector<double> taps);
   /// Equal weights over `length` >= 1 samples; costs the same for any length. Throws Error(argument) on length < 1.
   [[nodiscard]] static Fir moving_average(int length);
+  /// Geometric weights exp(-k / time_constant), cut off where less than the share `rest` of them is left and scaled to
+  /// a sum of one; costs the same for any length. Its variance tends to time_constant^2. Throws Error(argument) on a
+  /// time constant (in samples) that is not > 0 and finite, a share outside 0 ... 1, or more than 10 million taps.
+  [[nodiscard]] static Fir exponential(double time_constant_samples, double rest = 1e-6);
 
   [[nodiscard]] const std::vector<int>& delays() const noexcept { return delays_; }
   [[nodiscard]] const std::vector<double>& taps() const noexcept { return taps_; }
   [[nodiscard]] bool is_moving_average() const noexcept { return moving_average_; }
+  /// Ratio of each tap to the one before it where the taps are geometric; 0 otherwise.
+  [[nodiscard]] double decay() const noexcept { return decay_; }
   /// Largest delay in samples: how much longer the output moves than the input.
   [[nodiscard]] int duration_samples() const noexcept;
   /// First moment of the taps in samples: the mean delay.
@@ -41,9 +47,16 @@ class Fir {
   void apply_rows(const double* in, Eigen::Index rows, int n_axes, double* out) const;
 
  private:
+  friend class FirStream;
+
   std::vector<int> delays_;
   std::vector<double> taps_;
   bool moving_average_ = false;
+  // Exponential only: ratio of successive taps, that ratio to the power of their number, and the taps' sum before
+  // scaling.
+  double decay_ = 0.0;
+  double leaving_ = 0.0;
+  double weight_sum_ = 0.0;
 };
 
 /// Real-time form: one sample of every axis per step; no allocation, no exception, bounded work.
@@ -63,8 +76,9 @@ class FirStream {
   int n_axes_ = 0;
   std::vector<double> ring_;  // one row of n_axes values per sample; the number of rows is a power of two
   std::size_t row_mask_ = 0;
-  std::size_t row_ = 0;                  // samples since reset; its low bits are the row of the next sample
-  std::vector<double> sum_, sum_error_;  // moving average only: running sum of each axis and what its rounding lost
+  std::size_t row_ = 0;  // samples since reset; its low bits are the row of the next sample
+  std::vector<double> sum_,
+      sum_error_;  // of each axis: running sum and what its rounding lost; exponential: see fir.cpp
 };
 
 }  // namespace shapegcode

@@ -14,6 +14,14 @@ enum class BlockEnd : std::uint8_t {
   carry,  ///< at once: the remainder of a period is carried over
 };
 
+/// Time after which a block's successor starts, in periods: l / (F T_I), a whole number under `ceil` (spec section 0).
+/// 0 for a block without length.
+[[nodiscard]] double block_periods(double length_mm, double feed_mm_per_s, double period_s,
+                                   BlockEnd block_end) noexcept;
+
+/// Whole periods that hold so many: rounded up, but for what is rounding error.
+[[nodiscard]] double whole_periods(double periods) noexcept;
+
 /// A controller without look-ahead: every block runs at its feed for its whole length, the next one follows at once.
 /// The acceleration filter comes after it (a moving average: block overlap). Real-time form.
 class BlockPlayer {

@@ -24,7 +24,9 @@ struct MotionLimits {
   Vector3 max_acceleration_mm_per_s2 = Vector3::Constant(none);
   Vector3 max_jerk_mm_per_s3 = Vector3::Constant(none);
   Vector3 corner_speed_difference_mm_per_s = Vector3::Constant(none);  ///< per axis at a corner
-  double centripetal_acceleration_mm_per_s2 = none;                    ///< on arcs and along polylines
+  double centripetal_acceleration_mm_per_s2 = none;                    ///< on arcs and along polylines (1735)
+  Vector3 contour_acceleration_mm_per_s2 = Vector3::Constant(none);    ///< per axis, of a change of direction (1737)
+  double feed_override = 1.0;                                          ///< scales the programmed feeds
   double arc_feed_ratio = 1.0;                                         ///< feed on arcs relative to the programmed feed
   /// Deviation that a filter with the spread below may cause at corners and on arcs.
   double contour_tolerance_mm = none;

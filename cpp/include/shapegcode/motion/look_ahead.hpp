@@ -22,6 +22,9 @@ namespace shapegcode {
 /// speed (there the corner limits bound what happens), and jerk on arcs is not bounded.
 [[nodiscard]] SpeedProfile plan_speed(const Path& path, const MotionLimits& limits);
 
+/// Highest speed at which no axis of a segment is above its largest feed.
+[[nodiscard]] double axis_feed_limit(const Segment& segment, const MotionLimits& limits) noexcept;
+
 /// Highest speed at which segment `i` may be run under the limits.
 [[nodiscard]] double segment_speed_limit(const Segment& segment, const MotionLimits& limits) noexcept;
 
