@@ -6,8 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-__all__ = ["PERIODS_S", "Finding", "combine", "known", "mean", "unknown"]
+__all__ = ["CUTTING_SUM", "PERIODS_S", "Finding", "combine", "known", "mean", "unknown"]
 
+#: What a stopwatch sees of the acceleration after interpolation.
+CUTTING_SUM = "cutting time constant + bell time"
 #: Interpolation periods that controls are built with, s.
 PERIODS_S = tuple(ms / 1000.0 for ms in (0.125, 0.25, 0.5, 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16))
 
@@ -91,6 +93,9 @@ def combine(first: Sequence[Finding], second: Sequence[Finding]) -> list[Finding
 
 
 def _apart(a: Finding, b: Finding) -> bool:
+    if isinstance(a.value, str) or isinstance(b.value, str):
+        # "linear or bell" contains "bell"
+        return str(a.value) not in str(b.value) and str(b.value) not in str(a.value)
     if a.low is None or a.high is None or b.low is None or b.high is None:
-        return a.value != b.value
+        return False
     return a.low > b.high or b.low > a.high

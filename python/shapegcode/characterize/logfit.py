@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.characterize.findings import PERIODS_S, Finding, known, mean, unknown
+from shapegcode.characterize.findings import CUTTING_SUM, PERIODS_S, Finding, known, mean, unknown
 from shapegcode.characterize.log import ServoLog
 from shapegcode.characterize.moves import (
     PartLog,
@@ -135,11 +135,9 @@ def _cutting(state: _State, stops: list[PartLog]) -> None:
     pairs = [sorted(zip(fit.values[1:].tolist(), fit.half[1:].tolist(), strict=True), reverse=True) for fit in chosen]
     value, half = mean([pair[0][0] for pair in pairs], [pair[0][1] for pair in pairs])
     note = {"linear": "linear", "bell": "the longer of two moving averages", "exponential": "exponential"}[best]
-    key = "" if best == "exponential" else "controller.time_constant_s"
-    if best == "exponential":
-        note += ": the machine file has no key for that shape"
-    state.findings.append(known(names[0], value, half, "s", key, _SOURCE, note))
-    state.findings.append(Finding("cutting acceleration shape", best, None, None, "", "", _SOURCE))
+    state.findings.append(known(names[0], value, half, "s", "controller.time_constant_s", _SOURCE, note))
+    shape_key = "controller.after_interpolation_shape"
+    state.findings.append(Finding("cutting acceleration shape", best, None, None, "", shape_key, _SOURCE))
     state.exponential = best == "exponential"
     state.cutting, state.cutting_half = value, half
     if best == "bell":
@@ -151,6 +149,12 @@ def _cutting(state: _State, stops: list[PartLog]) -> None:
         state.findings.append(
             Finding(names[1], 0.0, 0.0, max(fine, 0.002), "s", "controller.bell_time_s", _SOURCE, note)
         )
+
+
+def _sum(state: _State) -> None:
+    """The sum of both times, which is what a stopwatch sees."""
+    if state.cutting is not None and not state.exponential:
+        state.findings.append(known(CUTTING_SUM, state.cutting, state.cutting_half, "s", "", _SOURCE))
 
 
 def _dwells(state: _State, stops: list[PartLog]) -> None:
@@ -400,7 +404,8 @@ def _servo(state: _State, logs: Mapping[str, ServoLog]) -> None:
         half = float(spread[0]) + (_SERVO_SLACK + apart / rest) * gain
         state.findings.append(known(name, gain, half, "1/s", key, _SOURCE))
         half = float(spread[1]) + _SERVO_SLACK + apart
-        state.findings.append(known(f"feed-forward {axis}", max(0.0, 1.0 - rest), half, "1", "", _SOURCE))
+        forward_key = f"controller.feed_forward_ratio.{axis.lower()}"
+        state.findings.append(known(f"feed-forward {axis}", max(0.0, 1.0 - rest), half, "1", forward_key, _SOURCE))
     if not done:
         state.findings.append(unknown("position gain", "1/s", _SOURCE, "no actual positions in the logs"))
 
@@ -461,6 +466,7 @@ def fit_logs(tests: Mapping[str, Test], logs: Mapping[str, ServoLog]) -> list[Fi
     stops = [part for part in parts.get("log_cutting", []) if part.part.pattern == "dwell"]
     if stops:
         _cutting(state, stops)
+        _sum(state)
         _dwells(state, stops)
     else:
         state.findings.append(unknown("cutting time constant", "s", _SOURCE, "needs log_cutting"))

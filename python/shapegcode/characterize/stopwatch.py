@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.characterize.findings import PERIODS_S, Finding, known, unknown
+from shapegcode.characterize.findings import CUTTING_SUM, PERIODS_S, Finding, known, unknown
 from shapegcode.characterize.plan import AXES, Test
 from shapegcode.characterize.results import Results
 from shapegcode.characterize.timing import Timing, part_time_s, test_time_s
@@ -27,6 +27,7 @@ _SOURCE = "stopwatch"
 _CLEARLY = 9.0  # chi² by which an alternative must fit worse
 _WIDE = 0.5  # of the value: an interval of so much either way determines nothing
 _CONTRADICTS = 4.0  # standard deviations
+_SHAPE_KEY = "controller.after_interpolation_shape"
 _SLOW = ("stop_slow", "stop_slower")
 _NO_PERIOD_S = 1e-6
 _PRIOR_S = 1.0
@@ -127,7 +128,7 @@ def _shape(rows: dict[str, _Row], out: StopwatchFit) -> float:
     half = 1.96 / math.sqrt(spread)
     if slope <= half + 0.002:
         note = "a stop takes equally long from every feed; linear or bell cannot be told apart"
-        out.findings.append(Finding(name, "linear or bell", None, None, "", "", _SOURCE, note))
+        out.findings.append(Finding(name, "linear or bell", None, None, "", _SHAPE_KEY, _SOURCE, note))
         return 0.0
     out.findings.append(
         Finding(name, "exponential", None, None, "", "", _SOURCE, "stops from a higher feed last longer")
@@ -136,8 +137,9 @@ def _shape(rows: dict[str, _Row], out: StopwatchFit) -> float:
     slack = (
         1.96 * 0.008 / math.sqrt(12.0) * math.sqrt(float(((x - centre) ** 2).sum())) / float(((x - centre) ** 2).sum())
     )
-    note = "from stops at several feeds: the machine file has no key for that shape"
-    out.findings.append(known("cutting time constant", slope, math.hypot(half, slack), "s", "", _SOURCE, note))
+    note = "from stops at several feeds"
+    key = "controller.time_constant_s"
+    out.findings.append(known("cutting time constant", slope, math.hypot(half, slack), "s", key, _SOURCE, note))
     return slope
 
 
@@ -176,9 +178,8 @@ def _determined(name: str, value: float, half: float, key: str, needs: str, note
 def _cutting(best: _Fit, rows: dict[str, _Row], exponential: bool, out: StopwatchFit) -> None:
     cutting, half = best.get("cutting")
     if not exponential:
-        name = "cutting time constant"
-        needs, note = "stop_below, overhead", "with the bell time: a stopwatch sees only their sum"
-        out.findings.append(_determined(name, cutting, half, "controller.time_constant_s", needs, note))
+        needs, note = "stop_below, overhead", "a stopwatch sees only the sum"
+        out.findings.append(_determined(CUTTING_SUM, cutting, half, "controller.time_constant_s", needs, note))
         out.findings.append(unknown("cutting bell time", "s", _SOURCE, "a stopwatch sees only the sum of both times"))
     for axis in AXES:
         value, half = best.get(axis)

@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, load_machine
+from shapegcode.cli.options import add_machine_argument, load_machine, refuse_same_file
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
+    from shapegcode.characterize.findings import Finding
     from shapegcode.machine import Machine
 
 __all__ = ["add_arguments", "run"]
@@ -28,7 +31,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="write the test programs, RESULTS.toml to fill in, and README.txt",
     )
+    action.add_argument(
+        "--fit",
+        metavar="RESULTS",
+        default=None,
+        help="fit a filled-in RESULTS.toml, a folder with it and servo logs, or one log beside it",
+    )
     add_machine_argument(parser)
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", default=None, help="with --fit: machine file to write, with what is known"
+    )
+    parser.add_argument(
+        "--units",
+        metavar="TIME,LENGTH",
+        default=None,
+        help="with --fit: units of the servo logs, for example ms,um (default: from their headers)",
+    )
     parser.add_argument(
         "--box",
         metavar="X0:X1,Y0:Y1,Z0:Z1",
@@ -40,25 +58,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the tests; see the module.
+    """Write the tests or fit their results; see the module.
 
     Raises:
         ArgumentError, MachineError: bad input.
         OSError: a file cannot be read or written.
     """
-    return _write(args, load_machine(args))
+    machine = load_machine(args)
+    return _write(args, machine) if args.write is not None else _fit(args, machine)
 
 
 def _write(args: argparse.Namespace, machine: Machine) -> int:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
+    from shapegcode._core import ArgumentError
     from shapegcode.characterize.plan import Box
     from shapegcode.characterize.programs import write_tests
     from shapegcode.characterize.timing import Timing, test_time_s
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, write_json
 
+    for option, value in (("-o", args.output), ("--units", args.units)):
+        if value is not None:
+            raise ArgumentError(f"{option} {value}: goes with --fit, not with --write")
     box = Box.parse(args.box)
     folder = Path(args.write)
     tests = write_tests(folder, machine, box)
@@ -89,3 +112,78 @@ def _write(args: argparse.Namespace, machine: Machine) -> int:
     )
     console.print(f"next: read {folder / 'README.txt'}, run the tests, fill in {folder / 'RESULTS.toml'}", markup=False)
     return ExitCode.OK
+
+
+def _fit(args: argparse.Namespace, machine: Machine) -> int:
+    from shapegcode.characterize.fit import applied, assumed_value, fit
+    from shapegcode.characterize.log import parse_units
+    from shapegcode.cli import ExitCode
+    from shapegcode.cli.console import output_console, progress, write_json, write_text
+
+    units = parse_units(args.units) if args.units is not None else None
+    with progress(f"fitting {args.fit}", args.json) as bar:
+        found = fit(Path(args.fit), units, bar.update)
+    read = [Path(args.machine), *found.read]
+    fitted, remarks = applied(machine, found.findings)
+    if args.output is not None:
+        refuse_same_file([Path(args.output)], read)
+    if args.json is not None:
+        rows = [
+            {
+                "quantity": each.quantity,
+                "value": each.value,
+                "low": each.low,
+                "high": each.high,
+                "unit": each.unit,
+                "assumed": assumed_value(machine, each),
+                "key": each.key,
+                "source": each.source,
+                "note": each.note,
+            }
+            for each in found.findings
+        ]
+        if args.json != "-":
+            refuse_same_file([Path(args.json)], [*read, *([Path(args.output)] if args.output else [])])
+        write_json({"findings": rows, "contradictions": found.contradictions, "output": args.output}, args.json)
+    console = output_console(args.json)
+    console.print(_table(machine, found.findings))
+    for each in found.contradictions:
+        console.print(f"contradiction: {each}", markup=False, soft_wrap=True)
+    if args.output is not None:
+        write_text(args.output, fitted.to_toml(remarks))
+        console.print(f"wrote {args.output}: {len(remarks)} keys from measurement", markup=False, soft_wrap=True)
+    if found.contradictions:
+        console.print("next: repeat the tests that contradict the others", markup=False)
+        return ExitCode.OUT_OF_TOLERANCE
+    if args.output is None:
+        console.print("next: -o FILE writes the machine file with these values", markup=False)
+    else:
+        console.print(f"next: shapegcode machine show {args.output}", markup=False, soft_wrap=True)
+    return ExitCode.OK
+
+
+def _table(machine: Machine, findings: list[Finding]) -> Table:
+    """Findings with their intervals beside what the machine file has; times in ms."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    from shapegcode.characterize.fit import assumed_value
+
+    table = Table(title=f"{machine.name}, measured", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for heading in ("quantity", "value", "95 % interval", "unit", "file has", "from", "remark"):
+        table.add_column(heading, overflow="fold", no_wrap=heading != "remark")
+    for each in findings:
+        scale, unit = (1e3, "ms") if each.unit == "s" else (1.0, each.unit)
+
+        def shown(value: object, scale: float = scale) -> str:
+            return f"{value * scale:.4g}" if isinstance(value, int | float) else str(value or "")
+
+        if each.low is not None and each.high is not None:
+            interval = f"{shown(each.low)} ... {shown(each.high)}"
+        else:
+            interval = f"at most {shown(each.high)}" if each.high is not None else ""
+        value = "unknown" if each.value is None else shown(each.value)
+        cells = (each.quantity, value, interval, unit, shown(assumed_value(machine, each)), each.source, each.note)
+        table.add_row(*(Text(cell) for cell in cells))
+    return table
