@@ -360,7 +360,7 @@ def _feed_steps(state: _State, parts: list[PartLog]) -> None:
     for log in parts:
         part = log.part
         distance = abs(part.length_mm)
-        top = int(np.argmax(log.way_mm > distance * part.stride - max(0.02, 5 * log.noise_mm)))
+        top = int(np.argmax(log.way_mm))  # the turn, which smoothing cuts short
         begin = log.times_s[int(np.argmax(log.way_mm > max(0.02, 5 * log.noise_mm)))]
         settle = min(_STEPS_SETTLE_S, 0.25 * (log.times_s[top] - begin))
         inside = (log.times_s > begin + settle) & (log.times_s < log.times_s[top] - settle)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from shapegcode._core import ArgumentError
 from shapegcode.characterize.plan import AXES, Box, Part, Test, check, steps
-from shapegcode.characterize.timing import Timing, test_time_s
+from shapegcode.characterize.timing import Timing, program_time_s
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -203,7 +203,7 @@ def program_text(test: Test, box: Box, machine: Machine) -> str:
     step = machine.controller.least_increment_mm
     shared = test.name.startswith("override")  # one program, run at several overrides
     title = "OVERRIDE" if shared else test.name.upper().replace("_", "-")
-    seconds = test_time_s(dataclasses.replace(test, override_percent=100), Timing.of(machine))
+    seconds = program_time_s(dataclasses.replace(test, override_percent=100), Timing.of(machine))
     sides = [f"{a}{low:g}/{high:g}" for a, low, high in zip(AXES, box.low, box.high, strict=True)]
     lines = [
         "%",

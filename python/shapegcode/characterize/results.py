@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from shapegcode._core import ArgumentError
 from shapegcode.characterize.plan import AXES, PATTERNS, Box, Part, Test
-from shapegcode.characterize.timing import Timing, test_time_s
+from shapegcode.characterize.timing import Timing, program_time_s
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -78,9 +78,9 @@ def results_text(tests: Sequence[Test], machine: Machine, box: Box) -> str:
         lines.append(f'program = "{test.program}"')
         if test.kind == "stopwatch":
             lines.append(f"override_percent = {test.override_percent}")
-            lines.append(f"times_s = []  # expected: about {test_time_s(test, timing):.1f} s")
+            lines.append(f"times_s = []  # expected: about {program_time_s(test, timing):.1f} s")
         else:
-            lines.append(f'log = ""  # for example "{test.name}.csv"; about {test_time_s(test, timing):.0f} s')
+            lines.append(f'log = ""  # for example "{test.name}.csv"; about {program_time_s(test, timing):.0f} s')
         lines += ["parts = [", *(f"  {_part_text(part)}," for part in test.parts), "]", ""]
     return "\n".join(lines)
 
@@ -100,7 +100,7 @@ def readme_text(tests: Sequence[Test], machine: Machine, box: Box) -> str:
     feed = max(part.feed_mm_per_min for test in tests for part in test.parts if part.pattern != "rapid")
 
     def row(test: Test) -> str:
-        seconds = test_time_s(test, timing)
+        seconds = program_time_s(test, timing)
         note = f"override {test.override_percent} %" if test.name.startswith("override") else ""
         return f"  {test.program}  {test.name:<15} {seconds:7.1f} s  {test.purpose.capitalize()}  {note}".rstrip()
 
@@ -120,14 +120,14 @@ def readme_text(tests: Sequence[Test], machine: Machine, box: Box) -> str:
         "  Overrides 100 % unless the table says otherwise. Switch look-ahead modes off (G05.1 Q0, G08 P0),",
         "  if you want the figures without them; write down which mode was on.",
         "",
-        f"With a stopwatch: about {sum(test_time_s(test, timing) for test in watch) / 60:.0f} minutes",
+        f"With a stopwatch: about {sum(program_time_s(test, timing) for test in watch) / 60:.0f} minutes",
         "  Time from cycle start to the end of the program, or read the cycle time off the control.",
         "  Put the times into RESULTS.toml (times_s = [34.2] or, for several runs, [34.2, 34.3]).",
         "  Tests may be left out: what then cannot be known is said. The order does not matter.",
         "",
         *(row(test) for test in watch),
         "",
-        f"With a servo log: about {sum(test_time_s(test, timing) for test in logs):.0f} s of motion",
+        f"With a servo log: about {sum(program_time_s(test, timing) for test in logs):.0f} s of motion",
         "  Record time and the commanded positions of X, Y, Z (and the actual positions, if you can) every 1 ms, from",
         "  before the start to after the end. Save as CSV with a header line such as",
         "    time_ms,X,Y,Z,X_act,Y_act,Z_act",

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from shapegcode.characterize.findings import CUTTING_SUM, PERIODS_S, Finding, known, unknown
 from shapegcode.characterize.plan import AXES, Test
 from shapegcode.characterize.results import Results
-from shapegcode.characterize.timing import Timing, part_time_s, test_time_s
+from shapegcode.characterize.timing import Timing, part_time_s, program_time_s
 
 __all__ = ["StopwatchFit", "fit_stopwatch"]
 
@@ -86,7 +86,7 @@ def _least_squares(rows: Sequence[_Row], period: float, end: str) -> _Fit:
 
     def residual(p: Array) -> Array:
         timing = _timing(p.tolist(), period, end)
-        fits = [(test_time_s(row.test, timing) - row.time_s) / row.sigma_s for row in rows]
+        fits = [(program_time_s(row.test, timing) - row.time_s) / row.sigma_s for row in rows]
         return np.array([*fits, *((p - begin) / _PRIOR_S)])
 
     found = least_squares(residual, begin, x_scale=np.maximum(begin, 1e-3), diff_step=1e-6)
@@ -321,7 +321,7 @@ def fit_stopwatch(results: Results) -> StopwatchFit:
     _cutting(best, rows, exponential > 0.0, out)
     timing = _timing(best.values.tolist(), best.period, best.end)
     for row in used:
-        expected = test_time_s(row.test, timing)
+        expected = program_time_s(row.test, timing)
         if abs(expected - row.time_s) > _CONTRADICTS * row.sigma_s + 0.001 * row.time_s:
             out.contradictions.append(
                 f"{results.file}:{results.lines[row.test.name]}: {row.test.name}: {row.time_s:.2f} s; what fits all "

@@ -15,7 +15,7 @@ from shapegcode.characterize.plan import AXES, Part, Test
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["Timing", "part_time_s", "test_time_s", "whole_periods"]
+__all__ = ["Timing", "part_time_s", "program_time_s", "whole_periods"]
 
 _TICK_DUST = 1e-6  # periods: the dust of doubles
 
@@ -110,7 +110,7 @@ def part_time_s(part: Part, timing: Timing, override: float = 1.0) -> float:
     return part.count * mean + timing.cutting_s
 
 
-def test_time_s(test: Test, timing: Timing) -> float:
+def program_time_s(test: Test, timing: Timing) -> float:
     """Duration of a test in s, with the operator's overhead."""
     override = test.override_percent / 100.0
     return timing.overhead_s + sum(part_time_s(part, timing, override) for part in test.parts)

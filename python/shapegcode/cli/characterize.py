@@ -75,7 +75,7 @@ def _write(args: argparse.Namespace, machine: Machine) -> int:
     from shapegcode._core import ArgumentError
     from shapegcode.characterize.plan import Box
     from shapegcode.characterize.programs import write_tests
-    from shapegcode.characterize.timing import Timing, test_time_s
+    from shapegcode.characterize.timing import Timing, program_time_s
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, write_json
 
@@ -93,7 +93,7 @@ def _write(args: argparse.Namespace, machine: Machine) -> int:
                 "program": test.program,
                 "kind": test.kind,
                 "override_percent": test.override_percent,
-                "expected_s": round(test_time_s(test, timing), 3),
+                "expected_s": round(program_time_s(test, timing), 3),
             }
             for test in tests
         ]
@@ -103,7 +103,7 @@ def _write(args: argparse.Namespace, machine: Machine) -> int:
         table.add_column(heading, justify="right" if heading == "expected s" else "left")
     for test in tests:
         kind = f"{test.kind} {test.override_percent} %" if test.override_percent != 100 else test.kind
-        cells = (test.program, test.name, kind, f"{test_time_s(test, timing):.1f}", test.purpose.lower())
+        cells = (test.program, test.name, kind, f"{program_time_s(test, timing):.1f}", test.purpose.lower())
         table.add_row(*cells)
     console = output_console(args.json)
     console.print(table)
