@@ -15,6 +15,7 @@ from shapegcode.characterize.log import ServoLog
 from shapegcode.characterize.moves import (
     PartLog,
     ShapeFit,
+    bend_samples,
     fit_shape,
     held_samples,
     lagged_share,
@@ -59,15 +60,17 @@ def _pitch(part: PartLog) -> tuple[float, float]:
     return float(steps.mean()), 1.96 * max(spread, 2e-5) / math.sqrt(len(steps))
 
 
-def _period(state: _State, logs: Mapping[str, ServoLog], parts: Mapping[str, list[PartLog]]) -> None:
+def _period(state: _State, logs: Mapping[str, ServoLog], parts: Mapping[str, list[PartLog]], bend: int) -> None:
     """Interpolation period: from a held command, else from moves just below and just above whole periods."""
     name, key = "interpolation period", "controller.interpolation_period_s"
     holds = [(held_samples(log)[0], log.sampling_s) for log in logs.values()]
     count, sampling = min(holds)
+    note = f"the command changes every {count} samples"
+    if count == 1 and bend > 1:
+        count, note = bend, f"the speed of the command changes every {bend} samples"
     if count > 1:
         period = round(count * sampling, 6)
         state.period, state.held = period, True
-        note = f"the command changes every {count} samples"
         state.findings.append(known(name, period, 1e-3 * period, "s", key, _SOURCE, note))
         return
     stops = [part for part in parts.get("log_cutting", []) if part.part.pattern == "dwell"]
@@ -126,7 +129,7 @@ def _cutting(state: _State, stops: list[PartLog]) -> None:
     length = abs(stops[0].part.length_mm)
     if rms[best] > _ODD_SHAPE * length + 3.0 * stops[0].noise_mm:
         why = (
-            f"the moves are no moving average and no exponential: the best fit ({best}) leaves {rms[best] * 1e3:.1f} µm; "
+            f"no moving average and no exponential: the best fit ({best}) leaves {rms[best] * 1e3:.1f} µm; "
             "was a look-ahead mode on?"
         )
         state.findings += [unknown(name, "s", _SOURCE, why) for name in names]
@@ -460,9 +463,10 @@ def fit_logs(tests: Mapping[str, Test], logs: Mapping[str, ServoLog]) -> list[Fi
     Raises:
         ArgumentError: a log is not that of its test.
     """
-    parts = {name: parts_of(log, tests[name]) for name, log in logs.items()}
+    bend = bend_samples(list(logs.values()))
+    parts = {name: parts_of(log, tests[name], bend) for name, log in logs.items()}
     state = _State()
-    _period(state, logs, parts)
+    _period(state, logs, parts, bend)
     stops = [part for part in parts.get("log_cutting", []) if part.part.pattern == "dwell"]
     if stops:
         _cutting(state, stops)

@@ -21,6 +21,7 @@ from shapegcode.characterize.plan import AXES, Part, Test
 __all__ = [
     "PartLog",
     "ShapeFit",
+    "bend_samples",
     "fit_shape",
     "held_samples",
     "lagged_share",
@@ -33,6 +34,7 @@ Array = npt.NDArray[np.float64]
 _PAUSE_S = 0.3  # a rest of a part is shorter, the pause between two parts is 0.5 s
 _SHORTEST_BOX_S = 2e-5
 _HOLD_SHARE = 0.9
+_BEND_SHARE = 0.85
 _LONGEST_HOLD = 64
 _STAMP = 0.03
 _MOST_SAMPLES = 1500
@@ -107,9 +109,49 @@ def held_samples(log: ServoLog) -> tuple[int, int]:
     return best
 
 
-def _ticks(log: ServoLog) -> tuple[Array, Array, int]:
-    """Times and positions, one for each change of a held command; and over how many samples it is held."""
+def _bends(log: ServoLog, count: int) -> tuple[float, int, float]:
+    """How much of the bending of a command lies at every *count*-th sample and its successor.
+
+    Returns the share, the index of such a sample, and the place of the bend between the two, 0 to 1.
+    """
+    command = np.nan_to_num(log.command_mm)
+    bend = np.diff(command, 2, axis=0)
+    energy = (bend**2).sum(axis=1)
+    rest = max(3, round(0.1 / log.sampling_s))
+    energy = energy - energy[:rest].mean()
+    sums = np.array([energy[k::count].sum() for k in range(count)])
+    pairs = sums + np.roll(sums, -1)
+    k = int(pairs.argmax())
+    total = float(sums.sum())
+    one, two = (math.sqrt(max(float(each), 0.0)) for each in (sums[k], np.roll(sums, -1)[k]))
+    share = float(pairs[k]) / total if total > 0.0 else 0.0
+    return share, (k + 1) % count, two / (one + two) if one + two > 0.0 else 0.0
+
+
+def bend_samples(logs: Sequence[ServoLog]) -> int:
+    """After how many samples the speed of a command changes that is interpolated between periods; 1: not seen.
+
+    Only periods of three samples or more can be told, and only where the command is not held.
+    """
+    for count in range(3, _LONGEST_HOLD + 1):
+        shares = [_bends(log, count)[0] for log in logs]
+        if shares and float(np.median(shares)) > _BEND_SHARE:
+            return count
+    return 1
+
+
+def _ticks(log: ServoLog, bend: int) -> tuple[Array, Array, int]:
+    """Times and positions, one for each interpolation period where that shows; and how many samples that is."""
     count, first = held_samples(log)
+    if count == 1 and bend > 1:
+        _, first, place = _bends(log, bend)
+        times = (
+            log.times_s[first]
+            + place * log.sampling_s
+            + np.arange(len(log.times_s) // bend - 1) * (bend * log.sampling_s)
+        )
+        points = [np.interp(times, log.times_s, log.command_mm[:, axis]) for axis in range(3)]
+        return times, np.stack(points, axis=1), bend
     if count == 1:
         return log.times_s, log.command_mm, 1
     n = (len(log.times_s) - first) // count
@@ -118,8 +160,13 @@ def _ticks(log: ServoLog) -> tuple[Array, Array, int]:
     return times, held.mean(axis=1), count
 
 
-def parts_of(log: ServoLog, test: Test) -> list[PartLog]:
+def parts_of(log: ServoLog, test: Test, bend: int = 1) -> list[PartLog]:
     """Cut a log into the parts of its test.
+
+    Args:
+        log: the record.
+        test: what the program did.
+        bend: of :func:`bend_samples`, for all logs of the control.
 
     Raises:
         ArgumentError: an axis is missing, or the motion does not have as many parts or moves as the test.
@@ -128,7 +175,7 @@ def parts_of(log: ServoLog, test: Test) -> list[PartLog]:
     for part in wanted:
         if np.isnan(log.command_mm[0, AXES.index(part.axis)]):
             raise ArgumentError(f"{log.file}: no commanded position of {part.axis}, which test {test.name} needs")
-    times, positions, _ = _ticks(log)
+    times, positions, _ = _ticks(log, bend)
     used = sorted({AXES.index(part.axis) for part in wanted})
     points = positions[:, used]
     start = points[: max(3, int(0.1 / (times[1] - times[0])))]
@@ -159,8 +206,8 @@ def parts_of(log: ServoLog, test: Test) -> list[PartLog]:
         least = 0.98 if part.pattern in ("dwell", "exact", "rapid") else 0.5
         if not least * expected < way.max() - way.min() < 1.02 * expected + 10.0 * spread:
             raise ArgumentError(
-                f"{log.file}: {part.axis} moves over {way.max() - way.min():.3f} mm in part {len(out)}, test {test.name} "
-                f"has {expected:.3f} mm there: wrong log, units or scale"
+                f"{log.file}: {part.axis} moves over {way.max() - way.min():.3f} mm in part {len(out)}, test "
+                f"{test.name} has {expected:.3f} mm there: wrong log, units or scale"
             )
     return out
 

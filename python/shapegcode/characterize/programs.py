@@ -85,7 +85,7 @@ class _Maker:
         return Part("rapid", axis, count, length, self.rapid[axis])
 
     def rapid_series(self, axis: str) -> list[Part]:
-        """Rapids over several lengths for a log; more where none may reach the rate, since each gives only a bracket."""
+        """Rapids over several lengths for a log; more where none may reach the rate: each gives only a bracket."""
         reached = self._rate_is_reached(axis)
         shares = _LOG_SHARES if reached else (*_LOG_SHARES, *_MORE_SHARES)
         return [self.rapids(axis, share, 6 if reached else 4) for share in shares]

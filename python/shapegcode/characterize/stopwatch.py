@@ -196,7 +196,8 @@ def _cutting(best: _Fit, rows: dict[str, _Row], exponential: bool, out: Stopwatc
     part = dataclasses.replace(part, count=1)
     floor = part_time_s(part, Timing(best.period, best.end, 0.0, 0.0))  # type: ignore[arg-type]
     if value <= 1.02 * floor + half or half > _WIDE * value:
-        why = f"blocks of {part.duration_s * 1e3:.2f} ms last {max(value, floor) * 1e3:.2f} ms: it hides behind the period"
+        lasts = max(value, floor) * 1e3
+        why = f"blocks of {part.duration_s * 1e3:.2f} ms last {lasts:.2f} ms: it hides behind the period"
         out.findings.append(
             unknown("block time", "s", _SOURCE, why, high=floor + 2.0 * tiny.sigma_s / tiny.test.parts[0].count)
         )

@@ -69,22 +69,21 @@ def fill_in_times(
     folder: Path, hidden: Hidden, rng: np.random.Generator, *, resolution_s: float = 0.1, jitter_s: float = 0.0
 ) -> None:
     """Play what is asked for in RESULTS.toml and put the times in."""
-    _edit(
-        folder,
-        "times_s = []",
-        lambda text, override: (
-            "times_s = [%.6g]"
-            % stopwatch_s(text, hidden, rng, override=override, resolution_s=resolution_s, jitter_s=jitter_s)
-        ),
-        {"reaction_s = 0.1": f"reaction_s = {jitter_s}", "resolution_s = 0.1": f"resolution_s = {resolution_s}"},
-    )
+
+    def value(text: str, override: float) -> str:
+        time = stopwatch_s(text, hidden, rng, override=override, resolution_s=resolution_s, jitter_s=jitter_s)
+        return f"times_s = [{time:.6g}]"
+
+    new = {"reaction_s = 0.1": f"reaction_s = {jitter_s}", "resolution_s = 0.1": f"resolution_s = {resolution_s}"}
+    _edit(folder, "times_s = []", value, new)
 
 
 def _edit(folder: Path, marker: str, value: Callable[[str, float], str], also: dict[str, str]) -> None:
     program, override, out = "", 1.0, []
-    for line in (folder / "RESULTS.toml").read_text().splitlines():
-        for old, new in also.items():
-            line = line.replace(old, new)
+    results = (folder / "RESULTS.toml").read_text()
+    for old, new in also.items():
+        results = results.replace(old, new)
+    for line in results.splitlines():
         if line.startswith("program = "):
             program = (folder / line.split('"')[1]).read_text()
         if line.startswith("override_percent = "):
