@@ -34,6 +34,8 @@ _ODD_SHAPE = 0.002  # of the way: a fit that leaves more is no fit
 _BELL_GAIN = 0.8  # a second moving average must lower the variance below this share
 _FOLLOWED = 0.9
 _SERVO_SLACK = 0.02
+_FINE = 1.7  # periods
+_FINE_BENT = 1.0
 _GAINS = (2.0, 1000.0)  # 1/s
 _RUN_SETTLE_S = 0.45
 _STEPS_SETTLE_S = 0.3
@@ -45,12 +47,21 @@ class _State:
 
     period: float | None = None
     held: bool = False
+    bent: bool = False
+    sampling: float = 0.001
     end: str | None = None
     cutting: float | None = None
     cutting_half: float = 0.0
     exponential: bool = False
     stop_pitch: float | None = None
     findings: list[Finding] = field(default_factory=list)
+
+    @property
+    def fine_s(self) -> float:
+        """A second moving average up to this length may be interpolation between unseen periods."""
+        if self.bent and self.period:
+            return _FINE_BENT * self.period
+        return 0.0 if self.held else _FINE * max(self.period or 0.0, 2.0 * self.sampling)
 
 
 def _pitch(part: PartLog) -> tuple[float, float]:
@@ -65,8 +76,10 @@ def _period(state: _State, logs: Mapping[str, ServoLog], parts: Mapping[str, lis
     name, key = "interpolation period", "controller.interpolation_period_s"
     holds = [(held_samples(log)[0], log.sampling_s) for log in logs.values()]
     count, sampling = min(holds)
+    state.sampling = sampling
     note = f"the command changes every {count} samples"
     if count == 1 and bend > 1:
+        state.bent = True
         count, note = bend, f"the speed of the command changes every {bend} samples"
     if count > 1:
         period = round(count * sampling, 6)
@@ -123,7 +136,7 @@ def _cutting(state: _State, stops: list[PartLog]) -> None:
     rms = {shape: math.sqrt(sum(fit.rms_mm**2 for fit in each) / len(each)) for shape, each in fits.items()}
     best = "exponential" if rms["exponential"] < min(rms["linear"], rms["bell"]) else "linear"
     bell = [sorted(fit.values[1:])[0] for fit in fits["bell"]]
-    fine = 1.2 * (state.period or 0.0) if not state.held else 0.0  # interpolation between periods looks like a bell
+    fine = state.fine_s
     if best == "linear" and rms["bell"] ** 2 < _BELL_GAIN * rms["linear"] ** 2 and min(bell) > fine:
         best = "bell"
     length = abs(stops[0].part.length_mm)
@@ -203,7 +216,7 @@ class _Rapid:
     rms_mm: float
 
 
-def _rapid(part: PartLog, period: float) -> _Rapid:
+def _rapid(part: PartLog, period: float, fine_s: float) -> _Rapid:
     """The shape of rapids over one length, as a long move (the rate is reached) or a short one."""
     nominal = part.part.duration_s
     rectangle = whole_periods(nominal, period)
@@ -229,7 +242,8 @@ def _rapid(part: PartLog, period: float) -> _Rapid:
         found.append((fit, True, bell is not None))
     plain = min((each for each in found if not each[2]), key=lambda each: each[0].rms_mm)
     curved = min((each for each in found if each[2]), key=lambda each: each[0].rms_mm)
-    fit, long, bell_found = curved if curved[0].rms_mm ** 2 < _BELL_GAIN * plain[0].rms_mm ** 2 else plain
+    better = curved[0].rms_mm ** 2 < _BELL_GAIN * plain[0].rms_mm ** 2
+    fit, long, bell_found = curved if better and curved[0].values[1] > fine_s else plain
     values = list(zip(fit.values.tolist(), fit.half.tolist(), strict=True))
     if long:
         values.sort(reverse=True)
@@ -245,7 +259,7 @@ def _rapids(state: _State, axis: str, parts: list[PartLog]) -> list[tuple[float,
     period = state.period or 1e-6
     lower = axis.lower()
     name, bell_name = f"rapid time constant {axis}", f"rapid bell time {axis}"
-    every = [_rapid(part, period) for part in parts]
+    every = [_rapid(part, period, state.fine_s) for part in parts]
     fits = [fit for fit, part in zip(every, parts, strict=True) if fit.rms_mm < _ODD_SHAPE * abs(part.part.length_mm)]
     if not fits:
         why = f"the rapids are no constant acceleration: the best fit leaves {every[0].rms_mm * 1e3:.1f} µm"
@@ -277,7 +291,7 @@ def _rapids(state: _State, axis: str, parts: list[PartLog]) -> list[tuple[float,
         state.findings.append(known(bell_name, value, half, "s", bell_key, _SOURCE))
     else:
         note = "no second moving average shows"
-        state.findings.append(Finding(bell_name, 0.0, 0.0, 0.002, "s", bell_key, _SOURCE, note))
+        state.findings.append(Finding(bell_name, 0.0, 0.0, max(state.fine_s, 0.002), "s", bell_key, _SOURCE, note))
     return [fit.wait for fit in fits]
 
 

@@ -109,11 +109,24 @@ def held_samples(log: ServoLog) -> tuple[int, int]:
     return best
 
 
-def _bends(log: ServoLog, count: int) -> tuple[float, int, float]:
-    """How much of the bending of a command lies at every *count*-th sample and its successor.
+@dataclass(frozen=True)
+class _Bends:
+    """How much of the bending of a command lies at every count-th sample and its successor.
 
-    Returns the share, the index of such a sample, and the place of the bend between the two, 0 to 1.
+    Attributes:
+        share: of all bending.
+        first: index of such a sample.
+        place: of the bend between the two samples, 0 to 1.
+        energy: all bending above the noise.
     """
+
+    share: float
+    first: int
+    place: float
+    energy: float
+
+
+def _bends(log: ServoLog, count: int) -> _Bends:
     command = np.nan_to_num(log.command_mm)
     bend = np.diff(command, 2, axis=0)
     energy = (bend**2).sum(axis=1)
@@ -125,7 +138,7 @@ def _bends(log: ServoLog, count: int) -> tuple[float, int, float]:
     total = float(sums.sum())
     one, two = (math.sqrt(max(float(each), 0.0)) for each in (sums[k], np.roll(sums, -1)[k]))
     share = float(pairs[k]) / total if total > 0.0 else 0.0
-    return share, (k + 1) % count, two / (one + two) if one + two > 0.0 else 0.0
+    return _Bends(share, (k + 1) % count, two / (one + two) if one + two > 0.0 else 0.0, max(total, 0.0))
 
 
 def bend_samples(logs: Sequence[ServoLog]) -> int:
@@ -133,25 +146,29 @@ def bend_samples(logs: Sequence[ServoLog]) -> int:
 
     Only periods of three samples or more can be told, and only where the command is not held.
     """
-    for count in range(3, _LONGEST_HOLD + 1):
-        shares = [_bends(log, count)[0] for log in logs]
-        if shares and float(np.median(shares)) > _BEND_SHARE:
-            return count
-    return 1
+    best = 1
+    for count in range(3, _LONGEST_HOLD // 2):
+        every = [_bends(log, count) for log in logs]
+        total = sum(each.energy for each in every)
+        # A divisor of the true count shows all bends too: the largest counts.
+        if total > 0.0 and sum(each.share * each.energy for each in every) > _BEND_SHARE * total:
+            best = count
+    return best
 
 
 def _ticks(log: ServoLog, bend: int) -> tuple[Array, Array, int]:
     """Times and positions, one for each interpolation period where that shows; and how many samples that is."""
     count, first = held_samples(log)
     if count == 1 and bend > 1:
-        _, first, place = _bends(log, bend)
-        times = (
-            log.times_s[first]
-            + place * log.sampling_s
-            + np.arange(len(log.times_s) // bend - 1) * (bend * log.sampling_s)
-        )
-        points = [np.interp(times, log.times_s, log.command_mm[:, axis]) for axis in range(3)]
-        return times, np.stack(points, axis=1), bend
+        found = _bends(log, bend)
+        before = np.arange(found.first, len(log.times_s) - 2, bend)
+        before = before[before > 0]
+        times = log.times_s[before] + found.place * log.sampling_s
+        x = log.command_mm
+        # The straight pieces on both sides meet at the bend.
+        left = x[before] + found.place * (x[before] - x[before - 1])
+        right = x[before + 1] - (1.0 - found.place) * (x[before + 2] - x[before + 1])
+        return times, (left + right) / 2.0, bend
     if count == 1:
         return log.times_s, log.command_mm, 1
     n = (len(log.times_s) - first) // count
@@ -180,8 +197,8 @@ def parts_of(log: ServoLog, test: Test, bend: int = 1) -> list[PartLog]:
     points = positions[:, used]
     start = points[: max(3, int(0.1 / (times[1] - times[0])))]
     noise = np.maximum(start.std(axis=0), 1e-4)
-    reach = max(1, round(0.008 / float(np.median(np.diff(times)))))
-    moved = np.abs(points[reach:] - points[:-reach]).max(axis=1) > max(8.0 * float(noise.max()), 0.003)
+    reach = max(1, round(0.024 / float(np.median(np.diff(times)))))
+    moved = np.abs(points[reach:] - points[:-reach]).max(axis=1) > max(9.0 * float(noise.max()), 0.004)
     rows = np.flatnonzero(moved)
     if not len(rows):
         raise ArgumentError(f"{log.file}: nothing moves, so this is no log of test {test.name}")
