@@ -118,6 +118,14 @@ def _period(state: _State, logs: Mapping[str, ServoLog], parts: Mapping[str, lis
     state.findings.append(unknown(name, "s", _SOURCE, why))
 
 
+def _smoothed(times: Array, boxes: Array) -> Array:
+    return smoothed_share(times, boxes.tolist())
+
+
+def _lagged(times: Array, values: Array) -> Array:
+    return lagged_share(times, float(values[0]), float(values[1]))
+
+
 def _cutting(state: _State, stops: list[PartLog]) -> None:
     """Time constant and bell time from the shape of moves between stops."""
     names = ("cutting time constant", "cutting bell time")
@@ -131,7 +139,7 @@ def _cutting(state: _State, stops: list[PartLog]) -> None:
             "exponential": ([nominal, 0.03], [nominal * 0.95, 1e-4], [longest, 1.0]),
         }
         for shape, (guess, low, high) in shapes.items():
-            share = (lambda t, p: lagged_share(t, p[0], p[1])) if shape == "exponential" else smoothed_share
+            share = _lagged if shape == "exponential" else _smoothed
             fits.setdefault(shape, []).append(fit_shape(part, share, guess, low, high))
     rms = {shape: math.sqrt(sum(fit.rms_mm**2 for fit in each) / len(each)) for shape, each in fits.items()}
     best = "exponential" if rms["exponential"] < min(rms["linear"], rms["bell"]) else "linear"
@@ -455,8 +463,10 @@ def _lag_of(records: list[tuple[Array, Array, float]]) -> tuple[float, float]:
         for way, error, step in records:
             kept = math.exp(-gain * step)
             part = (1.0 - kept) / (gain * step)  # of a ramp over one step
-            model = lfilter([part, -part], [1.0, -kept], way)
-            cross, square, power = cross + model @ error, square + model @ model, power + error @ error
+            model: Array = np.asarray(lfilter([part, -part], [1.0, -kept], way))
+            cross += float(model @ error)
+            square += float(model @ model)
+            power += float(error @ error)
         rest = cross / square
         return power - rest * cross, rest
 

@@ -300,7 +300,7 @@ def fit_shape(
     t, y = t[::every], y[::every]
 
     def residual(p: Array) -> Array:
-        return (share(t - p[-1], p[:-1]) - y) * length
+        return np.asarray((share(t - p[-1], p[:-1]) - y) * length)
 
     grid = np.linspace(0.0, 2.0, 20001)
     middle = float(grid[np.searchsorted(share(grid, np.array(guess)), 0.5)])
@@ -315,7 +315,8 @@ def fit_shape(
     n = len(guess)
     freedom = max(1, len(t) - len(begin))
     variance = float(found.fun @ found.fun) / freedom
-    normal = found.jac.T @ found.jac
+    jacobian = np.asarray(found.jac)
+    normal = jacobian.T @ jacobian
     covariance = variance * np.linalg.pinv(normal)
     # Time stamps are no better than a part of the sampling time, however many samples agree.
     stamp = _STAMP * float(np.median(np.diff(log.times_s)))

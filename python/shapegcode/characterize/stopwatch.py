@@ -89,8 +89,9 @@ def _least_squares(rows: Sequence[_Row], period: float, end: str) -> _Fit:
         fits = [(program_time_s(row.test, timing) - row.time_s) / row.sigma_s for row in rows]
         return np.array([*fits, *((p - begin) / _PRIOR_S)])
 
-    found = least_squares(residual, begin, x_scale=np.maximum(begin, 1e-3), diff_step=1e-6)
-    covariance = np.linalg.inv(found.jac.T @ found.jac)
+    found = least_squares(residual, begin, x_scale=np.maximum(begin, 1e-3), diff_step=[1e-6] * len(begin))
+    jacobian = np.asarray(found.jac)
+    covariance = np.linalg.inv(jacobian.T @ jacobian)
     return _Fit(period, end, found.x, covariance, float(found.fun @ found.fun))
 
 
