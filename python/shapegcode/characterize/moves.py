@@ -196,7 +196,7 @@ def parts_of(log: ServoLog, test: Test, bend: int = 1) -> list[PartLog]:
     used = sorted({AXES.index(part.axis) for part in wanted})
     points = positions[:, used]
     start = points[: max(3, int(0.1 / (times[1] - times[0])))]
-    noise = np.maximum(start.std(axis=0), 1e-4)
+    noise = np.maximum(start.std(axis=0), 8e-4)
     reach = max(1, round(0.024 / float(np.median(np.diff(times)))))
     moved = np.abs(points[reach:] - points[:-reach]).max(axis=1) > max(9.0 * float(noise.max()), 0.004)
     rows = np.flatnonzero(moved)
