@@ -80,7 +80,8 @@ def run(items: list[Item]) -> list[Item]:
             # A full circle stays one; else the sweep follows from the new ends.
             full = abs(abs(item.sweep) - math.tau) < 1e-9
             moved.sweep = item.sweep if full and np.hypot(*(points[0] - at)) < 1e-6 else sweep_to(moved, points[0])
-        check_direction(item, moved)
+        if k > 0:
+            check_direction(item, moved)
         out.append(moved)
         for p, q in itertools.pairwise(points):
             if np.hypot(*(q - p)) > 1e-9:
@@ -96,9 +97,9 @@ def run(items: list[Item]) -> list[Item]:
 
 def check_direction(item: Item, moved: Item) -> None:
     """A line that runs backwards, or an arc that goes on where it should have shrunk away, cuts too much."""
-    if item.kind == "line" and item.side != 40:
+    if item.kind == "line":
         step = moved.flat(moved.end) - moved.flat(moved.start)
-        if float(step @ item.tangent(True)) < -1e-9 and moved.line != item.line:
+        if float(step @ item.tangent(True)) < -1e-9:
             raise Alarm(item.line, "the compensated move runs backwards", 41)
     elif item.kind == "arc" and abs(moved.sweep) - abs(item.sweep) > 0.75 * math.pi:
         raise Alarm(item.line, "the compensated arc runs backwards", 41)

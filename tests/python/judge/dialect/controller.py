@@ -14,7 +14,7 @@ from .motion import Motion
 from .offsets import Offsets
 from .tape import Alarm
 from .transforms import Transform
-from .words import BlockWords, Word
+from .words import INTEGERS, BlockWords, Word
 
 Vector = npt.NDArray[np.float64]
 PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
@@ -80,6 +80,9 @@ class Controller(Motion, Offsets):
         self.line = line
         codes = [canonical_g(f"{w.value:g}") for w in words if w.letter == "G"]
         block = BlockWords([w for w in words if w.letter != "G"], line, self.calculator)
+        for word in block.words:
+            if word.letter in INTEGERS and "." in word.literal:
+                raise self.fail(f"decimal point in {word.letter}{word.literal}", 7)
         for code in codes:
             if code not in MODAL_GROUPS and code not in INERT | ONE_SHOT | MODES:
                 raise self.fail(f"{code} is not judged", 10)

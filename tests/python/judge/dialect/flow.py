@@ -190,7 +190,7 @@ class Flow:
     def nc_block(self, frame: Frame, text: str) -> bool:
         words = parse_words(text, self.line, self.read)
         g_codes = [round(w.value, 1) for w in words if w.letter == "G"]
-        m_codes = [int(w.value) for w in words if w.letter == "M"]
+        m_codes = [int(half_away(w.value)) for w in words if w.letter == "M"]
         every = self.modal_calls[-1] if self.modal_calls and self.modal_calls[-1].every_block else None
         if 65 in g_codes:
             self.call_macro(words)

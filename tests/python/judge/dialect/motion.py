@@ -132,6 +132,8 @@ class Motion:
                     centre[k] += self.millimetres(block, "IJK"[k])
         radius = math.hypot(start[a] - centre[a], start[b] - centre[b])
         end_radius = math.hypot(programmed[a] - centre[a], programmed[b] - centre[b])
+        if radius < 1e-9:
+            raise self.fail("arc of radius zero", 20)
         if abs(radius - end_radius) > self.arc_tolerance_mm:
             raise self.fail(f"arc end off its radius by {abs(radius - end_radius):.4f}", 20)
         factors = self.transform.factors

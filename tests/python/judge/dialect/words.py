@@ -41,10 +41,8 @@ def parse_words(text: str, line: int, read: Reader) -> list[Word]:
         if found := _LITERAL.match(text, at):
             literal = found.group()
             at = found.end()
-            if literal.strip("+-").replace(".", "").__len__() > 8:
+            if len(literal.strip("+-").replace(".", "")) > 8:
                 raise Alarm(line, f"{letter}{literal} has too many digits", 3)
-            if letter in INTEGERS and "." in literal and letter not in "SPL":
-                raise Alarm(line, f"decimal point in {letter}{literal}", 7)
             out.append(Word(letter, float(literal), "." not in literal, literal))
             continue
         if text[at : at + 1] not in ("#", "[", "-", "+"):
@@ -53,8 +51,6 @@ def parse_words(text: str, line: int, read: Reader) -> list[Word]:
         value = expression.factor()
         at = expression.at
         if value is not None:
-            if letter in INTEGERS:
-                value = half_away(value)
             out.append(Word(letter, value))
     return out
 
