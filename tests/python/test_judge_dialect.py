@@ -102,7 +102,7 @@ def test_computed_words_are_rounded_one_by_one() -> None:
 def test_computed_codes_and_functions() -> None:
     items = moves_of("computed_codes")
     assert [i.kind for i in items[1:6]] == ["rapid", "line", "line", "line", "arc"]
-    assert ends(items)[4:] == [(20, 8, -2), (11, 5, -2), (3, 1, -2), (2, 10, -2), (5, 9, 6)]
+    assert ends(items)[4:] == [(20, 8, -2), (10.5, 5, -2), (3, 1, -2), (2, 10, -2), (5, 9, 6)]
 
 
 def test_locals_belong_to_a_call() -> None:

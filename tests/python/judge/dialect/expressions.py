@@ -54,8 +54,10 @@ def from_bcd(value: float) -> float:
 class Expression:
     """Evaluates from a place of a text on; `at` is where it stopped."""
 
-    def __init__(self, text: str, at: int, read: Reader, line: int) -> None:
+    def __init__(self, text: str, at: int, read: Reader, line: int, *, in_word: bool = False) -> None:
         self.text, self.at, self.read, self.line = text, at, read, line
+        #: In a word ROUND goes to the least increment of its address, which the word does anyway.
+        self.in_word = in_word
         self.depth = 0
 
     def fail(self, message: str, alarm: int) -> Alarm:
@@ -191,8 +193,8 @@ class Expression:
             "ABS": lambda: abs(x),
             "BIN": lambda: from_bcd(x),
             "BCD": lambda: to_bcd(x),
-            "ROUND": lambda: half_away(x),
-            "RND": lambda: half_away(x),
+            "ROUND": lambda: x if self.in_word else half_away(x),
+            "RND": lambda: x if self.in_word else half_away(x),
             "FIX": lambda: float(math.trunc(x)),
             "FUP": lambda: math.copysign(math.ceil(abs(x)), x),
             "LN": lambda: math.log(x),

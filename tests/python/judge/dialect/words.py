@@ -47,7 +47,7 @@ def parse_words(text: str, line: int, read: Reader) -> list[Word]:
             continue
         if text[at : at + 1] not in ("#", "[", "-", "+"):
             raise Alarm(line, f"no number behind {letter} in {text!r}", 5)
-        expression = Expression(text, at, read, line)
+        expression = Expression(text, at, read, line, in_word=True)
         value = expression.factor()
         at = expression.at
         if value is not None:
