@@ -33,7 +33,7 @@ PACKAGE_INPUTS := CMakeLists.txt cmake $(shell find cpp/include cpp/src bindings
 TIDY_STAMPS := $(CORE_SOURCES:%=build/tidy/%.ok)
 
 .PHONY: help demo test lint bench fuzz stubs format clean \
-        build-packages test-packages package dev tidy release sanitize stub-check fuzz-merge
+        build-packages test-packages package dev tidy release sanitize stub-check fuzz-parameters fuzz-merge
 
 help:
 	@echo 'make demo    build, convert a first program and a real one of some thousand lines; results in demo-output/'
@@ -77,6 +77,13 @@ fuzz: build/fuzz/tests/fuzz/fuzz_reader
 	mkdir -p build/fuzz/corpus/reader build/fuzz/findings
 	$< -max_total_time=$(FUZZ_SECONDS) $(FUZZ_FLAGS) -artifact_prefix=build/fuzz/findings/ build/fuzz/corpus/reader \
 	  tests/fuzz/corpus/reader tests/golden/dialect
+
+fuzz-parameters: package
+	$(PIP) install -r <($(PYTHON) tests/tools/requirements.py fuzz)
+	mkdir -p build/fuzz/corpus/parameters build/fuzz/findings
+	$(BIN)/python tests/fuzz/fuzz_parameters.py -max_total_time=$(FUZZ_SECONDS) -timeout=5 -rss_limit_mb=2048 -max_len=4000 \
+	  -dict=tests/fuzz/parameters.dict -artifact_prefix=build/fuzz/findings/ build/fuzz/corpus/parameters \
+	  tests/fuzz/corpus/parameters tests/golden/parameters
 
 fuzz-merge: build/fuzz/tests/fuzz/fuzz_reader
 	$< -merge=1 $(FUZZ_FLAGS) tests/fuzz/corpus/reader build/fuzz/corpus/reader
