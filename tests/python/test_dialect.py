@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hypothesis import HealthCheck, given, settings
 
 import shapegcode as sg
 from acceptance import machine_with
-from judge.dialect import Item, play
+from judge.dialect import Alarm, Item, play
+from judge.dialect.generate import compensated_programs, coordinate_programs, macro_programs
 from shapegcode import _core
 
 Vector = npt.NDArray[np.float64]
@@ -85,10 +87,11 @@ def difference(item: Item, segment: Any, dwell: float, place_mm: float) -> str:
     return ""
 
 
-def compare(text: str, machine: sg.Machine, **settings: Any) -> None:
+def compare(text: str, machine: sg.Machine, place_mm: float | None = None, **settings: Any) -> None:
     judged, read = played_moves(text, **settings), read_moves(text, machine)
+    place_mm = place_tolerance(text) if place_mm is None else place_mm
     for k, (item, (segment, dwell)) in enumerate(zip(judged, read, strict=False)):
-        wrong = difference(item, segment, dwell, place_tolerance(text))
+        wrong = difference(item, segment, dwell, place_mm)
         assert not wrong, f"move {k} of source line {item.line}: {wrong}"
     assert len(read) == len(judged), f"{len(read)} moves, judged {len(judged)}; next {judged[len(read) :][:1]}"
 
@@ -103,3 +106,37 @@ def test_read_as_judged(name: str) -> None:
 def test_block_skip(name: str, switch: str) -> None:
     on = frozenset(range(1, 10)) if switch == "on" else frozenset()
     compare((DIALECT / f"{name}.nc").read_text(), machine_with({"input.block_skip": switch}), switches=on)
+
+
+# ---- programs at random ----------------------------------------------------------------------------------------------
+
+RANDOM = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+MACHINE = machine_with()
+
+
+@RANDOM
+@given(text=macro_programs())
+def test_random_macro_programs(text: str) -> None:
+    try:
+        play(text)
+    except Alarm as alarm:
+        with pytest.raises(sg.ProgramError) as caught:
+            read_moves(text, MACHINE)
+        # The judge leaves out what is no alarm of arithmetic.
+        assert (caught.value.line, f"(alarm {alarm.alarm:04d})" in str(caught.value)) == (alarm.line, True), str(alarm)
+        return
+    # A computed word that lies on the half of an increment may go either way by the last bit of its value.
+    compare(text, MACHINE, place_mm=1.001e-3)
+
+
+@RANDOM
+@given(text=coordinate_programs())
+def test_random_coordinate_modes_and_cycles(text: str) -> None:
+    compare(text, MACHINE, place_mm=1.001e-3)
+
+
+@RANDOM
+@given(text=compensated_programs())
+def test_random_compensation(text: str) -> None:
+    # The rounded end of an arc is up to 0.7 µm off its circle, which a corner of 30 degrees makes 1.4 µm.
+    compare(text, MACHINE, place_mm=2.5e-3)

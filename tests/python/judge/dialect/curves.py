@@ -69,7 +69,7 @@ class OffsetCurve:
         return np.asarray(p - self.miss(p) * left_of(self.direction))
 
 
-def crossings(a: OffsetCurve, b: OffsetCurve, reach: float, samples: int = 4000) -> list[Vector]:
+def crossings(a: OffsetCurve, b: OffsetCurve, reach: float, samples: int = 800) -> list[Vector]:
     """Every point in which the curve a meets b or its continuation."""
     first, last = a.span(reach)
     grid = np.linspace(first, last, samples)

@@ -90,6 +90,8 @@ class Expression:
         value = self.factor()
         while operator := self.take("*", "/", "AND", "MOD"):
             left, right = number(value), number(self.factor())
+            if operator == "MOD":  # of whole numbers, with the sign of the first
+                left, right = half_away(left), half_away(right)
             if operator in ("/", "MOD") and right == 0.0:
                 raise self.fail("division by zero", 112)
             if operator == "*":
@@ -171,6 +173,8 @@ class Expression:
                 second = number(self.bracket())
             if second is None:
                 return math.degrees(math.atan(first))
+            if first == 0.0 and second == 0.0:
+                raise self.fail("ATAN of no direction", 112)
             return math.degrees(math.atan2(first, second)) % 360.0
         return self.one_value(name, number(self.bracket()))
 
