@@ -20,23 +20,27 @@ endif
 
 BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libsundials-dev python3-dev python3-venv
 TEST_PACKAGES := $(BUILD_PACKAGES) doctest-dev clang-format clang-tidy
+FUZZ_PACKAGES := $(BUILD_PACKAGES) clang-14 libclang-rt-14-dev libomp-14-dev
+FUZZ_SECONDS ?= 600
+FUZZ_FLAGS := -timeout=5 -rss_limit_mb=2048 -max_len=2000 -dict=tests/fuzz/gcode.dict
 
 CPP_HEADERS := $(shell find cpp -name '*.hpp')
 CORE_SOURCES := $(shell find cpp/src -name '*.cpp')
-CPP_FILES := $(shell find cpp bindings tests/cpp -name '*.[ch]pp')
+CPP_FILES := $(shell find cpp bindings tests/cpp tests/fuzz -name '*.[ch]pp')
 # Folders too: their time changes when a file comes or goes.
 PACKAGE_INPUTS := CMakeLists.txt cmake $(shell find cpp/include cpp/src bindings python \
                     -name __pycache__ -prune -o -print)
 TIDY_STAMPS := $(CORE_SOURCES:%=build/tidy/%.ok)
 
-.PHONY: help demo test lint bench stubs format clean \
-        build-packages test-packages package dev tidy release sanitize stub-check
+.PHONY: help demo test lint bench fuzz stubs format clean \
+        build-packages test-packages package dev tidy release sanitize stub-check fuzz-parameters fuzz-merge
 
 help:
 	@echo 'make demo    build, convert a first program and a real one of some thousand lines; results in demo-output/'
 	@echo 'make test    everything that must hold: lint, C++ tests plain and with sanitizers, Python tests'
 	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy'
 	@echo 'make bench   measure, with LinuxCNC rs274 as the independent interpreter'
+	@echo 'make fuzz    FUZZ_SECONDS (600) of coverage-guided fuzzing of the program reader; findings in build/fuzz/findings/'
 	@echo 'make stubs   write python/shapegcode/_core.pyi anew from the built module'
 	@echo 'make format  lay out the C++ and Python sources as lint wants them'
 	@echo 'make clean   remove everything that was built or downloaded'
@@ -67,6 +71,22 @@ lint: test-packages dev
 bench: package dev
 	tests/tools/fetch_rs274.sh
 	$(BIN)/python tests/benchmarks/run.py
+
+# New inputs go to build/, so that the kept corpus grows only by `fuzz-merge`, which adds what covers more.
+fuzz: build/fuzz/tests/fuzz/fuzz_reader
+	mkdir -p build/fuzz/corpus/reader build/fuzz/findings
+	$< -max_total_time=$(FUZZ_SECONDS) $(FUZZ_FLAGS) -artifact_prefix=build/fuzz/findings/ build/fuzz/corpus/reader \
+	  tests/fuzz/corpus/reader tests/golden/dialect
+
+fuzz-parameters: package
+	$(PIP) install -r <($(PYTHON) tests/tools/requirements.py fuzz)
+	mkdir -p build/fuzz/corpus/parameters build/fuzz/findings
+	$(BIN)/python tests/fuzz/fuzz_parameters.py -max_total_time=$(FUZZ_SECONDS) -timeout=5 -rss_limit_mb=2048 -max_len=4000 \
+	  -dict=tests/fuzz/parameters.dict -artifact_prefix=build/fuzz/findings/ build/fuzz/corpus/parameters \
+	  tests/fuzz/corpus/parameters tests/golden/parameters
+
+fuzz-merge: build/fuzz/tests/fuzz/fuzz_reader
+	$< -merge=1 $(FUZZ_FLAGS) tests/fuzz/corpus/reader build/fuzz/corpus/reader
 
 # A default argument that is an object of ours has no spelling in a stub and becomes `...`.
 stubs: package dev
@@ -117,6 +137,11 @@ release sanitize: test-packages
 stub-check: package dev
 	$(BIN)/python -m mypy.stubtest --mypy-config-file pyproject.toml \
 	  --allowlist tests/tools/stubtest_allowlist.txt shapegcode._core
+
+build/fuzz/tests/fuzz/fuzz_reader: $(CORE_SOURCES) $(CPP_HEADERS) $(wildcard tests/fuzz/*.[ch]pp) tests/fuzz/CMakeLists.txt
+	@tests/tools/debian_packages.sh $(FUZZ_PACKAGES)
+	cmake --preset fuzz
+	cmake --build --preset fuzz
 
 build/release/compile_commands.json: CMakeLists.txt CMakePresets.json $(CORE_SOURCES) | test-packages
 	cmake --preset release

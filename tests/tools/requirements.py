@@ -1,4 +1,4 @@
-"""Prints requirements of pyproject.toml, one per line: `requirements.py [build] [runtime] [dev]`."""
+"""Prints requirements of pyproject.toml, one per line: `requirements.py [build] [runtime] [dev] [fuzz]`."""
 
 import sys
 import tomllib
@@ -8,7 +8,7 @@ project = tomllib.loads((Path(__file__).resolve().parents[2] / "pyproject.toml")
 groups = {
     "build": project["build-system"]["requires"],
     "runtime": project["project"]["dependencies"],
-    "dev": project["dependency-groups"]["dev"],
+    **project["dependency-groups"],
 }
 for name in sys.argv[1:]:
     print(*groups[name], sep="\n")
