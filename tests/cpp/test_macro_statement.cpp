@@ -1,6 +1,7 @@
 #include <doctest/doctest.h>
 
 #include <cstdint>
+#include <random>
 #include <string>
 #include <string_view>
 
@@ -79,6 +80,50 @@ TEST_CASE("has_macro: signs and keywords outside comments") {
   }
 }
 
+TEST_CASE("has_macro agrees with its definition read one character at a time") {
+  const auto definition = [](std::string_view line) {
+    bool in_comment = false;
+    bool after_letter = false;
+    for (const char c : line) {
+      const bool letter = (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
+      if (in_comment) {
+        in_comment = c != ')';
+        continue;
+      }
+      if (c == '(') {
+        in_comment = true;
+      } else if (c == '#' || c == '[' || c == '=' || (letter && after_letter)) {
+        return true;
+      }
+      after_letter = letter;
+    }
+    return false;
+  };
+  std::mt19937 random(3);
+  for (int value = 0; value < 256; ++value) {
+    for (std::size_t at = 0; at < 17; ++at) {
+      std::string line(17, '1');
+      line[at] = static_cast<char>(value);
+      CHECK(has_macro(line) == definition(line));
+    }
+  }
+  int with = 0;
+  constexpr int count = 200000;
+  for (int n = 0; n < count; ++n) {
+    static constexpr std::string_view plain = "0123456789.-+ /;,%)@`{Zz\xe1\xdb";
+    static constexpr std::string_view telling = "#[=((AZaz";
+    std::string line(random() % 40, ' ');
+    for (char& c : line) {
+      c = random() % 10 != 0 ? plain[random() % plain.size()] : telling[random() % telling.size()];
+    }
+    with += definition(line) ? 1 : 0;
+    CAPTURE(line);
+    REQUIRE(has_macro(line) == definition(line));
+  }
+  CHECK(with > count / 10);
+  CHECK(with < count * 9 / 10);
+}
+
 TEST_CASE("kinds of statements") {
   check_kind("", MacroStatementKind::nc_block);
   check_kind("(ONLY A COMMENT)", MacroStatementKind::nc_block);
@@ -91,6 +136,7 @@ TEST_CASE("kinds of statements") {
   check_kind("(A) #1=2", MacroStatementKind::assignment, "#1=2");
   check_kind("GOTO 10", MacroStatementKind::go_to, "10");
   check_kind("GOTO#1", MacroStatementKind::go_to, "#1");
+  check_kind("IF[#1EQ2](WHY)GOTO10", MacroStatementKind::if_go_to, "10");
   check_kind("go [#1*10]", MacroStatementKind::go_to, "[#1");
   check_kind("IF[#1EQ2]GOTO10", MacroStatementKind::if_go_to, "10");
   check_kind("IF [[#1 EQ 2] AND [#2 LT 1]] GO #1", MacroStatementKind::if_go_to, "#1");
