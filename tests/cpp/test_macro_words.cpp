@@ -160,6 +160,7 @@ TEST_CASE("alarms of NC blocks") {
   }
   CHECK(alarm("X#1=5") == 127);
   CHECK(alarm("G1 =5") == 127);
+  CHECK(alarm("G1 X,R#20Y1") == 5);
   CHECK(alarm("X#7") == 3);  // 123456.789
   CHECK(alarm("X#8") == 3);
   CHECK(alarm("S#8") == 3);
