@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <string>
 
 #include "gcode/macro_text.hpp"
@@ -47,20 +49,32 @@ Keyword keyword_of(std::string_view run) noexcept {
   return Keyword::none;
 }
 
-enum CharacterClass : std::uint8_t { letter = 1, macro_sign = 2, open_comment = 4 };
+// Eight characters at once, the first in the lowest byte: bit 7 of a byte tells what the character is.
+struct EightCharacters {
+  std::uint64_t letters;
+  std::uint64_t signs;
+  std::uint64_t comments;
 
-constexpr std::array<std::uint8_t, 256> character_classes = [] {
-  std::array<std::uint8_t, 256> classes{};
-  for (unsigned c = 'A'; c <= 'Z'; ++c) {
-    classes[c] = letter;
-    classes[c - 'A' + 'a'] = letter;
+  static constexpr std::uint64_t ones = 0x0101010101010101U;
+  static constexpr std::uint64_t tops = 0x80U * ones;
+
+  explicit EightCharacters(const char* text) noexcept {
+    std::uint64_t bytes = 0;
+    std::memcpy(&bytes, text, sizeof bytes);
+    const std::uint64_t is_ascii = ~bytes & tops;
+    bytes &= ~tops;
+    const std::uint64_t small = bytes | (0x20U * ones);
+    letters = (small + (0x80U - 'a') * ones) & ~(small + (0x7fU - 'z') * ones) & is_ascii;
+    signs = (equal(bytes, '#') | equal(bytes, '[') | equal(bytes, '=')) & is_ascii;
+    comments = equal(bytes, '(') & is_ascii;
   }
-  classes[static_cast<unsigned>('#')] = macro_sign;
-  classes[static_cast<unsigned>('[')] = macro_sign;
-  classes[static_cast<unsigned>('=')] = macro_sign;
-  classes[static_cast<unsigned>('(')] = open_comment;
-  return classes;
-}();
+
+ private:
+  // Bit 7 where the seven bits of the byte are `c`; other bits mean nothing.
+  static std::uint64_t equal(std::uint64_t bytes, char c) noexcept {
+    return ~((bytes ^ (static_cast<std::uint64_t>(c) * ones)) + 0x7fU * ones);
+  }
+};
 
 // Blanks and comments.
 void skip_filling(std::string_view line, std::size_t& i, std::uint32_t line_number) {
@@ -168,7 +182,7 @@ void read_condition(std::string_view line, std::size_t& i, std::uint32_t line_nu
   }
   statement.condition = i;
   i = behind_bracket(line, i, line_number);
-  skip_blanks(line, i);
+  skip_filling(line, i, line_number);
 }
 
 void read_if(std::string_view line, std::size_t i, std::uint32_t line_number, MacroStatement& statement) {
@@ -257,24 +271,37 @@ void read_head(std::string_view line, std::size_t& i, std::uint32_t line_number,
 }  // namespace
 
 bool has_macro(std::string_view line) noexcept {
-  unsigned previous = 0;
   const char* p = line.data();
   const char* const end = p + line.size();
+  bool after_letter = false;
   while (p != end) {
-    const unsigned now = character_classes[static_cast<unsigned char>(*p)];
-    ++p;
-    if (now != 0) {
-      if ((now & macro_sign) != 0 || (now & previous) != 0) {
-        return true;
-      }
-      if (now == open_comment) {
-        while (p != end && *p++ != ')') {
+    if constexpr (std::endian::native == std::endian::little) {
+      while (end - p >= 8) {
+        const EightCharacters eight(p);
+        if (eight.comments != 0) {
+          break;  // one by one up to the end of the comment
         }
-        previous = 0;
-        continue;
+        if (eight.signs != 0 || (eight.letters & ((eight.letters << 8) | (after_letter ? 0x80U : 0U))) != 0) {
+          return true;
+        }
+        after_letter = (eight.letters >> 63) != 0;
+        p += 8;
       }
     }
-    previous = now;
+    for (int k = 0; k < 8 && p != end; ++k) {
+      const char c = *p++;
+      if (c == '(') {
+        p = std::find(p, end, ')');
+        p += p != end ? 1 : 0;
+        after_letter = false;
+        break;
+      }
+      const bool is_one = is_letter(c);
+      if (c == '#' || c == '[' || c == '=' || (is_one && after_letter)) {
+        return true;
+      }
+      after_letter = is_one;
+    }
   }
   return false;
 }

@@ -208,6 +208,8 @@ std::string substitute(std::string_view line, std::uint32_t line_number, Variabl
       text.append(line.substr(i, at - i));
       append_word(text, line[at], *value, notation, decimals, line_number, at);
       dwell = dwell || (letter == 'G' && std::round(*value * 10.0) == 40.0);
+    } else if (!text.empty() && is_letter(text.back())) {
+      fail(5, std::string("address ") + text.back() + " has no number", line_number, i);  // must not join the next word
     }
     i = operand;
   }
