@@ -52,13 +52,13 @@ def reader_options(
             int(name[6:]): offset for name, offset in offsets.items() if name.startswith("G54.1P")
         }
     options.tool_offsets = _tool_offsets(machine)
-    options.offset_memory = getattr(machine.controller, "offset_memory", "C")
+    options.offset_memory = machine.controller.offset_memory
     options.retained_variables = {int(name): value for name, value in machine.input.variables.items()}
     options.bindings = _bindings(machine)
     options.program = -1 if program_number is None else program_number
     options.opaque_programs = list(machine.input.opaque_programs)
-    options.subprogram_nesting = getattr(machine.controller, "nesting_limit_subprogram", 10)
-    options.max_steps = getattr(machine.controller, "max_program_steps", 10_000_000)
+    options.subprogram_nesting = machine.controller.nesting_limit_subprogram
+    options.max_steps = machine.controller.max_program_steps
     options.block_skip = [{"unknown": None, "on": True, "off": False}[machine.input.block_skip]] * 9
     options.expand_compensation = expand_compensation
     options.compensation_start_up = machine.input.compensation_start_up

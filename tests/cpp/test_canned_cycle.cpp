@@ -55,9 +55,10 @@ CannedCycle cycle_of(int code, double peck = 0.0, double dwell = 0.0, bool retur
 }  // namespace
 
 TEST_CASE("canned cycle: drilling, with dwell, with the return to R") {
-  check_steps(cycle_of(81), {{2, true}, {-7, false}, {2, true}, {10, true}});
+  check_steps(cycle_of(81), {{2, true}, {-7, false}, {10, true}});
   check_steps(cycle_of(81, 0, 0, true), {{2, true}, {-7, false}, {2, true}});
-  check_steps(cycle_of(82, 0, 0.5), {{2, true}, {-7, false}, {-7, false, 0.5}, {2, true}, {10, true}});
+  check_steps(cycle_of(82, 0, 0.5), {{2, true}, {-7, false}, {-7, false, 0.5}, {10, true}});
+  check_steps(cycle_of(81, 0, 0.5), {{2, true}, {-7, false}, {10, true}});  // P has no meaning here
 }
 
 TEST_CASE("canned cycle: boring and tapping feed out") {
@@ -66,20 +67,12 @@ TEST_CASE("canned cycle: boring and tapping feed out") {
 
 TEST_CASE("canned cycle: pecks of 4 mm in a hole of 9 mm") {
   // G83 goes out to R and back to 0.5 mm over the last depth; G73 backs up by 0.5 mm only.
-  check_steps(cycle_of(83, 4.0), {{2, true},
-                                  {-2, false},
-                                  {2, true},
-                                  {-1.5, true},
-                                  {-6, false},
-                                  {2, true},
-                                  {-5.5, true},
-                                  {-7, false},
-                                  {2, true},
-                                  {10, true}});
+  check_steps(
+      cycle_of(83, 4.0),
+      {{2, true}, {-2, false}, {2, true}, {-1.5, true}, {-6, false}, {2, true}, {-5.5, true}, {-7, false}, {10, true}});
   check_steps(cycle_of(73, 4.0),
-              {{2, true}, {-2, false}, {-1.5, true}, {-6, false}, {-5.5, true}, {-7, false}, {2, true}, {10, true}});
-  check_steps(cycle_of(83, 0.0), {{2, true}, {-7, false}, {2, true}, {10, true}});   // no Q
-  check_steps(cycle_of(83, 20.0), {{2, true}, {-7, false}, {2, true}, {10, true}});  // one peck
+              {{2, true}, {-2, false}, {-1.5, true}, {-6, false}, {-5.5, true}, {-7, false}, {10, true}});
+  check_steps(cycle_of(83, 20.0), {{2, true}, {-7, false}, {10, true}});  // one peck
 }
 
 TEST_CASE("canned cycle: along another axis, and upwards") {
@@ -89,6 +82,6 @@ TEST_CASE("canned cycle: along another axis, and upwards") {
   cycle.initial_mm = 0.0;
   std::vector<OtherMove> moves;
   CHECK(expand_cycle(cycle, {0.0, 0.0, 0.0}, 1, 5.0, 1, moves) == Vector3(0.0, 0.0, 0.0));
-  REQUIRE(moves.size() == 4);
+  REQUIRE(moves.size() == 3);
   CHECK(moves[1].segment.end_mm == Vector3(0.0, 4.0, 0.0));
 }

@@ -122,6 +122,12 @@ Group group_of(int g_tenths) noexcept {
   }
 }
 
+namespace {
+
+constexpr std::uint32_t whole_number_letters = letter_mask("MSTNOHDL");
+
+}  // namespace
+
 void sort_words(const Block& block, std::uint32_t line, BlockWords& words) {
   words.present = 0;
   words.g_count = 0;
@@ -129,13 +135,21 @@ void sort_words(const Block& block, std::uint32_t line, BlockWords& words) {
   words.m_count = 0;
   words.corner = nullptr;
   words.duplicate = nullptr;
+  words.fractional = nullptr;
+  words.negative = nullptr;
   for (const Word& word : block) {
+    if (word.letter >= 'A' && word.letter <= 'Z' && ((whole_number_letters >> (word.letter - 'A')) & 1U) != 0) {
+      words.fractional = word.has_point && words.fractional == nullptr ? &word : words.fractional;
+      words.negative = word.value < 0.0 && words.negative == nullptr ? &word : words.negative;
+    }
     switch (word.letter) {
       case 'G': {
         const double tenths = word.value * 10.0;
         const int code = static_cast<int>(std::lround(tenths));
         if (std::abs(tenths - code) > 1e-6 || code < 0 || words.g_count == static_cast<int>(words.g_tenths.size())) {
-          throw Error(ErrorKind::program, "unknown G code or too many G codes in a block", line, word.column);
+          throw alarm_error(code < 0 ? 6 : 10,
+                            code < 0 ? "G code with a minus sign" : "unknown G code or too many G codes in a block",
+                            line, word.column);
         }
         words.g_tenths[static_cast<std::size_t>(words.g_count)] = code;
         words.g_column[static_cast<std::size_t>(words.g_count)] = word.column;
@@ -155,6 +169,9 @@ void sort_words(const Block& block, std::uint32_t line, BlockWords& words) {
         break;
       case '<':
       case '>':
+        if (words.corner != nullptr) {
+          throw alarm_error(53, "two corner words ,R ,C in one block", line, word.column);
+        }
         words.corner = &word;
         break;
       default: {

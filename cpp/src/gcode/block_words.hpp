@@ -50,8 +50,11 @@ struct BlockWords {
   bool has_m = false;
   std::array<int, 6> m_codes;
   int m_count = 0;
-  const Word* corner = nullptr;     ///< ,R or ,C
-  const Word* duplicate = nullptr;  ///< of an address that stands twice: only a macro call may hold one
+  const Word* corner = nullptr;  ///< ,R or ,C
+  // What only a macro call may hold.
+  const Word* duplicate = nullptr;   ///< an address that stands twice
+  const Word* fractional = nullptr;  ///< a decimal point in an address of whole numbers
+  const Word* negative = nullptr;    ///< a minus sign in one
 
   [[nodiscard]] bool has(char letter) const noexcept { return (present >> (letter - 'A')) & 1U; }
   [[nodiscard]] bool has_any(std::uint32_t mask) const noexcept { return (present & mask) != 0; }

@@ -32,6 +32,14 @@ Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, doubl
       moves.push_back(OtherMove{make_line(position, position, 0.0, line), cycle.dwell_s});
     }
   };
+  // Back boring goes down beside the bore and cuts upwards; its shift in the plane is not counted.
+  if (cycle.code == 87) {
+    go(cycle.r_mm, true);
+    go(cycle.bottom_mm, false);
+    wait();
+    go(cycle.initial_mm, true);
+    return position;
+  }
   go(cycle.r_mm, true);
   const double depth = std::abs(cycle.r_mm - cycle.bottom_mm);
   const double down = cycle.bottom_mm < cycle.r_mm ? -1.0 : 1.0;
@@ -50,12 +58,21 @@ Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, doubl
   } else {
     go(cycle.bottom_mm, false);
   }
-  wait();
-  const bool feeds_out = cycle.code == 74 || cycle.code == 84 || cycle.code == 85 || cycle.code == 89;
-  go(cycle.r_mm, !feeds_out);
-  if (!cycle.return_to_r) {
-    go(cycle.initial_mm, true);
+  // P has no meaning in G81, G85 and G86; tapping waits at both ends.
+  const bool taps = cycle.code == 74 || cycle.code == 84;
+  if (cycle.code != 81 && cycle.code != 85 && cycle.code != 86) {
+    wait();
   }
+  if (taps || cycle.code == 85 || cycle.code == 89) {
+    go(cycle.r_mm, false);
+  }
+  if (taps) {
+    wait();
+  }
+  if (cycle.code == 88) {
+    go(cycle.r_mm, true);  // the operator retracts to R by hand
+  }
+  go(cycle.return_to_r ? cycle.r_mm : cycle.initial_mm, true);
   return position;
 }
 

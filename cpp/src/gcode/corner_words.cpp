@@ -199,18 +199,19 @@ CornerResult insert_corner(const Segment& before, const Segment& after, bool cha
   const Inserted corner = chamfer ? chamfer_of(a, b, word) : rounding_of(a, b, turn, word);
   const Vector3 corner_start = plane::in_space(corner.from.point, before.end_mm, plane_normal);
   Vector3 corner_end = plane::in_space(corner.to.point, before.end_mm, plane_normal);
-  CornerResult result;
-  if (corner.length_mm <= plane::coincident_mm) {
+  Segment inserted;  // not in an optional yet: GCC 12 would warn of its unset part
+  const bool has_length = corner.length_mm > plane::coincident_mm;
+  if (!has_length) {
     corner_end = corner_start;  // both blocks are shortened to one point
   } else if (chamfer) {
-    result.inserted = make_line(corner_start, corner_end, before.feed_mm_per_s, before.line);
+    inserted = make_line(corner_start, corner_end, before.feed_mm_per_s, before.line);
   } else {
-    result.inserted = make_arc(corner_start, corner_end, plane::in_space(corner.centre, before.end_mm, plane_normal),
-                               corner.sweep_rad, plane_normal, before.feed_mm_per_s, before.line);
+    inserted = make_arc(corner_start, corner_end, plane::in_space(corner.centre, before.end_mm, plane_normal),
+                        corner.sweep_rad, plane_normal, before.feed_mm_per_s, before.line);
   }
-  result.before = shortened(before, a, before.start_mm, corner_start, corner.from.taken);
-  result.after = shortened(after, b, corner_end, after.end_mm, corner.to.taken);
-  return result;
+  return {shortened(before, a, before.start_mm, corner_start, corner.from.taken),
+          has_length ? std::optional<Segment>(inserted) : std::nullopt,
+          shortened(after, b, corner_end, after.end_mm, corner.to.taken)};
 }
 
 }  // namespace shapegcode

@@ -101,11 +101,32 @@ void Interpreter::scan(std::string_view text, std::uint32_t line) {
   }
 }
 
-void Interpreter::require_single_words(std::uint32_t line) const {
+void Interpreter::require_plain_words(std::uint32_t line) const {
+  const auto refuse = [&](int number, const Word& word, const std::string& what) {
+    throw alarm_error(number, what + " in address " + std::string(1, word.letter) + ", which takes whole numbers", line,
+                      word.column);
+  };
+  if (words_.fractional != nullptr) {
+    refuse(7, *words_.fractional, "decimal point");
+  }
+  if (words_.negative != nullptr && words_.negative->letter != 'S') {
+    refuse(6, *words_.negative, "minus sign");
+  }
   if (words_.duplicate != nullptr) {
     throw Error(ErrorKind::program,
                 "address " + std::string(1, words_.duplicate->letter) + " is given twice in one block", line,
                 words_.duplicate->column);
+  }
+  for (const char letter : {'H', 'D'}) {
+    if (words_.has(letter) && words_[letter].value > 999.0) {
+      throw alarm_error(30,
+                        std::string("offset number ") + letter +
+                            std::to_string(static_cast<int>(words_[letter].value)) + " outside 0 ... 999",
+                        line, words_[letter].column);
+    }
+  }
+  if (words_.has('E') && state_.motion != 33 && (words_.groups & group_bit(Group::motion)) == 0) {
+    throw alarm_error(9, "address E is used with threading G33 only", line, words_['E'].column);
   }
 }
 
@@ -117,7 +138,7 @@ void Interpreter::finish() {
 void Interpreter::execute(std::uint32_t line, const LineOrigin& origin, std::size_t begin, std::size_t end) {
   line_number_ = line;
   origin_ = origin;
-  require_single_words(line);
+  require_plain_words(line);
   if (block_.word_count > 0) {
     ++program_.block_count;
   }

@@ -111,8 +111,14 @@ void Interpreter::read_codes(LineFlow& flow) {
         set(state_.cycle_return, false);
         break;
       case Group::coordinates: {
-        const int system = g == 541 ? g : whole;
-        const int extra = g != 541 ? 0 : words_.has('P') ? static_cast<int>(words_['P'].value) : 1;
+        // G54 P7 is G54.1 P7; in a block with a dwell or a cycle P belongs to that.
+        const bool extended = g == 541 || (g == 540 && words_.has('P') && state_.cycle == 80 &&
+                                           (words_.groups & (group_bit(Group::none) | group_bit(Group::cycle))) == 0);
+        const int system = extended ? 541 : whole;
+        const int extra = !extended ? 0 : words_.has('P') ? static_cast<int>(words_['P'].value) : 1;
+        if (extended && (extra < 1 || extra > 300)) {
+          alarm(30, "G54.1 P" + std::to_string(extra) + ": P is 1 ... 300", words_['P'].column);
+        }
         if (system != state_.coordinate_system || extra != state_.coordinate_number) {
           change_coordinates(system, extra);
           flow.stop = true;
@@ -204,7 +210,7 @@ void Interpreter::dwell() {
     fail("G04 needs P (milliseconds) or X (seconds)");
   }
   if (seconds < 0.0) {
-    fail("dwell G04 is negative");
+    alarm(6, "dwell G04 is negative");
   }
   add_move({make_line(state_.position_mm, state_.position_mm, 0.0, line_number_), seconds});
 }
@@ -243,9 +249,15 @@ void Interpreter::data_setting() {
         set_tool_offset(kind);
         return;
       }
+      if (kind >= 10) {
+        alarm(31, "G10 L" + std::to_string(kind) + " needs an offset number P and a value R");
+      }
+      break;
+    case 50:
+    case 52:
       break;
     default:
-      break;
+      alarm(31, "G10 L" + std::to_string(kind) + " is not known", words_['L'].column);
   }
   if (kind == -1 || kind == 50 || kind == 52 || kind == 3) {
     return;  // parameters, tool life: nothing that moves an axis
@@ -360,6 +372,13 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
       }
       return;
     default:  // G28, G30, G53: machine coordinates
+      if (g_tenths != 530 && state_.cycle != 80) {
+        alarm(44, "G" + std::to_string(g_tenths / 10) + " while the drilling cycle G" + std::to_string(state_.cycle) +
+                      " is on: cancel it with G80");
+      }
+      if (g_tenths == 300 && words_.has('P') && (words_['P'].value < 2.0 || words_['P'].value > 4.0)) {
+        alarm(46, "G30 P: the reference points are 2, 3 and 4", words_['P'].column);
+      }
       flow.stop = true;
       one_shot_axes_ = true;
       forget_axes(words_.present);

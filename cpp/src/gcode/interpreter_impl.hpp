@@ -40,8 +40,8 @@ class Interpreter {
 
   /// Splits a line into words: `block()` and `words()`.
   void scan(std::string_view text, std::uint32_t line);
-  /// Throws where an address stands twice among the words that were scanned.
-  void require_single_words(std::uint32_t line) const;
+  /// Throws where the words that were scanned could only be arguments of a macro call.
+  void require_plain_words(std::uint32_t line) const;
   /// Executes the words that were scanned. The text of the line stands at [begin, end) of the program's text.
   void execute(std::uint32_t line, const LineOrigin& origin, std::size_t begin, std::size_t end);
   /// Ends an open region: the next line is not part of it.
@@ -118,8 +118,6 @@ class Interpreter {
   Vector3 local_offset_ = Vector3::Zero();
   std::array<bool, axis_count> local_offset_uncertain_ = {false, false, false};  ///< set in a '/' block
   CannedCycle cycle_;
-  double cycle_r_ = 0.0;
-  double cycle_z_ = 0.0;
   std::uint32_t seen_no_point_ = 0;
   std::uint32_t seen_distance_ = 0;
   std::uint32_t kept_run_line_ = 0;

@@ -15,7 +15,7 @@ void Interpreter::check_range() const {
     if (words_.has(letter) && std::abs(length_mm(words_[letter])) > limit * unit) {
       char value[80];
       std::snprintf(value, sizeof value, "%c%.4f lies outside +-%.4f", letter, length_mm(words_[letter]) / unit, limit);
-      fail(value, words_[letter].column);
+      alarm(3, value, words_[letter].column);
     }
   }
 }
@@ -230,16 +230,22 @@ void Interpreter::cycle_block() {
   const auto z = static_cast<std::size_t>(axis);
   const char depth_letter = static_cast<char>('X' + axis);
   const bool incremental = state_.distance == 91;
+  // Levels are kept as levels: a row of holes in G91 behind a cycle in G90 is drilled at the same ones.
   if (words_.has('R')) {
-    cycle_r_ = length_mm(words_['R']);
+    const double value = length_mm(words_['R']);
+    cycle_.r_mm = incremental ? cycle_.initial_mm + value : value;
   }
   if (words_.has(depth_letter)) {
-    cycle_z_ = length_mm(words_[depth_letter]);
+    const double value = length_mm(words_[depth_letter]);
+    cycle_.bottom_mm = incremental ? cycle_.r_mm + value : value;
   }
   if (words_.has('Q')) {
     cycle_.peck_mm = std::abs(length_mm(words_['Q']));
   }
   if (words_.has('P')) {
+    if (words_['P'].has_point) {
+      alarm(7, "P of a drilling cycle takes whole milliseconds: no decimal point", words_['P'].column);
+    }
     cycle_.dwell_s = words_['P'].value * 1e-3;
   }
   cycle_.code = state_.cycle;
@@ -247,15 +253,19 @@ void Interpreter::cycle_block() {
   int repeats = 1;
   for (char letter : {'K', 'L'}) {
     if (words_.has(letter)) {
-      repeats = static_cast<int>(std::clamp(words_[letter].value, 0.0, 9999.0));
+      if (words_[letter].value < 0.0) {
+        alarm(6, std::string("minus sign in the repetitions ") + letter + " of a drilling cycle",
+              words_[letter].column);
+      }
+      repeats = static_cast<int>(std::min(words_[letter].value, 9999.0));
     }
   }
   if (!(state_.feed > 0.0) && repeats > 0) {
     alarm(11, "drilling cycle G" + std::to_string(state_.cycle) + " without a feed F");
   }
-  const double level = cycle_.initial_mm;
-  cycle_.r_mm = incremental ? level + cycle_r_ : cycle_r_;
-  cycle_.bottom_mm = incremental ? cycle_.r_mm + cycle_z_ : cycle_z_;
+  if ((state_.cycle == 73 || state_.cycle == 83) && repeats > 0 && !(cycle_.peck_mm > 0.0)) {
+    alarm(45, "drilling cycle G" + std::to_string(state_.cycle) + " without a depth of cut Q");
+  }
   const double rate = state_.feed_mode != 93 ? feed_mm_per_s(0.0) : 0.0;
   for (int k = 0; k < repeats && foreign_ == 0; ++k) {
     Vector3 hole = state_.position_mm;

@@ -19,20 +19,8 @@ char upper(char c) noexcept { return c >= 'a' && c <= 'z' ? static_cast<char>(c 
 
 bool is_letter(char c) noexcept { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
 
-bool takes_whole_numbers(char letter) noexcept {
-  switch (letter) {
-    case 'M':
-    case 'S':
-    case 'T':
-    case 'N':
-    case 'O':
-    case 'H':
-    case 'D':
-    case 'L':
-      return true;
-    default:
-      return false;
-  }
+[[noreturn]] void alarm(int number, const std::string& message, std::uint32_t line, std::size_t index) {
+  throw alarm_error(number, message, line, static_cast<std::uint32_t>(index + 1));
 }
 
 [[noreturn]] void fail(const std::string& message, std::uint32_t line, std::size_t index) {
@@ -103,16 +91,13 @@ bool scan_number(std::string_view text, std::uint32_t line, std::size_t& i, std:
     if ((i < n && (text[i] == '#' || text[i] == '[')) || is_macro_keyword(text, letter_at)) {
       return false;
     }
-    throw alarm_error(5, "address " + std::string(1, upper(text[letter_at])) + " has no number", line,
-                      static_cast<std::uint32_t>(letter_at + 1));
+    alarm(5, "address " + std::string(1, upper(text[letter_at])) + " has no number", line, letter_at);
   }
   if (significant > max_digits) {
-    fail("too many digits in address " + std::string(1, word.letter) + ": " + std::to_string(significant) + " (limit " +
-             std::to_string(max_digits) + ")",
-         line, letter_at);
-  }
-  if (word.has_point && takes_whole_numbers(word.letter)) {
-    fail("decimal point in address " + std::string(1, word.letter) + ", which takes whole numbers", line, letter_at);
+    alarm(3,
+          "too many digits in address " + std::string(1, word.letter) + ": " + std::to_string(significant) +
+              " (limit " + std::to_string(max_digits) + ")",
+          line, letter_at);
   }
   if (decimals >= powers_of_ten.size()) {
     decimals = static_cast<unsigned>(powers_of_ten.size()) - 1;
@@ -182,11 +167,12 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
       return;
     } else if (c == ',') {
       // ",R" ",C" corner words: read as a word of their own so that they can be named.
-      if (i + 1 < n && is_letter(text[i + 1]) && block.word_count < Block::max_words) {
+      const char kind = i + 1 < n ? upper(text[i + 1]) : ' ';
+      if ((kind == 'R' || kind == 'C') && block.word_count < Block::max_words) {
         const std::size_t letter_at = i + 1;
         Word& word = block.words[block.word_count];
         word = Word{};
-        word.letter = upper(text[letter_at]) == 'R' ? '<' : '>';
+        word.letter = kind == 'R' ? '<' : '>';
         word.column = static_cast<std::uint32_t>(i + 1);
         i += 2;
         if (!scan_number(text, line, i, letter_at, word)) {
@@ -195,10 +181,12 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
         }
         ++block.word_count;
       } else {
-        fail("',' without R or C", line, i);
+        alarm(9, "',' without R or C", line, i);
       }
+    } else if (is_digit(c) || c == '.' || c == '-' || c == '+') {
+      alarm(4, quoted(c) + " stands where an address is expected", line, i);
     } else {
-      fail(quoted(c) + " is no program character", line, i);
+      alarm(9, quoted(c) + " is no program character", line, i);
     }
   }
 }

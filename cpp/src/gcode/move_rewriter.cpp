@@ -66,7 +66,7 @@ void MoveRewriter::block(const Block& block, const BlockWords& words, std::strin
   words_ = &words;
   text_ = text;
   origin_ = origin;
-  interpreter_.require_single_words(origin.line);
+  interpreter_.require_plain_words(origin.line);
   if (idle()) {
     synchronise();
   }
@@ -89,6 +89,8 @@ void MoveRewriter::block(const Block& block, const BlockWords& words, std::strin
   }
   if (ends_span && !idle()) {
     flush();
+    // The interpreter read what was written: its words are those of another block now.
+    interpreter_.scan(text, origin.line);
     synchronise();
   }
   refuse_machine_coordinates();
@@ -157,6 +159,10 @@ void MoveRewriter::read_codes(const BlockWords& words) {
           throw alarm_error(37, "the plane changes to G" + std::to_string(whole) + " under cutter compensation",
                             origin_.line, words.g_column[i]);
         }
+        if ((modes_.rotation || polar_) && whole != programmed_.plane) {
+          throw alarm_error(144, "the plane changes to G" + std::to_string(whole) + " under rotation G68 or G16",
+                            origin_.line, words.g_column[i]);
+        }
         programmed_.plane = whole;
         break;
       case Group::distance:
@@ -178,21 +184,17 @@ void MoveRewriter::read_codes(const BlockWords& words) {
         set_compensation(whole);
         break;
       case Group::polar:
-        flush();
         polar_ = g == 160;
         polar_radius_ = 0.0;
         polar_angle_rad_ = 0.0;
         break;
       case Group::rotation:
-        flush();
         set_rotation(g);
         break;
       case Group::scaling:
-        flush();
         set_scaling(g);
         break;
       case Group::mirror:
-        flush();
         set_mirror(g);
         break;
       default:
@@ -279,6 +281,9 @@ void MoveRewriter::set_scaling(int g_tenths) {
     modes_.scale = Vector3::Ones();
     programmed_point_ = modes_.undo(programmed_.position_mm);
     return;
+  }
+  if (compensation_ != 40) {
+    throw alarm_error(141, "scaling G51 under cutter compensation", origin_.line, 1);
   }
   const BlockWords& words = *words_;
   const auto factor = [&](char letter) {

@@ -111,8 +111,13 @@ void Reader::put(std::string_view flat, const LineOrigin& origin) {
   put_raw(flat, origin);
   const auto number = static_cast<std::uint32_t>(program_.origins.size());
   const std::size_t end = program_.text.size();
-  interpreter_.scan(std::string_view(program_.text).substr(begin, flat.size()), origin.line);
-  interpreter_.execute(number, origin, begin, end);
+  try {
+    interpreter_.scan(std::string_view(program_.text).substr(begin, flat.size()), origin.line);
+    interpreter_.execute(number, origin, begin, end);
+  } catch (const Error& error) {
+    // The interpreter counts the lines of the expanded text.
+    throw Error(error.kind(), error.what(), origin.line, error.column(), error.alarm());
+  }
 }
 
 Error Reader::located(const Error& error) const {
@@ -124,8 +129,12 @@ Error Reader::located(const Error& error) const {
 }
 
 std::string Reader::call_stack() const {
+  constexpr std::size_t most_callers = 3;
   std::string stack;
   for (std::size_t k = frames_.size(); k-- > 1;) {
+    if (frames_.size() - k > most_callers) {
+      return stack + "; and " + std::to_string(k) + " more";
+    }
     const Frame& caller = frames_[k - 1];
     const std::string& file = program_.files[caller.unit->file];
     stack += "; called by " +
@@ -218,7 +227,7 @@ void Reader::line(std::string_view text, std::size_t begin, std::size_t end) {
   }
   if (block.macro) {
     macro_line(text, begin);
-  } else if (interpreter_.words().has('O')) {
+  } else if (interpreter_.words().has('O') && !is_call(interpreter_.words())) {
     program_line(begin, end);
   } else {
     plain_line(text, begin, end);
@@ -300,7 +309,7 @@ void Reader::finish() {
   const std::uint32_t last = here_.line;
   if (!interpreter_.ended() && !framed_) {
     const Error error(ErrorKind::program, "the program has neither '%' lines nor an end M30 or M02: truncated?",
-                      program_.line_count, 1);
+                      std::max({program_.expanded ? 0U : program_.line_count, last, 1U}), 1);
     if (!record(error)) {
       throw error;
     }

@@ -105,6 +105,9 @@ void Reader::subprogram_call(std::string_view text) {
   if (!words.has('P')) {
     alarm(76, "M98 without a program number P", words['M'].column);
   }
+  if (words['P'].has_point) {
+    alarm(7, "decimal point in the program number P of M98", words['P'].column);
+  }
   const auto p = static_cast<std::int64_t>(words['P'].value);
   std::int64_t number = p;
   std::int64_t repeats = 1;
