@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from shapegcode import _core
+from shapegcode.compensation import guard_lines, header_lines, read_for_conversion, require_decision
 from shapegcode.emit import Grid, emit_region, make_grid, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.program import Program
@@ -146,7 +147,8 @@ def convert(
     if arc_feed_ratio is not None and not 0.0 < arc_feed_ratio <= 1.0:
         raise _core.ArgumentError(f"arc feed ratio is {arc_feed_ratio:g}, must be above 0 and at most 1")
     if not isinstance(program, Program):
-        program = Program.read(program, machine)
+        program = read_for_conversion(program, machine)
+    require_decision(program, machine)
     if written_by_shapegcode(program):
         raise _core.ProgramError(
             f"{program.source}:1:1: written by shapegcode already (its header says so): convert the original"
@@ -227,7 +229,9 @@ def _write(
 
     put(core.slice(0, core.header_offset))
     if machine.emission.header and not all(reasons):
-        put(b"".join(comment.encode() + line_end for comment in _header(machine, grid)))
+        head = [*_header(machine, grid), *(f"({note})" for note in header_lines(core.expanded_radii_mm))]
+        put(b"".join(comment.encode() + line_end for comment in head))
+    put(b"".join(guard.encode() + line_end for guard in guard_lines(core.expanded_radii_mm, machine)))
     position = core.header_offset
     placed: list[Placed] = []
     kept: list[str] = []
@@ -266,8 +270,7 @@ def _keep(program: Program, region: _core.Region, machine: Machine, reason: str)
     """The warning for a region that keeps its text."""
     if machine.input.arc_centre == "absolute" and region.path.largest_sweep_rad > 0.0:
         raise program.region_error(region, f"{reason}; its arcs have absolute centres and cannot be kept as they are")
-    first, last = region.first_line, region.last_line
-    return f"{program.source}:{first}: lines {first} to {last} kept untouched: {reason}"
+    return f"{program.place(region.first_line)}: {program.lines(region)} kept untouched: {reason}"
 
 
 def _header(machine: Machine, grid: Grid) -> list[str]:
@@ -308,7 +311,8 @@ def _report(
         warnings.append(f"{program.source}: no cutting moves that can be shaped: the text is unchanged")
     for region in figures["regions"]:
         first, last = region["lines"]
-        warnings += [f"{program.source}:{first}: lines {first} to {last}: {miss}" for miss in region["misses"]]
+        where = f"{program.place(first)}: lines {first} to {last}" + (" expanded" if program.core.expanded else "")
+        warnings += [f"{where}: {miss}" for miss in region["misses"]]
     warnings += _worse_warnings(figures)
     warnings += _region_warnings(program, placed, machine)
     warnings += _controller_warnings(
@@ -328,6 +332,8 @@ def _report(
             "amplitudes": [float(a) for a in grid.shaper.amplitudes],
         },
         "blocks": {"read": program.core.block_count, "emitted": written.blocks},
+        "expanded": program.core.expanded,
+        "expanded_radii_mm": {f"D{number}": radius for number, radius in program.core.expanded_radii_mm.items()},
         "bytes_read": program.core.size,
         "bytes_emitted": len(written.text),
         **figures,
@@ -365,14 +371,14 @@ def _region_warnings(program: Program, placed: list[Placed], machine: Machine) -
     on = next((place.region for place in placed if place.region.look_ahead_mode), None)
     if on is not None and not machine.emission.prologue:
         warnings.append(
-            f"{program.source}:{on.first_line}: shaped blocks run while the program's look-ahead mode is on; the "
+            f"{program.place(on.first_line)}: shaped blocks run while the program's look-ahead mode is on; the "
             'verdict holds for it off: set emission.prologue = ["G05.1Q0"] and emission.epilogue = ["G05.1Q1"]'
         )
     fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
     fast = next((place.region for place in placed if place.region.path.fastest_feed_mm_per_s * 60.0 > fastest), None)
     if fast is not None:
         warnings.append(
-            f"{program.source}:{fast.first_line}: programmed feed {fast.path.fastest_feed_mm_per_s * 60.0:g} mm/min is "
+            f"{program.place(fast.first_line)}: programmed feed {fast.path.fastest_feed_mm_per_s * 60.0:g} mm/min is "
             f"over every axis' largest ({fastest:g} mm/min, axes.*.max_feed_mm_per_min): shaped at the axes' limits"
         )
     return warnings

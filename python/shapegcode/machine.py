@@ -485,6 +485,12 @@ class Emission(Table):
     prefill_dwell_s: Annotated[NonNegative, Field(le=60)] = key(
         "dwell before each shaped stretch, in which the block buffer fills; 0: none", unit="s", default=0.0
     )
+    compensation_guard: Literal["alarm", "stop"] = key(
+        'where cutter compensation was expanded: "alarm" compares the offset in the control with the expanded radius '
+        'and raises an alarm if it differs; "stop" halts with M00 for the operator to compare (always so where programs '
+        "are drip fed: IF cannot run from there)",
+        default="alarm",
+    )
     header: Bool = key(
         "write comments: tool version, machine, modes, block period, shaper length, override, time constant",
         default=True,

@@ -241,10 +241,14 @@ class Program:
         number, file = self.core.origin(line)
         return f"{file or self.source}:{number}"
 
+    def lines(self, region: _core.Region) -> str:
+        """The lines of a region in words: of the source, or of the expanded text."""
+        return f"lines {region.first_line} to {region.last_line}{' expanded' if self.core.expanded else ''}"
+
     def region_error(self, region: _core.Region, message: str) -> ProgramError:
         """An error that names the file and the lines of a region."""
-        (first, file), (last, _) = self.core.origin(region.first_line), self.core.origin(region.last_line)
-        return located_error(file or self.source, first, 1, f"lines {first} to {last}: {message}")
+        first, file = self.core.origin(region.first_line)
+        return located_error(file or self.source, first, 1, f"{self.lines(region)}: {message}")
 
     def refuse_endless(self, limit_s: float) -> None:
         """Refuse a region that cuts for longer than can be computed.

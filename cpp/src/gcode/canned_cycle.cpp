@@ -32,12 +32,31 @@ Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, doubl
       moves.push_back(OtherMove{make_line(position, position, 0.0, line), cycle.dwell_s});
     }
   };
-  // Back boring goes down beside the bore and cuts upwards; its shift in the plane is not counted.
-  if (cycle.code == 87) {
+  // G76 and G87 lift the tip off the wall by Q; the direction is a parameter (5148), the way the same.
+  const auto shift = [&](double by) {
+    Vector3 target = position;
+    target[(axis + 1) % 3] += by;
+    OtherMove move{make_line(position, target, 0.0, line), 0.0};
+    move.segment.kind = SegmentKind::rapid;
+    if (move.segment.length_mm > 0.0) {
+      moves.push_back(move);
+    }
+    position = target;
+  };
+  const Vector3 centre = position;
+  const auto unshift = [&] {
+    shift(centre[(axis + 1) % 3] - position[(axis + 1) % 3]);
+    position[(axis + 1) % 3] = centre[(axis + 1) % 3];
+  };
+  if (cycle.code == 87) {  // back boring goes down beside the bore and cuts upwards
+    shift(cycle.peck_mm);
     go(cycle.r_mm, true);
+    unshift();
     go(cycle.bottom_mm, false);
     wait();
+    shift(cycle.peck_mm);
     go(cycle.initial_mm, true);
+    unshift();
     return position;
   }
   go(cycle.r_mm, true);
@@ -72,7 +91,13 @@ Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, doubl
   if (cycle.code == 88) {
     go(cycle.r_mm, true);  // the operator retracts to R by hand
   }
+  if (cycle.code == 76) {
+    shift(cycle.peck_mm);
+  }
   go(cycle.return_to_r ? cycle.r_mm : cycle.initial_mm, true);
+  if (cycle.code == 76) {
+    unshift();
+  }
   return position;
 }
 

@@ -120,6 +120,7 @@ class Interpreter {
   CannedCycle cycle_;
   std::uint32_t seen_no_point_ = 0;
   std::uint32_t seen_distance_ = 0;
+  std::uint32_t seen_cycle_point_ = 0;
   std::uint32_t kept_run_line_ = 0;
 };
 

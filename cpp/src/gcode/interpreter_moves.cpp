@@ -244,7 +244,7 @@ void Interpreter::cycle_block() {
   }
   if (words_.has('P')) {
     if (words_['P'].has_point) {
-      alarm(7, "P of a drilling cycle takes whole milliseconds: no decimal point", words_['P'].column);
+      warn_once(seen_cycle_point_, "P of a drilling cycle counts milliseconds; some controls refuse its decimal point");
     }
     cycle_.dwell_s = words_['P'].value * 1e-3;
   }

@@ -1,6 +1,7 @@
 // Reading blocks under coordinate modes; rewriter_output.cpp writes them.
 #include "move_rewriter.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -110,12 +111,26 @@ void MoveRewriter::block(const Block& block, const BlockWords& words, std::strin
                         (words.groups & group_bit(Group::unknown_position)) != 0 || has_code(words, 40) ||
                         has_code(words, 280) || has_code(words, 300) || has_code(words, 530) || has_code(words, 920) ||
                         has_code(words, 520) || has_code(words, 100);
-  if (words.has_any(axis_letters | centre_letters) && !own_axes) {
-    if (programmed_.cycle != 80) {
-      read_cycle(item);
-    } else {
-      read_move(item);
+  const bool drills = programmed_.cycle != 80 && !own_axes;
+  if (drills && words.has_any(axis_letters | letter_mask("RKL"))) {
+    // Each hole gets a block of its own: its place may be anything but a multiple of the first step.
+    const int repeats = words.has('K')   ? static_cast<int>(words['K'].value)
+                        : words.has('L') ? static_cast<int>(words['L'].value)
+                                         : 1;
+    const bool data_only = repeats == 0;
+    for (int k = 0; k < std::clamp(repeats, 1, 9999); ++k) {
+      Item hole = item;
+      read_cycle(hole, data_only);
+      item.head.clear();
+      item.tail.clear();
+      enqueue(std::move(hole));
+      interpreter_.scan(text, origin.line);  // it read what was written
+      synchronise();
     }
+    return;
+  }
+  if (words.has_any(axis_letters | centre_letters) && !own_axes) {
+    read_move(item);
   } else if (corner_waits_ && words.has_any(~letter_mask("N"))) {
     throw alarm_error(51, "a block with ,R or ,C must be followed by a move in the plane", origin.line, 1);
   }
@@ -186,6 +201,7 @@ void MoveRewriter::read_codes(const BlockWords& words) {
       case Group::polar:
         polar_ = g == 160;
         polar_radius_ = 0.0;
+        polar_pole_.setZero();
         polar_angle_rad_ = 0.0;
         break;
       case Group::rotation:
@@ -388,7 +404,7 @@ void MoveRewriter::keep_words(Item& item) const {
       if (raw) {
         add(item.tail, text);
       }
-    } else if (taken && word.letter == 'P') {
+    } else if ((taken && word.letter == 'P') || (word.letter == 'L' && programmed_.cycle != 80)) {
       continue;
     } else if (!drops(word, 0)) {
       add(item.tail, text);
@@ -427,17 +443,16 @@ void MoveRewriter::read_target(Item& item, Vector3& end) {
   const bool turned = polar_ && (given[static_cast<std::size_t>(a)] || given[static_cast<std::size_t>(b)]);
   if (turned) {
     if (words.has(letter_of(a))) {
+      // A radius in G91 counts from the present position, one in G90 from the origin; an angle alone keeps the pole.
       polar_radius_ = interpreter_.length_mm(words[letter_of(a)]);
+      polar_pole_ = incremental ? programmed_point_ : Vector3(Vector3::Zero());
     }
     if (words.has(letter_of(b))) {
       const double angle = angle_rad(words[letter_of(b)]);
       polar_angle_rad_ = incremental ? polar_angle_rad_ + angle : angle;
     }
-    // In G91 the present position is the pole.
-    const double pole_a = incremental ? programmed_point_[a] : 0.0;
-    const double pole_b = incremental ? programmed_point_[b] : 0.0;
-    end[a] = pole_a + polar_radius_ * std::cos(polar_angle_rad_);
-    end[b] = pole_b + polar_radius_ * std::sin(polar_angle_rad_);
+    end[a] = polar_pole_[a] + polar_radius_ * std::cos(polar_angle_rad_);
+    end[b] = polar_pole_[b] + polar_radius_ * std::sin(polar_angle_rad_);
     given[static_cast<std::size_t>(a)] = given[static_cast<std::size_t>(b)] = true;
   }
   for (int axis = 0; axis < axis_count; ++axis) {
@@ -518,7 +533,10 @@ void MoveRewriter::read_move(Item& item) {
   }
 }
 
-void MoveRewriter::read_cycle(Item& item) {
+void MoveRewriter::read_cycle(Item& item, bool data_only) {
+  const Vector3 present = programmed_point_;
+  const double radius = polar_radius_;
+  const double angle = polar_angle_rad_;
   Vector3 end;
   read_target(item, end);
   const BlockWords& words = *words_;
@@ -549,6 +567,13 @@ void MoveRewriter::read_cycle(Item& item) {
   }
   item.axes[static_cast<std::size_t>(normal)] = false;
   end[normal] = programmed_point_[normal];
+  if (data_only) {  // K0 stores the levels and drills nothing
+    item.levels += " K0";
+    item.axes = {false, false, false};
+    end = present;
+    polar_radius_ = radius;
+    polar_angle_rad_ = angle;
+  }
   const Vector3 target = modes_.apply(end);
   item.move = item.cycle = true;
   item.increment_mm = target - programmed_.position_mm;

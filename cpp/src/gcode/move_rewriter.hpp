@@ -61,7 +61,7 @@ class MoveRewriter {
   [[nodiscard]] bool drops(const Word& word, int g_tenths) const noexcept;
   void keep_words(Item& item) const;
   void read_move(Item& item);
-  void read_cycle(Item& item);
+  void read_cycle(Item& item, bool data_only);
   void read_target(Item& item, Vector3& end);
   void check_known(bool from_polar) const;
   [[nodiscard]] Segment programmed_segment(const Vector3& end) const;
@@ -86,6 +86,7 @@ class MoveRewriter {
   CoordinateModes modes_;
   bool polar_ = false;
   double polar_radius_ = 0.0;
+  Vector3 polar_pole_ = Vector3::Zero();
   double polar_angle_rad_ = 0.0;
   int compensation_ = 40;
   int d_number_ = -1;

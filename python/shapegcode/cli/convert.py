@@ -11,6 +11,7 @@ from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.options import (
     add_machine_argument,
     add_plots_argument,
+    add_program_argument,
     load_machine,
     ratio,
     refuse_same_file,
@@ -44,6 +45,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="duration of the shortest block, for example 5ms (default: chosen for the modes)",
     )
+    parser.add_argument(
+        "--compensation",
+        choices=("refuse", "expand", "keep"),
+        default=None,
+        help="what becomes of cutter compensation G41/G42: see input.compensation (default: the machine file's)",
+    )
+    add_program_argument(parser)
     add_plots_argument(parser)
     add_json_argument(parser)
 
@@ -57,9 +65,9 @@ def run(args: argparse.Namespace) -> int:
     """
     from shapegcode._core import ArgumentError
     from shapegcode.cli import ExitCode
+    from shapegcode.compensation import read_for_conversion
     from shapegcode.cli.console import output_console, print_before_after, progress, write_bytes, write_json
     from shapegcode.converter import convert
-    from shapegcode.program import Program
 
     if args.output == "-":
         raise ArgumentError("-o - : the program needs a file of its own; --json - writes the report to standard output")
@@ -67,6 +75,10 @@ def run(args: argparse.Namespace) -> int:
     if not output.name or output.is_dir():
         raise ArgumentError(f"-o {args.output}: the output must be a file, not a folder")
     machine = load_machine(args)
+    if args.compensation is not None:
+        machine = machine.model_copy(
+            update={"input": machine.input.model_copy(update={"compensation": args.compensation})}
+        )
     failed = output.with_name(output.name + machine.emission.failed_suffix)
     read = [Path(args.input), Path(args.machine)]
     refuse_same_file([output, failed], read)
@@ -75,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     # The solvers load while the program is read.
     threading.Thread(target=importlib.import_module, args=("shapegcode.shaping",), daemon=True).start()
     with progress(f"converting {args.input}", args.json) as bar:
-        program = Program.read(args.input, machine)
+        program = read_for_conversion(args.input, machine, program_number=args.program)
         stages = {"shaping": 0.0, "shaping again, slower": 0.0, "round trip": 0.5}
         conversion = convert(
             program,

@@ -44,6 +44,29 @@ def add_plots_argument(
     parser.add_argument("--plots", metavar="DIR", default=None, help=what)
 
 
+def add_program_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--program O1234``."""
+    parser.add_argument(
+        "--program",
+        metavar="O1234",
+        type=program_number,
+        default=None,
+        help="program to play of a file that holds several (default: the first)",
+    )
+
+
+def program_number(text: str) -> int:
+    """An O number with or without its letter.
+
+    Raises:
+        ArgumentTypeError: no number from 1 to 99999999.
+    """
+    digits = text.removeprefix("O").removeprefix("o")
+    if not digits.isdigit() or not 1 <= int(digits) <= 99_999_999:
+        raise argparse.ArgumentTypeError(f"{text!r} is no program number: O1 ... O99999999")
+    return int(digits)
+
+
 def load_machine(args: argparse.Namespace) -> Machine:
     """The machine of ``-m`` with the values of ``--set``.
 

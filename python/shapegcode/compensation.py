@@ -1,0 +1,103 @@
+"""Cutter compensation in a conversion: refused, kept, or expanded behind a guard."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shapegcode._core import ProgramError
+from shapegcode.program import MM_PER_INCH, Program, located_error
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from shapegcode.machine import Machine
+
+_KEPT = "cutter compensation is on and not expanded"
+_NOT_KNOWN = "the radius of offset D"
+_SLACK_MM = 0.0005  # a radius that differs by more is another one
+
+
+def read_for_conversion(path: str | Path, machine: Machine, *, program_number: int | None = None) -> Program:
+    """Read a program as `convert` wants it: compensation expanded only if `input.compensation` says so.
+
+    Raises:
+        ProgramError: see :meth:`Program.read`, and where compensation is refused.
+        OSError: the file cannot be read.
+    """
+    expand = machine.input.compensation == "expand"
+    program = Program.read(path, machine, program_number=program_number, expand_compensation=expand)
+    require_decision(program, machine)
+    return program
+
+
+def require_decision(program: Program, machine: Machine) -> None:
+    """Refuse a program with G41 or G42 unless the machine file says what becomes of it.
+
+    Raises:
+        ProgramError: compensation is refused, its radius is not known, or the program was read otherwise.
+    """
+    core, policy = program.core, machine.input.compensation
+    if policy == "expand":
+        unknown = next((w for w in core.warnings if w[3].startswith(_NOT_KNOWN)), None)
+        if unknown is not None:
+            line, _, _, message, file = unknown
+            reason = message.partition(":")[0]
+            raise located_error(file or program.source, line, 1, f"{reason}: its path cannot be shaped")
+        if core.kept_compensated_moves:
+            raise ProgramError(f"{program.source}:1:1: read the program with expand_compensation=True to expand it")
+        return
+    if core.compensated_moves:
+        raise ProgramError(
+            f"{program.source}:1:1: cutter compensation was expanded when the program was read: "
+            'read it with expand_compensation=False, or set input.compensation = "expand"'
+        )
+    if policy == "refuse" and core.kept_compensated_moves:
+        line, file = next(((w[0], w[4]) for w in core.warnings if _KEPT in w[3]), (1, ""))
+        raise located_error(
+            file or program.source,
+            line,
+            1,
+            "cutter compensation G41/G42: behind shaped moves the offset in the control would no longer act, and that "
+            "is how a shop hits size. --compensation expand shapes the path of the radius given in "
+            "input.tool_radius_mm (the header says so, and a guard stops the program if the control holds another "
+            "one); --compensation keep leaves these moves as they are",
+        )
+
+
+def header_lines(radii_mm: Mapping[int, float]) -> list[str]:
+    """Comments on the radii that were expanded."""
+    return [f"D{number} RADIUS {radius:g} MM EXPANDED - OFFSET DOES NOT ACT" for number, radius in radii_mm.items()]
+
+
+def guard_lines(radii_mm: Mapping[int, float], machine: Machine) -> list[str]:
+    """Program lines that stop where the control's offset is not the one that was expanded.
+
+    Offsets that the program sets itself (G10) need none. A drip-fed program cannot hold IF: it stops with M00, and the
+    operator compares.
+    """
+    lines = []
+    for number, radius in radii_mm.items():
+        own = machine.input
+        name = str(number)
+        known = [table[name] for table in (own.tool_radius_mm, own.tool_radius_wear_mm) if name in table]
+        if number == 0 or not known or abs(sum(known) - radius) > 1e-9:
+            continue
+        if machine.emission.compensation_guard == "stop" or machine.controller.dnc_baud > 0:
+            lines.append(f"M00(CHECK D{number} RADIUS {radius:.4g} WITH WEAR)")
+            continue
+        value = _offset_expression(number, machine.controller.offset_memory)
+        # The variable counts mm or inch as the control is set when the guard runs: either will do.
+        checks = [
+            f"[ABS[{value}-{size:.6f}]GT{slack:.6f}]"
+            for size, slack in ((radius, _SLACK_MM), (radius / MM_PER_INCH, _SLACK_MM / MM_PER_INCH))
+        ]
+        lines.append(f"IF[{'AND'.join(checks)}]THEN#3000=1(D{number} CHANGED)")
+    return lines
+
+
+def _offset_expression(number: int, memory: str) -> str:
+    if memory == "A":
+        return f"#{10000 + number}"
+    geometry, wear = (13000, 12000) if memory == "C" else (11000, 10000)
+    return f"[#{geometry + number}+#{wear + number}]"
