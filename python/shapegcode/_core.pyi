@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'InPosition', 'InterpolatedTime', 'Interpolator', 'ModalState', 'Mode', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'ToolTime', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'interpolate', 'interpolate_program', 'minimal_two_mode', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'shape_path', 'simulate_circle', 'time_program', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'InPosition', 'InterpolatedTime', 'Interpolator', 'ModalState', 'Mode', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'interpolate', 'interpolate_program', 'minimal_two_mode', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'shape_path', 'simulate_circle', 'time_program', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -614,6 +614,14 @@ class ModalState:
     def compensation(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
+    def coordinate_number(self) -> int:
+        """
+        P of G54.1.
+        """
+    @coordinate_number.setter
+    def coordinate_number(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
     def coordinate_system(self) -> int:
         """
         Group 14: 54 ... 59; 541 for G54.1.
@@ -712,12 +720,146 @@ class ModalState:
         Position in the active work coordinates, shape (3,), mm.
         """
     @property
+    def spindle_rev_per_min(self) -> float:
+        """
+        S; 0 before the first.
+        """
+    @spindle_rev_per_min.setter
+    def spindle_rev_per_min(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def units(self) -> int:
         """
         Group 06: 20, 21.
         """
     @units.setter
     def units(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class StepKind:
+    """
+    What a step of a program is.
+    
+    Members:
+    
+      region
+    
+      move
+    
+      function
+    """
+    __members__: typing.ClassVar[dict[str, StepKind]]
+    function: typing.ClassVar[StepKind]
+    move: typing.ClassVar[StepKind]
+    region: typing.ClassVar[StepKind]
+    @typing.overload
+    def __eq__(self, other: StepKind) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: StepKind) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class ToolOffset:
+    """
+    Offsets of one tool, mm; None: not known.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def length_mm(self) -> float | None:
+        """
+        Geometry of H.
+        """
+    @length_mm.setter
+    def length_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def length_wear_mm(self) -> float | None:
+        """
+        Wear of H.
+        """
+    @length_wear_mm.setter
+    def length_wear_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def radius_mm(self) -> float | None:
+        """
+        Geometry of D.
+        """
+    @radius_mm.setter
+    def radius_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+    @property
+    def radius_wear_mm(self) -> float | None:
+        """
+        Wear of D.
+        """
+    @radius_wear_mm.setter
+    def radius_wear_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex | None) -> None:
+        ...
+class CodeBindings:
+    """
+    Codes that the machine builder bound to programs.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def g_macros(self) -> dict[int, int]:
+        """
+        G code in tenths to program, called like G65.
+        """
+    @g_macros.setter
+    def g_macros(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def m_macros(self) -> dict[int, int]:
+        """
+        M code to program, called like G65.
+        """
+    @m_macros.setter
+    def m_macros(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def m_subprograms(self) -> dict[int, int]:
+        """
+        M code to program, called like M98.
+        """
+    @m_subprograms.setter
+    def m_subprograms(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def tool_program(self) -> int:
+        """
+        T calls it with T in #149; -1: none.
+        """
+    @tool_program.setter
+    def tool_program(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
 class ReaderOptions:
     """
@@ -742,12 +884,60 @@ class ReaderOptions:
     def arc_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def bindings(self) -> CodeBindings:
+        """
+        Codes bound to programs.
+        """
+    @bindings.setter
+    def bindings(self, arg0: CodeBindings) -> None:
+        ...
+    @property
+    def block_skip(self) -> typing.Annotated[list[bool | None], "FixedSize(9)"]:
+        """
+        Switch of / ... /9: on, off, or None: not known.
+        """
+    @block_skip.setter
+    def block_skip(self, arg0: typing.Annotated[collections.abc.Sequence[bool | None], "FixedSize(9)"]) -> None:
+        ...
+    @property
     def calculator_decimal_point(self) -> bool:
         """
         True: X10 is 10 mm; False: 10 least increments (parameter 3401#0).
         """
     @calculator_decimal_point.setter
     def calculator_decimal_point(self, arg0: bool) -> None:
+        ...
+    @property
+    def collect_alarms(self) -> bool:
+        """
+        Go on behind an alarm and keep all in ProgramText.alarms.
+        """
+    @collect_alarms.setter
+    def collect_alarms(self, arg0: bool) -> None:
+        ...
+    @property
+    def compensation_start_up(self) -> str:
+        """
+        Start-up of cutter compensation, A or B (parameter 5003).
+        """
+    @compensation_start_up.setter
+    def compensation_start_up(self, arg1: str) -> None:
+        ...
+    @property
+    def expand_compensation(self) -> bool:
+        """
+        G41/G42 become plain moves; False: kept as they stand.
+        """
+    @expand_compensation.setter
+    def expand_compensation(self, arg0: bool) -> None:
+        ...
+    @property
+    def extra_work_offsets_mm(self) -> dict[int, typing.Annotated[list[float], "FixedSize(3)"]]:
+        """
+        G54.1 P number to offsets, mm.
+        """
+    @extra_work_offsets_mm.setter
+    def extra_work_offsets_mm(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]]) -> None:
         ...
     @property
     def least_increment_inch(self) -> float:
@@ -766,12 +956,44 @@ class ReaderOptions:
     def least_increment_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def load_program(self) -> bool:
+        """
+        Called with an O number that the file does not hold; gives (name, bytes) or None.
+        """
+    @load_program.setter
+    def load_program(self, arg1: typing.Any) -> None:
+        ...
+    @property
     def max_line_length(self) -> int:
         """
         Characters.
         """
     @max_line_length.setter
     def max_line_length(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_steps(self) -> int:
+        """
+        Blocks executed behind the first call or jump.
+        """
+    @max_steps.setter
+    def max_steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def offset_memory(self) -> str:
+        """
+        Offset memory A, B or C.
+        """
+    @offset_memory.setter
+    def offset_memory(self, arg1: str) -> None:
+        ...
+    @property
+    def opaque_programs(self) -> typing.Annotated[list[int], "FixedSize(2)"]:
+        """
+        First and last program number whose calls are kept if the program is not found.
+        """
+    @opaque_programs.setter
+    def opaque_programs(self, arg0: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"]) -> None:
         ...
     @property
     def power_on(self) -> ModalState:
@@ -788,6 +1010,46 @@ class ReaderOptions:
         """
     @probe_lines.setter
     def probe_lines(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def program(self) -> int:
+        """
+        O number to play of a file with several; -1: the first.
+        """
+    @program.setter
+    def program(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def retained_variables(self) -> dict[int, float]:
+        """
+        #500 ... #999.
+        """
+    @retained_variables.setter
+    def retained_variables(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def scale_unit(self) -> float:
+        """
+        Of the factors of G51 without a point.
+        """
+    @scale_unit.setter
+    def scale_unit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def subprogram_nesting(self) -> int:
+        """
+        Deepest nesting of M98.
+        """
+    @subprogram_nesting.setter
+    def subprogram_nesting(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def tool_offsets(self) -> dict[int, ToolOffset]:
+        """
+        Number to ToolOffset.
+        """
+    @tool_offsets.setter
+    def tool_offsets(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, ToolOffset]) -> None:
         ...
     @property
     def unknown_after_tool_change(self) -> typing.Annotated[list[bool], "FixedSize(3)"]:
@@ -901,9 +1163,18 @@ class ProgramText:
         """
         The cutting moves of the regions within a range of lines, as one path.
         """
+    def origin(self, line: typing.SupportsInt | typing.SupportsIndex) -> tuple:
+        """
+        (line, file) of the source from which a line of `text` comes.
+        """
     def slice(self, begin: typing.SupportsInt | typing.SupportsIndex, end: typing.SupportsInt | typing.SupportsIndex) -> bytes:
         """
         Bytes of the text between two offsets.
+        """
+    @property
+    def alarms(self) -> list:
+        """
+        What a control would refuse, as `warnings`; only with ReaderOptions.collect_alarms.
         """
     @property
     def block_count(self) -> int:
@@ -911,14 +1182,39 @@ class ProgramText:
         Lines with at least one word.
         """
     @property
+    def compensated_moves(self) -> int:
+        """
+        Cutting moves under G41 or G42, expanded.
+        """
+    @property
+    def expanded(self) -> bool:
+        """
+        Whether `text` is the plain program that calls, macros and coordinate modes come to.
+        """
+    @property
+    def expanded_radii_mm(self) -> dict[int, float]:
+        """
+        D number to radius, mm, where cutter compensation was expanded.
+        """
+    @property
     def final_state(self) -> ModalState:
         """
         Modal state at the end.
         """
     @property
+    def functions(self) -> list:
+        """
+        (M codes, T or -1, S or -1) of blocks with M, S or T words.
+        """
+    @property
     def header_offset(self) -> int:
         """
         Byte offset at which a header comment may stand.
+        """
+    @property
+    def kept_compensated_moves(self) -> int:
+        """
+        Cutting moves under G41 or G42, kept as they stand.
         """
     @property
     def line_count(self) -> int:
@@ -946,6 +1242,11 @@ class ProgramText:
         O number; -1: none.
         """
     @property
+    def program_numbers(self) -> list[int]:
+        """
+        All O numbers in the file.
+        """
+    @property
     def regions(self) -> list[Region]:
         """
         Runs of cutting moves in order.
@@ -956,6 +1257,11 @@ class ProgramText:
         Bytes.
         """
     @property
+    def steps(self) -> list:
+        """
+        (StepKind, index into regions, other_moves or functions, line) in program order.
+        """
+    @property
     def text(self) -> bytes:
         """
         The whole text.
@@ -963,7 +1269,7 @@ class ProgramText:
     @property
     def warnings(self) -> list:
         """
-        (line, message) pairs.
+        (line, column, alarm, message, file) each; alarm 0: none; file empty: the program's own.
         """
 class ShapingOptions:
     """

@@ -487,8 +487,8 @@ class Emission(Table):
     )
     compensation_guard: Literal["alarm", "stop"] = key(
         'where cutter compensation was expanded: "alarm" compares the offset in the control with the expanded radius '
-        'and raises an alarm if it differs; "stop" halts with M00 for the operator to compare (always so where programs '
-        "are drip fed: IF cannot run from there)",
+        'and raises an alarm if it differs; "stop" halts with M00 for the operator to compare (always so where '
+        "programs are drip fed: IF cannot run from there)",
         default="alarm",
     )
     header: Bool = key(

@@ -51,7 +51,7 @@ def reader_options(
         options.extra_work_offsets_mm = {
             int(name[6:]): offset for name, offset in offsets.items() if name.startswith("G54.1P")
         }
-    options.tool_offsets = _tool_offsets(machine)
+    options.tool_offsets = _tool_offsets(machine)  # type: ignore[assignment]
     options.offset_memory = machine.controller.offset_memory
     options.retained_variables = {int(name): value for name, value in machine.input.variables.items()}
     options.bindings = _bindings(machine)

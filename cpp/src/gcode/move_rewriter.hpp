@@ -24,6 +24,8 @@ class MoveRewriter {
   [[nodiscard]] bool wants(const BlockWords& words) const noexcept;
   /// Writes the block, now or as soon as the blocks behind it allow. Words and text are the interpreter's.
   void block(const Block& block, const BlockWords& words, std::string_view text, const LineOrigin& origin);
+  /// Writes a comment in its place among the blocks that wait.
+  void comment(std::string_view text, const LineOrigin& origin);
   /// Writes all that waits: before anything that is more than a block.
   void flush();
 

@@ -242,17 +242,20 @@ void Reader::program_line(std::size_t begin, std::size_t end) {
   for (std::size_t i = 0; i < block.comment_count; ++i) {
     comments += block.comments[i];
   }
-  interpreter_.close_region();
-  ++program_.block_count;
   if (frames_.size() > 1) {
+    // A call does not stop the motion: its comment may stand inside of a region.
     std::string digits = std::to_string(number);
     digits.insert(0, digits.size() < 4 ? 4 - digits.size() : 0, '0');
-    put_raw("(O" + digits + ")" + comments, origin_);
-  } else if (program_.expanded) {
+    rewriter_.comment("(O" + digits + ")" + comments, origin_);
+    return;
+  }
+  interpreter_.close_region();
+  ++program_.block_count;
+  if (program_.expanded) {
     const std::string line(frames_.back().unit->text->substr(begin, end - begin));
     put_raw(std::string_view(line).substr(0, line.find_first_of("\r\n")), origin_);
   }
-  if (frames_.size() == 1 && program_.regions.empty()) {
+  if (program_.regions.empty()) {
     program_.header_offset = program_.expanded ? program_.text.size() : end;
   }
 }

@@ -188,6 +188,17 @@ void MoveRewriter::enqueue(Item item) {
   }
 }
 
+void MoveRewriter::comment(std::string_view text, const LineOrigin& origin) {
+  if (idle()) {
+    put_(text, origin);
+    return;
+  }
+  Item item;
+  item.origin = origin;
+  item.tail = text;
+  waiting_.push_back(std::move(item));
+}
+
 void MoveRewriter::flush() {
   if (waiting_.empty()) {
     return;

@@ -63,6 +63,7 @@ class Command:
 COMMANDS: tuple[Command, ...] = (
     Command("convert", "convert a CNC program into an input-shaped FANUC program, and check the result"),
     Command("simulate", "play a program on the machine's model: cycle time, vibration, contour error"),
+    Command("expand", "write the plain program that calls, macros and coordinate modes come to"),
     Command("time", "predict the cycle time of a program and show where the time goes"),
     Command("machine", "write or explain a machine file, or import one from the control's parameters"),
     Command("characterize", "measure a controller with test programs, and fit the machine file to the results"),

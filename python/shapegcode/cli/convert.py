@@ -65,8 +65,8 @@ def run(args: argparse.Namespace) -> int:
     """
     from shapegcode._core import ArgumentError
     from shapegcode.cli import ExitCode
-    from shapegcode.compensation import read_for_conversion
     from shapegcode.cli.console import output_console, print_before_after, progress, write_bytes, write_json
+    from shapegcode.compensation import read_for_conversion
     from shapegcode.converter import convert
 
     if args.output == "-":

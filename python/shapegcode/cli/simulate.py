@@ -6,7 +6,13 @@ import argparse
 from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, add_plots_argument, load_machine, refuse_same_file
+from shapegcode.cli.options import (
+    add_machine_argument,
+    add_plots_argument,
+    add_program_argument,
+    load_machine,
+    refuse_same_file,
+)
 
 __all__ = ["add_arguments", "run"]
 
@@ -19,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("input", metavar="IN", help="CNC program")
     add_machine_argument(parser)
+    add_program_argument(parser)
     parser.add_argument(
         "--shaped",
         action="store_true",
@@ -46,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json not in (None, "-"):
         refuse_same_file([Path(args.json)], [Path(args.input), Path(args.machine)])
     with progress(f"playing {args.input}", args.json) as bar:
-        program = Program.read(args.input, machine)
+        program = Program.read(args.input, machine, program_number=args.program)
         # A program of ours says so; played as an ordinary one it would show figures of nothing.
         shaped = args.shaped or written_by_shapegcode(program)
         simulation = simulate(

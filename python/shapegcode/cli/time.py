@@ -9,6 +9,7 @@ from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.options import (
     add_machine_argument,
     add_plots_argument,
+    add_program_argument,
     load_machine,
     override,
     ratio,
@@ -30,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("input", metavar="PROGRAM", help="CNC program")
     add_machine_argument(parser)
+    add_program_argument(parser)
     parser.add_argument(
         "--override",
         type=override,
@@ -75,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     stdout = "-" if "-" in (args.csv, args.json) else None
     with progress(f"timing {args.input}", stdout) as bar:
         bar.wait()
-        program = Program.read(args.input, machine)
+        program = Program.read(args.input, machine, program_number=args.program)
         wanted = args.csv is not None or args.blocks
         time = cycle_time(
             program,
