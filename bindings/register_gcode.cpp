@@ -184,6 +184,8 @@ void register_gcode(py::module_& module) {
           [](ReaderOptions& self, const std::string& type) { self.compensation_start_up = one_letter(type, "AB"); },
           "Start-up of cutter compensation, A or B (parameter 5003).")
       .def_readwrite("scale_unit", &ReaderOptions::scale_unit, "Of the factors of G51 without a point.")
+      .def_readwrite("peck_clearance_mm", &ReaderOptions::peck_clearance_mm,
+                     "To which a peck of G73 and G83 returns, mm (parameters 5114, 5115).")
       .def_readwrite("collect_alarms", &ReaderOptions::collect_alarms,
                      "Go on behind an alarm and keep all in ProgramText.alarms.")
       .def_readwrite("power_on", &ReaderOptions::power_on, "Modal state before the first block.")

@@ -349,7 +349,7 @@ class _Importer:
             for name, choose in choices:
                 self._set(f"power_on.{name}", choose(), 3402)
         speed = self._scalar(103, len(_BAUD) - 1)
-        if speed is not None and speed < 0:
+        if speed is not None and not 0 <= speed < len(_BAUD):
             self._miss(103, f"{speed:g}: no transfer speed has this code (0 to {len(_BAUD) - 1})")
         elif speed:
             self._set("controller.dnc_baud", _BAUD[int(speed)], 103)

@@ -388,6 +388,13 @@ class Input(Table):
         default=0.001,
         assumed=True,
     )
+    peck_clearance_mm: NonNegative = key(
+        "distance to which a peck of G73 and G83 returns before it feeds on; for the clock",
+        unit="mm",
+        fanuc="5114, 5115",
+        default=0.5,
+        assumed=True,
+    )
     block_skip: Literal["unknown", "on", "off"] = key(
         'block-skip switch on the panel: "on": blocks with / do not run; "off": they run; "unknown": either may be '
         "true, and nothing is shaped whose state depends on it",

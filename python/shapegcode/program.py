@@ -62,6 +62,7 @@ def reader_options(
     options.block_skip = [{"unknown": None, "on": True, "off": False}[machine.input.block_skip]] * 9
     options.expand_compensation = expand_compensation
     options.compensation_start_up = machine.input.compensation_start_up
+    options.peck_clearance_mm = machine.input.peck_clearance_mm
     options.scale_unit = machine.input.scale_unit
     options.collect_alarms = collect_alarms
     state = _core.ModalState()

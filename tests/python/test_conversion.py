@@ -257,15 +257,55 @@ def test_bytes_of_a_comment_are_kept() -> None:
     assert b"(\xfc\xb5)" in lines
 
 
-def test_what_is_not_supported_is_kept_with_a_warning() -> None:
-    text = part("G41D1G1X10.F600\nY10.\nG40G1X0\nG0X5.Y5.\nG1X20.,R2.\nY20.\nG68X0Y0R30.\nG1X3.\nG69\n")
-    machine = machine_with()
-    converted = sg.convert(sg.Program.from_text(text, machine), machine)
-    for line in ("G41D1G1X10.F600", "G40G1X0", "G1X20.,R2.", "G68X0Y0R30.", "G1X3."):
-        assert line in converted.text.decode().split("\n")
-    said = "\n".join(converted.report["warnings"])
-    for what in ("compensation", ",R", "G68"):
-        assert what in said
+COMPENSATED = part("G41D1G1X10.F600\nY10.\nG40G1X0\nG0X5.Y5.\nG1X20.,R2.\nY20.\n")
+
+
+def test_compensation_is_refused_unless_the_machine_file_decides() -> None:
+    machine = machine_with({"input.tool_radius_mm": {"1": 3.0}})
+    for program in (COMPENSATED, sg.Program.from_text(COMPENSATED, machine, expand_compensation=False)):
+        text = program if isinstance(program, sg.Program) else sg.Program.from_text(program, machine)
+        with pytest.raises(sg.ProgramError, match="cutter compensation"):
+            sg.convert(text, machine)
+
+
+def test_compensation_that_is_kept_stays_to_the_letter() -> None:
+    machine = machine_with({"input.compensation": "keep"})
+    converted = sg.convert(sg.Program.from_text(COMPENSATED, machine, expand_compensation=False), machine)
+    lines = converted.text.decode().split("\n")
+    for line in ("G41D1G1X10.F600", "Y10.", "G40G1X0"):
+        assert line in lines
+    assert any("compensation" in warning for warning in converted.report["warnings"])
+
+
+@pytest.mark.parametrize("guard", ["alarm", "stop"])
+def test_expanded_compensation_says_so_and_guards_its_radius(guard: str) -> None:
+    machine = machine_with(
+        {
+            "input.compensation": "expand",
+            "input.tool_radius_mm": {"1": 3.0},
+            "input.tool_radius_wear_mm": {"1": -0.02},
+            "emission.compensation_guard": guard,
+        }
+    )
+    converted = sg.convert(sg.Program.from_text(COMPENSATED, machine), machine)
+    text = converted.text.decode()
+    assert converted.report["expanded_radii_mm"] == {"D1": 2.98}
+    assert "(D1 RADIUS 2.98 MM EXPANDED - OFFSET DOES NOT ACT)\n" in text
+    assert not re.search(r"G4[12](?!\d)|D1G|,R", text)
+    if guard == "stop":
+        assert "\nM00(CHECK D1 RADIUS 2.98 WITH WEAR)\n" in text
+        return
+    assert re.search(r"\nIF\[.*#13001\+#12001.*\]THEN#3000=1\(D1 CHANGED\)\n", text)
+    # With another offset in the control the program stops before it moves.
+    other = machine_with({"input.tool_radius_mm": {"1": 3.0}, "input.tool_radius_wear_mm": {"1": 0.01}})
+    with pytest.raises(sg.ProgramError, match="3001"):
+        sg.Program.from_text(text, other)
+
+
+def test_a_radius_that_is_not_known_cannot_be_expanded() -> None:
+    machine = machine_with({"input.compensation": "expand"})
+    with pytest.raises(sg.ProgramError, match=r"radius of offset D1 is not known"):
+        sg.convert(sg.Program.from_text(COMPENSATED, machine), machine)
 
 
 def test_inserted_lines_stand_at_every_region() -> None:

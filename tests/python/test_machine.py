@@ -137,7 +137,7 @@ def test_kimm004_has_the_first_set_of_constants_of_paper_004() -> None:
     machine = Machine.load("kimm004")
     controller = machine.controller
     assert controller.motion == "after_interpolation"
-    assert (controller.rapid_time_constant_s, controller.rapid_bell_time_s) == (0.15, 0.03)
+    assert (controller.rapid_time_constant_s.as_tuple(), controller.rapid_bell_time_s) == ((0.15,) * 3, 0.03)
     assert controller.time_constant_s == 0.05
     assert controller.rapid_path == "linear"
     assert controller.in_position_s.as_tuple() == (0.025, 0.025, 0.12)

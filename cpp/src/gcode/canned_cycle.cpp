@@ -6,9 +6,6 @@
 namespace shapegcode {
 namespace {
 
-// Clearance to which a peck returns before it feeds on (parameter 5114/5115; the value on a given machine is not
-// known).
-constexpr double peck_clearance_mm = 0.5;
 constexpr int max_pecks = 10'000;
 
 }  // namespace
@@ -69,9 +66,9 @@ Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, doubl
       const double reached = std::min(depth, i * cycle.peck_mm);
       go(cycle.r_mm + down * reached, false);
       if (i < count) {
-        const double back = cycle.code == 83 ? 0.0 : std::max(0.0, reached - peck_clearance_mm);
+        const double back = cycle.code == 83 ? 0.0 : std::max(0.0, reached - cycle.clearance_mm);
         go(cycle.r_mm + down * back, true);
-        go(cycle.r_mm + down * std::max(0.0, reached - peck_clearance_mm), true);
+        go(cycle.r_mm + down * std::max(0.0, reached - cycle.clearance_mm), true);
       }
     }
   } else {

@@ -101,6 +101,7 @@ void Interpreter::read_codes(LineFlow& flow) {
         } else {
           if (state_.cycle == 80) {
             cycle_ = CannedCycle{};
+            cycle_.clearance_mm = options_.peck_clearance_mm;
             cycle_.initial_mm = state_.position_mm[plane_normal(state_.plane)];
           }
           state_.cycle = whole;

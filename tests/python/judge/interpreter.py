@@ -528,7 +528,8 @@ class _Interpreter:
             sweep=-sweep if clockwise else sweep,
             normal_axis=normal,
         )
-        return Move(**{**move.__dict__, "feed": self.block_feed(move.length)})
+        # In G93 the F of an arc counts its radius.
+        return Move(**{**move.__dict__, "feed": self.block_feed(radius)})
 
     def centre_from_words(self, values: Mapping[str, float], a: int, b: int, start: Vector) -> tuple[float, float]:
         given = [CENTRE_WORDS[k] for k in (a, b) if CENTRE_WORDS[k] in values]

@@ -60,6 +60,7 @@ struct ReaderOptions {
   bool expand_compensation = true;                ///< G41/G42 become plain moves; false: kept as they stand
   char compensation_start_up = 'A';               ///< type A or B (parameter 5003)
   double scale_unit = 0.001;                      ///< of P, I, J, K of G51 without a point (parameter 5400#7)
+  double peck_clearance_mm = 0.5;                 ///< of G73 and G83 (parameters 5114, 5115)
   bool collect_alarms = false;                    ///< go on behind an alarm, and keep all in Program::alarms
   ModalState power_on;                            ///< state at the first block
   std::vector<std::uint32_t> probe_lines;  ///< ascending lines behind which the modal state is kept (Program::probed)
