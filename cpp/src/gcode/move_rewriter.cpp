@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "message.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/gcode/arc_geometry.hpp"
 
@@ -117,7 +118,7 @@ void MoveRewriter::block(const Block& block, const BlockWords& words, std::strin
       read_move(item);
     }
   } else if (corner_waits_ && words.has_any(~letter_mask("N"))) {
-    throw alarm_error(51, "a block with ,R or ,C must be followed by a move in the plane", origin.line, 1);
+    refuse_corner(origin.line);
   }
   if (item.move || !item.head.empty() || !item.tail.empty()) {
     enqueue(std::move(item));
@@ -290,9 +291,9 @@ void MoveRewriter::set_scaling(int g_tenths) {
     const Word& word = words[letter];
     const double value = word.has_point ? word.value : word.value * options_.scale_unit;
     if (!(std::abs(value) > 0.0) || std::abs(value) > 1000.0) {
-      fail(
-          std::string("scaling factor ") + letter + " is " + std::to_string(value) + ", must not be 0 and at most 1000",
-          word.column);
+      throw alarm_error(142,
+                        format_message("scaling factor %c = %g, which must not be 0 nor above 1000", letter, value),
+                        origin_.line, word.column);
     }
     return value;
   };
