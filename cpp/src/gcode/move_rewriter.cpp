@@ -127,7 +127,14 @@ void MoveRewriter::block(const Block& block, const BlockWords& words, std::strin
 
 // G27 ... G30, G53, G92, G52 and G54 ... speak of coordinates that the modes do not change.
 void MoveRewriter::refuse_machine_coordinates() const {
-  if (!modes_.active() && !polar_) {
+  // The cancelling code may share its block with others ("G40 G69 G80 G54", the safety line of many programs).
+  CoordinateModes left = modes_;
+  left.rotation = left.rotation && !has_code(*words_, 690);
+  left.scaling = left.scaling && !has_code(*words_, 500);
+  if (has_code(*words_, 501) && !words_->has_any(axis_letters)) {
+    left.mirror = {};
+  }
+  if (!left.active() && (!polar_ || has_code(*words_, 150))) {
     return;
   }
   for (int k = 0; k < words_->g_count; ++k) {
