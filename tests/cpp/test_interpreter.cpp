@@ -646,8 +646,8 @@ TEST_CASE("interpreter: what is no program is refused") {
 TEST_CASE("interpreter: unknown and unsupported codes are refused with their column") {
   check_refused(framed("G90 G77 X1.\n"), 4, 5, {"unknown G code G77"});
   check_refused(framed("G90 G54.7 X1.\n"), 4, 5, {"G54.7"});
-  check_refused(framed("G1.23 X1.\n"), 4, 1, {"G code"});
-  check_refused(framed("G-1 X1.\n"), 4, 1, {"G code"});
+  check_refused(framed("G1.23 X1.\n"), 4, 1, {"unknown G code G1.23", "0010"});
+  check_refused(framed("G-1 X1.\n"), 4, 1, {"minus sign in G code G-1", "0006"});
   check_refused(framed("N5 G65 P8000\n"), 4, 1, {"O8000", "0078"});
   check_refused(framed("G66 P9000\n"), 4, 1, {"G66", "0078"});
   check_refused(framed("G07.1 C50.\n"), 4, 1, {"G7.1"});
@@ -662,7 +662,55 @@ TEST_CASE("interpreter: unknown and unsupported codes are refused with their col
   check_refused(framed("M1 M2 M3 M4 M5 M6 M7\n"), 4, 19, {"6 M codes"});
   check_refused(framed("G04\n"), 4, 1, {"G04 needs P"});
   check_refused(framed("G04 P1.5\n"), 4, 5, {"0007"});
-  check_refused(framed("N-5 G01 X1. F60.\n"), 4, 1, {"sequence number"});
+  check_refused(framed("N-5 G01 X1. F60.\n"), 4, 1, {"minus sign in address N", "0006"});
+  check_refused(framed("G01 X1. E2. F60.\n"), 4, 9, {"address E", "0009"});
+  check_refused(framed("M98 M99 P2\n"), 4, 5, {"M99 in one block with M98"});
+}
+
+TEST_CASE("interpreter: a decimal point is refused where whole numbers belong") {
+  for (const char* word : {"M3.", "S1000.5", "T1.", "N1.", "O1.", "H1.", "D1.", "L2."}) {
+    check_refused(framed(std::string(word) + "\n"), 4, 1,
+                  {"decimal point in address " + std::string(1, word[0]), "0007"});
+  }
+  check_refused(framed("M98 P1. L2\n"), 4, 5, {"program number P", "0007"});
+  check_refused(framed("M98 P1 L2.\n"), 4, 8, {"repetitions L", "0007"});
+}
+
+TEST_CASE("interpreter: axis values beyond eight digits are refused in every kind of move") {
+  for (const char* code : {"G00", "G01 F60.", "G81 Z-1. R1. F60."}) {
+    CAPTURE(std::string(code));
+    const Refusal found = refusal(framed(std::string(code) + " X100000.\n"));
+    CHECK(found.message == "X100000.0000 lies outside +-99999.9990 (alarm 0003)");
+  }
+  CHECK_FALSE(refusal(framed("G00 X-99999.999\n")).thrown);
+}
+
+TEST_CASE("interpreter: the repetitions of a cycle may carry a point but no fraction") {
+  const auto holes = [](const std::string& k) {
+    return read("G00 Z10.\nG91 G98 G81 X10. Z-7. R-8. " + k + " F60.\nG80\n").final_state.position_mm.x();
+  };
+  CHECK(holes("K3") == 30.0);
+  CHECK(holes("K3.") == 30.0);  // as a computed K is written
+  check_refused(framed("G81 Z-1. R1. K1.5 F60.\n"), 4, 14, {"K1.5", "0007"});
+}
+
+TEST_CASE("interpreter: an error of a block that waited is that block's own") {
+  // The corner and the compensated span are worked out later than they are read.
+  check_refused(framed("G01 X5. F60.\nX10. ,R20.\nY10.\n"), 5, 6, {",R20.0000", "0055"});
+  check_refused(framed("G10 L12 P1 R5.\nG01 G42 D1 X10. F60.\nX30.\nG02 X34. Y-4. R4.\nG01 Y-20.\nG40 X0.\n"), 7, 1,
+                {"4.0000", "5.0000", "0041"});
+}
+
+TEST_CASE("interpreter: a text that breaks off is refused at its last line") {
+  for (const char* text : {"G#5G#5", "G21\nG90\nG00X0", "G21\nG90\nG00X0\n", "G21\nM98P2\nO2\nM99\n"}) {
+    CAPTURE(std::string(text));
+    const Refusal found = refusal(text);
+    const std::string lines = text;
+    CHECK(found.thrown);
+    CHECK(found.line >= 1);
+    CHECK(found.line <= static_cast<std::uint32_t>(1 + std::count(lines.begin(), lines.end() - 1, '\n')));
+    CHECK(found.column >= 1);
+  }
 }
 
 TEST_CASE("interpreter: a line over the limit is refused with its length") {
@@ -789,11 +837,11 @@ TEST_CASE("interpreter: rapids and dwells between the regions") {
   ReaderOptions increments;
   increments.calculator_decimal_point = false;
   CHECK(read("G04 X2500\n", increments).other_moves[0].dwell_s == doctest::Approx(2.5));
-  check_refused(framed("G04 P-5\n"), 4, 1, {"negative"});
+  check_refused(framed("G04 P-5\n"), 4, 5, {"G04 P-5 is negative", "0006"});
 }
 
 TEST_CASE("interpreter: a drilling cycle runs down and back, modal from hole to hole") {
-  // From Z10: rapid over the hole, rapid to R2, feed to Z-5, rapid to the return level.
+  // From Z10: rapid over the hole, rapid to R2, feed to Z-5, one rapid to the return level.
   const Program program = read("G00 Z10.\nG98 G81 X10. Y0. Z-5. R2. F60.\nX20.\nG80\nG00 X0.\n");
   CHECK(program.regions.empty());
   const auto& moves = program.other_moves;
@@ -801,9 +849,9 @@ TEST_CASE("interpreter: a drilling cycle runs down and back, modal from hole to 
     Vector3 end;
     double feed;
   };
-  const std::vector<Expected> expected = {{{0, 0, 10}, 0},  {{10, 0, 10}, 0}, {{10, 0, 2}, 0},  {{10, 0, -5}, 1},
-                                          {{10, 0, 2}, 0},  {{10, 0, 10}, 0}, {{20, 0, 10}, 0}, {{20, 0, 2}, 0},
-                                          {{20, 0, -5}, 1}, {{20, 0, 2}, 0},  {{20, 0, 10}, 0}, {{0, 0, 10}, 0}};
+  const std::vector<Expected> expected = {{{0, 0, 10}, 0},  {{10, 0, 10}, 0}, {{10, 0, 2}, 0}, {{10, 0, -5}, 1},
+                                          {{10, 0, 10}, 0}, {{20, 0, 10}, 0}, {{20, 0, 2}, 0}, {{20, 0, -5}, 1},
+                                          {{20, 0, 10}, 0}, {{0, 0, 10}, 0}};
   REQUIRE(moves.size() == expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
     CAPTURE(i);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "message.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode::detail {
@@ -146,10 +147,15 @@ void sort_words(const Block& block, std::uint32_t line, BlockWords& words) {
       case 'G': {
         const double tenths = word.value * 10.0;
         const int code = static_cast<int>(std::lround(tenths));
-        if (std::abs(tenths - code) > 1e-6 || code < 0 || words.g_count == static_cast<int>(words.g_tenths.size())) {
-          throw alarm_error(code < 0 ? 6 : 10,
-                            code < 0 ? "G code with a minus sign" : "unknown G code or too many G codes in a block",
-                            line, word.column);
+        if (word.value < 0.0) {
+          throw alarm_error(6, format_message("minus sign in G code G%g", word.value), line, word.column);
+        }
+        if (std::abs(tenths - code) > 1e-6) {
+          throw alarm_error(10, format_message("unknown G code G%.8g", word.value), line, word.column);
+        }
+        if (words.g_count == static_cast<int>(words.g_tenths.size())) {
+          throw Error(ErrorKind::program, format_message("more than %zu G codes in a block", words.g_tenths.size()),
+                      line, word.column);
         }
         words.g_tenths[static_cast<std::size_t>(words.g_count)] = code;
         words.g_column[static_cast<std::size_t>(words.g_count)] = word.column;

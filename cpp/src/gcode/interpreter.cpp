@@ -125,7 +125,12 @@ void Interpreter::require_plain_words(std::uint32_t line) const {
                         line, words_[letter].column);
     }
   }
-  if (words_.has('E') && state_.motion != 33 && (words_.groups & group_bit(Group::motion)) == 0) {
+  int motion = state_.motion;
+  for (int k = 0; k < words_.g_count; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    motion = words_.g_group[i] == Group::motion ? words_.g_tenths[i] / 10 : motion;
+  }
+  if (words_.has('E') && motion != 33) {
     throw alarm_error(9, "address E is used with threading G33 only", line, words_['E'].column);
   }
 }
@@ -141,13 +146,6 @@ void Interpreter::execute(std::uint32_t line, const LineOrigin& origin, std::siz
   require_plain_words(line);
   if (block_.word_count > 0) {
     ++program_.block_count;
-  }
-  if (words_.has('N')) {
-    const double n = words_['N'].value;
-    if (n < 0.0 || n > 99'999'999.0) {
-      fail("sequence number N" + std::to_string(static_cast<std::int64_t>(n)) + " outside 0 ... 99999999",
-           words_['N'].column);
-    }
   }
   const ModalState before = state_;
   const std::uint32_t foreign_before = foreign_;

@@ -1,5 +1,6 @@
 // Codes that change the modal state or what is known of the position.
 #include "interpreter_impl.hpp"
+#include "message.hpp"
 
 namespace shapegcode::detail {
 
@@ -145,6 +146,9 @@ void Interpreter::read_codes(LineFlow& flow) {
         one_shot_axes_ = one_shot_axes_ || g == 220;  // the others may share their block with a move
         break;
       case Group::unknown_position:
+        if (g == 270 || g == 290) {
+          refuse_in_cycle(g);
+        }
         flow.stop = true;
         one_shot_axes_ = true;
         if (words_.has_any(axis_letters)) {
@@ -198,20 +202,23 @@ void Interpreter::length_offset(int whole) {
 
 void Interpreter::dwell() {
   double seconds = 0.0;
+  const Word* time = nullptr;
   if (words_.has('P')) {
     const Word& p = words_['P'];
     if (p.has_point) {
       alarm(7, "G04 P takes whole milliseconds: no decimal point", p.column);
     }
     seconds = p.value * 1e-3;
+    time = &p;
   } else if (words_.has('X') || words_.has('U')) {
     const Word& x = words_[words_.has('X') ? 'X' : 'U'];
     seconds = x.has_point || options_.calculator_decimal_point ? x.value : x.value * 1e-3;
+    time = &x;
   } else {
     fail("G04 needs P (milliseconds) or X (seconds)");
   }
   if (seconds < 0.0) {
-    alarm(6, "dwell G04 is negative");
+    alarm(6, format_message("dwell G04 %c%g is negative", time->letter, time->value), time->column);
   }
   add_move({make_line(state_.position_mm, state_.position_mm, 0.0, line_number_), seconds});
 }
@@ -251,7 +258,9 @@ void Interpreter::data_setting() {
         return;
       }
       if (kind >= 10) {
-        alarm(31, "G10 L" + std::to_string(kind) + " needs an offset number P and a value R");
+        const bool value = words_.has('P');
+        alarm(value ? 32 : 31,
+              "G10 L" + std::to_string(kind) + (value ? " without a value R" : " without an offset number P"));
       }
       break;
     case 50:
@@ -329,6 +338,22 @@ void Interpreter::set_tool_offset(int kind) {
   }
 }
 
+// G27 ... G30 while a drilling cycle is on.
+void Interpreter::refuse_in_cycle(int g_tenths) const {
+  if (state_.cycle == 80) {
+    return;
+  }
+  std::uint32_t column = 1;
+  for (int k = 0; k < words_.g_count; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    column = words_.g_tenths[i] == g_tenths ? words_.g_column[i] : column;
+  }
+  alarm(44,
+        "G" + std::to_string(g_tenths / 10) + " while the drilling cycle G" + std::to_string(state_.cycle) +
+            " is on: cancel it with G80",
+        column);
+}
+
 void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
   switch (g_tenths) {
     case 90:
@@ -373,12 +398,12 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
       }
       return;
     default:  // G28, G30, G53: machine coordinates
-      if (g_tenths != 530 && state_.cycle != 80) {
-        alarm(44, "G" + std::to_string(g_tenths / 10) + " while the drilling cycle G" + std::to_string(state_.cycle) +
-                      " is on: cancel it with G80");
+      if (g_tenths != 530) {
+        refuse_in_cycle(g_tenths);
       }
       if (g_tenths == 300 && words_.has('P') && (words_['P'].value < 2.0 || words_['P'].value > 4.0)) {
-        alarm(46, "G30 P: the reference points are 2, 3 and 4", words_['P'].column);
+        alarm(46, format_message("G30 P%g: the reference points are P2, P3 and P4", words_['P'].value),
+              words_['P'].column);
       }
       flow.stop = true;
       one_shot_axes_ = true;

@@ -71,6 +71,7 @@ class Interpreter {
 
   void optional_skip_block(const ModalState& before);
   void read_codes(LineFlow& flow);
+  void refuse_in_cycle(int g_tenths) const;
   void one_shot(int g_tenths, LineFlow& flow);
   void dwell();
   void data_setting();

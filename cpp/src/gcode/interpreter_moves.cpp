@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "interpreter_impl.hpp"
+#include "message.hpp"
 #include "shapegcode/gcode/arc_geometry.hpp"
 
 namespace shapegcode::detail {
@@ -105,6 +106,7 @@ Segment Interpreter::cutting_segment(const Vector3& end) const {
 }
 
 void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t begin, std::size_t end) {
+  check_range();
   if (!distance_given_) {
     warn_once(seen_distance_, "neither G90 nor G91 before the first move: G" + std::to_string(state_.distance) +
                                   " assumed (power_on.distance)");
@@ -163,7 +165,6 @@ void Interpreter::cut(const char* why_kept, const ModalState& before, std::size_
     alarm(11, words_.has('F') ? "cutting move with feed F0" : "cutting move, but no feed F was given",
           words_.has('F') ? words_['F'].column : 1);
   }
-  check_range();
   Vector3 to;
   std::array<bool, 3> known_after{};
   bool relative = false;
@@ -253,8 +254,14 @@ void Interpreter::cycle_block() {
   int repeats = 1;
   for (char letter : {'K', 'L'}) {
     if (words_.has(letter)) {
-      if (words_[letter].value < 0.0) {
-        alarm(6, std::string("minus sign in the repetitions ") + letter + " of a drilling cycle",
+      const double count = words_[letter].value;
+      if (count < 0.0) {
+        alarm(6, format_message("minus sign in the repetitions %c%g of a drilling cycle", letter, count),
+              words_[letter].column);
+      }
+      // A computed K carries a point ("K3."): only a fraction is wrong.
+      if (count != std::floor(count)) {
+        alarm(7, format_message("repetitions %c%g of a drilling cycle are no whole number", letter, count),
               words_[letter].column);
       }
       repeats = static_cast<int>(std::min(words_[letter].value, 9999.0));
@@ -264,7 +271,11 @@ void Interpreter::cycle_block() {
     alarm(11, "drilling cycle G" + std::to_string(state_.cycle) + " without a feed F");
   }
   if ((state_.cycle == 73 || state_.cycle == 83) && repeats > 0 && !(cycle_.peck_mm > 0.0)) {
-    alarm(45, "drilling cycle G" + std::to_string(state_.cycle) + " without a depth of cut Q");
+    const bool given = words_.has('Q');
+    alarm(45,
+          "drilling cycle G" + std::to_string(state_.cycle) +
+              (given ? " with a depth of cut Q of 0" : " without a depth of cut Q"),
+          given ? words_['Q'].column : 1);
   }
   const double rate = state_.feed_mode != 93 ? feed_mm_per_s(0.0) : 0.0;
   for (int k = 0; k < repeats && foreign_ == 0; ++k) {

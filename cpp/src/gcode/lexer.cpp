@@ -183,6 +183,12 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
       } else {
         alarm(9, "',' without R or C", line, i);
       }
+    } else if ((c == '.' || c == '-') && block.word_count > 0 && block.words[block.word_count - 1].end == i) {
+      const char letter = block.words[block.word_count - 1].letter;
+      const std::string name = letter == '<' ? ",R" : letter == '>' ? ",C" : std::string(1, letter);
+      alarm(c == '.' ? 7 : 6,
+            (c == '.' ? "second decimal point in address " : "minus sign behind the number of address ") + name, line,
+            i);
     } else if (is_digit(c) || c == '.' || c == '-' || c == '+') {
       alarm(4, quoted(c) + " stands where an address is expected", line, i);
     } else {

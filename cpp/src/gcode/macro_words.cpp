@@ -242,6 +242,10 @@ class ArgumentReader {
       bool is_computed = false;
       bool has_point = false;
       const MacroValue value = read_operand(i, is_computed, has_point);
+      if (called_ && has_point && (letter == 'P' || letter == 'L')) {
+        fail(7, std::string("decimal point in address ") + letter + " of a macro call, which takes whole numbers",
+             line_number_, at);
+      }
       take(letter, value, is_computed || has_point, at);
     }
     return arguments_;

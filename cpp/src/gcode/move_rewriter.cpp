@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "message.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/gcode/arc_geometry.hpp"
 
@@ -132,7 +133,7 @@ void MoveRewriter::block(const Block& block, const BlockWords& words, std::strin
   if (words.has_any(axis_letters | centre_letters) && !own_axes) {
     read_move(item);
   } else if (corner_waits_ && words.has_any(~letter_mask("N"))) {
-    throw alarm_error(51, "a block with ,R or ,C must be followed by a move in the plane", origin.line, 1);
+    refuse_corner(origin.line);
   }
   if (item.move || !item.head.empty() || !item.tail.empty()) {
     enqueue(std::move(item));
@@ -141,7 +142,14 @@ void MoveRewriter::block(const Block& block, const BlockWords& words, std::strin
 
 // G27 ... G30, G53, G92, G52 and G54 ... speak of coordinates that the modes do not change.
 void MoveRewriter::refuse_machine_coordinates() const {
-  if (!modes_.active() && !polar_) {
+  // The cancelling code may share its block with others ("G40 G69 G80 G54", the safety line of many programs).
+  CoordinateModes left = modes_;
+  left.rotation = left.rotation && !has_code(*words_, 690);
+  left.scaling = left.scaling && !has_code(*words_, 500);
+  if (has_code(*words_, 501) && !words_->has_any(axis_letters)) {
+    left.mirror = {};
+  }
+  if (!left.active() && (!polar_ || has_code(*words_, 150))) {
     return;
   }
   for (int k = 0; k < words_->g_count; ++k) {
@@ -306,9 +314,9 @@ void MoveRewriter::set_scaling(int g_tenths) {
     const Word& word = words[letter];
     const double value = word.has_point ? word.value : word.value * options_.scale_unit;
     if (!(std::abs(value) > 0.0) || std::abs(value) > 1000.0) {
-      fail(
-          std::string("scaling factor ") + letter + " is " + std::to_string(value) + ", must not be 0 and at most 1000",
-          word.column);
+      throw alarm_error(142,
+                        format_message("scaling factor %c = %g, which must not be 0 nor above 1000", letter, value),
+                        origin_.line, word.column);
     }
     return value;
   };

@@ -76,6 +76,7 @@ class MoveRewriter {
   [[nodiscard]] double increment_mm(int units) const noexcept;
   void append_length(std::string& text, char letter, double value_mm, int units) const;
   [[noreturn]] void fail(const std::string& message, std::uint32_t column = 1) const;
+  [[noreturn]] void refuse_corner(std::uint32_t line);
   [[nodiscard]] double angle_rad(const Word& word) const noexcept;
 
   const ReaderOptions& options_;

@@ -121,10 +121,11 @@ void Reader::put(std::string_view flat, const LineOrigin& origin) {
 }
 
 Error Reader::located(const Error& error) const {
-  // Errors of the interpreter count the lines of the expanded text.
-  Error result(error.kind(), error.what() + call_stack(), program_.expanded ? here_.line : error.line(), error.column(),
-               error.alarm());
-  result.set_file(program_.files[frames_.empty() ? 0 : frames_.back().unit->file]);
+  // An error of a block that waited (compensation, corners) carries that block's line.
+  Error result(error.kind(), error.what() + call_stack(), error.line() > 0 ? error.line() : here_.line,
+               std::max<std::uint32_t>(error.column(), 1), error.alarm());
+  const std::string& file = program_.files[frames_.empty() ? 0 : frames_.back().unit->file];
+  result.set_file(error.file().empty() ? file : error.file());
   return result;
 }
 
@@ -237,6 +238,7 @@ void Reader::line(std::string_view text, std::size_t begin, std::size_t end) {
 // The O line at a program's head: that of a called program becomes a comment.
 void Reader::program_line(std::size_t begin, std::size_t end) {
   const Block& block = interpreter_.block();
+  interpreter_.require_plain_words(here_.line);
   const auto number = static_cast<std::int64_t>(interpreter_.words()['O'].value);
   std::string comments;
   for (std::size_t i = 0; i < block.comment_count; ++i) {
@@ -295,6 +297,7 @@ void Reader::plain_line(std::string_view text, std::size_t begin, std::size_t en
 }
 
 void Reader::finish() {
+  const std::uint32_t last_of_text = std::max<std::uint32_t>(program_.line_count, 1);
   try {
     rewriter_.flush();
   } catch (const Error& error) {
@@ -312,7 +315,7 @@ void Reader::finish() {
   const std::uint32_t last = here_.line;
   if (!interpreter_.ended() && !framed_) {
     const Error error(ErrorKind::program, "the program has neither '%' lines nor an end M30 or M02: truncated?",
-                      std::max({program_.expanded ? 0U : program_.line_count, last, 1U}), 1);
+                      last_of_text, 1);
     if (!record(error)) {
       throw error;
     }

@@ -60,6 +60,9 @@ bool Reader::call_block(std::string_view text, std::string_view raw) {
       return true;
     }
   }
+  if (has_m(words, 99) && (has_m(words, 98) || has_m(words, 198))) {
+    fail("M99 in one block with M98 or M198: a block either calls or returns", words['M'].column);
+  }
   if (has_m(words, 99)) {
     subprogram_return(text);
   } else if (has_m(words, 98) || has_m(words, 198)) {
@@ -107,6 +110,9 @@ void Reader::subprogram_call(std::string_view text) {
   }
   if (words['P'].has_point) {
     alarm(7, "decimal point in the program number P of M98", words['P'].column);
+  }
+  if (words.has('L') && words['L'].has_point) {
+    alarm(7, "decimal point in the repetitions L of M98", words['L'].column);
   }
   const auto p = static_cast<std::int64_t>(words['P'].value);
   std::int64_t number = p;

@@ -159,12 +159,21 @@ void MoveRewriter::meet_corner(Item& item) {
   }
 }
 
+// No move of the plane behind a corner word; `line` has something else, 0: nothing comes.
+void MoveRewriter::refuse_corner(std::uint32_t line) {
+  corner_waits_ = false;
+  throw alarm_error(51,
+                    "a block with ,R or ,C must be followed by a move in the plane" +
+                        (line > 0 ? ", and line " + std::to_string(line) + " has none" : std::string()),
+                    corner_origin_.line, corner_column_);
+}
+
 void MoveRewriter::enqueue(Item item) {
   const int normal = plane_normal(programmed_.plane);
   const bool moves_in_plane = item.move && !item.cycle && in_plane(item.segment, normal);
   if (corner_waits_ && item.move) {
     if (!moves_in_plane) {
-      throw alarm_error(51, "a block with ,R or ,C must be followed by a move in the plane", item.origin.line, 1);
+      refuse_corner(item.origin.line);
     }
     meet_corner(item);
     corner_waits_ = false;
@@ -207,8 +216,7 @@ void MoveRewriter::flush() {
     corner_waits_ = false;
     span_open_ = false;
     waiting_.clear();
-    throw alarm_error(51, "a block with ,R or ,C must be followed by a move in the plane", corner_origin_.line,
-                      corner_column_);
+    refuse_corner(0);
   }
   std::vector<Item> items;
   items.swap(waiting_);
@@ -230,8 +238,13 @@ void MoveRewriter::flush() {
       for (CompensatedMove& move : compensate(blocks, plane_normal(programmed_.plane), options)) {
         moves[of_item[move.source]].push_back(move.segment);
       }
-    } catch (...) {
+    } catch (Error& error) {
       span_open_ = false;
+      for (const Item& item : items) {
+        if (item.move && item.origin.line == error.line()) {
+          error.set_file(program_.files[item.origin.file]);
+        }
+      }
       throw;
     }
   }
