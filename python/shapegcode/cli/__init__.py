@@ -64,6 +64,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("convert", "convert a CNC program into an input-shaped FANUC program, and check the result"),
     Command("simulate", "play a program on the machine's model: cycle time, vibration, contour error"),
     Command("time", "predict the cycle time of a program and show where the time goes"),
+    Command("check", "list what the controller would refuse in a program, or not run as programmed"),
     Command("machine", "write or explain a machine file, or import one from the control's parameters"),
     Command("characterize", "measure a controller with test programs, and fit the machine file to the results"),
     Command("demo", "repeat the figures of a paper beside the published ones"),
