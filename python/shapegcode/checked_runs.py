@@ -6,6 +6,8 @@ in order; `Program.place` leads back to the source.
 
 from __future__ import annotations
 
+import itertools
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -18,7 +20,7 @@ from shapegcode.controller import controller_model
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 
-__all__ = ["BlockTable", "Breaker", "Run", "block_table", "look_ahead_breakers"]
+__all__ = ["BlockTable", "Breaker", "ClampedFeed", "Run", "block_table", "look_ahead_breakers"]
 
 _CUTTING, _RAPID, _DWELL = (
     kind.value for kind in (_core.BlockKind.cutting, _core.BlockKind.rapid, _core.BlockKind.dwell)
@@ -31,6 +33,16 @@ _RESOLUTION_S = _PERIOD_S * _SLOW_MOTION
 _NO_LIMIT = 1e12
 _ROUNDING = 1e-6
 _FIRST_PLACES = 20
+
+# What a stop between two cutting moves does, worst first.
+_STOPS = "the control stops reading ahead, and the tool stands in the cut"
+_CANCELS = "it cancels the look-ahead mode for its block, and the tool stands in the cut"
+_ASKED = "the tool stands in the cut, as programmed"
+_STOPS_READING = "the control reads ahead only up to here"
+_MAY_CANCEL = "in a look-ahead mode the tool would stand in the cut"
+_EFFECTS = (_STOPS, _CANCELS, _ASKED, _STOPS_READING, _MAY_CANCEL)
+_CODED = re.compile(rb"[Gg] *0*(53|9|61)(?![\d.])")
+_COMMENT = re.compile(rb"\([^()\r\n]*\)?")
 
 
 @dataclass(frozen=True)
@@ -47,10 +59,6 @@ class Run:
         short_blocks: blocks below the block time.
         shortest_s: shortest block.
         first_short_line: line of the first short block, 0: none.
-        slowed_blocks: blocks whose F is above what the axes allow.
-        slowest_ratio: least share of F that is possible.
-        slowed_feed_mm_per_min: F of that block.
-        slowed_line: line of that block, 0: none.
     """
 
     first_line: int
@@ -62,10 +70,23 @@ class Run:
     short_blocks: int
     shortest_s: float
     first_short_line: int
-    slowed_blocks: int
-    slowest_ratio: float
-    slowed_feed_mm_per_min: float
-    slowed_line: int
+
+
+@dataclass(frozen=True)
+class ClampedFeed:
+    """An F that the axes cannot follow, all its blocks together.
+
+    Attributes:
+        feed_mm_per_min: as programmed.
+        first_line: line of its first block that is slowed.
+        blocks: how many are.
+        least_mm_per_min: feed along the path in the slowest of them.
+    """
+
+    feed_mm_per_min: float
+    first_line: int
+    blocks: int
+    least_mm_per_min: float
 
 
 @dataclass(frozen=True)
@@ -78,6 +99,7 @@ class BlockTable:
         rapid_lines: ascending line of every rapid.
         dwell_lines: ascending line of every dwell.
         first_short_lines: lines of the first short blocks.
+        clamped_feeds: by feed, ascending.
     """
 
     runs: tuple[Run, ...]
@@ -85,6 +107,7 @@ class BlockTable:
     rapid_lines: npt.NDArray[np.int64]
     dwell_lines: npt.NDArray[np.int64]
     first_short_lines: tuple[int, ...]
+    clamped_feeds: tuple[ClampedFeed, ...]
 
 
 @dataclass(frozen=True)
@@ -108,7 +131,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     cutting = np.flatnonzero(limited["kind"] == _CUTTING)
     lines_of = {kind: limited["line"][limited["kind"] == kind].astype(np.int64) for kind in (_RAPID, _DWELL)}
     if cutting.size == 0:
-        return BlockTable((), np.empty(0, np.int64), lines_of[_RAPID], lines_of[_DWELL], ())
+        return BlockTable((), np.empty(0, np.int64), lines_of[_RAPID], lines_of[_DWELL], (), ())
     free = _timed(program, machine, with_limits=False)[cutting]
     rows = limited[cutting]
     lines = rows["line"].astype(np.int64)
@@ -125,17 +148,15 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     short = duration < block_time * (1.0 - _ROUNDING)
     ratio = programmed / np.maximum(duration, _RESOLUTION_S)
     slowed = (ratio < 1.0 - _ROUNDING) & (duration - programmed > 2.0 * _RESOLUTION_S)
-    ratio[~slowed] = 1.0
+    clamped = tuple(_clamped_feeds(line[slowed], feed[slowed], ratio[slowed]))
     line_bytes = _line_offsets(program)
     bounds = np.append(np.flatnonzero(np.diff(run_of_block, prepend=-1)), line.size).tolist()
     short_at, runs = np.flatnonzero(short), []
     taken = np.maximum(duration, block_time)
-    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for begin, end in itertools.pairwise(bounds):
         first, last = int(line[begin]), int(line[end - 1])
         first_short = int(np.searchsorted(short_at, begin))
         shorts = int(np.searchsorted(short_at, end)) - first_short
-        worst = begin + int(np.argmin(ratio[begin:end]))
-        slow = int(np.count_nonzero(slowed[begin:end]))
         runs.append(
             Run(
                 first,
@@ -147,14 +168,25 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
                 shorts,
                 float(duration[begin:end].min()),
                 int(line[short_at[first_short]]) if shorts else 0,
-                slow,
-                float(ratio[worst]),
-                float(feed[worst]),
-                int(line[worst]) if slow else 0,
             )
         )
     firsts = tuple(line[short_at[:_FIRST_PLACES]].tolist())
-    return BlockTable(tuple(runs), lines, lines_of[_RAPID], lines_of[_DWELL], firsts)
+    return BlockTable(tuple(runs), lines, lines_of[_RAPID], lines_of[_DWELL], firsts, clamped)
+
+
+def _clamped_feeds(
+    line: npt.NDArray[np.int64], feed: npt.NDArray[np.float64], ratio: npt.NDArray[np.float64]
+) -> Iterator[ClampedFeed]:
+    feeds, group = np.unique(feed.round(3), return_inverse=True)
+    if feeds.size == 0:
+        return
+    least = np.full(feeds.size, np.inf)
+    np.minimum.at(least, group, ratio)
+    first = np.full(feeds.size, np.iinfo(np.int64).max)
+    np.minimum.at(first, group, line)
+    blocks = np.bincount(group)
+    for k in range(feeds.size):
+        yield ClampedFeed(float(feeds[k]), int(first[k]), int(blocks[k]), float(feeds[k] * least[k]))
 
 
 def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDArray[Any]:
@@ -175,7 +207,7 @@ def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDAr
 
 def _run_starts(program: Program, lines: npt.NDArray[np.int64], places: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
     """Which cutting moves begin a run: another region, or something between it and the move before."""
-    starts = np.diff(places, prepend=-2) != 1
+    starts: npt.NDArray[np.bool_] = np.diff(places, prepend=-2) != 1
     firsts = np.array([region.first_line for region in program.regions], dtype=np.int64)
     lasts = np.array([region.last_line for region in program.regions], dtype=np.int64)
     if firsts.size:
@@ -195,48 +227,73 @@ def _line_offsets(program: Program) -> npt.NDArray[np.int64]:
 
 def look_ahead_breakers(program: Program, machine: Machine, table: BlockTable) -> Iterator[Breaker]:
     """What stops the reading ahead between two cutting moves without a rapid between them, once per gap."""
-    gaps: dict[int, list[tuple[int, str, bool]]] = {}
+    gaps: dict[int, list[tuple[int, str, str]]] = {}
     cutting = table.cutting_lines
 
-    def note(line: int, words: str, unasked: bool, *, behind: bool = False) -> None:
-        # A word in a cutting block acts before it, an exact stop at its end.
+    def note(line: int, words: str, effect: str, *, behind: bool = False) -> None:
+        # A word in a cutting block counts for the joint before it, an exact stop for the one behind it.
         after = int(np.searchsorted(cutting, line, side="right" if behind else "left"))
         if not 0 < after < cutting.size:
             return
         between = np.searchsorted(table.rapid_lines, (cutting[after - 1], cutting[after] + 1), side="left")
         if between[0] == between[1]:
-            gaps.setdefault(after, []).append((line, words, unasked))
+            gaps.setdefault(after, []).append((line, words, effect))
 
-    mode_lines = np.array([region.first_line for region in program.regions], dtype=np.int64)
-    for region in program.regions:
-        if region.exact_stop_at_end:
-            note(region.last_line, "exact stop", False, behind=True)
-    for line in table.dwell_lines.tolist():
-        note(line, "G04", False)
-    functions = program.core.functions
     regions = program.regions
+    for region in regions:
+        if region.exact_stop_at_end:
+            note(region.last_line, "exact stop", _ASKED, behind=True)
+    for line, code in _coded_lines(program):
+        if code == "53":
+            note(line, "G53", _STOPS_READING)
+        elif _present(cutting, line):
+            note(line, "exact stop", _ASKED, behind=True)
+    for line in table.dwell_lines.tolist():
+        note(line, "G04", _ASKED)
+    firsts = np.array([region.first_line for region in regions], dtype=np.int64)
+    functions = program.core.functions
     for kind, index, line in program.core.steps:
         if kind == _core.StepKind.function:
-            words, unasked = _words(functions[index], machine)
-            following = int(np.searchsorted(mode_lines, line))
+            following = int(np.searchsorted(firsts, line))
             mode = following < len(regions) and regions[following].look_ahead_mode
-            note(line, words, unasked or (mode and not words.startswith(("M00", "M01"))))
+            note(line, *_words(functions[index], machine, look_ahead_mode=mode))
     for entries in gaps.values():
         words = ", ".join(dict.fromkeys(word for _, word, _ in entries))
-        unasked = any(each for _, _, each in entries)
-        yield Breaker(min(line for line, _, _ in entries), _breaker_message(words, unasked), unasked)
+        effect = min((effect for _, _, effect in entries), key=_EFFECTS.index)
+        yield Breaker(
+            min(line for line, _, _ in entries),
+            f"{words} between two cutting moves: {effect}",
+            effect in (_STOPS, _CANCELS),
+        )
 
 
-def _words(function: tuple[list[int], int, float], machine: Machine) -> tuple[str, bool]:
-    """The words of a block, and whether one of them stops the reading ahead on this machine."""
+def _coded_lines(program: Program) -> Iterator[tuple[int, str]]:
+    """Lines with G53, G09 or G61, and which."""
+    text = program.core.text
+    if _CODED.search(text) is None:
+        return
+    if b"(" in text:
+        text = _COMMENT.sub(lambda comment: b" " * len(comment[0]), text)
+    offsets = _line_offsets(program)
+    for match in _CODED.finditer(text):
+        yield int(np.searchsorted(offsets, match.start(), side="right")), match[1].decode()
+
+
+def _present(ascending: npt.NDArray[np.int64], line: int) -> bool:
+    at = int(np.searchsorted(ascending, line))
+    return at < ascending.size and int(ascending[at]) == line
+
+
+def _words(function: tuple[list[int], int, float], machine: Machine, *, look_ahead_mode: bool) -> tuple[str, str]:
+    """The words of a block, and what they do to the reading ahead on this machine."""
     m_codes, tool, spindle = function
     words = [f"M{code:02d}" for code in m_codes]
     words += [f"S{spindle:g}"] if spindle >= 0 else []
     words += [f"T{tool}"] if tool >= 0 else []
-    return " ".join(words), any(code in machine.controller.no_buffer_m_codes for code in m_codes)
-
-
-def _breaker_message(words: str, unasked: bool) -> str:
-    if unasked:
-        return f"{words} between two cutting moves: the control stops reading ahead, and the tool stands in the cut"
-    return f"{words} between two cutting moves: the tool stands in the cut (with words M, S, T: in look-ahead modes)"
+    if any(code in machine.controller.no_buffer_m_codes for code in m_codes):
+        effect = _STOPS
+    elif any(code in (0, 1) for code in m_codes):
+        effect = _ASKED
+    else:
+        effect = _CANCELS if look_ahead_mode else _MAY_CANCEL
+    return " ".join(words), effect

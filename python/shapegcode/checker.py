@@ -222,13 +222,13 @@ def _breaker_findings(program: Program, breakers: Iterable[Breaker]) -> Iterator
 
 
 def _feed_findings(program: Program, table: BlockTable) -> Iterator[Finding]:
-    for run in table.runs:
-        if run.slowed_blocks:
-            message = (
-                f"F is above what the axes allow in {run.slowed_blocks} of {run.blocks} blocks; worst here: "
-                f"{run.slowest_ratio:.1%} of the programmed {run.slowed_feed_mm_per_min:.0f} mm/min are possible"
-            )
-            yield _at(program, "warning", "axis_feed", run.slowed_line, message)
+    for clamped in table.clamped_feeds:
+        message = (
+            f"{clamped.feed_mm_per_min:.10g} mm/min are more than the axes allow in {clamped.blocks} "
+            f"block{'' if clamped.blocks == 1 else 's'} from here on: the control goes down to "
+            f"{clamped.least_mm_per_min:.0f} mm/min"
+        )
+        yield _at(program, "warning", "axis_feed", clamped.first_line, message)
 
 
 def _short_findings(program: Program, machine: Machine, runs: Iterable[Run]) -> Iterator[Finding]:
@@ -273,27 +273,27 @@ def _short_blocks(program: Program, machine: Machine, table: BlockTable) -> dict
 def _dnc(program: Program, machine: Machine, runs: Iterable[Run]) -> dict[str, Any]:
     controller = machine.controller
     carried = controller.dnc_baud / controller.dnc_bits_per_character
-    rows = [
-        {
-            "lines": _lines(program, run),
-            "bytes": run.bytes,
-            "time_s": run.time_s,
-            "blocks_per_s": run.blocks / run.time_s,
-            "needed_characters_per_s": run.bytes / run.time_s,
-            "factor": run.bytes / run.time_s / carried,
-        }
-        for run in runs
-        if run.time_s > 0.0
-    ]
-    starved = [row for row in rows if row["factor"] > 1.0]
+    timed = [run for run in runs if run.time_s > 0.0]
+    needed = max((run.bytes / run.time_s for run in timed), default=0.0)
+    starved = [run for run in timed if run.bytes > run.time_s * carried]
     return {
         "baud": controller.dnc_baud,
         "bits_per_character": controller.dnc_bits_per_character,
         "characters_per_s": carried,
-        "needed_characters_per_s": max((row["needed_characters_per_s"] for row in rows), default=0.0),
-        "factor": max((row["factor"] for row in rows), default=0.0),
+        "needed_characters_per_s": needed,
+        "factor": needed / carried,
         "region_count": len(starved),
-        "regions": starved[:MOST_FINDINGS],
+        "regions": [
+            {
+                "lines": _lines(program, run),
+                "bytes": run.bytes,
+                "time_s": run.time_s,
+                "blocks_per_s": run.blocks / run.time_s,
+                "needed_characters_per_s": run.bytes / run.time_s,
+                "factor": run.bytes / run.time_s / carried,
+            }
+            for run in starved[:MOST_FINDINGS]
+        ],
     }
 
 
