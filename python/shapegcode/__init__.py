@@ -62,6 +62,9 @@ if TYPE_CHECKING:
     from shapegcode._core import (
         zv as zv,
     )
+    from shapegcode.checker import Check as Check
+    from shapegcode.checker import Finding as Finding
+    from shapegcode.checker import check as check
     from shapegcode.converter import Conversion as Conversion
     from shapegcode.converter import choose_grid as choose_grid
     from shapegcode.converter import convert as convert
@@ -88,6 +91,7 @@ _HOME = {
         ),
         "_core",
     ),
+    **dict.fromkeys(("Check", "Finding", "check"), "checker"),
     **dict.fromkeys(("Conversion", "choose_grid", "convert"), "converter"),
     **dict.fromkeys(("Machine", "MachineError"), "machine"),
     "Program": "program",

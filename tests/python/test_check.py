@@ -1,0 +1,330 @@
+"""What a control would refuse, and what it would not run as programmed: each kind by hand."""
+
+from __future__ import annotations
+
+import json
+import random
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import shapegcode as sg
+from shapegcode import checked_runs
+from shapegcode.checker import MOST_FINDINGS, check_text
+from shapegcode.cli import main
+
+HEAD = "%\nO1\nG21G17G90G94G54G64\nG0X0Y0Z0\n"  # 4 lines
+END = "M30\n%\n"
+KEYS = {
+    "program", "machine", "findings", "counts", "counts_by_code", "size_bytes", "memory_bytes", "short_blocks", "dnc",
+}  # fmt: skip
+
+
+def machine(**controller: Any) -> sg.Machine:
+    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
+    data["controller"].update(controller)
+    return sg.Machine.from_data(data)
+
+
+def checked(body: str, end: str = END, **controller: Any) -> sg.Check:
+    return check_text(HEAD + body + end, machine(**controller), source="part.nc")
+
+
+def told(check: sg.Check, code: str) -> list[tuple[int, str, int]]:
+    """(line, severity, alarm) of the findings of one code."""
+    return [(each.line, each.severity, each.alarm) for each in check.findings if each.code == code]
+
+
+# ---- what is refused ---------------------------------------------------------------------------------------
+
+
+def test_several_alarms_in_one_run() -> None:
+    check = checked("G1X10.F1000.\nG99.9\nX20.Q\nX25.\nG2X30.R1.\nG1X40.\nM98P77\n")
+    assert told(check, "alarm") == [(6, "alarm", 10), (7, "alarm", 5), (9, "alarm", 20), (11, "alarm", 78)]
+    assert check.counts["alarm"] == check.counts_by_code["alarm"] == 4
+    assert check.refused
+    for finding in check.findings:
+        # The number has a field of its own and the place too.
+        assert "(alarm" not in finding.message
+        assert "part.nc" not in finding.message
+        assert finding.file == "part.nc"
+    columns = {finding.line: finding.column for finding in check.findings}
+    assert columns[7] == 5
+    assert columns[11] == 4
+
+
+def test_a_good_program_has_nothing() -> None:
+    check = checked("G1X10.F1000.\nY20.\nG0Z5.\n")
+    assert check.findings == ()
+    assert check.counts == {"alarm": 0, "warning": 0, "note": 0}
+    assert not check.refused
+    assert check.size_bytes == len(HEAD + "G1X10.F1000.\nY20.\nG0Z5.\n" + END)
+
+
+def test_an_error_that_ends_the_reading_is_a_finding() -> None:
+    check = checked("G1X10.F1000.\n", end="M30\n")
+    assert told(check, "alarm")
+    assert check.refused
+
+
+def test_calls_are_told_with_their_callers(tmp_path: Path) -> None:
+    (tmp_path / "main.nc").write_text(HEAD + "M98P2\n" + END)
+    (tmp_path / "O0002.nc").write_text("%\nO2\nG1X10.F1000.\nM98P3\nM99\n%\n")
+    (tmp_path / "O0003.nc").write_text("%\nO3\nX20.\nG99.9\nM99\n%\n")
+    check = sg.check(tmp_path / "main.nc", machine())
+    (finding,) = (each for each in check.findings if each.severity == "alarm")
+    assert (finding.alarm, finding.line, Path(finding.file).name) == (10, 4, "O0003.nc")
+    assert "called by O2 line 4" in finding.message
+    assert "called by O1 line 5" in finding.message
+
+
+def test_another_program_of_the_file() -> None:
+    text = "%\nO1\nG21\nM30\nO2\nG99.9\nM30\n%\n"
+    assert not check_text(text, machine()).refused
+    second = check_text(text, machine(), program_number=2)
+    assert told(second, "alarm") == [(6, "alarm", 10)]
+    missing = check_text(text, machine(), program_number=3)
+    assert [each.alarm for each in missing.findings if each.severity == "alarm"] == [78]
+
+
+def test_macro_control_cannot_run_from_dnc() -> None:
+    body = "#1=0\nWHILE[#1LT2]DO1\n#1=#1+1\nG1X#1F1000.\nEND1\n(IF THIS GOTO 5)\nIF[#1EQ9]GOTO10\nN10\n"
+    assert told(checked(body), "macro_in_dnc") == []
+    check = checked(body, dnc_baud=115_200)
+    assert told(check, "macro_in_dnc") == [(6, "alarm", 123), (9, "alarm", 123), (11, "alarm", 123)]
+    assert check.refused
+
+
+# ---- what stops in the cut ---------------------------------------------------------------------------------
+
+_CUTS = "G1X10.F1000.\n{}\nX20.\n"
+
+
+@pytest.mark.parametrize(
+    ("between", "severity", "said"),
+    [
+        ("M8", "note", "M08 "),
+        ("M0", "note", "M00 "),
+        ("M1", "note", "M01 "),
+        ("S2000", "note", "S2000 "),
+        ("G4X0.5", "note", "G04 "),
+        ("G53Z0", "note", "G53 "),
+        ("M50", "warning", "M50 "),
+        ("G9X15.", "note", "exact stop "),
+    ],
+)
+def test_what_stops_between_two_cuts(between: str, severity: str, said: str) -> None:
+    check = checked(_CUTS.format(between), no_buffer_m_codes=[50])
+    ((line, level, alarm),) = told(check, "look_ahead_breaker")
+    assert (line, level, alarm) == (6, severity, 0)
+    assert next(each for each in check.findings if each.code == "look_ahead_breaker").message.startswith(said)
+
+
+def test_a_rapid_between_makes_it_harmless() -> None:
+    for between in ("M8", "M50", "G4X0.5", "S2000"):
+        for body in (f"G0Z5.\n{between}", f"{between}\nG0Z5."):
+            assert told(checked(_CUTS.format(body), no_buffer_m_codes=[50]), "look_ahead_breaker") == []
+    # Before the first cut and behind the last one nothing is broken.
+    assert told(checked("M50\nG1X10.F1000.\nX20.\nM50\n", no_buffer_m_codes=[50]), "look_ahead_breaker") == []
+
+
+def test_words_of_one_gap_are_one_finding() -> None:
+    check = checked(_CUTS.format("M9\nS2000\nG4X1."))
+    (finding,) = check.findings
+    assert finding.line == 6
+    assert all(word in finding.message for word in ("M09", "S2000", "G04"))
+
+
+def test_a_comment_stops_nothing() -> None:
+    assert checked(_CUTS.format("(G53 M8 G9)")).findings == ()
+
+
+def test_in_a_look_ahead_mode_every_function_stops() -> None:
+    check = checked("G05.1Q1\n" + _CUTS.format("M8") + "G05.1Q0\n")
+    assert told(check, "look_ahead_breaker") == [(7, "warning", 0)]
+
+
+def test_long_lists_are_capped_and_counted() -> None:
+    count = MOST_FINDINGS + 500
+    check = checked("G1F1000.\n" + "".join(f"X{k % 2 * 10}.\nM8\n" for k in range(1, count + 1)) + "X5.\n")
+    assert check.counts_by_code["look_ahead_breaker"] == check.counts["note"] == count
+    assert len(told(check, "look_ahead_breaker")) == MOST_FINDINGS
+
+
+# ---- time, memory, line ------------------------------------------------------------------------------------
+
+
+def test_short_blocks_by_hand() -> None:
+    """At 100 mm/s: 10 mm are 100 ms, 0.4 mm 4 ms, 0.1 mm 1 ms, 0.5 mm exactly 5 ms."""
+    check = checked("G1X10.F6000.\nX10.4\nX10.5\nX11.\nX21.\n", block_time_s=0.005)
+    assert told(check, "short_block") == [(6, "warning", 0)]
+    short = check.short_blocks
+    assert short is not None
+    assert (short["count"], short["blocks"], short["region_count"]) == (2, 5, 1)
+    assert short["share"] == pytest.approx(0.4)
+    assert short["shortest_s"] == pytest.approx(0.001, abs=1e-8)
+    assert short["programmed_s"] == pytest.approx(0.210, abs=1e-8)
+    assert short["taken_s"] == pytest.approx(0.215, abs=1e-8)
+    assert short["first_places"] == ["part.nc:6", "part.nc:7"]
+    (region,) = short["regions"]
+    assert region["lines"] == [5, 9]
+    assert (region["count"], region["blocks"]) == (2, 5)
+    assert checked("G1X10.F6000.\nX10.4\n", block_time_s=0.004).counts_by_code == {}
+
+
+def test_short_blocks_of_each_region_and_its_lines_in_the_source() -> None:
+    """A subprogram called twice: two runs, both told at its own lines."""
+    sub = "O2\nG91G1X10.F6000.\nX0.1\nG90\nM99\n"
+    text = HEAD + "M98P2\nG0Z5.\nM98P2\nM30\n" + sub + "%\n"
+    check = check_text(text, machine(block_time_s=0.005), source="part.nc")
+    assert told(check, "short_block") == [(11, "warning", 0)] * 2
+    assert check.short_blocks is not None
+    assert [row["lines"] for row in check.short_blocks["regions"]] == [[10, 11]] * 2
+
+
+def test_against_the_segments_one_by_one() -> None:
+    chance = random.Random(5)
+    lines, kinds = [], ("G1X{:.3f}Y{:.3f}F{}.", "G0X{:.3f}Y{:.3f}", "M8", "G1Y{:.3f}X{:.3f}F{}.")
+    for _ in range(2000):
+        kind = chance.choices(kinds, (8, 1, 1, 4))[0]
+        lines.append(kind.format(chance.uniform(0, 2), chance.uniform(0, 2), chance.randint(200, 14_000)))
+    program = sg.Program.from_text(HEAD + "\n".join(lines) + "\n" + END, machine())
+    table = checked_runs.block_table(program, machine(block_time_s=0.007))
+    runs = [run for run in table.runs if run.blocks]
+    by_lines = {(run.first_line, run.last_line): run for run in runs}
+    assert len(program.regions) > 100
+    text = program.core.text.split(b"\n")
+    for region in program.regions:
+        path = region.path
+        times = [path[k].length_mm / path[k].feed_mm_per_s for k in range(len(path))]
+        run = by_lines[region.first_line, region.last_line]
+        assert run.blocks == len(path)
+        assert run.short_blocks == sum(time_s < 0.007 for time_s in times)
+        assert run.time_s == pytest.approx(sum(times), abs=1e-7)
+        assert run.taken_s == pytest.approx(sum(max(time_s, 0.007) for time_s in times), abs=1e-7)
+        assert run.shortest_s == pytest.approx(min(times), abs=1e-8)
+        assert run.bytes == sum(len(line) + 1 for line in text[region.first_line - 1 : region.last_line])
+
+
+def test_feeds_above_the_limits_of_the_axes() -> None:
+    """15 000 mm/min per axis: a diagonal may run 15 000 * sqrt 2 = 21 213 mm/min."""
+    check = checked("G1X100.F20000.\nX0\nX100.Y100.\nX0.Y0.F30000.\nX10.F15000.\n")
+    assert told(check, "axis_feed") == [(5, "warning", 0), (8, "warning", 0)]
+    first, second = (each.message for each in check.findings if each.code == "axis_feed")
+    assert "20000 mm/min are more than the axes allow in 2 blocks" in first
+    assert first.endswith("15000 mm/min")
+    assert second.endswith("21213 mm/min")
+
+
+def test_program_memory() -> None:
+    size = checked("G1X10.F1000.\n").size_bytes
+    assert checked("G1X10.F1000.\n", program_memory_bytes=size).findings == ()
+    check = checked("G1X10.F1000.\n", program_memory_bytes=size - 1)
+    assert told(check, "program_memory") == [(0, "warning", 70)]
+    assert (check.size_bytes, check.memory_bytes) == (size, size - 1)
+    fed = checked("G1X10.F1000.\n", program_memory_bytes=size - 1, dnc_baud=115_200)
+    assert told(fed, "program_memory") == [(0, "note", 0)]
+
+
+def test_serial_line_by_hand() -> None:
+    """19 200 baud, 11 bits: 1745.5 characters/s. 8 blocks of 10 bytes and 5 ms each ask for 2000."""
+    body = "G1X0.F6000.\n" + "".join(f"X{k * 0.5:.3f}Y0.\n" for k in range(1, 9))
+    assert {len(line) for line in body.splitlines()[1:]} == {9}
+    rate = 8 * 10 / 0.040
+    for baud, starves in ((19_200, True), (38_400, False)):
+        check = checked(body, dnc_baud=baud, block_time_s=0.004)
+        assert check.dnc is not None
+        assert check.dnc["characters_per_s"] == pytest.approx(baud / 11)
+        assert check.dnc["needed_characters_per_s"] == pytest.approx(rate, rel=1e-6)
+        assert check.dnc["factor"] == pytest.approx(rate * 11 / baud, rel=1e-6)
+        assert told(check, "dnc_rate") == ([(6, "warning", 0)] if starves else [])
+        assert check.dnc["region_count"] == len(check.dnc["regions"]) == int(starves)
+    row = checked(body, dnc_baud=19_200).dnc["regions"][0]  # type: ignore[index]
+    assert (row["lines"], row["bytes"]) == ([6, 13], 80)
+    assert row["blocks_per_s"] == pytest.approx(200.0, rel=1e-6)
+    assert checked(body, dnc_bits_per_character=10).dnc is None
+
+
+# ---- size --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", ["", "G61\n"], ids=["run", "exact stops"])
+def test_a_long_program_quickly(mode: str) -> None:
+    body = f"{mode}G1F3000.\n" + "".join(f"X{k % 1000 * 0.1:.1f}Y{k % 2}.\n" for k in range(1, 100_001))
+    began = time.perf_counter()
+    check = checked(body)
+    assert time.perf_counter() - began < 10.0
+    assert check.short_blocks is not None
+    assert check.short_blocks["blocks"] == 100_000
+
+
+# ---- the command -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "good.nc").write_text(HEAD + "G1X10.F1000.\nG0Z5.\n" + END)
+    (tmp_path / "short.nc").write_text(HEAD + "G1X10.F6000.\nX10.1\n" + END)
+    (tmp_path / "bad.nc").write_text(HEAD + "G1X10.F1000.\nG99.9\nX20.\nX5.Q\n" + END)
+    return tmp_path
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    code = main(["check", *words])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_exit_codes_and_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "good.nc", "-m", "vx500")
+    assert (code, err) == (0, "")
+    assert "0 alarms, 0 warnings, 0 notes" in out
+    assert "next: " in out
+    code, out, err = run(capsys, "short.nc", "-m", "vx500")
+    assert (code, err) == (1, "")
+    assert "short.nc:6" in out
+    code, out, err = run(capsys, "bad.nc", "-m", "vx500")
+    assert (code, err) == (2, "")
+    for said in ("bad.nc:6:1", "0010", "bad.nc:8:4", "0005", "2 alarms", "next: correct bad.nc:6:1 first"):
+        assert said in out
+    assert run(capsys, "short.nc", "-m", "vx500", "--set", "controller.block_time_s=0.001")[0] == 0
+
+
+def test_json(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "bad.nc", "-m", "vx500", "--json", "-")
+    assert (code, err) == (2, "")
+    data = json.loads(out)
+    assert set(data) == KEYS
+    assert data["counts"] == {"alarm": 2, "warning": 0, "note": 0}
+    assert set(data["findings"][0]) == {"severity", "code", "alarm", "file", "line", "column", "message"}
+    assert [(each["line"], each["column"], each["alarm"]) for each in data["findings"]] == [(6, 1, 10), (8, 4, 5)]
+    assert data["dnc"] is None
+    assert run(capsys, "good.nc", "-m", "vx500", "--json", "c.json")[0] == 0
+    assert set(json.loads((folder / "c.json").read_text())) == KEYS
+
+
+def test_table_of_many_alike_is_short(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cuts = "".join(f"X{k % 2 * 10}.\nM8\n" for k in range(1, 2001))
+    (folder / "many.nc").write_text(HEAD + "G1F1000.\n" + cuts + "X5.\n" + END)
+    code, out, _ = run(capsys, "many.nc", "-m", "vx500")
+    assert code == 0
+    assert len(out.splitlines()) < 30
+    assert "1995 more of look_ahead_breaker" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["no.nc", "-m", "vx500"], "no.nc: no such file"),
+        (["good.nc", "-m", "vx501"], "no built-in machine"),
+        (["good.nc", "-m", "vx500", "--json", "good.nc"], "would overwrite"),
+        (["good.nc", "-m", "vx500", "--program", "P1"], "must be a program number"),
+    ],
+)
+def test_bad_input(folder: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str) -> None:
+    code, _, err = run(capsys, *words)
+    assert code == 2
+    assert said in err
