@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from shapegcode._core import (
         zv as zv,
     )
+    from shapegcode.budget import Budget as Budget
     from shapegcode.converter import Conversion as Conversion
     from shapegcode.converter import choose_grid as choose_grid
     from shapegcode.converter import convert as convert
@@ -88,6 +89,7 @@ _HOME = {
         ),
         "_core",
     ),
+    "Budget": "budget",
     **dict.fromkeys(("Conversion", "choose_grid", "convert"), "converter"),
     **dict.fromkeys(("Machine", "MachineError"), "machine"),
     "Program": "program",

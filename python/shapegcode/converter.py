@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from shapegcode import _core
+from shapegcode.budget import Budget, Load, Spending, measure_load
 from shapegcode.emit import Grid, emit_region, make_grid, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.program import Program
@@ -125,6 +126,7 @@ def convert(
     *,
     arc_feed_ratio: float | None = None,
     block_period_s: float | None = None,
+    budget: Budget | None = None,
     on_progress: Progress = lambda _stage, _done, _total: None,
 ) -> Conversion:
     """Shape every cutting region of a program, and judge the emitted text by playing it.
@@ -135,12 +137,13 @@ def convert(
         arc_feed_ratio: feed on arcs relative to the programmed one, reached before the arc; None:
             `shaping.arc_feed_ratio`.
         block_period_s: block period; None: see `choose_grid`.
+        budget: what the emitted text may need; None: no limit.
         on_progress: called with stage, regions done and regions in all.
 
     Raises:
         ProgramError: the program cannot be read, or a region not be written.
         DesignError: no shaper exists on this grid.
-        ArgumentError: a value outside its range.
+        ArgumentError: a value outside its range, or a budget that no choice fits.
         RoundTripError: the emitted text would not be equivalent: a defect of shapegcode.
     """
     if arc_feed_ratio is not None and not 0.0 < arc_feed_ratio <= 1.0:
@@ -156,22 +159,29 @@ def convert(
     program.refuse_endless(_MOST_PERIODS * grid.block_period_s)
     reasons = [_why_kept(region, machine) for region in program.regions]
     room_um = [machine.tolerance.contour_um * _CONTOUR_MARGIN] * len(program.regions)
+    spending = None if budget is None else Spending(budget, program, machine)
     # The originals are played on the other cores while this one shapes.
     pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
     try:
         playbacks = [pool.submit(play_original, region.path, machine) for region in program.regions]
-        originals = [playback for playback, reason in zip(playbacks, reasons, strict=True) if not reason]
-        for attempt in range(_ATTEMPTS):
-            stage = "shaping" if attempt == 0 else "shaping again, slower"
-            written = _write(program, machine, grid, ratio, reasons, room_um, partial(on_progress, stage))
-            emitted = read_back(written.text, written.placed, machine)
-            figures = measure(emitted, written.placed, originals, machine, pool, partial(on_progress, "round trip"))
-            if attempt + 1 == _ATTEMPTS or not _tighten(room_um, program, written.placed, figures, machine):
-                break
+        settle = partial(
+            _settle, program, machine, arc_feed_ratio=ratio, room_um=room_um, playbacks=playbacks, pool=pool,
+            spending=spending, on_progress=on_progress,
+        )  # fmt: skip
+        if spending is not None and spending.budget.limits_rate and block_period_s is None:
+            weights = [float(play.result().residual_mm.max()) for play in playbacks]
+            grid = spending.choose_period(
+                grid, weights, lambda period_s: choose_grid(machine, period_s),
+                lambda other: _write(program, machine, other, ratio, reasons, room_um, spending),
+            )  # fmt: skip
+        written, emitted, figures = settle(grid, reasons)
+        while spending is not None and spending.give_up(grid, written, summarise(figures, written.placed, machine)):
+            reasons = [spending.given_up.get(index, reason) for index, reason in enumerate(reasons)]
+            written, emitted, figures = settle(grid, reasons)
         kept_s = sum(play.result().duration_s for play, reason in zip(playbacks, reasons, strict=True) if reason)
     finally:
         pool.shutdown(cancel_futures=True)
-    report = _report(program, machine, grid, written, kept_s, summarise(figures, written.placed, machine))
+    report = _report(program, machine, grid, written, kept_s, summarise(figures, written.placed, machine), spending)
     verdict = _VERDICT_GOOD if report["within_tolerance"] else _VERDICT_BAD
     text = written.text.replace(_VERDICT_PENDING, verdict, 1)
     return Conversion(text, report, emitted, tuple(written.placed))
@@ -179,12 +189,38 @@ def convert(
 
 @dataclass(frozen=True)
 class _Written:
-    """The emitted text before it is judged."""
+    """The emitted text before it is judged; loads per index of a shaped region, only under a budget."""
 
     text: bytes
     placed: list[Placed]
     blocks: int
     kept_warnings: list[str]
+    loads: dict[int, Load]
+
+
+def _settle(
+    program: Program,
+    machine: Machine,
+    grid: Grid,
+    reasons: list[str],
+    *,
+    arc_feed_ratio: float,
+    room_um: list[float],
+    playbacks: list[Future[_core.PlaybackFigures]],
+    pool: Executor,
+    spending: Spending | None,
+    on_progress: Progress,
+) -> tuple[_Written, Program, list[RegionFigures]]:
+    """Write, read back and play; again, slower, where a region left the contour tolerance."""
+    originals = [playback for playback, reason in zip(playbacks, reasons, strict=True) if not reason]
+    for attempt in range(_ATTEMPTS):
+        stage = partial(on_progress, "shaping" if attempt == 0 else "shaping again, slower")
+        written = _write(program, machine, grid, arc_feed_ratio, reasons, room_um, spending, stage)
+        emitted = read_back(written.text, written.placed, machine)
+        figures = measure(emitted, written.placed, originals, machine, pool, partial(on_progress, "round trip"))
+        if attempt + 1 == _ATTEMPTS or not _tighten(room_um, program, written.placed, figures, machine):
+            break
+    return written, emitted, figures
 
 
 def _tighten(
@@ -212,7 +248,8 @@ def _write(
     arc_feed_ratio: float,
     reasons: list[str],
     room_um: list[float],
-    on_progress: Callable[[int, int], None],
+    spending: Spending | None = None,
+    on_progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> _Written:
     core = program.core
     regions = program.regions
@@ -231,12 +268,14 @@ def _write(
     position = core.header_offset
     placed: list[Placed] = []
     kept: list[str] = []
+    loads: dict[int, Load] = {}
     blocks = 0
     for done, (region, reason, room) in enumerate(zip(regions, reasons, room_um, strict=True), start=1):
         put(core.slice(position, region.text_begin))
         position = region.text_end
         if reason:
-            kept.append(_keep(program, region, machine, reason))
+            if spending is None or done - 1 not in spending.given_up:  # it has a sentence for all of them
+                kept.append(_keep(program, region, machine, reason))
             put(core.slice(region.text_begin, region.text_end))
             continue
         try:
@@ -248,9 +287,11 @@ def _write(
         put(shaped.text)
         placed.append(Placed(region, first, line - 1))
         blocks += shaped.blocks
+        if spending is not None:
+            loads[done - 1] = measure_load(region, shaped, grid, machine)
         on_progress(done, len(regions))
     put(core.slice(position, core.size))
-    return _Written(b"".join(parts), placed, blocks, kept)
+    return _Written(b"".join(parts), placed, blocks, kept, loads)
 
 
 def _why_kept(region: _core.Region, machine: Machine) -> str:
@@ -295,7 +336,13 @@ def _plain(text: str) -> str:
 
 
 def _report(
-    program: Program, machine: Machine, grid: Grid, written: _Written, kept_s: float, figures: dict[str, Any]
+    program: Program,
+    machine: Machine,
+    grid: Grid,
+    written: _Written,
+    kept_s: float,
+    figures: dict[str, Any],
+    spending: Spending | None,
 ) -> dict[str, Any]:
     placed = written.placed
     warnings = [*program.warnings, *written.kept_warnings]
@@ -304,7 +351,9 @@ def _report(
     }
     other = kept_s + other_time_s(program.core, machine)
     prefill = machine.emission.prefill_dwell_s * len(placed)
-    if not placed:
+    if spending is not None and (sentence := spending.warning(grid)):
+        warnings.append(sentence)
+    elif not placed:
         warnings.append(f"{program.source}: no cutting moves that can be shaped: the text is unchanged")
     for region in figures["regions"]:
         first, last = region["lines"]
@@ -340,6 +389,8 @@ def _report(
         "within_tolerance": not any(region["misses"] for region in figures["regions"]),
         "warnings": warnings,
     }
+    if spending is not None:
+        report["budget"] = spending.report(grid, written)
     keep = report.pop("shaper")
     return {**_tidy(report), "shaper": keep}
 
