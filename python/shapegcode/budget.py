@@ -23,6 +23,8 @@ from shapegcode.program import Program, least_increment_mm
 __all__ = ["Budget", "Load", "Spending", "busiest_per_s", "keepable", "measure_load", "residual_unit_um"]
 
 _ROUNDING = 1e-9  # relative; rates are quotients
+# A stretch of a longer period may hold fewer blocks than one of a shorter period, but hardly less than this share.
+_LEAST_FILLED = 0.5
 _LINES_NAMED = 5  # lines of regions in the one sentence
 
 FloatArray = npt.NDArray[np.float64]
@@ -167,7 +169,7 @@ class Spending:
         design: Callable[[float], Grid],
         write: Callable[[Grid], Written],
     ) -> Grid:
-        """The block period on which the most that is worth shaping is not too fast; the shortest of equals.
+        """The block period on which the most that is worth shaping is not too fast; of equals the shortest shaper.
 
         Args:
             grid: what is used without a budget.
@@ -175,8 +177,6 @@ class Spending:
             design: grid of a block period.
             write: writes all regions on a grid.
         """
-        if self.machine.emission.block_period_s is not None:
-            return grid
         regions = self.program.regions
         weights = [
             residual * 1e3 / residual_unit_um(region, self.machine)
@@ -185,27 +185,28 @@ class Spending:
         written = write(grid)
         loads = written.loads
         self._note_before(grid, written)
+        if self.machine.emission.block_period_s is not None or not self._factors(loads):
+            return grid
         tick = self.machine.controller.interpolation_period_s
         most = math.floor(self.machine.shaping.max_duration_s / tick + _ROUNDING)
-        best = grid
-        best_worth = self._worth(loads, weights)
-        ticks = round(grid.block_period_s / tick)
-        factors = self._factors(loads)
-        while factors:
-            # Blocks of the longer period hold no less than those of the shorter one: the next region to fit needs this.
-            ticks = max(ticks + 1, math.ceil(ticks * min(factors) * (1 - _ROUNDING)))
+        ticks = measured = round(grid.block_period_s / tick)
+        best, best_loads = grid, loads
+        while self._factors(best_loads) or ticks * tick < best.shaper.duration_s:
+            # A shaper lasts a period at least: where nothing is too fast any more, a shorter one is still looked for.
+            factors = self._factors(loads)
+            ticks = max(ticks + 1, math.floor(measured * min(factors, default=1.0) * _LEAST_FILLED))
             if ticks > most:
                 break
             try:
                 longer = design(ticks * tick)
+                if not self._factors(best_loads) and longer.shaper.duration_s >= best.shaper.duration_s:
+                    continue
                 loads = write(longer).loads
             except (_core.DesignError, _core.ProgramError):  # no shaper on this grid, or no region on it
-                factors = [1.0]
                 continue
-            worth = self._worth(loads, weights)
-            if worth > best_worth:
-                best, best_worth = longer, worth
-            factors = self._factors(loads)
+            measured = ticks
+            if self._worth(longer, loads, weights) > self._worth(best, best_loads, weights):
+                best, best_loads = longer, loads
         self.longer = best is not grid
         return best
 
@@ -303,9 +304,11 @@ class Spending:
                 return f"needs {value:.0f} {unit}, limit {limit:g}"
         return ""
 
-    def _worth(self, loads: Mapping[int, Load], weights: Sequence[float]) -> tuple[float, int]:
+    def _worth(self, grid: Grid, loads: Mapping[int, Load], weights: Sequence[float]) -> tuple[float, int, int]:
+        """Gain of the regions that are not too fast, how many they are, and how short the shaper is, in ticks."""
         slow = [index for index, load in loads.items() if not self._too_fast(load)]
-        return math.fsum(weights[index] for index in slow), len(slow)
+        duration = round(grid.shaper.duration_s / self.machine.controller.interpolation_period_s)
+        return math.fsum(weights[index] for index in slow), len(slow), -duration
 
     def _too_large(
         self, size: int, loads: Mapping[int, Load], figures: Mapping[int, Mapping[str, Any]]
