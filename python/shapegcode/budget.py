@@ -345,16 +345,18 @@ class Spending:
         regions = self.program.regions
         possible = all(keepable(regions[k], self.machine) for k in loads)
         if limit is None or not possible or self.program.core.size > limit:
-            raise self._too_large_error(min(size, self.program.core.size) if possible else size)
+            if possible:
+                raise self._too_large_error(min(size, self.program.core.size))
+            raise self._too_large_error(size, "; arcs with absolute centres cannot be kept as they are")
         return dict.fromkeys(loads, self._memory_reason())
 
     def _memory_reason(self) -> str:
         return f"gains least per byte, limit {self.budget.max_bytes} bytes"
 
-    def _too_large_error(self, least: int) -> _core.ArgumentError:
+    def _too_large_error(self, least: int, why: str = "") -> _core.ArgumentError:
         return _core.ArgumentError(
             f"{self.program.source}: needs {least} bytes at least (the original has {self.program.core.size}), "
-            f"the budget is {self.budget.max_bytes} bytes (--max-bytes)"
+            f"the budget is {self.budget.max_bytes} bytes (--max-bytes){why}"
         )
 
     def _impossible(self, index: int, reason: str) -> _core.ArgumentError:
