@@ -225,15 +225,14 @@ class Spending:
         loads = written.loads
         entries = dict(zip(loads, figures["regions"], strict=True))
         chosen = {index: reason for index, load in loads.items() if (reason := self._too_fast(load))}
-        if self.longer:
-            for index, figure in entries.items():
-                if figure["misses"] and index not in chosen:
-                    period_ms = grid.block_period_s * 1e3
-                    chosen[index] = f"{figure['misses'][0]}, at a block period of {period_ms:g} ms"
         regions = self.program.regions
         for index, reason in chosen.items():
             if not keepable(regions[index], self.machine):
                 raise self._impossible(index, reason)
+        if self.longer:
+            at = f"at a block period of {grid.block_period_s * 1e3:g} ms"
+            missed = (index for index in loads if entries[index]["misses"] and keepable(regions[index], self.machine))
+            chosen = {index: f"{entries[index]['misses'][0]}, {at}" for index in missed} | chosen
         size = len(written.text) - sum(loads[index].extra_bytes for index in chosen)
         chosen |= self._too_large(size, {k: load for k, load in loads.items() if k not in chosen}, entries)
         for index in chosen:
