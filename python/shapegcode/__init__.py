@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from shapegcode._core import (
         zv as zv,
     )
+    from shapegcode.budget import Budget as Budget
     from shapegcode.checker import Check as Check
     from shapegcode.checker import Finding as Finding
     from shapegcode.checker import check as check
@@ -92,6 +93,7 @@ _HOME = {
         "_core",
     ),
     **dict.fromkeys(("Check", "Finding", "check"), "checker"),
+    "Budget": "budget",
     **dict.fromkeys(("Conversion", "choose_grid", "convert"), "converter"),
     **dict.fromkeys(("Machine", "MachineError"), "machine"),
     "Program": "program",

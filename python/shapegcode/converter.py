@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from shapegcode import _core
+from shapegcode.advice import controller_warnings, region_warnings, worse_warnings
+from shapegcode.budget import Budget, Load, Spending, measure_load
 from shapegcode.compensation import guard_lines, header_lines, read_for_conversion, require_decision
 from shapegcode.emit import Grid, emit_region, make_grid, motion_limits
 from shapegcode.machine import Machine
@@ -39,8 +41,6 @@ _VERDICT_PENDING, _VERDICT_GOOD, _VERDICT_BAD = (
     b"(VERDICT WITHIN TOLERANCE       )",
     b"(OUT OF TOLERANCE - DO NOT RUN  )",
 )
-# How much worse than the original's a figure must be to be worth a warning: ratio, and size in um.
-_WORSE_RATIO, _WORSE_UM = 1.2, 5.0
 
 Progress = Callable[[str, int, int], None]
 
@@ -126,6 +126,7 @@ def convert(
     *,
     arc_feed_ratio: float | None = None,
     block_period_s: float | None = None,
+    budget: Budget | None = None,
     on_progress: Progress = lambda _stage, _done, _total: None,
 ) -> Conversion:
     """Shape every cutting region of a program, and judge the emitted text by playing it.
@@ -136,12 +137,13 @@ def convert(
         arc_feed_ratio: feed on arcs relative to the programmed one, reached before the arc; None:
             `shaping.arc_feed_ratio`.
         block_period_s: block period; None: see `choose_grid`.
+        budget: what the emitted text may need; None: no limit.
         on_progress: called with stage, regions done and regions in all.
 
     Raises:
         ProgramError: the program cannot be read, or a region not be written.
         DesignError: no shaper exists on this grid.
-        ArgumentError: a value outside its range.
+        ArgumentError: a value outside its range, or a budget that no choice fits.
         RoundTripError: the emitted text would not be equivalent: a defect of shapegcode.
     """
     if arc_feed_ratio is not None and not 0.0 < arc_feed_ratio <= 1.0:
@@ -158,22 +160,29 @@ def convert(
     program.refuse_endless(_MOST_PERIODS * grid.block_period_s)
     reasons = [_why_kept(region, machine) for region in program.regions]
     room_um = [machine.tolerance.contour_um * _CONTOUR_MARGIN] * len(program.regions)
+    spending = None if budget is None else Spending(budget, program, machine)
     # The originals are played on the other cores while this one shapes.
     pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
     try:
         playbacks = [pool.submit(play_original, region.path, machine) for region in program.regions]
-        originals = [playback for playback, reason in zip(playbacks, reasons, strict=True) if not reason]
-        for attempt in range(_ATTEMPTS):
-            stage = "shaping" if attempt == 0 else "shaping again, slower"
-            written = _write(program, machine, grid, ratio, reasons, room_um, partial(on_progress, stage))
-            emitted = read_back(written.text, written.placed, machine)
-            figures = measure(emitted, written.placed, originals, machine, pool, partial(on_progress, "round trip"))
-            if attempt + 1 == _ATTEMPTS or not _tighten(room_um, program, written.placed, figures, machine):
-                break
+        settle = partial(
+            _settle, program, machine, arc_feed_ratio=ratio, room_um=room_um, playbacks=playbacks, pool=pool,
+            spending=spending, on_progress=on_progress,
+        )  # fmt: skip
+        if spending is not None and spending.budget.limits_rate and block_period_s is None:
+            weights = [float(play.result().residual_mm.max()) for play in playbacks]
+            grid = spending.choose_period(
+                grid, weights, lambda period_s: choose_grid(machine, period_s),
+                lambda other: _write(program, machine, other, ratio, reasons, room_um, spending),
+            )  # fmt: skip
+        written, emitted, figures = settle(grid, reasons)
+        while spending is not None and spending.give_up(grid, written, summarise(figures, written.placed, machine)):
+            reasons = [spending.given_up.get(index, reason) for index, reason in enumerate(reasons)]
+            written, emitted, figures = settle(grid, reasons)
         kept_s = sum(play.result().duration_s for play, reason in zip(playbacks, reasons, strict=True) if reason)
     finally:
         pool.shutdown(cancel_futures=True)
-    report = _report(program, machine, grid, written, kept_s, summarise(figures, written.placed, machine))
+    report = _report(program, machine, grid, written, kept_s, summarise(figures, written.placed, machine), spending)
     verdict = _VERDICT_GOOD if report["within_tolerance"] else _VERDICT_BAD
     text = written.text.replace(_VERDICT_PENDING, verdict, 1)
     return Conversion(text, report, emitted, tuple(written.placed))
@@ -181,12 +190,38 @@ def convert(
 
 @dataclass(frozen=True)
 class _Written:
-    """The emitted text before it is judged."""
+    """The emitted text before it is judged; loads per index of a shaped region, only under a budget."""
 
     text: bytes
     placed: list[Placed]
     blocks: int
     kept_warnings: list[str]
+    loads: dict[int, Load]
+
+
+def _settle(
+    program: Program,
+    machine: Machine,
+    grid: Grid,
+    reasons: list[str],
+    *,
+    arc_feed_ratio: float,
+    room_um: list[float],
+    playbacks: list[Future[_core.PlaybackFigures]],
+    pool: Executor,
+    spending: Spending | None,
+    on_progress: Progress,
+) -> tuple[_Written, Program, list[RegionFigures]]:
+    """Write, read back and play; again, slower, where a region left the contour tolerance."""
+    originals = [playback for playback, reason in zip(playbacks, reasons, strict=True) if not reason]
+    for attempt in range(_ATTEMPTS):
+        stage = partial(on_progress, "shaping" if attempt == 0 else "shaping again, slower")
+        written = _write(program, machine, grid, arc_feed_ratio, reasons, room_um, spending, stage)
+        emitted = read_back(written.text, written.placed, machine)
+        figures = measure(emitted, written.placed, originals, machine, pool, partial(on_progress, "round trip"))
+        if attempt + 1 == _ATTEMPTS or not _tighten(room_um, program, written.placed, figures, machine):
+            break
+    return written, emitted, figures
 
 
 def _tighten(
@@ -214,7 +249,8 @@ def _write(
     arc_feed_ratio: float,
     reasons: list[str],
     room_um: list[float],
-    on_progress: Callable[[int, int], None],
+    spending: Spending | None = None,
+    on_progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> _Written:
     core = program.core
     regions = program.regions
@@ -235,12 +271,14 @@ def _write(
     position = core.header_offset
     placed: list[Placed] = []
     kept: list[str] = []
+    loads: dict[int, Load] = {}
     blocks = 0
     for done, (region, reason, room) in enumerate(zip(regions, reasons, room_um, strict=True), start=1):
         put(core.slice(position, region.text_begin))
         position = region.text_end
         if reason:
-            kept.append(_keep(program, region, machine, reason))
+            if spending is None or done - 1 not in spending.given_up:  # it has a sentence for all of them
+                kept.append(_keep(program, region, machine, reason))
             put(core.slice(region.text_begin, region.text_end))
             continue
         try:
@@ -252,9 +290,11 @@ def _write(
         put(shaped.text)
         placed.append(Placed(region, first, line - 1))
         blocks += shaped.blocks
+        if spending is not None:
+            loads[done - 1] = measure_load(region, shaped, grid, machine)
         on_progress(done, len(regions))
     put(core.slice(position, core.size))
-    return _Written(b"".join(parts), placed, blocks, kept)
+    return _Written(b"".join(parts), placed, blocks, kept, loads)
 
 
 def _why_kept(region: _core.Region, machine: Machine) -> str:
@@ -298,7 +338,13 @@ def _plain(text: str) -> str:
 
 
 def _report(
-    program: Program, machine: Machine, grid: Grid, written: _Written, kept_s: float, figures: dict[str, Any]
+    program: Program,
+    machine: Machine,
+    grid: Grid,
+    written: _Written,
+    kept_s: float,
+    figures: dict[str, Any],
+    spending: Spending | None,
 ) -> dict[str, Any]:
     placed = written.placed
     warnings = [*program.warnings, *written.kept_warnings]
@@ -307,17 +353,17 @@ def _report(
     }
     other = kept_s + other_time_s(program.core, machine)
     prefill = machine.emission.prefill_dwell_s * len(placed)
-    if not placed:
+    if spending is not None and (sentence := spending.warning(grid)):
+        warnings.append(sentence)
+    elif not placed:
         warnings.append(f"{program.source}: no cutting moves that can be shaped: the text is unchanged")
     for region in figures["regions"]:
         first, last = region["lines"]
         where = f"{program.place(first)}: lines {first} to {last}" + (" expanded" if program.core.expanded else "")
         warnings += [f"{where}: {miss}" for miss in region["misses"]]
-    warnings += _worse_warnings(figures)
-    warnings += _region_warnings(program, placed, machine)
-    warnings += _controller_warnings(
-        machine, written.text, cutting["emitted"], written.blocks, figures["slowed_blocks"]
-    )
+    warnings += worse_warnings(figures)
+    warnings += region_warnings(program, placed, machine)
+    warnings += controller_warnings(machine, written.text, cutting["emitted"], written.blocks, figures["slowed_blocks"])
     report = {
         "program": program.source,
         "machine": machine.name,
@@ -346,42 +392,10 @@ def _report(
         "within_tolerance": not any(region["misses"] for region in figures["regions"]),
         "warnings": warnings,
     }
+    if spending is not None:
+        report["budget"] = spending.report(grid, written)
     keep = report.pop("shaper")
     return {**_tidy(report), "shaper": keep}
-
-
-def _worse_warnings(figures: dict[str, Any]) -> list[str]:
-    """Figures that the conversion made noticeably worse, within tolerance or not."""
-    pairs = [
-        (f"{name} {axis.upper()}", figures[key]["original"][axis], figures[key]["emitted"][axis])
-        for name, key in (("residual vibration", "residual_vibration_um"), ("peak vibration", "peak_vibration_um"))
-        for axis in "xyz"
-    ]
-    response = figures["contour_error_um"]["response"]
-    pairs.append(("contour error of the table", response["original"]["max"], response["emitted"]["max"]))
-    return [
-        f"{name} is larger than the original's: {before:.1f} -> {after:.1f} um"
-        for name, before, after in pairs
-        if after > _WORSE_RATIO * before and after - before > _WORSE_UM
-    ]
-
-
-def _region_warnings(program: Program, placed: list[Placed], machine: Machine) -> list[str]:
-    warnings = []
-    on = next((place.region for place in placed if place.region.look_ahead_mode), None)
-    if on is not None and not machine.emission.prologue:
-        warnings.append(
-            f"{program.place(on.first_line)}: shaped blocks run while the program's look-ahead mode is on; the "
-            'verdict holds for it off: set emission.prologue = ["G05.1Q0"] and emission.epilogue = ["G05.1Q1"]'
-        )
-    fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
-    fast = next((place.region for place in placed if place.region.path.fastest_feed_mm_per_s * 60.0 > fastest), None)
-    if fast is not None:
-        warnings.append(
-            f"{program.place(fast.first_line)}: programmed feed {fast.path.fastest_feed_mm_per_s * 60.0:g} mm/min is "
-            f"over every axis' largest ({fastest:g} mm/min, axes.*.max_feed_mm_per_min): shaped at the axes' limits"
-        )
-    return warnings
 
 
 def _tidy(value: Any) -> Any:
@@ -393,27 +407,3 @@ def _tidy(value: Any) -> Any:
     if isinstance(value, float):
         return 0.0 if abs(value) < 1e-9 else float(f"{value:.9g}")
     return value
-
-
-def _controller_warnings(machine: Machine, text: bytes, cutting_s: float, blocks: int, slowed_blocks: int) -> list[str]:
-    controller = machine.controller
-    warnings = []
-    if len(text) > controller.program_memory_bytes:
-        warnings.append(
-            f"the emitted program has {len(text)} bytes, the controller's memory {controller.program_memory_bytes} "
-            "(controller.program_memory_bytes): run it from DNC or a data server"
-        )
-    if controller.dnc_baud > 0 and blocks > 0 and cutting_s > 0.0:
-        needed = len(text) * controller.dnc_bits_per_character / cutting_s
-        if needed > controller.dnc_baud:
-            warnings.append(
-                f"drip feeding needs {needed:.0f} baud on average, the line has {controller.dnc_baud} "
-                "(controller.dnc_baud): the buffer will run empty"
-            )
-    if slowed_blocks:
-        warnings.append(
-            f"{slowed_blocks} of {blocks} shaped blocks step an axis by more than "
-            "controller.corner_speed_difference_mm_per_min: run them with the look-ahead mode off "
-            '(emission.prologue, for example ["G05.1Q0"]), or it slows them'
-        )
-    return warnings

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
@@ -36,10 +39,16 @@ class EmittedRegion:
     Attributes:
         text: whole lines.
         blocks: shaped blocks in it, without the lines around them.
+        periods: whole block periods that each of them lasts.
+        blocks_begin: byte of the text at which they begin.
+        blocks_end: byte behind them.
     """
 
     text: bytes
     blocks: int
+    periods: npt.NDArray[np.uint32]
+    blocks_begin: int
+    blocks_end: int
 
 
 def make_grid(block_period_s: float, shaper: _core.Shaper) -> Grid:
@@ -151,8 +160,9 @@ def emit_region(
         head.append(f"G04P{round(machine.emission.prefill_dwell_s * 1e3)}")
     tail = [_restore_line(region, motion, plane), *machine.emission.epilogue]
     end = line_end.encode()
-    lines = b"".join(line.encode("latin-1") + end for line in head)
-    return EmittedRegion(lines + text + b"".join(line.encode("latin-1") + end for line in tail), len(fitted))
+    before = b"".join(line.encode("latin-1") + end for line in head)
+    after = b"".join(line.encode("latin-1") + end for line in tail)
+    return EmittedRegion(before + text + after, len(fitted), fitted.periods, len(before), len(before) + len(text))
 
 
 def decimal(value: float, decimals: int) -> str:

@@ -13,6 +13,7 @@ The report itself is a plain dictionary, the JSON that ``--json`` writes. Its ke
     within_tolerance                          true or false
     frequency_residual                        [{shift, residual_um: {x, y, z}}]
     limits                                    {contour_um, ...}
+    budget                                    {limits, before, after, block_period_s, given_up: [...]}
     regions                                   [{lines: [first, last], misses: [text]}], and more
     warnings                                  list of texts
 
@@ -241,6 +242,9 @@ def _program_rows(report: Mapping[str, Any]) -> Iterator[Row]:
         rows.append(("size of the program", "bytes", size, float(report["bytes_emitted"]), 0))
     if report.get("block_period_s") is not None:
         rows.append(("block period", "ms", None, report["block_period_s"] * 1e3, 3))
+    budget = report.get("budget")
+    if budget:
+        rows.append(("regions given up for the budget", "", None, float(len(budget["given_up"])), 0))
     times = (report.get("shaper") or {}).get("times_s")
     if times:
         rows.append(("duration of the shaper", "ms", None, (times[-1] - times[0]) * 1e3, 3))
@@ -293,7 +297,8 @@ def before_after_table(report: Mapping[str, Any]) -> Table | Text:
     from rich.text import Text
 
     if nothing_to_shape(report):
-        return Text("nothing to shape: the text is unchanged")
+        given_up = (report.get("budget") or {}).get("given_up")
+        return Text(f"nothing {'fits the budget' if given_up else 'to shape'}: the text is unchanged")
     rows = list(before_after_rows(report))
     limits = any(row.limit is not None for row in rows)
     table = Table(show_edge=False, pad_edge=False, caption_justify="left")

@@ -13,9 +13,11 @@ from shapegcode.cli.options import (
     add_plots_argument,
     add_program_argument,
     load_machine,
+    positive,
     ratio,
     refuse_same_file,
     seconds,
+    size,
 )
 
 __all__ = ["add_arguments", "run"]
@@ -51,6 +53,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="what becomes of cutter compensation G41/G42: see input.compensation (default: the machine file's)",
     )
+    parser.add_argument(
+        "--max-bytes",
+        metavar="N[k|M]",
+        type=size,
+        default=None,
+        help="largest size of the written program, for example 256k (1k = 1024): what gains least keeps its text",
+    )
+    parser.add_argument(
+        "--baud",
+        metavar="N",
+        type=positive,
+        default=None,
+        help="speed of the serial line that feeds the program: longer block periods, then regions keep their text",
+    )
+    parser.add_argument(
+        "--max-blocks-per-second",
+        metavar="N",
+        type=positive,
+        default=None,
+        help="blocks that the control reads per second; as --baud",
+    )
     add_program_argument(parser)
     add_plots_argument(parser)
     add_json_argument(parser)
@@ -61,9 +84,11 @@ def run(args: argparse.Namespace) -> int:
 
     Raises:
         ProgramError, DesignError, MachineError: bad input.
+        ArgumentError: a bad file name, or a budget that no choice fits.
         OSError: a file cannot be read or written.
     """
     from shapegcode._core import ArgumentError
+    from shapegcode.budget import Budget
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, print_before_after, progress, write_bytes, write_json
     from shapegcode.compensation import read_for_conversion
@@ -74,6 +99,8 @@ def run(args: argparse.Namespace) -> int:
     output = Path(args.output)
     if not output.name or output.is_dir():
         raise ArgumentError(f"-o {args.output}: the output must be a file, not a folder")
+    limits = (args.max_bytes, args.baud, args.max_blocks_per_second)
+    budget = None if limits == (None, None, None) else Budget(*limits)
     machine = load_machine(args)
     if args.compensation is not None:
         machine = machine.model_copy(
@@ -94,6 +121,7 @@ def run(args: argparse.Namespace) -> int:
             machine,
             arc_feed_ratio=args.arc_feed,
             block_period_s=args.block_period,
+            budget=budget,
             on_progress=lambda stage, done, total: bar.update(stages[stage] + 0.5 * done / total),
         )
         target = output if conversion.within_tolerance else failed

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 _LARGEST_OVERRIDE = 2.54
+_SIZE_UNITS = {"": 1, "k": 1024, "M": 1024 * 1024}
 _TIME_UNITS = {"ms": 1e-3, "us": 1e-6, "s": 1.0}
 
 
@@ -156,6 +157,23 @@ def seconds(text: str) -> float:
         value = 0.0
     if not (math.isfinite(value) and value > 0.0):
         raise argparse.ArgumentTypeError(f"{text!r}: must be a time above 0 with its unit (s, ms, us), for example 5ms")
+    return value
+
+
+def size(text: str) -> int:
+    """A number of bytes such as ``262144``, ``256k`` or ``1M`` (1024 bytes, 1024 k), above 0."""
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)([kM]?)", text)
+    value = math.floor(float(match[1]) * _SIZE_UNITS[match[2]]) if match else 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a number of bytes above 0, for example 65536, 64k or 1M")
+    return value
+
+
+def positive(text: str) -> float:
+    """A number above 0."""
+    value = _number(text)
+    if not (math.isfinite(value) and value > 0.0):
+        raise argparse.ArgumentTypeError(f"{text!r}: must be above 0")
     return value
 
 

@@ -1,0 +1,341 @@
+"""Budgets of a conversion, measured on the emitted text by a reader and a clock that share no code with it."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import shapegcode as sg
+from acceptance import Judged, convert, machine_with, read_sample
+from judge.player import durations
+from shapegcode.budget import busiest_per_s
+
+COMMAND = Path(sys.executable).with_name("shapegcode")
+HEAD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\n"
+TAIL = "G0Z50.\nM30\n%\n"
+FEEDS = (9000, 60, 3000, 600, 12000, 1500, 6000)
+#: Regions of one form at very different feeds, out of order: residuals of the original from 0.04 to 50 um.
+PART = HEAD + "".join(f"G0X0Y0\nG1X{20 + k}.F{f}\nY{10 + k}.\nG0Z5.\n" for k, f in enumerate(FEEDS)) + TAIL
+MACHINE = machine_with()
+PERIOD = {"emission.block_period_s": 0.005}
+
+
+def budgeted(text: str = PART, keys: dict[str, Any] | None = None, **limits: float) -> Judged:
+    """Converted under a budget; the judge holds shaped and kept lines against the original."""
+    return convert(text, machine_with(keys), budget=sg.Budget(**limits))  # type: ignore[arg-type]
+
+
+FREE = convert(PART, MACHINE)
+
+
+def emitted_size(judged: Judged, entry: dict[str, Any]) -> int:
+    """Bytes of a region's lines in the emitted text, less those of its lines in the original."""
+    ours, theirs = judged.original.split("\n"), judged.conversion.text.decode().split("\n")
+    (a, b), (c, d) = entry["lines"], entry["emitted_lines"]
+    return sum(len(line) + 1 for line in theirs[c - 1 : d]) - sum(len(line) + 1 for line in ours[a - 1 : b])
+
+
+def gain(entry: dict[str, Any]) -> float:
+    was, now = (entry["residual_vibration_um"][side] for side in ("original", "emitted"))
+    return max(was.values()) - max(now.values())
+
+
+def given_up(judged: Judged) -> set[int]:
+    """First lines of the regions given up."""
+    return {entry["lines"][0] for entry in judged.conversion.report["budget"]["given_up"]}
+
+
+def rates(judged: Judged) -> tuple[float, float]:
+    """Bits per second and blocks per second of the busiest stretch, tick by tick."""
+    report = judged.conversion.report
+    tick = judged.machine.controller.interpolation_period_s
+    stretch = round(report["shaper"]["times_s"][-1] / tick)
+    lines = judged.emitted.split("\n")
+    worst = np.zeros(2)
+    for _, moves, _ in judged.regions():
+        cuts = [move for move in moves if move.length > 0.0]
+        ticks = np.round(durations(cuts, period_s=tick, block_end="ceil") / tick).astype(int)
+        sizes = np.array([len(lines[move.line - 1]) + 1 for move in cuts])
+        for which, amounts in enumerate((sizes, np.ones(len(cuts)))):
+            flow = np.repeat(amounts / ticks, ticks)
+            window = min(stretch, len(flow))
+            worst[which] = max(worst[which], np.convolve(flow, np.ones(window), "valid").max() / (window * tick))
+    return worst[0] * judged.machine.controller.dnc_bits_per_character, worst[1]
+
+
+# ---- size --------------------------------------------------------------------------------------------------
+
+
+def test_least_gain_per_byte_is_given_up_first() -> None:
+    """At every limit at which the choice changes, and one byte below."""
+    entries = FREE.conversion.report["regions"]
+    sizes = {entry["lines"][0]: emitted_size(FREE, entry) for entry in entries}
+    gains = {entry["lines"][0]: gain(entry) for entry in entries}
+    assert min(sizes.values()) > 100
+    assert max(gains.values()) > 40.0
+    negative = sorted((line for line in sizes if gains[line] <= 0.0), key=gains.__getitem__)
+    order = negative + sorted(set(sizes) - set(negative), key=lambda line: gains[line] / sizes[line])
+    total = len(FREE.conversion.text)
+    before = set[int]()
+    for count in range(len(order)):
+        prefix = set(order[:count])
+        size = total - sum(sizes[line] for line in prefix)
+        fits = budgeted(max_bytes=size)
+        assert given_up(fits) == prefix
+        assert len(fits.conversion.text) == size
+        assert fits.conversion.within_tolerance
+        assert before <= prefix
+        before = prefix
+        if count + 1 == len(order):
+            continue
+        tighter = budgeted(max_bytes=size - 1)
+        gone = given_up(tighter)
+        # The next in the order goes; of the earlier ones those that gain something come back where there is room.
+        assert order[count] in gone <= set(order[: count + 1])
+        left = size - 1 - len(tighter.conversion.text)
+        assert left >= 0
+        assert all(sizes[line] > left for line in gone if gains[line] > 0.0)
+    assert "keep their text" not in str(FREE.conversion.report["warnings"])
+
+
+def test_what_is_given_up_is_said() -> None:
+    limit = len(FREE.conversion.text) - 900
+    report = budgeted(max_bytes=limit).conversion.report
+    original = {tuple(e["lines"]): e for e in FREE.conversion.report["regions"]}
+    budget = report["budget"]
+    assert budget["limits"] == {"max_bytes": limit, "baud": None, "max_blocks_per_second": None}
+    assert budget["before"]["bytes"] == len(FREE.conversion.text)
+    assert budget["after"]["bytes"] == report["bytes_emitted"] <= limit
+    assert budget["block_period_s"] == report["block_period_s"] == FREE.conversion.report["block_period_s"]
+    assert len(budget["given_up"]) + len(report["regions"]) == len(FEEDS)
+    for entry in budget["given_up"]:
+        whole = original.pop(tuple(entry["lines"]))
+        assert entry["residual_um"] == whole["residual_vibration_um"]["original"]
+        assert entry["bytes"] == emitted_size(FREE, whole)
+        assert str(limit) in entry["reason"]
+    (sentence,) = (warning for warning in report["warnings"] if "given up for the budget" in warning)
+    first, last = budget["given_up"][0]["lines"]
+    assert f"{len(budget['given_up'])} of {len(FEEDS)} regions keep their text (lines {first} to {last}" in sentence
+
+
+def test_everything_is_given_up_before_nothing_fits() -> None:
+    judged = budgeted(max_bytes=len(PART))
+    assert judged.conversion.text.decode() == PART
+    assert judged.conversion.within_tolerance
+    assert len(given_up(judged)) == len(FEEDS)
+    with pytest.raises(sg.ArgumentError, match=rf"needs {len(PART)} bytes at least .* budget is {len(PART) - 1} bytes"):
+        budgeted(max_bytes=len(PART) - 1)
+
+
+def test_a_program_without_regions_may_be_too_large() -> None:
+    text = HEAD + TAIL
+    assert budgeted(text, max_bytes=len(text)).conversion.text.decode() == text
+    with pytest.raises(sg.ArgumentError, match=f"needs {len(text)} bytes"):
+        budgeted(text, max_bytes=len(text) - 1)
+
+
+def test_a_region_that_becomes_shorter_is_shaped_although_the_original_is_too_large() -> None:
+    """Thousands of points on a line: shaped they are fewer blocks."""
+    points = "".join(f"G1X{k * 0.01:.2f}F3000.\n" for k in range(1, 3000))
+    text = HEAD + points + TAIL
+    free = convert(text, MACHINE)
+    size = len(free.conversion.text)
+    assert size < len(text)
+    assert budgeted(text, max_bytes=size).conversion.text == free.conversion.text
+    with pytest.raises(sg.ArgumentError, match=rf"needs {size} bytes at least \(the original has {len(text)}\)"):
+        budgeted(text, max_bytes=size - 1)
+
+
+def test_arcs_with_absolute_centres_cannot_be_given_up() -> None:
+    text = HEAD + "G1X10.F60\nG2X20.Y0I15.J0\nG0Z5.\nG1X40.F6000\nG0Z9.\n" + TAIL
+    keys = {"input.arc_centre": "absolute"}
+    free = convert(text, machine_with(keys))
+    arc, line = free.conversion.report["regions"]
+    least = len(free.conversion.text) - emitted_size(free, line)
+    fits = budgeted(text, keys, max_bytes=least)
+    assert given_up(fits) == {line["lines"][0]}
+    assert [entry["lines"] for entry in fits.conversion.report["regions"]] == [arc["lines"]]
+    with pytest.raises(sg.ArgumentError, match=f"needs {least} bytes at least .* absolute centres"):
+        budgeted(text, keys, max_bytes=least - 1)
+    with pytest.raises(sg.ArgumentError, match="limit 1; their arcs have absolute centres"):
+        budgeted(text, keys, max_blocks_per_second=1)
+
+
+# ---- line and control --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("limits", "which"),
+    [
+        ({"baud": 19200}, 0),
+        ({"baud": 9600}, 0),
+        ({"max_blocks_per_second": 100}, 1),
+        ({"max_blocks_per_second": 20}, 1),
+    ],
+    ids=str,
+)
+def test_the_shortest_shaper_whose_blocks_are_slow_enough(limits: dict[str, float], which: int) -> None:
+    (limit,) = limits.values()
+    key = ("baud", "blocks_per_second")[which]
+    judged = budgeted(**limits)
+    report = judged.conversion.report
+    assert rates(judged)[which] <= limit * (1 + 1e-9)
+    assert rates(judged) == pytest.approx([report["budget"]["after"][k] for k in ("baud", "blocks_per_second")])
+    assert report["budget"]["before"][key] == pytest.approx(rates(FREE)[which])
+    assert judged.conversion.within_tolerance
+    assert not given_up(judged)
+    chosen = round(report["block_period_s"] * 1e3)
+    assert f"the block period is {chosen} ms instead of 5 ms" in str(report["warnings"])
+    duration = report["shaper"]["times_s"][-1]
+    for ms in range(5, 100):
+        try:
+            grid = sg.choose_grid(MACHINE, ms * 1e-3)
+        except sg.DesignError:
+            continue
+        shorter = grid.shaper.duration_s - duration
+        if shorter < -1e-9 or (shorter < 1e-9 and ms < chosen):
+            other = convert(PART, MACHINE, block_period_s=ms * 1e-3)
+            assert rates(other)[which] > limit, f"{ms} ms would do"
+
+
+@pytest.mark.parametrize("limit", [50, 99, 100, 150, 199, 200])
+def test_with_a_fixed_block_period_only_the_fast_regions_are_given_up(limit: int) -> None:
+    free = convert(PART, machine_with(PERIOD))
+    judged = budgeted(keys=PERIOD, max_blocks_per_second=limit)
+    assert rates(judged)[1] <= limit * (1 + 1e-9)
+    assert judged.conversion.report["block_period_s"] == 0.005
+    for entry in free.conversion.report["regions"]:
+        report = {**free.conversion.report, "regions": [entry]}
+        alone = Judged(
+            sg.Conversion(free.conversion.text, report, free.conversion.emitted, ()), free.machine, free.original,
+            free.emitted, free.header_lines,
+        )  # fmt: skip
+        assert (entry["lines"][0] in given_up(judged)) == (rates(alone)[1] > limit * (1 + 1e-9))
+
+
+def test_an_argument_fixes_the_block_period_too() -> None:
+    judged = convert(PART, MACHINE, block_period_s=0.005, budget=sg.Budget(baud=300))
+    assert judged.conversion.report["block_period_s"] == 0.005
+    assert len(given_up(judged)) == len(FEEDS)
+    assert judged.conversion.text.decode() == PART
+    assert "limit 300" in judged.conversion.report["budget"]["given_up"][0]["reason"]
+
+
+def test_what_misses_its_tolerance_only_for_the_longer_period_is_kept() -> None:
+    """Circles within 1.2 um: 40 ms of them are no line."""
+    circles = "G1X5.F3000\n" + "G2X5.Y0I5.\n" * 6 + "G1X0\n"
+    text = HEAD + "G1X10.F600\nG0Z5.\nG0X0Y0\n" + circles + TAIL
+    keys = {"tolerance.contour_um": 1.2}
+    assert convert(text, machine_with(keys)).conversion.within_tolerance
+    judged = budgeted(text, keys, max_blocks_per_second=25)
+    assert judged.conversion.within_tolerance
+    (entry,) = judged.conversion.report["budget"]["given_up"]
+    assert entry["lines"] == [8, 15]
+    period_ms = judged.conversion.report["block_period_s"] * 1e3
+    assert entry["reason"].endswith(f"limit 1.2 um, at a block period of {period_ms:g} ms")
+
+
+@pytest.mark.parametrize("name", ["TEST_G90.NC", "TEST_G91.NC", "PROGRAM2.NC"])
+def test_sample_under_all_three(name: str) -> None:
+    keys = {"controller.calculator_decimal_point": True}
+    text = read_sample(name)
+    free = convert(text, machine_with(keys))
+    limit = (2 * len(free.conversion.text) + len(text)) // 3
+    judged = budgeted(text, keys, max_bytes=limit, baud=38400, max_blocks_per_second=150)
+    assert len(judged.conversion.text) <= limit
+    baud, blocks = rates(judged)
+    assert (baud <= 38400 * (1 + 1e-9), blocks <= 150 * (1 + 1e-9)) == (True, True)
+    assert judged.conversion.within_tolerance
+
+
+def test_comments_travel_on_the_line_too() -> None:
+    """A comment is sent with the block behind it."""
+    text = HEAD + "G1X10.F600\n(" + "A" * 100 + ")\nY10.\n" + TAIL
+    plain = text.replace("A" * 100, "A")
+    loads = [budgeted(t, PERIOD, baud=1e9).conversion.report["budget"]["before"]["baud"] for t in (plain, text)]
+    assert loads[1] > loads[0]
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 30), st.integers(0, 60)), min_size=1, max_size=30),
+    st.integers(1, 50),
+)
+def test_busiest_stretch_is_that_of_every_stretch_tried(blocks: list[tuple[int, int]], stretch: int) -> None:
+    ticks = np.array([duration for duration, _ in blocks])
+    flow = np.repeat([amount / duration for duration, amount in blocks], ticks)
+    window = min(stretch, len(flow))
+    tried = max(math.fsum(flow[k : k + window]) for k in range(len(flow) - window + 1)) / window
+    assert busiest_per_s(ticks, [amount for _, amount in blocks], stretch) == pytest.approx(tried, abs=1e-12)
+
+
+# ---- none, bad ones, and the command -----------------------------------------------------------------------
+
+
+def test_a_budget_that_is_not_reached_changes_nothing() -> None:
+    judged = budgeted(max_bytes=10**6, baud=10**6, max_blocks_per_second=1000)
+    assert judged.conversion.text == FREE.conversion.text
+    report = dict(judged.conversion.report)
+    budget = report.pop("budget")
+    assert report == FREE.conversion.report
+    assert budget["given_up"] == []
+    assert budget["before"] == budget["after"]
+    assert "budget" not in FREE.conversion.report
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    list(itertools.product(("max_bytes", "baud", "max_blocks_per_second"), (0, -1, math.nan, math.inf))),
+)
+def test_a_limit_is_finite_and_positive(name: str, value: float) -> None:
+    with pytest.raises(sg.ArgumentError, match=f"budget {name} is .*must be finite and above 0"):
+        sg.Budget(**{name: value})  # type: ignore[arg-type]
+
+
+def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    (folder / "part.nc").write_text(PART)
+    return subprocess.run(
+        [COMMAND, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", *words],
+        cwd=folder, capture_output=True, text=True, check=False, timeout=60, env=dict(os.environ),
+    )  # fmt: skip
+
+
+def test_command(tmp_path: Path) -> None:
+    done = run(tmp_path, "--max-bytes", "2k", "--baud", "38400", "--json", "report.json")
+    assert (done.returncode, done.stderr) == (0, "")
+    text = (tmp_path / "out.nc").read_bytes()
+    assert len(text) <= 2048
+    limits = {"max_bytes": 2048, "baud": 38400.0, "max_blocks_per_second": None}
+    budget = json.loads((tmp_path / "report.json").read_text())["budget"]
+    assert budget["limits"] == limits
+    assert budget["given_up"]
+    assert "given up for the budget" in done.stdout
+    assert text == sg.convert(sg.Program.from_text(PART, MACHINE), MACHINE, budget=sg.Budget(**limits)).text
+
+
+def test_command_with_an_impossible_budget_writes_nothing(tmp_path: Path) -> None:
+    done = run(tmp_path, "--max-bytes", "50")
+    assert done.returncode == 2
+    assert f"part.nc: needs {len(PART)} bytes at least" in done.stderr
+    assert "the budget is 50 bytes" in done.stderr
+    assert os.listdir(tmp_path) == ["part.nc"]
+
+
+@pytest.mark.parametrize(
+    "words", [("--max-bytes", w) for w in ("0", "-1", "1G", "k", "nan")] + [("--baud", w) for w in ("0", "x", "inf")]
+)
+def test_command_refuses_limits_that_are_none(tmp_path: Path, words: tuple[str, str]) -> None:
+    done = run(tmp_path, f"{words[0]}={words[1]}")
+    assert done.returncode == 2
+    assert words[0] in done.stderr
+    assert os.listdir(tmp_path) == ["part.nc"]
