@@ -34,7 +34,7 @@ LEFT_OUT = {
 CHANGED = {
     "G83.NC": (r"P500\.", "", "a wait in G83 is refused"),
     "cycles_all": (
-        r"G98G..Y10\.",
+        r"G98(G..)?Y10\.",
         "G80\nG00Z50.",
         "with G98 behind G99 LinuxCNC goes to the next hole at the initial level",
     ),
