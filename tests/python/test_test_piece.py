@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -17,7 +16,7 @@ import pytest
 
 import shapegcode as sg
 from acceptance import convert, machine_with
-from rs274_tool import run_rs274
+from rs274_tool import canonical_moves, run_rs274
 
 WRITER = Path(__file__).parents[1] / "tools" / "write_test_piece.py"
 TEXT = (resources.files("shapegcode") / "data" / "iso10791_7.nc").read_text(encoding="ascii")
@@ -49,37 +48,10 @@ def canonical(tmp_path: Path) -> list[str]:
 
 def cuts(lines: list[str]) -> Iterator[Cut]:
     """The moves of rs274's output; those from or to the reference position are left out."""
-    place = np.array([0.0, 0.0, 1e3])
-    tool = 0
-    for line in lines:
-        match = re.search(r" (CHANGE_TOOL|STRAIGHT_TRAVERSE|STRAIGHT_FEED|ARC_FEED)\((.*)\)", line)
-        if match is None:
-            continue
-        name, numbers = match[1], [float(word) for word in match[2].split(",")]
-        if name == "CHANGE_TOOL":
-            tool = int(numbers[0])
-        elif name in {"STRAIGHT_TRAVERSE", "STRAIGHT_FEED"}:
-            end = np.array(numbers[:3])
-            length = float(np.linalg.norm(end - place))
-            points = np.linspace(place, end, max(2, math.ceil(length / STEP_MM) + 1))
-            if max(place[2], end[2]) < HOME_MM:
-                yield Cut(tool, name == "STRAIGHT_TRAVERSE", points, length)
-            place = end
-        elif name == "ARC_FEED":
-            x, y, cx, cy, turns, z = numbers[:6]
-            begin = math.atan2(place[1] - cy, place[0] - cx)
-            sweep = (math.atan2(y - cy, x - cx) - begin) % math.tau
-            if sweep < 1e-9:
-                sweep = math.tau
-            if turns < 0:
-                sweep = sweep - math.tau if sweep < math.tau else -math.tau
-            radius = math.hypot(x - cx, y - cy)
-            share = np.linspace(0.0, 1.0, math.ceil(abs(sweep) * radius / STEP_MM) + 2)
-            angles = begin + sweep * share
-            heights = place[2] + (z - place[2]) * share
-            points = np.stack([cx + radius * np.cos(angles), cy + radius * np.sin(angles), heights], axis=1)
-            yield Cut(tool, False, points, math.hypot(radius * sweep, z - place[2]))
-            place = np.array([x, y, z])
+    for move in canonical_moves(lines):
+        if move.kind != "dwell" and max(move.start[2], move.end[2]) < HOME_MM:
+            count = max(2, math.ceil(move.length_mm / STEP_MM) + 1)
+            yield Cut(move.tool, move.kind == "rapid", move.points(np.linspace(0.0, 1.0, count)), move.length_mm)
 
 
 class Block:
