@@ -996,6 +996,14 @@ class ReaderOptions:
     def opaque_programs(self, arg0: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(2)"]) -> None:
         ...
     @property
+    def peck_clearance_mm(self) -> float:
+        """
+        To which a peck of G73 and G83 returns, mm (parameters 5114, 5115).
+        """
+    @peck_clearance_mm.setter
+    def peck_clearance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def power_on(self) -> ModalState:
         """
         Modal state before the first block.
