@@ -72,7 +72,8 @@ def test_rejected_program(
     program = REJECTED / f"{name}.nc"
     (tmp_path / program.name).write_bytes(program.read_bytes())
     monkeypatch.chdir(tmp_path)
-    for words in (["convert", program.name, "-m", "vx500", "-o", "out.nc"], ["simulate", program.name, "-m", "vx500"]):
+    convert = ["convert", program.name, "-m", "vx500", "-o", "out.nc", "--compensation", "expand"]
+    for words in (convert, ["simulate", program.name, "-m", "vx500"]):
         assert main(words) == 2
         out, err = capsys.readouterr()
         assert out == ""
