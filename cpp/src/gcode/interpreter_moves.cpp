@@ -244,8 +244,15 @@ void Interpreter::cycle_block() {
     cycle_.peck_mm = std::abs(length_mm(words_['Q']));
   }
   if (words_.has('P')) {
+    // Some post-processors write "P500.": whole milliseconds all the same.
+    if (words_['P'].value != std::floor(words_['P'].value)) {
+      alarm(7, format_message("P%g of a drilling cycle: it takes whole milliseconds", words_['P'].value),
+            words_['P'].column);
+    }
     if (words_['P'].has_point) {
-      alarm(7, "P of a drilling cycle takes whole milliseconds: no decimal point", words_['P'].column);
+      warn(
+          "P of a drilling cycle has a decimal point: read as whole milliseconds; a control may refuse it (alarm "
+          "0007)");
     }
     cycle_.dwell_s = words_['P'].value * 1e-3;
   }
