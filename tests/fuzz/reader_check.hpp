@@ -77,7 +77,9 @@ inline ReaderOptions options_from(std::span<const std::uint8_t> bytes) {
   options.subprogram_nesting = (choices & 64U) != 0 ? 1 + in.byte() % 12 : 10;
   for (auto& on : options.block_skip) {
     const std::uint8_t state = in.byte() % 3U;
-    on = state == 0 ? std::nullopt : std::optional<bool>(state == 1);
+    if (state != 0) {
+      on = state == 1;
+    }
   }
   const std::uint8_t tools = in.byte() % 4U;
   for (int number = 1; number <= tools; ++number) {

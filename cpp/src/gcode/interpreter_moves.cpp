@@ -244,6 +244,11 @@ void Interpreter::cycle_block() {
     cycle_.peck_mm = std::abs(length_mm(words_['Q']));
   }
   if (words_.has('P')) {
+    // Some post-processors write "P500.": whole milliseconds all the same.
+    if (words_['P'].value != std::floor(words_['P'].value)) {
+      alarm(7, format_message("P%g of a drilling cycle: it takes whole milliseconds", words_['P'].value),
+            words_['P'].column);
+    }
     if (words_['P'].has_point) {
       warn_once(seen_cycle_point_, "P of a drilling cycle counts milliseconds; some controls refuse its decimal point");
     }
