@@ -236,7 +236,7 @@ def _short_findings(program: Program, machine: Machine, runs: Iterable[Run]) -> 
     for run in runs:
         if run.short_blocks:
             message = (
-                f"{run.short_blocks} of {run.blocks} blocks up to line {program.core.origin(run.last_line)[0]} are "
+                f"{run.short_blocks} of {run.blocks} blocks up to {_end(program, run)} are "
                 f"shorter than the block time of {block_time_s * 1e3:g} ms, the shortest {run.shortest_s * 1e3:.3g} "
                 f"ms: without blocks in store the control starves, and {run.time_s:.3f} s become {run.taken_s:.3f} s"
             )
@@ -302,11 +302,17 @@ def _dnc_findings(program: Program, carried: float, runs: Iterable[Run]) -> Iter
         if run.bytes > run.time_s * carried > 0.0:
             needed = run.bytes / run.time_s
             message = (
-                f"up to line {program.core.origin(run.last_line)[0]} the program asks for {needed:.0f} characters/s "
+                f"up to {_end(program, run)} the program asks for {needed:.0f} characters/s "
                 f"({run.blocks / run.time_s:.0f} blocks/s), the serial line carries {carried:.0f}: it takes "
                 f"{needed / carried:.2f} times as long, in jerks"
             )
             yield _at(program, "warning", "dnc_rate", run.first_line, message)
+
+
+def _end(program: Program, run: Run) -> str:
+    """The last line of a run, with its file if it is another one than that of the first line."""
+    (number, file), (_, begun) = program.core.origin(run.last_line), program.core.origin(run.first_line)
+    return f"line {number}" if file == begun else f"line {number} of {file or program.source}"
 
 
 def _lines(program: Program, run: Run) -> list[int]:

@@ -184,6 +184,33 @@ def test_short_blocks_of_each_region_and_its_lines_in_the_source() -> None:
     assert [row["lines"] for row in check.short_blocks["regions"]] == [[10, 11]] * 2
 
 
+def test_moves_of_rotary_axes_alone_have_no_length_to_judge() -> None:
+    check = checked("G1X10.F6000.\nA90.\nX20.\n", block_time_s=0.005)
+    assert check.counts["warning"] == 0
+    assert check.short_blocks is not None
+    assert check.short_blocks["blocks"] == 2
+
+
+def test_short_blocks_in_a_called_file_stand_at_its_lines(tmp_path: Path) -> None:
+    (tmp_path / "main.nc").write_text(HEAD + "G1X10.1F6000.\nM98P2\n" + END)
+    (tmp_path / "O0002.nc").write_text("%\nO2\nX10.2\nM99\n%\n")
+    check = sg.check(tmp_path / "main.nc", machine(block_time_s=0.005))
+    (finding,) = check.findings
+    assert (finding.code, finding.line, Path(finding.file).name) == ("short_block", 3, "O0002.nc")
+    assert finding.message.startswith("1 of 1 blocks up to line 3 are shorter")
+
+
+def test_every_line_runs_once_and_in_order() -> None:
+    """What the search for places rests on, over every program of the dialect."""
+    paths = sorted(Path(__file__).parents[1].glob("golden/dialect/*.nc"))
+    assert len(paths) > 20
+    for path in paths:
+        program = sg.Program.read(path, machine(), collect_alarms=True)
+        table = checked_runs.block_table(program, machine())
+        for lines in (table.cutting_lines, table.rapid_lines, table.dwell_lines):
+            assert lines.tolist() == sorted(lines.tolist()), path.name
+
+
 def test_against_the_segments_one_by_one() -> None:
     chance = random.Random(5)
     lines, kinds = [], ("G1X{:.3f}Y{:.3f}F{}.", "G0X{:.3f}Y{:.3f}", "M8", "G1Y{:.3f}X{:.3f}F{}.")
