@@ -29,6 +29,8 @@ _COMMENT = re.compile(r"\([^()\n]*\)?")
 _ALARM_WORDS = re.compile(r" \(alarm \d+\)")
 _MACRO_FROM_DNC = 123
 _NO_ROOM = 70
+# Of one reading (most_alarms in the core's reader).
+_MOST_ALARMS = 200
 
 
 @dataclass(frozen=True)
@@ -208,6 +210,10 @@ def _whole_file(data: bytes, source: str, machine: Machine) -> Iterator[Finding]
 def _reader_findings(program: Program) -> Iterator[Finding]:
     for line, column, alarm, message, file in program.core.alarms:
         yield _finding("alarm", "alarm", alarm, file or program.source, line, column, message)
+    if len(program.core.alarms) >= _MOST_ALARMS:
+        line, _, _, _, file = program.core.alarms[-1]
+        message = f"reading stopped here after {_MOST_ALARMS} alarms: what follows is not checked"
+        yield Finding("note", "reader", 0, file or program.source, line, 0, message)
     for line, column, alarm, message, file in program.core.warnings:
         yield _finding("note", "reader", alarm, file or program.source, line, column, message)
 

@@ -97,6 +97,13 @@ def test_macro_control_cannot_run_from_dnc() -> None:
     assert check.refused
 
 
+def test_the_end_of_the_reading_is_told() -> None:
+    few, many = (checked("G1F1000.\n" + "X1.Q\n" * count) for count in (199, 500))
+    assert not any("not checked" in each.message for each in few.findings)
+    assert (few.counts["alarm"], many.counts["alarm"]) == (199, 200)
+    assert [each.line for each in many.findings if "what follows is not checked" in each.message] == [205]
+
+
 # ---- what stops in the cut ---------------------------------------------------------------------------------
 
 _CUTS = "G1X10.F1000.\n{}\nX20.\n"
