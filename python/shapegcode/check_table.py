@@ -63,10 +63,9 @@ def next_step(check: Check) -> str:
     if "program_memory" in worst:
         return "drip feed the program (controller.dnc_baud), or split it."
     if "short_block" in worst:
-        return (
-            f"post longer blocks, or lower the feed, in the {codes['short_block']} stretches with short blocks "
-            "(controller.block_time_s)."
-        )
+        count = codes["short_block"]
+        stretches = "the stretch" if count == 1 else f"the {count} stretches"
+        return f"post longer blocks, or lower the feed, in {stretches} with short blocks (controller.block_time_s)."
     if "axis_feed" in worst:
         return "lower F to what the axes allow: the control does so anyway."
     if worst:

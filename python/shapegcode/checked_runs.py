@@ -128,7 +128,8 @@ class Breaker:
 def block_table(program: Program, machine: Machine) -> BlockTable:
     """Time every block of a program at its feed; costs a few array operations per million blocks."""
     limited = _timed(program, machine, with_limits=True)
-    cutting = np.flatnonzero(limited["kind"] == _CUTTING)
+    # A move of rotary axes alone has no length here, and so no time that could be compared.
+    cutting = np.flatnonzero((limited["kind"] == _CUTTING) & (limited["duration_s"] > 0.0))
     lines_of = {kind: limited["line"][limited["kind"] == kind].astype(np.int64) for kind in (_RAPID, _DWELL)}
     if cutting.size == 0:
         return BlockTable((), np.empty(0, np.int64), lines_of[_RAPID], lines_of[_DWELL], (), ())

@@ -29,6 +29,8 @@ _COMMENT = re.compile(r"\([^()\n]*\)?")
 _ALARM_WORDS = re.compile(r" \(alarm \d+\)")
 _MACRO_FROM_DNC = 123
 _NO_ROOM = 70
+# Of one reading (most_alarms in the core's reader).
+_MOST_ALARMS = 200
 
 
 @dataclass(frozen=True)
@@ -208,6 +210,10 @@ def _whole_file(data: bytes, source: str, machine: Machine) -> Iterator[Finding]
 def _reader_findings(program: Program) -> Iterator[Finding]:
     for line, column, alarm, message, file in program.core.alarms:
         yield _finding("alarm", "alarm", alarm, file or program.source, line, column, message)
+    if len(program.core.alarms) >= _MOST_ALARMS:
+        line, _, _, _, file = program.core.alarms[-1]
+        message = f"reading stopped here after {_MOST_ALARMS} alarms: what follows is not checked"
+        yield Finding("note", "reader", 0, file or program.source, line, 0, message)
     for line, column, alarm, message, file in program.core.warnings:
         yield _finding("note", "reader", alarm, file or program.source, line, column, message)
 
@@ -236,7 +242,7 @@ def _short_findings(program: Program, machine: Machine, runs: Iterable[Run]) -> 
     for run in runs:
         if run.short_blocks:
             message = (
-                f"{run.short_blocks} of {run.blocks} blocks up to line {program.core.origin(run.last_line)[0]} are "
+                f"{run.short_blocks} of {run.blocks} blocks up to {_end(program, run)} are "
                 f"shorter than the block time of {block_time_s * 1e3:g} ms, the shortest {run.shortest_s * 1e3:.3g} "
                 f"ms: without blocks in store the control starves, and {run.time_s:.3f} s become {run.taken_s:.3f} s"
             )
@@ -302,11 +308,17 @@ def _dnc_findings(program: Program, carried: float, runs: Iterable[Run]) -> Iter
         if run.bytes > run.time_s * carried > 0.0:
             needed = run.bytes / run.time_s
             message = (
-                f"up to line {program.core.origin(run.last_line)[0]} the program asks for {needed:.0f} characters/s "
+                f"up to {_end(program, run)} the program asks for {needed:.0f} characters/s "
                 f"({run.blocks / run.time_s:.0f} blocks/s), the serial line carries {carried:.0f}: it takes "
                 f"{needed / carried:.2f} times as long, in jerks"
             )
             yield _at(program, "warning", "dnc_rate", run.first_line, message)
+
+
+def _end(program: Program, run: Run) -> str:
+    """The last line of a run, with its file if it is another one than that of the first line."""
+    (number, file), (_, begun) = program.core.origin(run.last_line), program.core.origin(run.first_line)
+    return f"line {number}" if file == begun else f"line {number} of {file or program.source}"
 
 
 def _lines(program: Program, run: Run) -> list[int]:

@@ -97,6 +97,13 @@ def test_macro_control_cannot_run_from_dnc() -> None:
     assert check.refused
 
 
+def test_the_end_of_the_reading_is_told() -> None:
+    few, many = (checked("G1F1000.\n" + "X1.Q\n" * count) for count in (199, 500))
+    assert not any("not checked" in each.message for each in few.findings)
+    assert (few.counts["alarm"], many.counts["alarm"]) == (199, 200)
+    assert [each.line for each in many.findings if "what follows is not checked" in each.message] == [205]
+
+
 # ---- what stops in the cut ---------------------------------------------------------------------------------
 
 _CUTS = "G1X10.F1000.\n{}\nX20.\n"
@@ -182,6 +189,33 @@ def test_short_blocks_of_each_region_and_its_lines_in_the_source() -> None:
     assert told(check, "short_block") == [(11, "warning", 0)] * 2
     assert check.short_blocks is not None
     assert [row["lines"] for row in check.short_blocks["regions"]] == [[10, 11]] * 2
+
+
+def test_moves_of_rotary_axes_alone_have_no_length_to_judge() -> None:
+    check = checked("G1X10.F6000.\nA90.\nX20.\n", block_time_s=0.005)
+    assert check.counts["warning"] == 0
+    assert check.short_blocks is not None
+    assert check.short_blocks["blocks"] == 2
+
+
+def test_short_blocks_in_a_called_file_stand_at_its_lines(tmp_path: Path) -> None:
+    (tmp_path / "main.nc").write_text(HEAD + "G1X10.1F6000.\nM98P2\n" + END)
+    (tmp_path / "O0002.nc").write_text("%\nO2\nX10.2\nM99\n%\n")
+    check = sg.check(tmp_path / "main.nc", machine(block_time_s=0.005))
+    (finding,) = check.findings
+    assert (finding.code, finding.line, Path(finding.file).name) == ("short_block", 3, "O0002.nc")
+    assert finding.message.startswith("1 of 1 blocks up to line 3 are shorter")
+
+
+def test_every_line_runs_once_and_in_order() -> None:
+    """What the search for places rests on, over every program of the dialect."""
+    paths = sorted(Path(__file__).parents[1].glob("golden/dialect/*.nc"))
+    assert len(paths) > 20
+    for path in paths:
+        program = sg.Program.read(path, machine(), collect_alarms=True)
+        table = checked_runs.block_table(program, machine())
+        for lines in (table.cutting_lines, table.rapid_lines, table.dwell_lines):
+            assert lines.tolist() == sorted(lines.tolist()), path.name
 
 
 def test_against_the_segments_one_by_one() -> None:

@@ -27,6 +27,10 @@ void Reader::fail(const std::string& message, std::uint32_t column) const {
   throw Error(ErrorKind::program, message, here_.line, column);
 }
 
+void Reader::warn(const std::string& message) {
+  program_.warnings.push_back({origin_.line, message, 0, 0, program_.files[origin_.file]});
+}
+
 void Reader::alarm(int number, const std::string& message, std::uint32_t column) const {
   throw alarm_error(number, message, here_.line, column);
 }
@@ -63,13 +67,6 @@ void Reader::load_main() {
   control_.program = main->number;
   frames_.push_back({main, main->first, {}, false, false, false, 1, {}});
   here_ = main->first;
-  if (program_.program_numbers.size() > 1) {
-    origin_ = {main->first.line, 0};
-    program_.warnings.push_back({main->first.line,
-                                 "the file holds " + std::to_string(program_.program_numbers.size()) + " programs: O" +
-                                     std::to_string(main->number) + " is played",
-                                 0, 0, ""});
-  }
   if (main != store_.units().front().get()) {
     // Another program than the first: what is written is this one alone.
     expand_from(0);
@@ -200,7 +197,7 @@ bool Reader::step() {
     if (frames_.size() == 1) {
       return false;
     }
-    interpreter_.warn("program O" + std::to_string(frame.unit->number) + " ends without M99");
+    warn("program O" + std::to_string(frame.unit->number) + " ends without M99");
     leave();
     return true;
   }
@@ -220,11 +217,7 @@ void Reader::line(std::string_view text, std::size_t begin, std::size_t end) {
   const Block& block = interpreter_.block();
   if (block.optional_skip && options_.block_skip[static_cast<std::size_t>(block.skip_switch - 1)].value_or(false)) {
     interpreter_.close_region();  // the switch is on: the control does not run it
-    if (program_.expanded) {
-      rewriter_.flush();
-      put_raw(text, origin_);
-    }
-    return;
+    return;  // an expanded text leaves it out
   }
   if (block.macro) {
     macro_line(text, begin);
@@ -313,6 +306,18 @@ void Reader::finish() {
     program_.line_count = static_cast<std::uint32_t>(program_.origins.size());
   }
   const std::uint32_t last = here_.line;
+  std::string others;
+  for (const std::int64_t number : program_.program_numbers) {
+    if (number != program_.program_number && !called_.contains(number)) {
+      others += (others.empty() ? "" : ", ") + std::string("O") + std::to_string(number);
+    }
+  }
+  if (!others.empty()) {
+    program_.warnings.push_back({1,
+                                 "O" + std::to_string(program_.program_number) + " is played; the file also holds " +
+                                     others + " (--program picks another)",
+                                 0, 0, ""});
+  }
   if (!interpreter_.ended() && !framed_) {
     const Error error(ErrorKind::program, "the program has neither '%' lines nor an end M30 or M02: truncated?",
                       last_of_text, 1);

@@ -145,7 +145,7 @@ void Reader::subprogram_return(std::string_view text) {
     }
     rewriter_.flush();
     put("M99", origin_);
-    interpreter_.warn("M99 at the end of the main program: it runs for ever; one pass is read");
+    warn("M99 at the end of the main program: it runs for ever; one pass is read");
     interpreter_.end();
     return;
   }
@@ -316,7 +316,7 @@ bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool ma
       put_raw(text, origin_);
       interpreter_.forget_all();
       variables_.forget();
-      interpreter_.warn("program " + program_name(number) +
+      warn("program " + program_name(number) +
                         " is not at hand: the call is kept, position and variables are not known afterwards");
       return false;
     }
@@ -337,6 +337,7 @@ bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool ma
               " (controller.nesting_limit_subprogram) at the call of " + program_name(number),
           column);
   }
+  called_.insert(number);
   if (macro) {
     variables_.push_level(arguments.locals, here_.line, column);
   }

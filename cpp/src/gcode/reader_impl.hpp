@@ -85,6 +85,7 @@ class Reader {
   [[nodiscard]] std::string call_stack() const;
   [[noreturn]] void fail(const std::string& message, std::uint32_t column = 1) const;
   [[noreturn]] void alarm(int number, const std::string& message, std::uint32_t column = 1) const;
+  void warn(const std::string& message);
 
   // Calls.
   [[nodiscard]] bool is_call(const BlockWords& words) const noexcept;
@@ -118,6 +119,7 @@ class Reader {
   std::deque<SourceText> sources_;  ///< of programs in other files, and the original of an expanded text
   ProgramStore store_;
   std::set<std::int64_t> sought_;  ///< programs that no file holds
+  std::set<std::int64_t> called_;
   Interpreter interpreter_;
   MoveRewriter rewriter_;
   ControlVariables control_;

@@ -90,8 +90,7 @@ void Reader::macro_line(std::string_view view, std::size_t begin) {
   if (statement.optional_skip) {
     const auto known = options_.block_skip[static_cast<std::size_t>(statement.skip_switch - 1)];
     if (known.value_or(false)) {
-      put_raw(text, origin_);
-      return;
+      return;  // the switch is on: the control does not run it
     }
     if (!known) {
       fail(
