@@ -31,9 +31,9 @@ MACHINE = machine_with()
 PERIOD = {"emission.block_period_s": 0.005}
 
 
-def budgeted(text: str = PART, keys: dict[str, Any] | None = None, **limits: float) -> Judged:
+def budgeted(text: str = PART, keys: dict[str, Any] | None = None, **limits: Any) -> Judged:
     """Converted under a budget; the judge holds shaped and kept lines against the original."""
-    return convert(text, machine_with(keys), budget=sg.Budget(**limits))  # type: ignore[arg-type]
+    return convert(text, machine_with(keys), budget=sg.Budget(**limits))
 
 
 FREE = convert(PART, MACHINE)
@@ -48,7 +48,7 @@ def emitted_size(judged: Judged, entry: dict[str, Any]) -> int:
 
 def gain(entry: dict[str, Any]) -> float:
     was, now = (entry["residual_vibration_um"][side] for side in ("original", "emitted"))
-    return max(was.values()) - max(now.values())
+    return float(max(was.values()) - max(now.values()))
 
 
 def given_up(judged: Judged) -> set[int]:
@@ -185,7 +185,7 @@ def test_arcs_with_absolute_centres_cannot_be_given_up() -> None:
     ],
     ids=str,
 )
-def test_the_shortest_shaper_whose_blocks_are_slow_enough(limits: dict[str, float], which: int) -> None:
+def test_the_shortest_shaper_whose_blocks_are_slow_enough(limits: dict[str, Any], which: int) -> None:
     (limit,) = limits.values()
     key = ("baud", "blocks_per_second")[which]
     judged = budgeted(**limits)
@@ -315,7 +315,7 @@ def test_command(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     text = (tmp_path / "out.nc").read_bytes()
     assert len(text) <= 2048
-    limits = {"max_bytes": 2048, "baud": 38400.0, "max_blocks_per_second": None}
+    limits: dict[str, Any] = {"max_bytes": 2048, "baud": 38400.0, "max_blocks_per_second": None}
     budget = json.loads((tmp_path / "report.json").read_text())["budget"]
     assert budget["limits"] == limits
     assert budget["given_up"]
