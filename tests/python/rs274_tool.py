@@ -64,7 +64,7 @@ def run_rs274(program_text: str, tmp_path: Path, *, tools: str = "", variables: 
 # ---- canonical calls -------------------------------------------------------------------------------------------------
 
 # A long N number runs into the call's name. Places have four decimals of the program's unit.
-_CALL = re.compile(r"([A-Z][A-Z_0-9]*[A-Z])\((.*)\)$")
+_CALL = re.compile(r"(?:\bN[\d.]+ *)?([A-Z][A-Z_0-9]*)\((.*)\)$")
 _MM = {"CANON_UNITS_MM": 1.0, "CANON_UNITS_INCHES": 25.4}
 #: First, second and normal axis of an arc's numbers.
 _PLANES = {"CANON_PLANE_XY": (0, 1, 2), "CANON_PLANE_XZ": (2, 0, 1), "CANON_PLANE_YZ": (1, 2, 0)}

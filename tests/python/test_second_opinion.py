@@ -66,8 +66,8 @@ SHAPED = [
     "while_pocket",
 ]
 
-#: The reference position, in inches; a place beyond HALF_WAY_MM is one that the program does not tell.
-HOME_INCH, HALF_WAY_MM = 4000.0, 50000.0
+#: The reference position is at 4000 inches: a place beyond half the way is one that the program does not tell.
+HALF_WAY_MM = 50000.0
 VARIABLES = "5161\t4000\n5162\t4000\n5163\t4000\n5220\t1\n"
 TOOLS = "".join(f"T{number} P{number} Z0 D0\n" for number in range(1, 100))
 KINDS = {_core.SegmentKind.rapid: "rapid", _core.SegmentKind.line: "line", _core.SegmentKind.arc: "arc"}
@@ -222,3 +222,21 @@ def test_enough_is_compared() -> None:
     assert len(SHAPED) >= 10
     assert set(SHAPED) <= set(NAMES)
     assert all((DIALECT / f"{name}.nc").is_file() for name in LEFT_OUT)
+
+
+def test_differences_are_seen(tmp_path: Path) -> None:
+    machine = machine_with()
+    text = "%\nG21G17G90G94\nG00X0Y0Z0\nN100000G01X10.F300.\nG03X20.Y10.R10.\nG04P500\nM30\n%\n"
+    program = sg.Program.from_text(text, machine)
+    assert agree(program, for_rs274(text, machine), machine, tmp_path) == 3
+    for was, now in [
+        ("X10.", "X10.002"),
+        ("F300.", "F301."),
+        ("R10.", "R10.02"),
+        ("G03", "G02"),
+        ("P500", "P501"),
+        ("G04P500\n", ""),
+        ("M30", "G01Y0\nM30"),
+    ]:
+        with pytest.raises(AssertionError):
+            agree(program, for_rs274(text.replace(was, now), machine), machine, tmp_path)
