@@ -58,7 +58,8 @@ test:
 	$(MAKE) release
 	$(MAKE) sanitize
 	$(MAKE) stub-check
-	$(BIN)/python -m pytest
+	tests/tools/fetch_rs274.sh
+	$(BIN)/python -m pytest -n $(JOBS)
 
 lint: test-packages dev
 	$(BIN)/ruff check .

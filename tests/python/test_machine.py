@@ -432,7 +432,10 @@ def test_init_writes_a_file_that_loads_and_never_overwrites(
     assert list(tmp_path.iterdir()) == [tmp_path / "machine.toml"]
 
 
-def test_show_prints_values_units_and_origin(capsys: pytest.CaptureFixture[str]) -> None:
+def test_show_prints_values_units_and_origin(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "140")
     assert main(["machine", "show", "vx500"]) == 0
     out = capsys.readouterr().out
     for part in ("[axes.x.modes.1]", "46.0", "mm/min", "file", "natural frequency"):

@@ -217,7 +217,7 @@ void Reader::line(std::string_view text, std::size_t begin, std::size_t end) {
   const Block& block = interpreter_.block();
   if (block.optional_skip && options_.block_skip[static_cast<std::size_t>(block.skip_switch - 1)].value_or(false)) {
     interpreter_.close_region();  // the switch is on: the control does not run it
-    return;  // an expanded text leaves it out
+    return;                       // an expanded text leaves it out
   }
   if (block.macro) {
     macro_line(text, begin);

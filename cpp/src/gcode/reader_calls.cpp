@@ -317,7 +317,7 @@ bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool ma
       interpreter_.forget_all();
       variables_.forget();
       warn("program " + program_name(number) +
-                        " is not at hand: the call is kept, position and variables are not known afterwards");
+           " is not at hand: the call is kept, position and variables are not known afterwards");
       return false;
     }
     alarm(78, "program " + program_name(number) + " is not found", column);
