@@ -358,7 +358,28 @@ class _Importer:
         if given:
             self._set("controller.no_buffer_m_codes", tuple(sorted(set(given.values()))), *given)
 
+    def _assume_limits(self) -> None:
+        """Acceleration and feed limits that a control without them keeps by its time constants."""
+        ramp_s = self._data.get("controller", {}).get("time_constant_s")
+        for axis in "xyz":
+            table = self._data.get("axes", {}).get(axis, {})
+            rapid = table.get("rapid_mm_per_min")
+            if rapid and "max_feed_mm_per_min" not in table:
+                table["max_feed_mm_per_min"] = rapid
+                self._note(f"axes.{axis}.max_feed_mm_per_min", rapid, "no 1422 or 1430: the rapid rate")
+            feed = table.get("max_feed_mm_per_min")
+            if feed and ramp_s and "max_acceleration_mm_s2" not in table:
+                acceleration = round(feed / 60.0 / ramp_s, 3)
+                table["max_acceleration_mm_s2"] = acceleration
+                why = "no 1660: what the largest cutting feed asks for within the time constant after interpolation"
+                self._note(f"axes.{axis}.max_acceleration_mm_s2", acceleration, why)
+
+    def _note(self, key: str, value: float, why: str) -> None:
+        self._remarks[key] = f"assumed: {why}"
+        self._assume(key, value, why)
+
     def _require_limits(self) -> None:
+        self._assume_limits()
         needed = {"max_feed_mm_per_min": "1430", "rapid_mm_per_min": "1420", "max_acceleration_mm_s2": "1660"}
         problems = [
             Problem(f"axes.{axis}.{name}", "", f"not in the dump (parameter {number}); --from MACHINE gives it")

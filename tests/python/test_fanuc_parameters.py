@@ -104,8 +104,16 @@ def test_bad_dump(data: bytes, message: str) -> None:
 
 
 def test_limits_that_nobody_gives_are_asked_for() -> None:
-    with pytest.raises(MachineError, match=r"axes\.x\.max_acceleration_mm_s2: not in the dump .*--from"):
-        read_parameters(DUMPS / "old.txt")
+    with pytest.raises(MachineError, match=r"axes\.x\.rapid_mm_per_min: not in the dump .*--from"):
+        import_parameters(b"%\nN01622 A1 P 64 A2 P 64 A3 P 64\n%\n", "d.txt")
+
+
+def test_acceleration_of_a_control_without_1660_is_assumed_from_its_time_constant() -> None:
+    dump = b"%\nN01420 A1 P 12000 A2 P 12000 A3 P 9000\nN01422 P 6000\nN01622 A1 P 50 A2 P 50 A3 P 50\n%\n"
+    result = import_parameters(dump, "d.txt")
+    # 6000 mm/min within 50 ms
+    assert [axis.max_acceleration_mm_s2 for axis in result.machine.axes.as_tuple()] == [2000.0] * 3
+    assert any(row["key"] == "axes.x.max_acceleration_mm_s2" for row in result.assumed)
 
 
 def test_large_dump_is_fast() -> None:

@@ -1,5 +1,6 @@
 // Subprograms M98/M99/M198, macro calls G65/G66/G67, codes that the builder bound to programs.
 #include <algorithm>
+#include <cmath>
 
 #include "reader_impl.hpp"
 #include "shapegcode/error.hpp"
@@ -227,7 +228,7 @@ bool Reader::bound_call(std::string_view text, std::string_view raw) {
   };
   for (const Word& word : interpreter_.block()) {
     if (word.letter == 'G') {
-      const auto found = bound.g_macros.find(static_cast<int>(word.value * 10.0 + 0.5));
+      const auto found = bound.g_macros.find(static_cast<int>(std::lround(word.value * 10.0)));
       if (found != bound.g_macros.end()) {
         return with_arguments(found->second, word.column);
       }
