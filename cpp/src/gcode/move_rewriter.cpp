@@ -550,7 +550,7 @@ void MoveRewriter::read_cycle(Item& item, bool data_only) {
   const BlockWords& words = *words_;
   const int normal = plane_normal(programmed_.plane);
   const bool incremental = programmed_.distance == 91;
-  if (compensation_ != 40) {
+  if (compensation_ != 40 || span_open_) {
     fail("drilling cycle G" + std::to_string(programmed_.cycle) +
          " under cutter compensation: cancel it with G40 first");
   }
