@@ -150,7 +150,8 @@ PUBLISHED_WATCH = re.compile(r"block time|in-position time|cutting time constant
 
 @pytest.mark.slow
 def test_logs_give_the_hidden_truth_within_2_percent() -> None:
-    found, wrong = deviations(range(20), log=True)
+    # The documented figures come from more draws: tests/python/characterization_figures.py.
+    found, wrong = deviations(range(12), log=True)
     assert wrong == []
     for each in found:
         if PUBLISHED_LOG.match(each.quantity) and each.value is not None and each.truth > 0.0:
