@@ -119,7 +119,8 @@ void Reader::put(std::string_view flat, const LineOrigin& origin) {
 
 Error Reader::located(const Error& error) const {
   // An error of a block that waited (compensation, corners) carries that block's line.
-  Error result(error.kind(), error.what() + call_stack(), error.line() > 0 ? error.line() : here_.line,
+  // Whatever is refused while a text is read is refused because of the text.
+  Error result(ErrorKind::program, error.what() + call_stack(), error.line() > 0 ? error.line() : here_.line,
                std::max<std::uint32_t>(error.column(), 1), error.alarm());
   const std::string& file = program_.files[frames_.empty() ? 0 : frames_.back().unit->file];
   result.set_file(error.file().empty() ? file : error.file());
@@ -143,7 +144,7 @@ std::string Reader::call_stack() const {
 }
 
 bool Reader::record(const Error& error) {
-  if (!options_.collect_alarms || error.kind() != ErrorKind::program) {
+  if (!options_.collect_alarms) {
     return false;
   }
   const Error at = located(error);
