@@ -276,7 +276,7 @@ def test_without_the_active_set_solver_the_linear_program_decides(monkeypatch: p
         raise RuntimeError("Maximum number of iterations reached.")
 
     expected = shortest_non_negative(PAPER_MODES, 0.004)
-    monkeypatch.setattr("shapegcode.shaping.nnls", cycles)
+    monkeypatch.setattr("shapegcode.shaping.grid_designs.nnls", cycles)
     shaper = shortest_non_negative(PAPER_MODES, 0.004)
     np.testing.assert_allclose(shaper.times_s, expected.times_s)
     np.testing.assert_allclose(shaper.amplitudes, expected.amplitudes, rtol=1e-12)

@@ -1,0 +1,64 @@
+"""What a shaper is designed for: modes, each with the band in which its frequency may lie."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from shapegcode._core import ArgumentError, Mode
+
+__all__ = ["ModeBand", "parse_mode_band"]
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_TEXT = re.compile(rf"({_NUMBER})(?::({_NUMBER}))?(?:(?:±|\+-|\+/-)({_NUMBER})(%|Hz)?)?")
+
+
+@dataclass(frozen=True)
+class ModeBand:
+    """A mode and how far its frequency may be off.
+
+    Attributes:
+        mode: nominal frequency and damping.
+        uncertainty: the frequency lies within (1 - uncertainty) to (1 + uncertainty) times the nominal one;
+            0 to below 1, 0: only the nominal frequency is designed for.
+    """
+
+    mode: Mode
+    uncertainty: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the range.
+
+        Raises:
+            ArgumentError: the uncertainty is not at least 0 and below 1.
+        """
+        if not 0.0 <= self.uncertainty < 1.0:
+            raise ArgumentError(
+                f"uncertainty of the mode at {self.mode.frequency_hz:g} Hz is {self.uncertainty:.4g}: "
+                "it must be at least 0 and below 1"
+            )
+
+    def shifted(self, share: float) -> Mode:
+        """The mode with its frequency moved by `share` (-1 to 1) of the band's half width."""
+        scale = 1.0 + share * self.uncertainty
+        return Mode(self.mode.frequency_hz * scale, self.mode.damping_ratio, self.mode.participation)
+
+    def __str__(self) -> str:
+        """As `parse_mode_band` reads it."""
+        text = f"{self.mode.frequency_hz:g}:{self.mode.damping_ratio:g}"
+        return f"{text}±{100.0 * self.uncertainty:g}%" if self.uncertainty else text
+
+
+def parse_mode_band(text: str) -> ModeBand:
+    """A mode such as ``46``, ``46:0.02``, ``46:0.02±5%`` or ``46:0.02+-2.3Hz``: Hz, damping ratio, band.
+
+    Raises:
+        ArgumentError: not of that form, or a value outside its range.
+    """
+    match = _TEXT.fullmatch(text.strip())
+    if match is None:
+        raise ArgumentError(f"{text!r} is no mode: FREQUENCY[:DAMPING][±BAND], for example 46:0.02±5%")
+    frequency_hz, damping = float(match[1]), float(match[2] or 0.0)
+    band = float(match[3] or 0.0)
+    mode = Mode(frequency_hz, damping)
+    return ModeBand(mode, band / frequency_hz if match[4] == "Hz" else band / 100.0)

@@ -1,0 +1,65 @@
+"""A shaper and what it is worth for the modes that it was designed for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapegcode._core import Shaper
+from shapegcode.shaping.band import ModeBand
+
+__all__ = ["Design", "evaluate"]
+
+_SWEEP = 201  # frequencies of a band
+
+
+@dataclass(frozen=True)
+class Design:
+    """One row of a comparison of shapers.
+
+    Attributes:
+        family: name of its row in the registry.
+        shaper: the taps.
+        period_s: grid on which its times lie and its zeros are exact, s; None: times are continuous.
+        residual: largest residual ratio of the modes at their nominal frequencies.
+        worst_residual: the same over the modes' bands.
+    """
+
+    family: str
+    shaper: Shaper
+    period_s: float | None
+    residual: float
+    worst_residual: float
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last tap, s."""
+        return self.shaper.duration_s
+
+    @property
+    def variance_s2(self) -> float:
+        """Contour cost, s²: dR/R = variance*(v/R)²/2."""
+        return self.shaper.variance_s2
+
+    @property
+    def abs_sum(self) -> float:
+        """Sum of the taps' magnitudes: 1 without negative taps."""
+        return self.shaper.abs_sum
+
+    @property
+    def negative(self) -> bool:
+        """Whether any tap is negative."""
+        return self.shaper.has_negative
+
+
+def evaluate(family: str, shaper: Shaper, bands: Sequence[ModeBand], period_s: float | None = None) -> Design:
+    """The figures of a shaper for modes and their bands."""
+    residual = max(shaper.residual_ratio(band.mode) for band in bands)
+    worst = max(
+        shaper.residual_ratio(band.shifted(float(share)))
+        for band in bands
+        for share in (np.linspace(-1.0, 1.0, _SWEEP) if band.uncertainty else (0.0,))
+    )
+    return Design(family, shaper, period_s, residual, worst)
