@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "shapegcode/motion/limits.hpp"
+
 namespace shapegcode {
 namespace {
 
@@ -135,9 +137,11 @@ void RunShaper::read_row() {
   if (measured_ != nullptr) {
     if (read_ == 1) {
       tangent_.assign(static_cast<std::size_t>(history_), tangent);
+      wanted_.assign(static_cast<std::size_t>(history_), wanted);
       segment_.assign(static_cast<std::size_t>(history_), 0);
     }
     tangent_.push_back(tangent);
+    wanted_.push_back(wanted);
     segment_.push_back(static_cast<std::uint32_t>(at));
   }
 }
@@ -289,27 +293,47 @@ double RunShaper::shaped(std::size_t axis, std::ptrdiff_t row, bool corrected) c
   return sum;
 }
 
-void RunShaper::measure(std::size_t row) {
-  const std::size_t half = static_cast<std::size_t>(filter_.half_shaper.duration_samples()) / 2 + 1;
-  read_to(row + half + 1);
+// What is left of the error behind the correction.
+Vector3 RunShaper::deviation(std::size_t row) const noexcept {
   const std::size_t i = index(row);
-  Vector3 deviation;
+  Vector3 result;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     const std::vector<double>& kernel = filter_.kernels[axis];
     double sum = error_[axis][i];
     for (std::size_t j = 0; j < kernel.size(); ++j) {
       sum += kernel[j] * correction_[axis][i - j];
     }
-    deviation[static_cast<Eigen::Index>(axis)] = sum;
+    result[static_cast<Eigen::Index>(axis)] = sum;
   }
-  deviation -= tangent_[i].dot(deviation) * tangent_[i];
-  const auto size = static_cast<float>(deviation.norm());
-  const std::uint32_t first = segment_[i - half];
-  const std::uint32_t last = segment_[i + half];
-  for (std::uint32_t k = first; k <= last; ++k) {
-    measured_->on_segment[k] = std::max(measured_->on_segment[k], size);
-    if (k > first) {
-      measured_->at_junction[k] = std::max(measured_->at_junction[k], size);
+  return result;
+}
+
+void RunShaper::measure(std::size_t row) {
+  const std::size_t half = static_cast<std::size_t>(filter_.half_shaper.duration_samples()) / 2 + 1;
+  read_to(row + half + 1);
+  const std::size_t i = index(row);
+  const Vector3 left = deviation(row);
+  double size = (left - tangent_[i].dot(left) * tangent_[i]).norm();
+  // At a corner the way by which the corner itself is missed counts.
+  constexpr std::size_t around = 4;  // rows, within which the place along the path counts fully
+  if (segment_[i - around] != segment_[i - around - 1] &&
+      is_corner(*path_, segment_[i - around - 1], segment_[i - around])) {
+    const Vector3& corner = (*path_)[segment_[i - around]].start_mm;
+    double nearest = MotionLimits::none;
+    for (std::size_t k = row - std::min(row, 2 * around); k < row; ++k) {
+      const Vector3 from = wanted_[index(k)] + deviation(k);
+      const Vector3 step = wanted_[index(k + 1)] + deviation(k + 1) - from;
+      const double length2 = step.squaredNorm();
+      const double share = length2 > 0.0 ? std::clamp((corner - from).dot(step) / length2, 0.0, 1.0) : 0.0;
+      nearest = std::min(nearest, (from + share * step - corner).norm());
+    }
+    size = std::max(size, nearest);
+  }
+  const auto found = static_cast<float>(size);
+  for (std::uint32_t k = segment_[i - half]; k <= segment_[i + half]; ++k) {
+    measured_->on_segment[k] = std::max(measured_->on_segment[k], found);
+    if (k > segment_[i - half]) {
+      measured_->at_junction[k] = std::max(measured_->at_junction[k], found);
     }
   }
 }
@@ -330,6 +354,7 @@ void RunShaper::forget() {
     drop(error_[axis]);
   }
   drop(tangent_);
+  drop(wanted_);
   drop(segment_);
   base_ = keep;
 }

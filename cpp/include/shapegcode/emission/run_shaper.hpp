@@ -77,6 +77,7 @@ class RunShaper {
   void correct(std::size_t begin, std::size_t end, std::size_t accepted);
   [[nodiscard]] bool asks_too_much(std::size_t begin, std::size_t end, std::size_t axis);
   [[nodiscard]] bool active(std::size_t row) const noexcept;
+  [[nodiscard]] Vector3 deviation(std::size_t row) const noexcept;
   void measure(std::size_t row);
   void forget();
   [[nodiscard]] double shaped(std::size_t axis, std::ptrdiff_t row, bool corrected) const noexcept;
@@ -108,6 +109,7 @@ class RunShaper {
   std::array<Column, axis_count> error_;    // to be corrected
   std::array<Column, axis_count> correction_;
   std::vector<Vector3> tangent_;        // of the target, only where deviations are measured
+  std::vector<Vector3> wanted_;         // likewise, its position
   std::vector<std::uint32_t> segment_;  // likewise
   std::deque<ArcRow> arcs_;             // rows on arcs that are still ahead
   ArcRow seen_;
