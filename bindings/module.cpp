@@ -13,6 +13,7 @@ PYBIND11_MODULE(_core, module) {
   register_motion(module);
   register_gcode(module);
   register_emission(module);
+  register_plant(module);
   register_simulation(module);
   register_timing(module);
 }
