@@ -18,13 +18,13 @@ _SIZE_UNITS = {"": 1, "k": 1024, "M": 1024 * 1024}
 _TIME_UNITS = {"ms": 1e-3, "us": 1e-6, "s": 1.0}
 
 
-def add_machine_argument(parser: argparse.ArgumentParser) -> None:
+def add_machine_argument(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Declare ``-m MACHINE`` and ``--set KEY=VALUE``."""
     parser.add_argument(
         "-m",
         "--machine",
         metavar="MACHINE",
-        required=True,
+        required=required,
         help="machine file (TOML), or name of a built-in machine such as vx500",
     )
     parser.add_argument(
