@@ -13,7 +13,16 @@ from shapegcode.shaping.registry import FAMILIES
 if TYPE_CHECKING:
     from rich.table import Table
 
-__all__ = ["designs_table", "families_table", "next_step", "radial_error_um", "refusals_table", "shown", "verdict"]
+__all__ = [
+    "designs_table",
+    "families_table",
+    "next_step",
+    "radial_error_um",
+    "refusals_table",
+    "shown",
+    "times_name",
+    "verdict",
+]
 
 _MARK, _GRID_MARK = "=>", "->"
 _PARETO_OF_A_FAMILY = 3  # rows, beside the preferred one
@@ -22,6 +31,11 @@ _PARETO_OF_A_FAMILY = 3  # rows, beside the preferred one
 def radial_error_um(design: Design, speed_mm_per_s: float, radius_mm: float) -> float:
     """By how much a circle comes out too small, µm: variance*v²/(2R) (spec 0)."""
     return design.variance_s2 * speed_mm_per_s**2 / (2.0 * radius_mm) * 1e3
+
+
+def times_name(period_s: float | None) -> str:
+    """Kind of times in words."""
+    return "continuous" if period_s is None else f"{period_s * 1e3:.4g} ms grid"
 
 
 def shown(result: Recommendation) -> list[int]:
@@ -69,7 +83,7 @@ def designs_table(result: Recommendation, speed_mm_per_s: float, radius_mm: floa
         table.add_row(
             _mark(result, index),
             Text(each.family),
-            _times_name(each.period_s),
+            times_name(each.period_s),
             f"{each.duration_s * 1e3:.2f}",
             _percent(each.worst_residual),
             _percent(each.residual),
@@ -93,7 +107,7 @@ def refusals_table(refusals: Sequence[Refusal]) -> Table:
     table.add_column("times", no_wrap=True)
     table.add_column("why", overflow="fold")
     for refusal in refusals:
-        table.add_row(Text(refusal.family), _times_name(refusal.period_s), Text(refusal.reason))
+        table.add_row(Text(refusal.family), times_name(refusal.period_s), Text(refusal.reason))
     return table
 
 
@@ -149,12 +163,8 @@ def _mark(result: Recommendation, index: int) -> str:
     return _GRID_MARK if index == result.grid_index else ""
 
 
-def _times_name(period_s: float | None) -> str:
-    return "continuous" if period_s is None else f"{period_s * 1e3:.4g} ms grid"
-
-
 def _spoken(each: Design) -> str:
-    return f"{each.duration_s * 1e3:.4g} ms, {_times_name(each.period_s).replace('continuous', 'continuous times')}"
+    return f"{each.duration_s * 1e3:.4g} ms, {times_name(each.period_s).replace('continuous', 'continuous times')}"
 
 
 def _percent(ratio: float) -> str:

@@ -6,12 +6,16 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from scipy.signal import lsim
 
-from shapegcode._core import Shaper
+from shapegcode._core import ArgumentError, Mode, Shaper, convolved_zv
 from shapegcode.cli import main
+from shapegcode.modal_response import respond, shaped_step
+from shapegcode.shaper_picture import residual_curve, selected
 from shapegcode.shaper_table import radial_error_um
-from shapegcode.shaping import Design
+from shapegcode.shaping import Design, choose_shaper
 
 PAPER = ("--mode", "46:0.02±5%", "--mode", "131:0.02")
 KEYS = {
@@ -130,3 +134,66 @@ def test_contour_cost_in_micrometres() -> None:
     assert radial_error_um(Design("average", shaper, None, 0.0, 0.0), speed, radius) == pytest.approx(
         expected, rel=3e-3
     )
+
+
+# --- pictures -----------------------------------------------------------------------------------------------
+
+
+def test_pictures_are_complete_and_the_same_each_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["shaper", *PAPER, "--period", "continuous", "--period", "5ms"]
+    for folder in ("one", "two"):
+        assert main([*words, "--plots", str(tmp_path / folder)]) == 0
+    capsys.readouterr()
+    kinds = {"pareto", "sensitivity", "impulses", "steps"}
+    names = {f"shaper-{kind}{suffix}" for kind in kinds for suffix in (".png", ".svg")}
+    assert {file.name for file in (tmp_path / "one").iterdir()} >= names
+    for file in (tmp_path / "one").glob("*.svg"):
+        assert file.read_bytes() == (tmp_path / "two" / file.name).read_bytes()
+    text = (tmp_path / "one" / "shaper-sensitivity.svg").read_text(encoding="utf-8")
+    assert "residual vibration in %" in text
+    assert "non-negative, 20 ms (5 ms grid)" in text or "polynomial, 20 ms (5 ms grid)" in text
+
+
+def test_selected_curves_begin_with_the_recommended_one() -> None:
+    result = choose_shaper(["46:0.02±5%", "131:0.02"])
+    curves = selected(result)
+    assert curves[0] is result.design
+    assert len(curves) <= 6
+    assert any(each.period_s is not None for each in curves)
+
+
+def test_residual_curve_is_zero_at_the_modes() -> None:
+    modes = [Mode(46.0, 0.02), Mode(131.0, 0.05)]
+    curve = residual_curve(convolved_zv(modes), np.array([46.0, 131.0, 80.0]), modes)
+    assert curve[:2] == pytest.approx([0.0, 0.0], abs=1e-14)
+    assert curve[2] == convolved_zv(modes).residual_ratio(Mode(80.0, 0.02))  # the damping of the nearer mode
+
+
+def test_responses_of_modes_against_scipy() -> None:
+    """Any number of modes side by side; the transfer function of spec 3 by SciPy."""
+    modes = [Mode(3.0, 0.1), Mode(11.0, 0.02), Mode(7.0, 0.0), Mode(1.0, 0.05)]
+    rng = np.random.default_rng(5)
+    command = np.cumsum(rng.normal(size=400))
+    command -= command[0]
+    run = respond(modes, command, 0.002)
+    for place, mode in enumerate(modes):
+        omega = 2.0 * np.pi * mode.frequency_hz
+        damping = 2.0 * mode.damping_ratio * omega
+        system = ([[0.0, 1.0], [-(omega**2), -damping]], [[0.0], [1.0]], [[omega**2, damping]], [[0.0]])
+        expected = lsim(system, command, run.times_s)[1]
+        np.testing.assert_allclose(run.responses[:, place], expected, atol=1e-9 * np.abs(command).max())
+    with pytest.raises(ArgumentError, match="0 modes"):
+        respond([], command, 0.002)
+
+
+def test_a_shaped_step_leaves_what_the_residual_ratio_says() -> None:
+    modes = [Mode(1.0, 0.0), Mode(4.0, 0.0)]
+    shaper = Shaper([0.0, 0.2, 0.41], [0.72361, -0.44721, 0.7236])
+    step = shaped_step(shaper, 0.0005, 1.0)
+    assert (step[0], step[-1]) == (0.0, pytest.approx(1.0))
+    run = respond(modes, step, 0.0005)
+    expected = [shaper.residual_ratio(mode) for mode in modes]
+    assert run.residuals == pytest.approx(expected, rel=1e-4)
+    # taps between the samples keep their times
+    odd = respond(modes, shaped_step(Shaper([0.0, 0.2003], [0.5, 0.5]), 0.0005, 1.0), 0.0005)
+    assert odd.residuals == pytest.approx([abs(np.cos(np.pi * f * 0.2003)) for f in (1.0, 4.0)], rel=1e-4)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.options import (
     add_machine_argument,
+    add_plots_argument,
     load_machine,
     positive,
     ratio,
@@ -107,6 +108,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=20.0,
         help="radius of the arc on which it is shown (default: %(default)g)",
     )
+    add_plots_argument(parser, "write pictures of the comparison (PNG and SVG) into this folder")
     add_json_argument(parser)
 
 
@@ -150,6 +152,10 @@ def run(args: argparse.Namespace) -> int:
             allow_negative=args.negative,
             taps=None if args.taps is None else _taps(args.taps),
         )
+    if args.plots is not None:
+        from shapegcode.shaper_picture import write_shaper_pictures
+
+        write_shaper_pictures(result, args.plots)
     if args.json is not None:
         write_json(result.report(), args.json)
     console.print(designs_table(result, args.speed, args.radius))
