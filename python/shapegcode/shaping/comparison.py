@@ -7,11 +7,11 @@ import re
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
+from shapegcode._core import ArgumentError, Mode, Shaper
 from shapegcode.shaping.band import ModeBand, parse_mode_band
 from shapegcode.shaping.choice import Recommendation, choose
-from shapegcode.shaping.grid_designs import choose_block_period
 from shapegcode.shaping.registry import DesignOptions
+from shapegcode.shaping.robust_search import Task, shortest_below
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -76,7 +76,7 @@ def choose_shaper(
         slowest = min(band.mode.frequency_hz for band in bands)
         max_duration_s = machine.shaping.max_duration_s if machine is not None else _SLOWEST_PERIODS / slowest
     if periods_s is None:
-        best = candidate_periods(bands, machine, max_duration_s)
+        best = candidate_periods(bands, machine, max_duration_s, vibration_limit)
         periods_s = [*([None] if machine is None else []), *best]
     elif machine is not None:
         for period_s in periods_s:
@@ -110,17 +110,23 @@ def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
     return [ModeBand(Mode(*key), width) for key, width in widths.items()]
 
 
-def candidate_periods(bands: Sequence[ModeBand], machine: Machine | None, max_duration_s: float) -> list[float]:
-    """The block periods worth comparing, ascending, s: those whose shortest non-negative shapers are shortest.
+def candidate_periods(
+    bands: Sequence[ModeBand], machine: Machine | None, max_duration_s: float, vibration_limit: float = 0.05
+) -> list[float]:
+    """The block periods worth comparing, ascending, s: those on which a non-negative shaper is shortest.
 
     Args:
         bands: the modes.
         machine: a stated block period is the only candidate; else its interpolation period and block time say which
             there are. None: multiples of 1 ms.
         max_duration_s: longest shaper.
+        vibration_limit: largest worst residual ratio of the shapers that are compared.
+
+    Returns:
+        The best four of those up to 20 ms; the shortest four if none has such a shaper.
 
     Raises:
-        ArgumentError: no multiple of the interpolation period lies between the block time and 20 ms.
+        ArgumentError: a value outside its range.
     """
     if machine is not None and machine.emission.block_period_s is not None:
         return [machine.emission.block_period_s]
@@ -129,17 +135,20 @@ def candidate_periods(bands: Sequence[ModeBand], machine: Machine | None, max_du
     else:
         least_s = _FINEST_SHARE / max(band.mode.frequency_hz for band in bands)
         tick_s = _ASSUMED_TICK_S * max(1, math.ceil(least_s / _ASSUMED_TICK_S))
-    longest_s = max(_LONGEST_BLOCK_PERIOD_S, least_s + _PERIODS_COMPARED * tick_s)
-    try:
-        tried = choose_block_period(
-            [band.mode for band in bands], tick_s, least_s, longest_s, max_duration_s
-        ).candidates
-    except DesignError:
-        # No grid has a non-negative design: the finest ones are the nearest to continuous times.
-        first = max(1, math.ceil(least_s / tick_s - _WHOLE))
-        return [multiple * tick_s for multiple in range(first, first + _PERIODS_COMPARED)]
-    possible = [(each.shaper.duration_s, -each.period_s) for each in tried if each.shaper is not None]
-    return sorted(-period for _, period in sorted(possible)[:_PERIODS_COMPARED])
+    first = max(1, math.ceil(least_s / tick_s - _WHOLE))
+    last = max(first + _PERIODS_COMPARED - 1, math.floor(_LONGEST_BLOCK_PERIOD_S / tick_s + _WHOLE))
+    best: list[tuple[float, float]] = []  # duration, and the period with a minus: of equal durations the longer one
+    for multiple in range(first, last + 1):
+        period_s = multiple * tick_s
+        # What is longer than the worst of the best so far need not be found.
+        longest_s = best[-1][0] if len(best) == _PERIODS_COMPARED else max_duration_s
+        task = Task.checked(bands, period_s, non_negative=True, max_abs_sum=1.0, zeros_at_nominal=False)
+        found = shortest_below(task, vibration_limit, longest_s, least_cost=False)
+        if found is not None:
+            best = sorted([*best, (round(found.shaper.duration_s, 9), -period_s)])[:_PERIODS_COMPARED]
+    return sorted(-period_s for _, period_s in best) or [
+        multiple * tick_s for multiple in range(first, first + _PERIODS_COMPARED)
+    ]
 
 
 def _band(given: str | Mode | ModeBand, uncertainty: float) -> ModeBand:
