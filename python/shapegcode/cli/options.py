@@ -26,13 +26,13 @@ def add_input_arguments(parser: argparse.ArgumentParser, metavar: str = "IN") ->
     add_program_argument(parser)
 
 
-def add_machine_argument(parser: argparse.ArgumentParser) -> None:
+def add_machine_argument(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Declare ``-m MACHINE`` and ``--set KEY=VALUE``."""
     parser.add_argument(
         "-m",
         "--machine",
         metavar="MACHINE",
-        required=True,
+        required=required,
         help="machine file (TOML), or name of a built-in machine such as vx500",
     )
     parser.add_argument(
