@@ -102,6 +102,12 @@ class Shaping(Table):
         unit="degrees",
         default=15.0,
     )
+    part_mass_kg: NonNegative | None = key(
+        "mass of the part on the table, for modes with a table over mass_kg; left out: not known, and their "
+        "nominal frequency holds",
+        unit="kg",
+        default=None,
+    )
 
 
 class Tolerance(Table):
