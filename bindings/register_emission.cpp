@@ -68,6 +68,9 @@ void register_emission(py::module_& module) {
       .def_readwrite("minimum_feed", &FitOptions::minimum_feed, "In feed units.")
       .def_readwrite("merge_tolerance_increments", &FitOptions::merge_tolerance_increments,
                      "Deviation of merged blocks per axis, least increments.")
+      .def_readwrite("modes", &FitOptions::modes,
+                     "Modes of X, Y, Z, which the rounding of block ends leaves at rest; none: ends are rounded to the "
+                     "nearest increment.")
       .def(
           "end_with_arc",
           [](FitOptions& self, bool clockwise, int normal, double radius_mm) {
@@ -98,7 +101,8 @@ void register_emission(py::module_& module) {
       [](const ShapedCommand& command, const std::vector<std::uint32_t>& breaks, const FitOptions& options) {
         const py::gil_scoped_release release;
         auto fitted = std::make_shared<FittedBlocks>();
-        fitted->blocks = fit_blocks(command.grid_mm, command.middle_mm, command.arc_normal, breaks, options);
+        fitted->blocks =
+            fit_blocks(command.grid_mm, command.middle_mm, command.arc_normal, breaks, options, command.run_ends);
         return fitted;
       },
       py::arg("command"), py::arg("breaks"), py::arg("options"),

@@ -1428,6 +1428,14 @@ class FitOptions:
     @minimum_feed.setter
     def minimum_feed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+    @property
+    def modes(self) -> typing.Annotated[list[list[Mode]], "FixedSize(3)"]:
+        """
+        Modes of X, Y, Z, which the rounding of block ends leaves at rest; none: ends are rounded to the nearest increment.
+        """
+    @modes.setter
+    def modes(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> None:
+        ...
 class FittedBlocks:
     """
     Blocks ready to be written.

@@ -124,6 +124,10 @@ def emit_region(
     fit.minimum_feed = max(1, math.ceil(machine.controller.minimum_feed_mm_per_min / unit * 10**feed_decimals - 1e-9))
     fit.merge_tolerance_increments = machine.emission.merge_tolerance_increments
     fit.arc_min_chord_mm = machine.emission.arc_min_chord_mm
+    if machine.emission.rounding == "vibration":
+        from shapegcode.verify import axis_modes  # which imports this module
+
+        fit.modes = axis_modes(machine)
     last = region.path[-1]
     if region.exit.motion in (2, 3) and last.kind == _core.SegmentKind.arc:
         fit.end_with_arc(region.exit.motion == 2, last.normal, last.radius_mm)
