@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "shapegcode/error.hpp"
@@ -10,11 +11,12 @@ namespace shapegcode {
 namespace {
 
 // Choices followed at a time; more of them on the last free blocks before a rest, where it shows most.
-constexpr std::size_t width_on_the_way = 12;
+constexpr std::size_t width_on_the_way = 8;
 constexpr std::size_t width_before_rest = 128;
 constexpr std::size_t free_nodes_before_rest = 8;
 // How much what is left now counts against one period of what was left on the way.
 constexpr double weight_now = 4.0;
+constexpr std::size_t room = 2 * std::max(width_on_the_way, width_before_rest);
 
 }  // namespace
 
@@ -35,6 +37,14 @@ ModalRounder::ModalRounder(std::span<const Mode> modes, double block_period_s) :
   chosen_state_.resize(modes_.size());
   turn_.resize(modes_.size());
   gain_.resize(modes_.size());
+  for (Choices* choices : {&kept_, &grown_}) {
+    choices->cost.resize(room);
+    choices->shift.resize(room);
+    choices->step.resize(room);
+    choices->real.resize(room * modes_.size());
+    choices->imag.resize(room * modes_.size());
+  }
+  left_.resize(room);
 }
 
 void ModalRounder::advance(std::span<std::complex<double>> excitation, double step) const noexcept {
@@ -43,11 +53,9 @@ void ModalRounder::advance(std::span<std::complex<double>> excitation, double st
   }
 }
 
-// Every survivor goes on to every candidate that it may go on to.
-void ModalRounder::expand(const RoundingNode& node, std::int8_t other_before, const std::complex<double>* excitation,
-                          std::size_t width) {
-  const std::size_t count = modes_.size();
-  for (std::size_t m = 0; m < count; ++m) {
+// Every choice goes on to every candidate that it may go on to.
+void ModalRounder::expand(const RoundingNode& node, const std::complex<double>* excitation) {
+  for (std::size_t m = 0; m < modes_.size(); ++m) {
     const ModeStep& mode = modes_[m];
     turn_[m] = mode.turn;
     gain_[m] = mode.gain;
@@ -57,81 +65,109 @@ void ModalRounder::expand(const RoundingNode& node, std::int8_t other_before, co
       gain_[m] = (1.0 - turn_[m]) * (mode.scale / periods);
     }
   }
-  grown_.clear();
-  grown_states_.clear();
-  for (std::uint8_t side = 0; side <= (node.other != 0 ? 1 : 0); ++side) {
-    const double shift = side != 0 ? node.other : 0.0;
-    const double error = node.error + shift;
-    for (std::size_t i = 0; i < kept_.size(); ++i) {
-      const Survivor& from = kept_[i];
-      if ((node.allowed >> (2 * from.side + side) & 1U) == 0) {
-        continue;
-      }
-      const double change = shift - (from.side != 0 ? other_before : 0);
-      double left = 0.0;
-      for (std::size_t m = 0; m < count; ++m) {
-        const std::complex<double> w = kept_states_[i * count + m] * turn_[m] + excitation[m] + gain_[m] * change;
-        grown_states_.push_back(w);
-        // What is left if the error is gone one period later: an error that lasts is no vibration.
-        left += std::norm(w * modes_[m].turn - modes_[m].gain * error);
-      }
-      const double cost = from.cost + left * static_cast<double>(node.periods);
-      grown_.push_back({cost, cost + weight_now * left, static_cast<std::uint16_t>(i), side});
+  grown_.count = 0;
+  order_.clear();
+  grow(node, 0, excitation);
+  if (node.other != 0) {
+    grow(node, 1, excitation);
+  }
+}
+
+void ModalRounder::grow(const RoundingNode& node, unsigned side, const std::complex<double>* excitation) {
+  const std::size_t count = kept_.count;
+  const std::size_t first = grown_.count;
+  const double shift = side != 0 ? node.other : 0.0;
+  std::fill_n(left_.begin(), count, 0.0);
+  for (std::size_t m = 0; m < modes_.size(); ++m) {
+    const double* real = &kept_.real[m * room];
+    const double* imag = &kept_.imag[m * room];
+    double* to_real = &grown_.real[m * room + first];
+    double* to_imag = &grown_.imag[m * room + first];
+    const double turn_real = turn_[m].real();
+    const double turn_imag = turn_[m].imag();
+    const double gain_real = gain_[m].real();
+    const double gain_imag = gain_[m].imag();
+    const std::complex<double> given = excitation[m] + gain_[m] * shift;
+    // What is left if the error is gone one period later: an error that lasts is no vibration.
+    const std::complex<double> turn_back = modes_[m].turn;
+    const std::complex<double> taken_back = modes_[m].gain * (node.error + shift);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double before = kept_.shift[i];
+      const double re = real[i] * turn_real - imag[i] * turn_imag + given.real() - gain_real * before;
+      const double im = real[i] * turn_imag + imag[i] * turn_real + given.imag() - gain_imag * before;
+      const double left_real = re * turn_back.real() - im * turn_back.imag() - taken_back.real();
+      const double left_imag = re * turn_back.imag() + im * turn_back.real() - taken_back.imag();
+      to_real[i] = re;
+      to_imag[i] = im;
+      left_[i] += left_real * left_real + left_imag * left_imag;
     }
   }
-  keep_best(width);
+  const auto periods = static_cast<double>(node.periods);
+  for (std::size_t i = 0; i < count; ++i) {
+    const unsigned from = kept_.step[i] & 1U;
+    grown_.cost[first + i] = kept_.cost[i] + left_[i] * periods;
+    grown_.step[first + i] = static_cast<std::uint16_t>(2U * i + side);
+    grown_.shift[first + i] = shift;
+    if ((node.allowed >> (2U * from + side) & 1U) != 0) {
+      order_.push_back({grown_.cost[first + i] + weight_now * left_[i], static_cast<std::uint16_t>(first + i)});
+    }
+  }
+  grown_.count += count;
 }
 
 // The nearest end stays reachable, because from it every later nearest end is.
 void ModalRounder::keep_best(std::size_t width) {
-  const std::size_t count = modes_.size();
-  order_.resize(grown_.size());
-  for (std::size_t i = 0; i < order_.size(); ++i) {
-    order_[i] = static_cast<std::uint16_t>(i);
-  }
-  const auto better = [&](std::uint16_t a, std::uint16_t b) { return grown_[a].rank < grown_[b].rank; };
   if (order_.size() > width) {
+    const auto better = [](const Ranked& a, const Ranked& b) { return a.rank < b.rank; };
+    const auto is_nearest = [&](const Ranked& ranked) { return (grown_.step[ranked.index] & 1U) == 0; };
     const auto border = order_.begin() + static_cast<std::ptrdiff_t>(width);
     std::nth_element(order_.begin(), border, order_.end(), better);
-    const auto is_nearest = [&](std::uint16_t i) { return grown_[i].side == 0; };
     if (std::none_of(order_.begin(), border, is_nearest)) {
       // Behind the border there is one: bit 0 of `allowed` is always set.
-      std::uint16_t best = *std::find_if(border, order_.end(), is_nearest);
-      for (auto it = border; it != order_.end(); ++it) {
-        if (is_nearest(*it) && better(*it, best)) {
-          best = *it;
+      auto best = std::find_if(border, order_.end(), is_nearest);
+      for (auto other = best; other != order_.end(); ++other) {
+        if (is_nearest(*other) && better(*other, *best)) {
+          best = other;
         }
       }
-      *(border - 1) = best;
+      *(border - 1) = *best;
     }
     order_.resize(width);
   }
-  kept_.clear();
-  kept_states_.clear();
   trace_begin_.push_back(trace_.size());
-  for (const std::uint16_t i : order_) {
-    kept_.push_back(grown_[i]);
-    trace_.push_back(static_cast<std::uint16_t>(2U * grown_[i].parent + grown_[i].side));
-    for (std::size_t m = 0; m < count; ++m) {
-      kept_states_.push_back(grown_states_[i * count + m]);
+  kept_.count = order_.size();
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    const std::size_t from = order_[i].index;
+    kept_.cost[i] = grown_.cost[from];
+    kept_.shift[i] = grown_.shift[from];
+    kept_.step[i] = grown_.step[from];
+    trace_.push_back(grown_.step[from]);
+  }
+  for (std::size_t m = 0; m < modes_.size(); ++m) {
+    for (std::size_t i = 0; i < order_.size(); ++i) {
+      kept_.real[m * room + i] = grown_.real[m * room + order_[i].index];
+      kept_.imag[m * room + i] = grown_.imag[m * room + order_[i].index];
     }
   }
 }
 
+std::complex<double> ModalRounder::state_of(std::size_t choice, std::size_t mode) const {
+  return {kept_.real[mode * room + choice], kept_.imag[mode * room + choice]};
+}
+
 std::size_t ModalRounder::best_end(const RoundingEnd& end) const {
-  const std::size_t count = modes_.size();
   std::size_t best = 0;
-  double least = 0.0;
-  for (std::size_t i = 0; i < kept_.size(); ++i) {
-    double left = end.rest ? 0.0 : kept_[i].rank;
-    for (std::size_t m = 0; end.rest && m < count; ++m) {
-      std::complex<double> w = kept_states_[i * count + m];
-      if (end.rest_periods > 0) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < kept_.count; ++i) {
+    double left = end.rest ? 0.0 : kept_.cost[i];
+    for (std::size_t m = 0; m < modes_.size(); ++m) {
+      std::complex<double> w = state_of(i, m);
+      if (end.rest && end.rest_periods > 0) {
         w = w * std::exp(modes_[m].pole_period * static_cast<double>(end.rest_periods)) + end.rest_excitation[m];
       }
       left += std::norm(w);
     }
-    if (i == 0 || left < least) {
+    if (left < least) {
       best = i;
       least = left;
     }
@@ -141,25 +177,32 @@ std::size_t ModalRounder::best_end(const RoundingEnd& end) const {
 
 void ModalRounder::choose(std::span<const RoundingNode> nodes, std::span<const std::complex<double>> excitation,
                           const RoundingEnd& end, std::span<std::int8_t> shift) {
-  const std::size_t count = modes_.size();
   std::size_t last_ones = nodes.size();
   for (std::size_t free = 0; end.rest && last_ones > 0 && free < free_nodes_before_rest; --last_ones) {
     free += nodes[last_ones - 1].other != 0 ? 1 : 0;
   }
-  kept_.assign(1, {});
-  kept_states_ = state_;
+  kept_.count = 1;
+  kept_.cost[0] = 0.0;
+  kept_.shift[0] = 0.0;
+  kept_.step[0] = 0;
+  for (std::size_t m = 0; m < modes_.size(); ++m) {
+    kept_.real[m * room] = state_[m].real();
+    kept_.imag[m * room] = state_[m].imag();
+  }
   trace_.clear();
   trace_begin_.clear();
   for (std::size_t n = 0; n < nodes.size(); ++n) {
-    expand(nodes[n], n == 0 ? std::int8_t{0} : nodes[n - 1].other, &excitation[n * count],
-           n < last_ones ? width_on_the_way : width_before_rest);
+    expand(nodes[n], &excitation[n * modes_.size()]);
+    keep_best(n < last_ones ? width_on_the_way : width_before_rest);
   }
-  std::size_t survivor = best_end(end);
-  std::copy_n(kept_states_.begin() + static_cast<std::ptrdiff_t>(survivor * count), count, chosen_state_.begin());
+  std::size_t choice = best_end(end);
+  for (std::size_t m = 0; m < modes_.size(); ++m) {
+    chosen_state_[m] = state_of(choice, m);
+  }
   for (std::size_t n = nodes.size(); n-- > 0;) {
-    const unsigned step = trace_[trace_begin_[n] + survivor];
+    const unsigned step = trace_[trace_begin_[n] + choice];
     shift[n] = (step & 1U) != 0 ? nodes[n].other : std::int8_t{0};
-    survivor = step >> 1U;
+    choice = step >> 1U;
   }
 }
 

@@ -63,29 +63,36 @@ class ModalRounder {
     std::complex<double> gain;         // of one increment in one period
     double scale = 1.0;                // amplitude per modal velocity and increment per period
   };
-  struct Survivor {
-    double cost = 0.0;  // of what was left on the way
-    double rank = 0.0;  // the same and what is left now
-    std::uint16_t parent = 0;
-    std::uint8_t side = 0;  // 0: nearest
+  // Choices made so far, side by side. States are per mode one behind the other, `room` apart.
+  struct Choices {
+    std::size_t count = 0;
+    std::vector<double> cost;   // of what was left on the way
+    std::vector<double> shift;  // of the last node, increments from its nearest
+    std::vector<double> real;   // modal states
+    std::vector<double> imag;
+    std::vector<std::uint16_t> step;  // 2 parent + side; side 0: nearest
+  };
+  struct Ranked {
+    double rank = 0.0;
+    std::uint16_t index = 0;
   };
 
-  void expand(const RoundingNode& node, std::int8_t other_before, const std::complex<double>* excitation,
-              std::size_t width);
+  void expand(const RoundingNode& node, const std::complex<double>* excitation);
+  void grow(const RoundingNode& node, unsigned side, const std::complex<double>* excitation);
   void keep_best(std::size_t width);
   [[nodiscard]] std::size_t best_end(const RoundingEnd& end) const;
+  [[nodiscard]] std::complex<double> state_of(std::size_t choice, std::size_t mode) const;
 
   double period_s_;
   std::vector<ModeStep> modes_;
   std::vector<std::complex<double>> state_;         // per mode, at the begin of the next stretch
   std::vector<std::complex<double>> chosen_state_;  // at the end of the stretch last chosen
-  std::vector<Survivor> kept_;
-  std::vector<Survivor> grown_;
-  std::vector<std::complex<double>> kept_states_;  // survivor by survivor
-  std::vector<std::complex<double>> grown_states_;
-  std::vector<std::uint16_t> order_;
-  std::vector<std::size_t> trace_begin_;    // per node: its survivors in trace_
-  std::vector<std::uint16_t> trace_;        // 2 parent + side
+  Choices kept_;
+  Choices grown_;
+  std::vector<double> left_;  // per grown choice, what is left now
+  std::vector<Ranked> order_;
+  std::vector<std::size_t> trace_begin_;    // per node: its choices in trace_
+  std::vector<std::uint16_t> trace_;        // their steps
   std::vector<std::complex<double>> turn_;  // of the block under expansion
   std::vector<std::complex<double>> gain_;
 };
