@@ -31,7 +31,9 @@ class BlockRounder {
         rests_(rests),
         limit_(std::max(1.0 - on_increment, options.merge_tolerance_increments)) {
     for (std::size_t axis = 0; axis < axis_count; ++axis) {
-      rounders_.emplace_back(options.modes[axis], options.block_period_s);
+      rounders_.emplace_back(options.modes[axis], options.block_period_s,
+                             static_cast<int>(std::lround(options.block_period_s / options.interpolation_period_s)));
+      bulge_excitation_[axis].resize(options.modes[axis].size());
     }
   }
 
@@ -103,8 +105,11 @@ class BlockRounder {
         break;
       }
     }
-    for (ModalRounder& rounder : rounders_) {
-      rounder.accept();
+    for (std::size_t axis = 0; axis < axis_count; ++axis) {
+      rounders_[axis].accept();
+      if (at_rest_) {
+        std::fill(bulge_excitation_[axis].begin(), bulge_excitation_[axis].end(), 0.0);
+      }
     }
   }
 
@@ -150,9 +155,33 @@ class BlockRounder {
         reached = position;
       });
       rounder.advance(at, move - reached - exact_step(starts_[n] + block.periods - 1, axis));
+      find_bulge(n, axis);
     }
     for (std::uint32_t k = end_of_blocks_; at_rest_ && k < rest_period_; ++k) {
       rounder.advance(rest_excitation_[axis], -exact_step(k, axis));
+    }
+  }
+
+  // What the curvature of arcs leaves against straight lines between the borders of periods.
+  void find_bulge(std::size_t n, std::size_t axis) {
+    const FittedBlock& block = blocks_[first_ + n];
+    auto& excitation = bulge_excitation_[axis];
+    const ModalRounder& rounder = rounders_[axis];
+    if (block.kind == BlockKind::line || axis == block.normal) {
+      for (std::uint32_t i = 0; i < block.periods; ++i) {
+        rounder.advance(excitation, 0.0);
+      }
+      return;
+    }
+    const ChordArc arc = shape_.arc_of(nearest_start(n), block);
+    const Eigen::Index row = static_cast<std::size_t>((block.normal + 1) % 3) == axis ? 0 : 1;
+    double before = arc.at(0.0)[row];
+    for (std::uint32_t i = 0; i < block.periods; ++i) {
+      const double middle = arc.at((i + 0.5) / block.periods)[row];
+      const double behind = arc.at((i + 1.0) / block.periods)[row];
+      rounder.advance(excitation, 0.0);
+      rounder.bulge(excitation, (middle - 0.5 * (before + behind)) / options_.increment_mm);
+      before = behind;
     }
   }
 
@@ -200,9 +229,12 @@ class BlockRounder {
                                                                      : std::int8_t{-1};
       node.allowed = allowed(n, axis);
     }
-    rounders_[axis].choose(nodes_, excitation_[axis],
-                           {at_rest_, rest_period_ - std::min(rest_period_, end_of_blocks_), rest_excitation_[axis]},
-                           shift_);
+    RoundingEnd end;
+    if (at_rest_) {
+      end = {true, bulge_excitation_[axis], rest_period_ - std::min(rest_period_, end_of_blocks_),
+             rest_excitation_[axis]};
+    }
+    rounders_[axis].choose(nodes_, excitation_[axis], end, shift_);
     for (std::size_t n = 0; n < count_; ++n) {
       blocks_[first_ + n].end[axis] = nearest_[n][axis] + shift_[n];
     }
@@ -317,6 +349,7 @@ class BlockRounder {
   std::vector<bool> forced_;  // to the nearest end
   std::array<std::vector<std::complex<double>>, axis_count> excitation_;
   std::array<std::vector<std::complex<double>>, axis_count> rest_excitation_;
+  std::array<std::vector<std::complex<double>>, axis_count> bulge_excitation_;  // since the last rest
   std::vector<RoundingNode> nodes_;
   std::vector<std::int8_t> shift_;
   std::vector<FittedBlock> shaped_;

@@ -20,9 +20,12 @@ constexpr std::size_t room = 2 * std::max(width_on_the_way, width_before_rest);
 
 }  // namespace
 
-ModalRounder::ModalRounder(std::span<const Mode> modes, double block_period_s) : period_s_(block_period_s) {
+ModalRounder::ModalRounder(std::span<const Mode> modes, double block_period_s, int ticks_per_period) {
   if (!std::isfinite(block_period_s) || !(block_period_s > 0.0)) {
     throw Error(ErrorKind::argument, "block period " + std::to_string(block_period_s) + " s, must be above 0");
+  }
+  if (ticks_per_period < 1) {
+    throw Error(ErrorKind::argument, std::to_string(ticks_per_period) + " ticks in a block period, must be at least 1");
   }
   for (const Mode& mode : modes) {
     const std::complex<double> s = pole(mode);
@@ -31,6 +34,15 @@ ModalRounder::ModalRounder(std::span<const Mode> modes, double block_period_s) :
     step.turn = std::exp(step.pole_period);
     step.scale = std::abs(mode.participation) / (s.imag() * block_period_s);
     step.gain = (1.0 - step.turn) * step.scale;
+    const std::complex<double> tick_turn = std::exp(step.pole_period / static_cast<double>(ticks_per_period));
+    double before = 0.0;
+    for (int tick = 1; tick <= ticks_per_period; ++tick) {
+      const double fraction = static_cast<double>(tick) / ticks_per_period;
+      const double height = 4.0 * fraction * (1.0 - fraction);
+      step.bulge_gain = step.bulge_gain * tick_turn + (1.0 - tick_turn) * (height - before);
+      before = height;
+    }
+    step.bulge_gain *= step.scale * ticks_per_period;
     modes_.push_back(step);
   }
   state_.resize(modes_.size());
@@ -50,6 +62,12 @@ ModalRounder::ModalRounder(std::span<const Mode> modes, double block_period_s) :
 void ModalRounder::advance(std::span<std::complex<double>> excitation, double step) const noexcept {
   for (std::size_t m = 0; m < modes_.size(); ++m) {
     excitation[m] = excitation[m] * modes_[m].turn + modes_[m].gain * step;
+  }
+}
+
+void ModalRounder::bulge(std::span<std::complex<double>> excitation, double height) const noexcept {
+  for (std::size_t m = 0; m < modes_.size(); ++m) {
+    excitation[m] += modes_[m].bulge_gain * height;
   }
 }
 
@@ -151,6 +169,17 @@ void ModalRounder::keep_best(std::size_t width) {
   }
 }
 
+// Gives every choice so far the state that becomes an excitation some periods later.
+void ModalRounder::add_late(std::span<const std::complex<double>> excitation, std::uint32_t periods) {
+  for (std::size_t m = 0; m < modes_.size(); ++m) {
+    const std::complex<double> now = excitation[m] * std::exp(-modes_[m].pole_period * static_cast<double>(periods));
+    for (std::size_t i = 0; i < kept_.count; ++i) {
+      kept_.real[m * room + i] += now.real();
+      kept_.imag[m * room + i] += now.imag();
+    }
+  }
+}
+
 std::complex<double> ModalRounder::state_of(std::size_t choice, std::size_t mode) const {
   return {kept_.real[mode * room + choice], kept_.imag[mode * room + choice]};
 }
@@ -191,9 +220,19 @@ void ModalRounder::choose(std::span<const RoundingNode> nodes, std::span<const s
   }
   trace_.clear();
   trace_begin_.clear();
+  std::uint32_t late_periods = 0;
+  for (std::size_t n = last_ones; n < nodes.size(); ++n) {
+    late_periods += nodes[n].periods;
+  }
   for (std::size_t n = 0; n < nodes.size(); ++n) {
+    if (n == last_ones && !end.late_excitation.empty()) {
+      add_late(end.late_excitation, late_periods);
+    }
     expand(nodes[n], &excitation[n * modes_.size()]);
     keep_best(n < last_ones ? width_on_the_way : width_before_rest);
+  }
+  if (last_ones == nodes.size() && !end.late_excitation.empty()) {
+    add_late(end.late_excitation, 0);
   }
   std::size_t choice = best_end(end);
   for (std::size_t m = 0; m < modes_.size(); ++m) {

@@ -19,10 +19,13 @@ struct RoundingNode {
       0xF;  ///< bit 2 f + t: the block may go from candidate f to t (0: nearest); bit 0 is always set
 };
 
-/// How a stretch of blocks ends. Where the command comes to rest, what it still moves behind the last block's end is
+/// How a stretch of blocks ends. `late_excitation` (per mode, see ModalRounder::advance): what the blocks leave besides
+/// their ends, which only the last choices before a rest meet; anywhere else it is no vibration but the path's own
+/// curvature. Where the command comes to rest, what it still moves behind the last block's end is
 /// left out by the blocks; `rest_periods` and `rest_excitation` (per mode, see ModalRounder::advance) account for it.
 struct RoundingEnd {
   bool rest = false;
+  std::span<const std::complex<double>> late_excitation;
   std::uint32_t rest_periods = 0;
   std::span<const std::complex<double>> rest_excitation;
 };
@@ -38,14 +41,18 @@ struct RoundingEnd {
 /// stretch to stretch.
 class ModalRounder {
  public:
-  /// Throws Error(argument) if a mode is none (see pole) or the period is not finite and above 0.
-  ModalRounder(std::span<const Mode> modes, double block_period_s);
+  /// Throws Error(argument) if a mode is none (see pole), the period is not finite and above 0 or it has no tick.
+  ModalRounder(std::span<const Mode> modes, double block_period_s, int ticks_per_period);
 
   [[nodiscard]] std::size_t mode_count() const noexcept { return modes_.size(); }
 
   /// Takes excitations, one per mode, over one period in which the blocks move `step` increments further than the
   /// exact command.
   void advance(std::span<std::complex<double>> excitation, double step) const noexcept;
+
+  /// Adds what a curved period leaves against a straight one: a parabola of a height in increments over it, joined by
+  /// straight lines between the controller's ticks. To be called behind `advance` of that period.
+  void bulge(std::span<std::complex<double>> excitation, double height) const noexcept;
 
   /// Chooses for every node how far it is from its nearest increment. `excitation`: per node and mode what the block
   /// before it leaves if both its ends are the nearest ones. The last node must have one candidate only.
@@ -61,6 +68,7 @@ class ModalRounder {
     std::complex<double> pole_period;  // s T
     std::complex<double> turn;         // over one period
     std::complex<double> gain;         // of one increment in one period
+    std::complex<double> bulge_gain;   // of a parabola one increment high over one period
     double scale = 1.0;                // amplitude per modal velocity and increment per period
   };
   // Choices made so far, side by side. States are per mode one behind the other, `room` apart.
@@ -79,11 +87,11 @@ class ModalRounder {
 
   void expand(const RoundingNode& node, const std::complex<double>* excitation);
   void grow(const RoundingNode& node, unsigned side, const std::complex<double>* excitation);
+  void add_late(std::span<const std::complex<double>> excitation, std::uint32_t periods);
   void keep_best(std::size_t width);
   [[nodiscard]] std::size_t best_end(const RoundingEnd& end) const;
   [[nodiscard]] std::complex<double> state_of(std::size_t choice, std::size_t mode) const;
 
-  double period_s_;
   std::vector<ModeStep> modes_;
   std::vector<std::complex<double>> state_;         // per mode, at the begin of the next stretch
   std::vector<std::complex<double>> chosen_state_;  // at the end of the stretch last chosen
