@@ -305,7 +305,7 @@ double left_by_blocks(const Command& command, const std::vector<FittedBlock>& bl
 TEST_CASE("rounding: fitted blocks keep time and place, stay within an increment and leave less") {
   int seed = 100;
   for (const double increment : {0.001, 0.00254, 0.0001}) {
-    for (const double speed : {0.5, 0.05}) {
+    for (const double speed : {0.5, 0.05, 0.002}) {
       for (const int steady_for : {1, 40}) {
         std::array<std::vector<double>, 2> before;
         std::array<std::vector<double>, 2> after;
@@ -348,14 +348,17 @@ TEST_CASE("rounding: fitted blocks keep time and place, stay within an increment
           std::nth_element(before[axis].begin(), before[axis].begin() + 4, before[axis].end());
           std::nth_element(after[axis].begin(), after[axis].begin() + 4, after[axis].end());
           CAPTURE(axis);
-          CHECK(after[axis][4] < before[axis][4] / 3.0);
+          // A slow command has few ends to choose.
+          CHECK(after[axis][4] < before[axis][4] / (speed > 0.01 ? 3.0 : 1.0));
         }
       }
     }
   }
 }
 
-TEST_CASE("rounding: arcs keep their sense and follow the circle, at rest at either end") {
+TEST_CASE("rounding: arcs keep their sense, follow the circle and leave less, whatever their bulge") {
+  double before = 0.0;
+  double after = 0.0;
   for (const double radius : {2.0, 20.0}) {
     for (const double sense : {1.0, -1.0}) {
       // A third of a turn, started and stopped without a jerk.
@@ -369,11 +372,17 @@ TEST_CASE("rounding: arcs keep their sense and follow the circle, at rest at eit
             return Vector3(1.2345 + radius * std::cos(angle(k)), -0.5 + radius * std::sin(angle(k)), 0.3333);
           },
           2);
-      const FitOptions options = with_modes(0.001);
+      // Small increments: the bulge of an arc is many of them.
+      const FitOptions options = with_modes(0.0001);
       FitOptions plain = options;
       plain.modes = {};
       const auto nearest = fit(command, plain);
       const auto blocks = fit(command, options);
+      for (const Eigen::Index axis : {0, 1}) {
+        const Mode mode = options.modes[static_cast<std::size_t>(axis)][0];
+        before += left_by_blocks(command, nearest, options, axis, mode);
+        after += left_by_blocks(command, blocks, options, axis, mode);
+      }
       const Findings found = judge(command, blocks, options);
       REQUIRE(blocks.size() == nearest.size());
       CHECK(found.arcs == judge(command, nearest, plain).arcs);
@@ -382,7 +391,7 @@ TEST_CASE("rounding: arcs keep their sense and follow the circle, at rest at eit
       CHECK(found.end_error < 1.0);
       for (std::size_t n = 0; n < blocks.size(); ++n) {
         CHECK(blocks[n].kind == nearest[n].kind);
-        CHECK(blocks[n].end[2] == 333);
+        CHECK(blocks[n].end[2] == 3333);
       }
       double off = 0.0;
       Position from = rounded(command, 0, options.increment_mm);
@@ -394,8 +403,21 @@ TEST_CASE("rounding: arcs keep their sense and follow the circle, at rest at eit
         }
         from = block.end;
       }
-      CHECK(off < 0.0024);  // an increment per axis, and what the fit allows the middle
+      CHECK(off < 0.00024);  // an increment per axis, and what the fit allows the middle
     }
+  }
+  CHECK(after < 0.07 * before);  // 0.05; without what the bulge leaves 0.1
+}
+
+TEST_CASE("rounding: a slow axis alone makes no empty block and does not turn back") {
+  for (const double step : {0.0003, 0.0006, 0.0011, 0.0017}) {
+    const Command command =
+        sampled(300, [&](double k) { return Vector3(0.0004 + step * (k + 0.3 * std::sin(k * k)), 1.0, 2.0); });
+    FitOptions options = with_modes(0.001);
+    options.merge_tolerance_increments = 0.0;  // so that the ends lie close
+    const Findings found = judge(command, fit(command, options), options);
+    CHECK(found.empty + found.wrong_ticks + found.late + found.reversals == 0);
+    CHECK(found.end_error < 1.0);
   }
 }
 
