@@ -1,5 +1,6 @@
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -94,7 +95,29 @@ void register_emission(py::module_& module) {
             }
             return out;
           },
-          "Whole block periods that each lasts, (n,).");
+          "Whole block periods that each lasts, (n,).")
+      .def_property_readonly(
+          "first_periods",
+          [](const FittedBlocks& self) {
+            py::array_t<std::uint32_t> out(static_cast<py::ssize_t>(self.blocks.size()));
+            auto* to = out.mutable_data();
+            for (const FittedBlock& block : self.blocks) {
+              *to++ = block.first_period;
+            }
+            return out;
+          },
+          "Block period of the command in which each begins, (n,).")
+      .def_property_readonly(
+          "ends",
+          [](const FittedBlocks& self) {
+            py::array_t<std::int64_t> out({static_cast<py::ssize_t>(self.blocks.size()), py::ssize_t{axis_count}});
+            auto* to = out.mutable_data();
+            for (const FittedBlock& block : self.blocks) {
+              to = std::copy(block.end.begin(), block.end.end(), to);
+            }
+            return out;
+          },
+          "Absolute end positions in least increments, (n, 3).");
 
   module.def(
       "fit_blocks",

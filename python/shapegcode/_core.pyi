@@ -1443,6 +1443,16 @@ class FittedBlocks:
     def __len__(self) -> int:
         ...
     @property
+    def ends(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        Absolute end positions in least increments, (n, 3).
+        """
+    @property
+    def first_periods(self) -> numpy.typing.NDArray[numpy.uint32]:
+        """
+        Block period of the command in which each begins, (n,).
+        """
+    @property
     def periods(self) -> numpy.typing.NDArray[numpy.uint32]:
         """
         Whole block periods that each lasts, (n,).
