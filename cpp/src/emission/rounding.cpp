@@ -1,6 +1,7 @@
 #include "shapegcode/emission/rounding.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -11,11 +12,14 @@ namespace shapegcode {
 namespace {
 
 // Choices followed at a time; more of them on the last free blocks before a rest, where it shows most.
-constexpr std::size_t width_on_the_way = 8;
+constexpr std::size_t width_on_the_way = 4;
 constexpr std::size_t width_before_rest = 128;
 constexpr std::size_t free_nodes_before_rest = 8;
 // How much what is left now counts against one period of what was left on the way.
 constexpr double weight_now = 4.0;
+// So few choices are ranked by comparing each with each.
+constexpr std::size_t small_field = 2 * width_on_the_way;
+constexpr double never = std::numeric_limits<double>::infinity();
 constexpr std::size_t room = 2 * std::max(width_on_the_way, width_before_rest);
 
 }  // namespace
@@ -57,6 +61,7 @@ ModalRounder::ModalRounder(std::span<const Mode> modes, double block_period_s, i
     choices->imag.resize(room * modes_.size());
   }
   left_.resize(room);
+  rank_.resize(room);
 }
 
 void ModalRounder::advance(std::span<std::complex<double>> excitation, double step) const noexcept {
@@ -84,7 +89,6 @@ void ModalRounder::expand(const RoundingNode& node, const std::complex<double>* 
     }
   }
   grown_.count = 0;
-  order_.clear();
   grow(node, 0, excitation);
   if (node.other != 0) {
     grow(node, 1, excitation);
@@ -126,36 +130,52 @@ void ModalRounder::grow(const RoundingNode& node, unsigned side, const std::comp
     grown_.cost[first + i] = kept_.cost[i] + left_[i] * periods;
     grown_.step[first + i] = static_cast<std::uint16_t>(2U * i + side);
     grown_.shift[first + i] = shift;
-    if ((node.allowed >> (2U * from + side) & 1U) != 0) {
-      order_.push_back({grown_.cost[first + i] + weight_now * left_[i], static_cast<std::uint16_t>(first + i)});
-    }
+    const bool is_allowed = (node.allowed >> (2U * from + side) & 1U) != 0;
+    rank_[first + i] = is_allowed ? grown_.cost[first + i] + weight_now * left_[i] : never;
   }
   grown_.count += count;
 }
 
-// The nearest end stays reachable, because from it every later nearest end is.
 void ModalRounder::keep_best(std::size_t width) {
-  if (order_.size() > width) {
-    const auto better = [](const Ranked& a, const Ranked& b) { return a.rank < b.rank; };
-    const auto is_nearest = [&](const Ranked& ranked) { return (grown_.step[ranked.index] & 1U) == 0; };
-    const auto border = order_.begin() + static_cast<std::ptrdiff_t>(width);
-    std::nth_element(order_.begin(), border, order_.end(), better);
-    if (std::none_of(order_.begin(), border, is_nearest)) {
-      // Behind the border there is one: bit 0 of `allowed` is always set.
-      auto best = std::find_if(border, order_.end(), is_nearest);
-      for (auto other = best; other != order_.end(); ++other) {
-        if (is_nearest(*other) && better(*other, *best)) {
-          best = other;
-        }
+  if (grown_.count <= small_field) {
+    // Each is kept that fewer than `width` others beat. No branch depends on the ranks, which nothing predicts.
+    std::array<std::int64_t, small_field> beaten_by{};
+    std::fill(rank_.begin() + static_cast<std::ptrdiff_t>(grown_.count), rank_.begin() + small_field, never);
+    for (std::size_t other = 0; other < grown_.count; ++other) {
+      for (std::size_t i = 0; i < small_field; ++i) {
+        beaten_by[i] += rank_[other] < rank_[i] ? 1 : 0;
       }
-      *(border - 1) = *best;
     }
-    order_.resize(width);
+    order_.resize(small_field);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < small_field; ++i) {
+      order_[kept] = static_cast<std::uint16_t>(i);
+      kept += (beaten_by[i] < static_cast<std::int64_t>(width)) & (rank_[i] < never) ? 1U : 0U;
+    }
+    order_.resize(kept);
+  } else {
+    order_.clear();
+    for (std::size_t i = 0; i < grown_.count; ++i) {
+      if (rank_[i] < never) {
+        order_.push_back(static_cast<std::uint16_t>(i));
+      }
+    }
+    if (order_.size() > width) {
+      const auto better = [&](std::uint16_t a, std::uint16_t b) { return rank_[a] < rank_[b]; };
+      std::nth_element(order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(width), order_.end(), better);
+      order_.resize(width);
+    }
+  }
+  // The nearest end stays reachable, because from it every later nearest end is. Its choices are the first grown.
+  const auto is_nearest = [&](std::uint16_t i) { return i < kept_.count; };
+  if (std::none_of(order_.begin(), order_.end(), is_nearest)) {
+    const auto best = std::min_element(rank_.begin(), rank_.begin() + static_cast<std::ptrdiff_t>(kept_.count));
+    order_.back() = static_cast<std::uint16_t>(best - rank_.begin());
   }
   trace_begin_.push_back(trace_.size());
   kept_.count = order_.size();
   for (std::size_t i = 0; i < order_.size(); ++i) {
-    const std::size_t from = order_[i].index;
+    const std::size_t from = order_[i];
     kept_.cost[i] = grown_.cost[from];
     kept_.shift[i] = grown_.shift[from];
     kept_.step[i] = grown_.step[from];
@@ -163,8 +183,8 @@ void ModalRounder::keep_best(std::size_t width) {
   }
   for (std::size_t m = 0; m < modes_.size(); ++m) {
     for (std::size_t i = 0; i < order_.size(); ++i) {
-      kept_.real[m * room + i] = grown_.real[m * room + order_[i].index];
-      kept_.imag[m * room + i] = grown_.imag[m * room + order_[i].index];
+      kept_.real[m * room + i] = grown_.real[m * room + order_[i]];
+      kept_.imag[m * room + i] = grown_.imag[m * room + order_[i]];
     }
   }
 }

@@ -80,10 +80,6 @@ class ModalRounder {
     std::vector<double> imag;
     std::vector<std::uint16_t> step;  // 2 parent + side; side 0: nearest
   };
-  struct Ranked {
-    double rank = 0.0;
-    std::uint16_t index = 0;
-  };
 
   void expand(const RoundingNode& node, const std::complex<double>* excitation);
   void grow(const RoundingNode& node, unsigned side, const std::complex<double>* excitation);
@@ -98,7 +94,8 @@ class ModalRounder {
   Choices kept_;
   Choices grown_;
   std::vector<double> left_;  // per grown choice, what is left now
-  std::vector<Ranked> order_;
+  std::vector<double> rank_;  // per grown choice: the less the better
+  std::vector<std::uint16_t> order_;
   std::vector<std::size_t> trace_begin_;    // per node: its choices in trace_
   std::vector<std::uint16_t> trace_;        // their steps
   std::vector<std::complex<double>> turn_;  // of the block under expansion
