@@ -135,7 +135,8 @@ inline Findings judge(const Command& command, const std::vector<FittedBlock>& bl
     if (ticks > wanted + 1e-6) ++found.late;
     // Samples between the ends; while nothing has moved there is nothing to follow.
     Eigen::Index moving = first;
-    while (moving < last && rounded(command, moving, options.increment_mm) == from) ++moving;
+    const Position begin = rounded(command, first, options.increment_mm);
+    while (moving < last && rounded(command, moving, options.increment_mm) == begin) ++moving;
     const double slack = options.merge_tolerance_increments + (block.kind == BlockKind::line ? 1e-3 : 0.251);
     for (Eigen::Index k = first + 1; k < last && moving < last; ++k) {
       const Vector3 p = played.at(static_cast<double>(k - first) / static_cast<double>(last - first));
