@@ -58,6 +58,11 @@ class Emission(Table):
         unit="increments",
         default=0.5,
     )
+    rounding: Literal["vibration", "nearest"] = key(
+        'how the ends of blocks are rounded. "vibration": to that of the two neighbouring increments that leaves the '
+        'modes at rest; "nearest": each to the nearest increment, which leaves up to several increments of vibration',
+        default="vibration",
+    )
 
     @field_validator("prologue", "epilogue")
     @classmethod
