@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'ModalState', 'Mode', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -270,6 +270,114 @@ class FirStream:
     def step(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Filtered sample, shape (n_axes,).
+        """
+class VaryingFir:
+    """
+    A set of filters on one grid between which the input moves.
+    
+    Each increment of the input is replaced by the whole impulse train of the filter that is valid where it begins (scatter
+    form), so that every increment keeps the zeros of its own filter, however often the filters change. Place k is filter k
+    of the set; place k + w shares an increment between filters k and k + 1.
+    
+    Args:
+        set: The filters (Fir), at least one.
+    
+    Raises:
+        ArgumentError: An empty set.
+    """
+    def __init__(self, set: collections.abc.Sequence[Fir]) -> None:
+        """
+        Make a set; ArgumentError if it is empty.
+        """
+    def apply(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], place: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> numpy.ndarray:
+        """
+        Filter samples (n, n_axes); `place` (n,) for the increment that leads to each sample. The result has duration_samples more rows. Bit-identical to VaryingFirStream. Raises ArgumentError on another shape or a value that is not finite.
+        """
+    def on_finer_grid(self, factor: typing.SupportsInt | typing.SupportsIndex) -> VaryingFir:
+        """
+        The same set on a grid `factor` times as fine. Raises ArgumentError below 1.
+        """
+    @property
+    def duration_samples(self) -> int:
+        """
+        Largest delay in samples.
+        """
+    @property
+    def mean_samples(self) -> float:
+        """
+        Mean delay, average of the set, in samples.
+        """
+    @property
+    def set(self) -> list[Fir]:
+        """
+        The filters.
+        """
+    @property
+    def variance_samples2(self) -> float:
+        """
+        Largest second central moment in samples squared: the contour cost.
+        """
+class VaryingFirStream:
+    """
+    Real-time form of VaryingFir: one sample per step.
+    """
+    def __init__(self, fir: VaryingFir, n_axes: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        At rest at zero. Raises ArgumentError on n_axes < 1.
+        """
+    def reset(self, position: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        """
+        Rest at `position`, shape (n_axes,).
+        """
+    def step(self, position: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], place: typing.SupportsFloat | typing.SupportsIndex) -> list[float]:
+        """
+        Filtered sample, n_axes values.
+        """
+class FollowingFir:
+    """
+    A set of filters followed along an axis.
+    
+    Filter k of the set is valid where the axis is at position k; in between the increments are shared, beyond the ends the
+    last filter holds. Each increment goes by its own middle in the input.
+    
+    Args:
+        fir: The set.
+        axis: 0, 1, 2 for X, Y, Z.
+        position_mm: Strictly ascending, one per filter, mm.
+    
+    Raises:
+        ArgumentError: No such axis, another number of positions, or positions that do not ascend.
+    """
+    def __init__(self, fir: VaryingFir, axis: typing.SupportsInt | typing.SupportsIndex, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        """
+        Place the filters of a set; ArgumentError if the positions do not fit.
+        """
+    def apply(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+        """
+        Filter samples (n, n_axes) in mm; the result has fir.duration_samples more rows. Raises ArgumentError on another shape, a value that is not finite, or samples without the axis.
+        """
+    def on_finer_grid(self, factor: typing.SupportsInt | typing.SupportsIndex) -> FollowingFir:
+        """
+        The same on a grid `factor` times as fine. Raises ArgumentError below 1.
+        """
+    def place(self, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Place in the set for a position (mm) of the axis.
+        """
+    @property
+    def axis(self) -> int:
+        """
+        Axis whose position counts.
+        """
+    @property
+    def fir(self) -> VaryingFir:
+        """
+        The set.
+        """
+    @property
+    def position_mm(self) -> list[float]:
+        """
+        Positions of the filters, mm.
         """
 class SegmentKind:
     """
@@ -1331,6 +1439,56 @@ class ProgramText:
         """
         (line, column, alarm, message, file) each; alarm 0: none; file empty: the program's own.
         """
+class ContourTarget:
+    """
+    What shall follow the programmed path.
+    
+    Members:
+    
+      none : Nothing: the path is shaped as it is.
+    
+      command : The shaped command.
+    
+      response : The plant's response to it: the part.
+    """
+    __members__: typing.ClassVar[dict[str, ContourTarget]]
+    command: typing.ClassVar[ContourTarget]
+    none: typing.ClassVar[ContourTarget]
+    response: typing.ClassVar[ContourTarget]
+    @typing.overload
+    def __eq__(self, other: ContourTarget) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: ContourTarget) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
 class ShapingOptions:
     """
     How a region is turned into a shaped command on the block grid.
@@ -1344,6 +1502,14 @@ class ShapingOptions:
         """
     @block_period_s.setter
     def block_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def contour_smoothness(self) -> float:
+        """
+        Weight of the correction's second differences.
+        """
+    @contour_smoothness.setter
+    def contour_smoothness(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def interpolation_period_s(self) -> float:
@@ -1360,6 +1526,14 @@ class ShapingOptions:
         """
     @limits.setter
     def limits(self, arg0: MotionLimits) -> None:
+        ...
+    @property
+    def modes(self) -> typing.Annotated[list[list[Mode]], "FixedSize(3)"]:
+        """
+        Modes of X, Y and Z, for the response as target.
+        """
+    @modes.setter
+    def modes(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> None:
         ...
     @property
     def plunge_axis_angle_rad(self) -> float:
@@ -1385,6 +1559,14 @@ class ShapingOptions:
     @rest_at_stop_s.setter
     def rest_at_stop_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
+    @property
+    def target(self) -> ContourTarget:
+        """
+        What is brought back to the path; with a target, the contour tolerance of `limits` is its own.
+        """
+    @target.setter
+    def target(self, arg0: ContourTarget) -> None:
+        ...
 class ShapedCommand:
     """
     A shaped command on the block grid.
@@ -1393,6 +1575,11 @@ class ShapedCommand:
     def arc_normal(self) -> list[int]:
         """
         Per period the axis across an arc's plane, or -1.
+        """
+    @property
+    def first_period(self) -> int:
+        """
+        Periods of the region before this piece.
         """
     @property
     def grid_mm(self) -> numpy.ndarray:
@@ -1407,12 +1594,66 @@ class ShapedCommand:
     @property
     def run_ends(self) -> list[int]:
         """
-        Periods at which the command is at rest.
+        Periods of the region at which the command is at rest.
         """
     @property
     def segment_periods(self) -> list[int]:
         """
-        Per marked segment the period in which its begin is reached.
+        Per marked segment the period of the region in which its begin is reached.
+        """
+class RegionShaper:
+    """
+    A region's shaped command in pieces, so that memory does not grow with the region.
+    
+    Args:
+        path: The programmed path.
+        shaper: Taps in whole block periods, common to all axes.
+        marked_segments: Ascending indices whose begin in time is wanted.
+        options: How the region is shaped.
+    
+    Raises:
+        ArgumentError: The block period is no multiple of the interpolation period, or a limit is not above 0.
+    """
+    def __init__(self, path: Path, shaper: Fir, marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> None:
+        """
+        See the class.
+        """
+    def next(self, periods: typing.SupportsInt | typing.SupportsIndex) -> ShapedCommand | None:
+        """
+        Next piece of at most so many periods, or None behind the last.
+        """
+    @property
+    def largest_deviation_mm(self) -> float:
+        """
+        Largest deviation of what shall follow the path, as far as given out, mm.
+        """
+    @property
+    def stops(self) -> int:
+        """
+        Stops at corners that no speed passes within the tolerance.
+        """
+class ContourSolver:
+    """
+    Correction of a command before shaping that brings the shaped command back to the path.
+    
+    Minimises |e + f*c|^2 + w |second differences of c|^2 for one axis.
+    
+    Args:
+        kernel: f, taps at delays 0, 1, ... samples.
+        smoothness: w, above 0.
+    
+    Raises:
+        ArgumentError: An empty or not finite kernel, or a smoothness that is not above 0.
+    
+    Source: spec 5.
+    """
+    def __init__(self, kernel: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], smoothness: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        See the class.
+        """
+    def solve(self, error: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], carried: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Corrections (m,) for errors (m + len(kernel) - 1,); `carried`: the len(kernel) + 1 corrections before.
         """
 class FitOptions:
     """
@@ -1551,6 +1792,49 @@ class WriterOptions:
     @position_decimals.setter
     def position_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+class ModeTable:
+    """
+    How a mode depends on where an axis stands. Immutable.
+    
+    Linear in frequency and damping ratio between the rows, constant beyond the ends; without rows the mode stays as it is.
+    
+    Args:
+        axis: Whose position counts: 0, 1, 2 for X, Y, Z.
+        position_mm: Strictly ascending positions in mm, shape (n,).
+        frequency_hz: Undamped natural frequencies in Hz, one per position, above 0.
+        damping_ratio: Damping ratios (no unit), one per position, 0 <= zeta < 1; none: that of the mode.
+    
+    Raises:
+        ArgumentError: Unequal lengths, positions that do not ascend, or a value outside its range.
+    """
+    def __init__(self, axis: typing.SupportsInt | typing.SupportsIndex = 0, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], frequency_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], damping_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
+        """
+        Make a table; ArgumentError if it is not what the class asks for.
+        """
+    def mode_at(self, mode: Mode, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> Mode:
+        """
+        The mode at a position (mm) of the axis; its participation stays.
+        """
+    @property
+    def axis(self) -> int:
+        """
+        Axis whose position counts.
+        """
+    @property
+    def damping_ratio(self) -> list[float]:
+        """
+        Damping ratios, or none.
+        """
+    @property
+    def frequency_hz(self) -> list[float]:
+        """
+        Frequencies in Hz.
+        """
+    @property
+    def position_mm(self) -> list[float]:
+        """
+        Positions in mm.
+        """
 class BlockEnd:
     """
     When a block's successor starts.
@@ -1661,6 +1945,14 @@ class PlaybackOptions:
         """
     @measure_contour.setter
     def measure_contour(self, arg0: bool) -> None:
+        ...
+    @property
+    def mode_tables(self) -> typing.Annotated[list[list[ModeTable]], "FixedSize(3)"]:
+        """
+        How the modes of X, Y and Z vary with position, one table per mode; none: constant modes.
+        """
+    @mode_tables.setter
+    def mode_tables(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[ModeTable]], "FixedSize(3)"]) -> None:
         ...
     @property
     def modes(self) -> typing.Annotated[list[list[Mode]], "FixedSize(3)"]:
@@ -2386,6 +2678,10 @@ def block_overlap_time_s(lengths_mm: typing.Annotated[numpy.typing.ArrayLike, nu
     """
     Time of a run of overlapping cutting blocks, s: sum of ceil(l / (F T)) T plus the length of the filters (paper 004). No override. Raises ArgumentError on unequal sizes or a feed <= 0.
     """
+def contour_kernel(shaper: Fir, modes: collections.abc.Sequence[Mode], period_s: typing.SupportsFloat | typing.SupportsIndex, target: ContourTarget) -> list[float]:
+    """
+    Kernel from a command before shaping to what shall follow the path; `shaper`: taps in samples of `period_s`.
+    """
 def convolve(first: Shaper, second: Shaper) -> Shaper:
     """
     The two shapers in series: cancels what either cancels, lasts as long as both together.
@@ -2494,7 +2790,7 @@ def insensitivity(shaper: Shaper, mode: Mode, vibration_limit: typing.SupportsFl
         vibration_limit: Residual ratio (no unit), above 0 and below 1.
     
     Returns:
-        The relative width (no unit): .065 for ZV and .399 for EI at 5 % without damping.
+        The relative width (no unit): .064 for ZV and .399 for EI at 5 % without damping.
     
     Raises:
         ArgumentError: The limit is outside its range.

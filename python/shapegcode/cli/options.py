@@ -18,6 +18,13 @@ _SIZE_UNITS = {"": 1, "k": 1024, "M": 1024 * 1024}
 _TIME_UNITS = {"ms": 1e-3, "us": 1e-6, "s": 1.0}
 
 
+def add_input_arguments(parser: argparse.ArgumentParser, metavar: str = "IN") -> None:
+    """Declare what a command reads: the program, ``-m MACHINE`` with ``--set``, and ``--program O1234``."""
+    parser.add_argument("input", metavar=metavar, help="CNC program")
+    add_machine_argument(parser)
+    add_program_argument(parser)
+
+
 def add_machine_argument(parser: argparse.ArgumentParser) -> None:
     """Declare ``-m MACHINE`` and ``--set KEY=VALUE``."""
     parser.add_argument(
@@ -52,7 +59,7 @@ def add_program_argument(parser: argparse.ArgumentParser) -> None:
         metavar="O1234",
         type=program_number,
         default=None,
-        help="program to play of a file that holds several (default: the first)",
+        help="program to read of a file that holds several (default: the first)",
     )
 
 
@@ -62,10 +69,10 @@ def program_number(text: str) -> int:
     Raises:
         ArgumentTypeError: no number from 1 to 99999999.
     """
-    digits = text.removeprefix("O").removeprefix("o")
-    if not digits.isdigit() or not 1 <= int(digits) <= 99_999_999:
-        raise argparse.ArgumentTypeError(f"{text!r} is no program number: O1 ... O99999999")
-    return int(digits)
+    match = re.fullmatch(r"[Oo]?0*([1-9][0-9]{0,7})", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a program number, O1 ... O99999999")
+    return int(match[1])
 
 
 def load_machine(args: argparse.Namespace) -> Machine:
@@ -130,6 +137,16 @@ def refuse_same_file(targets: Iterable[Path], others: Iterable[Path]) -> None:
                 raise ArgumentError(
                     f"{target} would overwrite {other}, which this run reads or writes too: name another file"
                 )
+
+
+def refuse_json_over_input(args: argparse.Namespace) -> None:
+    """Refuse to write the report of ``--json`` over the program or the machine file.
+
+    Raises:
+        ArgumentError: ``--json`` names one of them.
+    """
+    if args.json not in (None, "-"):
+        refuse_same_file([Path(args.json)], [Path(args.input), Path(args.machine)])
 
 
 def ratio(text: str) -> float:
