@@ -17,8 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from shapegcode._core import ArgumentError, DesignError, Mode, ShapegcodeError, Shaper, convolve, grid_polynomial
-from shapegcode._core import sensitivity_curve, worst_residual
+from shapegcode._core import (
+    ArgumentError,
+    DesignError,
+    Mode,
+    ShapegcodeError,
+    Shaper,
+    convolve,
+    grid_polynomial,
+    sensitivity_curve,
+    worst_residual,
+)
 
 __all__ = ["Conditions", "ResidualLimit", "Zero", "shortest_on_grid"]
 
