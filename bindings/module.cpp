@@ -9,6 +9,7 @@ PYBIND11_MODULE(_core, module) {
   register_errors(module);
   register_shaping(module);
   register_shaping_families(module);
+  register_minimal(module);
   register_filter(module);
   register_path(module);
   register_motion(module);

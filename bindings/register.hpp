@@ -9,6 +9,7 @@ void register_shaping_families(pybind11::module_& module);
 namespace shapegcode::bindings {
 
 void register_errors(pybind11::module_& module);
+void register_minimal(pybind11::module_& module);
 void register_filter(pybind11::module_& module);
 void register_path(pybind11::module_& module);
 void register_gcode(pybind11::module_& module);

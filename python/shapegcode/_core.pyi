@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -205,6 +205,81 @@ class FrequencyBand:
     def lowest_hz(self) -> float:
         """
         Lower end in Hz.
+        """
+class MinimalShapers:
+    """
+    The minimal shapers of some modes, and what is known about others.
+    """
+    @property
+    def boxes(self) -> int:
+        """
+        Boxes of times that the proof looked at.
+        """
+    @property
+    def complete(self) -> bool:
+        """
+        True if every box of times was settled: there is no other shaper in the region.
+        """
+    @property
+    def complete_up_to_s(self) -> float:
+        """
+        Duration in s up to which there is no other shaper; 0: nothing is proven.
+        """
+    @property
+    def converged(self) -> int:
+        """
+        Starts that reached a shaper in the region.
+        """
+    @property
+    def found_once(self) -> int:
+        """
+        Shapers that one start alone reached. Over `converged` it estimates the share of starts that would reach a shaper not listed yet (Good 1953).
+        """
+    @property
+    def max_abs_sum(self) -> float:
+        """
+        The region: largest sum of magnitudes (no unit).
+        """
+    @property
+    def max_duration_s(self) -> float:
+        """
+        The region: largest duration in s.
+        """
+    @property
+    def shapers(self) -> list[Shaper]:
+        """
+        The shapers, ascending in duration, then in the times.
+        """
+    @property
+    def starts(self) -> int:
+        """
+        Newton starts.
+        """
+    @property
+    def unresolved(self) -> int:
+        """
+        Boxes too small to halve on that could not be settled: solutions there are not isolated.
+        """
+class MinimalBranches:
+    """
+    The minimal shapers of two modes over the ratio of their frequencies, joined to curves.
+    """
+    @property
+    def amplitudes(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Amplitudes (no unit), shape (n_branches, n_ratios, 3), NaN as in `times_s`; read-only view.
+        """
+    @property
+    def ratios(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Frequency ratios (no unit), shape (n_ratios,), read-only view.
+        """
+    @property
+    def times_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Times of the taps in s, shape (n_branches, n_ratios, 3), NaN where a curve has no shaper; read-only view.
+        
+        [..., 2] is the duration.
         """
 class Fir:
     """
@@ -2804,6 +2879,52 @@ def interpolate(path: Path, profile: SpeedProfile, period_s: typing.SupportsFloa
 def interpolate_program(program: ProgramText, model: ControllerModel) -> InterpolatedTime:
     """
     The same by full interpolation, every set-point of every step. Raises ArgumentError on a model that no controller can have, or a program of more than 4e9 set-points.
+    """
+def minimal_branches(first: Mode, second_damping: typing.SupportsFloat | typing.SupportsIndex, ratios: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], max_duration_s: typing.SupportsFloat | typing.SupportsIndex, *, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> MinimalBranches:
+    """
+    All minimal two-mode shapers over the ratio of the frequencies, joined to curves (paper 002, fig. 2 and 3).
+    
+    At each ratio the list is that of `minimal_two_mode`; curves are followed by continuation, also through gaps, where the
+    sum of magnitudes or the duration exceeds its limit. Steps of 0.02 and less join reliably.
+    
+    Args:
+        first: The mode whose frequency stays.
+        second_damping: Damping ratio of the other mode (no unit).
+        ratios: Frequencies of the other mode over that of the first, ascending, above 0, shape (n_ratios,).
+        max_duration_s: Largest duration in s, at most 100 periods of the faster mode at any ratio.
+        max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1.
+    
+    Returns:
+        The curves, ordered by the ratio at which they begin, then by duration.
+    
+    Raises:
+        ArgumentError: No ratio, ratios that do not ascend, or a value outside its range.
+    
+    Source: paper 002; the continuation is this project's.
+    """
+def minimal_shapers(modes: collections.abc.Sequence[Mode], max_duration_s: typing.SupportsFloat | typing.SupportsIndex, *, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_starts: typing.SupportsInt | typing.SupportsIndex = 100000, max_boxes: typing.SupportsInt | typing.SupportsIndex = 400000) -> MinimalShapers:
+    """
+    Minimal multi-mode shapers: n+1 taps that cancel n = 1 ... 6 modes, damped or not.
+    
+    One mode is closed form and two are searched completely. Three and more are searched from many low-discrepancy starts
+    and by boxes of times, each of which is proven empty or shrunk onto a solution, in ascending duration: what the result
+    says about completeness is `complete` and `complete_up_to_s`. Shapers with fewer taps that serve all modes are listed
+    too; solutions that are not isolated (undamped modes at odd ratios, which one ZV serves) are not.
+    
+    Args:
+        modes: One to six modes, no two alike within 1e-6.
+        max_duration_s: Largest duration in s, above 0, at most 100 periods of the fastest mode.
+        max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1.
+        max_starts: Most Newton starts; fewer are used once every solution was found three times over.
+        max_boxes: Most boxes of times that the proof may look at (some 2 microseconds each for four modes); 0: no proof.
+    
+    Returns:
+        The shapers, residual_ratio of every mode at most 1e-12, and what was searched.
+    
+    Raises:
+        ArgumentError: No mode, more than six, two alike, or a value outside its range.
+    
+    Source: paper 002, eq. 4-11; the searches are this project's.
     """
 def minimal_two_mode(first: Mode, second: Mode, max_duration_s: typing.SupportsFloat | typing.SupportsIndex, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> list[Shaper]:
     """

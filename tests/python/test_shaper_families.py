@@ -69,8 +69,14 @@ def sampled_worst(shaper: Shaper, band: ModeBand, count: int = 101) -> float:
     return max(left_of(shaper, float(f), band.mode.damping_ratio) for f in np.linspace(low, high, count))
 
 
-def options(period_s: float | None = None, **more: float) -> DesignOptions:
-    return DesignOptions(period_s=period_s, **more)
+def options(
+    period_s: float | None = None,
+    *,
+    max_duration_s: float = 0.25,
+    max_abs_sum: float = 10.0,
+    vibration_limit: float = 0.05,
+) -> DesignOptions:
+    return DesignOptions(period_s, max_duration_s, max_abs_sum, vibration_limit)
 
 
 # --- every family ---------------------------------------------------------------------------------------------
@@ -141,8 +147,16 @@ def feasible(rows: list[NDArray[np.complex128]], last: int) -> bool:
     matrix = np.vstack([np.ones(last + 1), *[part for row in rows for part in (row.real, row.imag)]])
     right = np.zeros(len(matrix))
     right[0] = 1.0
-    tolerance = {"primal_feasibility_tolerance": 1e-10}
-    return bool(linprog(np.zeros(last + 1), A_eq=matrix, b_eq=right, method="highs-ds", options=tolerance).status == 0)
+    return bool(
+        linprog(
+            np.zeros(last + 1),
+            A_eq=matrix,
+            b_eq=right,
+            options={"primal_feasibility_tolerance": 1e-10},
+            method="highs-ds",
+        ).status
+        == 0
+    )
 
 
 @pytest.mark.parametrize("multiplicity", [1, 2, 3])
@@ -248,7 +262,7 @@ def test_simultaneous_of_two_modes_is_the_shortest_non_negative_minimal_shaper()
     for _ in range(6):
         slow = float(rng.uniform(20.0, 60.0))
         modes = [Mode(slow, float(rng.uniform(0.0, 0.05))), Mode(slow * float(rng.uniform(1.3, 2.8)), 0.02)]
-        minimal = [each for each in minimal_two_mode(*modes, 0.06) if not each.has_negative]
+        minimal = [each for each in minimal_two_mode(modes[0], modes[1], 0.06) if not each.has_negative]
         shaper = simultaneous_zv(modes, 0.25)
         assert max(simulated(shaper, mode) for mode in modes) < 1e-11
         assert shaper.duration_s <= minimal[0].duration_s * (1.0 + 1e-9)

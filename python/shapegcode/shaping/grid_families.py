@@ -198,14 +198,18 @@ class _Search:
 
     def _candidates(self, last: int) -> list[FloatArray]:
         """Taps of that many periods, the best first."""
+        feasible = self._feasible(last)
+        rest = [] if feasible is None else [feasible]
         if self._conditions.largest_tap is not None:
-            found = [self._best(last, 0.0)]
-        else:
-            found = sorted(
-                (taps for share in _CENTRES for taps in self._centred(last, share * last)),
-                key=lambda taps: float(taps @ (np.arange(last + 1) - taps @ np.arange(last + 1)) ** 2),
-            )
-        return [taps for taps in (*found, self._feasible(last)) if taps is not None]
+            best = self._best(last, 0.0)
+            return rest if best is None else [best, *rest]
+
+        def variance(taps: FloatArray) -> float:
+            steps = np.arange(last + 1)
+            return float(taps @ (steps - taps @ steps) ** 2)
+
+        centred = [taps for share in _CENTRES for taps in self._centred(last, share * last)]
+        return [*sorted(centred, key=variance), *rest]
 
     def _centred(self, last: int, centre: float) -> list[FloatArray]:
         """Taps on the way from a centre (periods) to a local minimum of the second central moment."""
@@ -276,8 +280,9 @@ class _Search:
                 options={"primal_feasibility_tolerance": tolerance, "dual_feasibility_tolerance": tolerance},
             )
             if result.status == 0:
-                taps = np.asarray(result.x[:-1], dtype=np.float64)
-                return taps if largest is None else taps[: last + 1] - taps[last + 1 :], float(result.x[-1])
+                *_, share = solution = np.asarray(result.x, dtype=np.float64)
+                taps = solution[: last + 1]
+                return taps if largest is None else taps - solution[last + 1 : -1], float(share)
             if result.status == _INFEASIBLE:
                 return None
         return None
