@@ -9,6 +9,7 @@ from shapegcode._core import ArgumentError, Shaper, convolved_zv, grid_polynomia
 from shapegcode.shaping.band import ModeBand
 from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
+from shapegcode.shaping.minimal_family import solve_minimal
 
 __all__ = ["FAMILIES", "DesignOptions", "Family", "design", "family_named"]
 
@@ -76,6 +77,11 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "zv", "zero vibration, one mode after the other", "paper 002, eq. 1-3; Smith 1958",
         "any number of modes, damped or not; exact at the nominal frequencies only", True, False, _convolved_zv,
+    ),
+    Family(
+        "minimal", "one tap more than modes", "paper 002, eq. 4-17; searches of this project",
+        "one to six modes, damped or not, at continuous times (on a grid the polynomial stands for it); exact at the "
+        "nominal frequencies only; taps may be negative", True, False, solve_minimal,
     ),
     Family(
         "polynomial", "shortest exact shaper of a grid", "this project",
