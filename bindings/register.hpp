@@ -2,8 +2,9 @@
 
 #include <pybind11/pybind11.h>
 
-// register_shaping keeps the global namespace of its own file.
+// These two keep the global namespace of their own files.
 void register_shaping(pybind11::module_& module);
+void register_shaping_families(pybind11::module_& module);
 
 namespace shapegcode::bindings {
 
