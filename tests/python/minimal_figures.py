@@ -58,12 +58,12 @@ def random_sets(count: int, seed: int) -> list[tuple[Mode, ...]]:
     return sets
 
 
-def solve(modes: Sequence[Mode], max_boxes: int = 400_000) -> Solved:
+def solve(modes: Sequence[Mode], max_boxes: int = 400_000, max_abs_sum: float = 10.0) -> Solved:
     """The set's minimal shapers within the first of `SPANS` that has one."""
     begin = time.process_time()
     convolved_s = convolved_zv(modes).duration_s
     for span in SPANS:
-        result = minimal_shapers(modes, span * convolved_s, max_boxes=max_boxes)
+        result = minimal_shapers(modes, span * convolved_s, max_boxes=max_boxes, max_abs_sum=max_abs_sum)
         if result.shapers:
             break
     seconds = time.process_time() - begin
@@ -115,8 +115,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sets", type=int, default=500, help="number of sets (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="of the random numbers (default: %(default)s)")
+    parser.add_argument("--max-boxes", type=int, default=400_000, help="of the proof (default: %(default)s)")
+    parser.add_argument("--max-abs-sum", type=float, default=10.0, help="of the taps (default: %(default)s)")
     arguments = parser.parse_args()
-    _print_figures([solve(modes) for modes in random_sets(arguments.sets, arguments.seed)])
+    sets = random_sets(arguments.sets, arguments.seed)
+    _print_figures([solve(modes, arguments.max_boxes, arguments.max_abs_sum) for modes in sets])
 
 
 if __name__ == "__main__":
