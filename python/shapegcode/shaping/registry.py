@@ -9,6 +9,7 @@ from shapegcode._core import ArgumentError, Shaper, convolved_zv, grid_polynomia
 from shapegcode.shaping.band import ModeBand
 from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
+from shapegcode.shaping.robust import least_worst, minimax_robust
 
 __all__ = ["FAMILIES", "DesignOptions", "Family", "design", "family_named"]
 
@@ -66,6 +67,17 @@ def _shortest_non_negative(bands: Sequence[ModeBand], options: DesignOptions) ->
     return [shortest_non_negative([band.mode for band in bands], _period(options), options.max_duration_s)]
 
 
+def _robust(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+    found = minimax_robust(
+        bands, _period(options), vibration_limit=options.vibration_limit, max_duration_s=options.max_duration_s
+    )
+    return [found.shaper]
+
+
+def _least_worst(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+    return [least_worst(bands, _period(options), options.max_duration_s).shaper]
+
+
 def _period(options: DesignOptions) -> float:
     if options.period_s is None:
         raise ArgumentError("this family is designed on a grid: give its period")
@@ -84,6 +96,14 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "non-negative", "shortest shaper of a grid without negative taps", "this project",
         "any modes on a grid on which one exists within the longest duration", False, True, _shortest_non_negative,
+    ),
+    Family(
+        "robust", "shortest shaper of a grid below a residual over the bands", "this project",
+        "modes with a band; one without is cancelled exactly; no tap is negative", False, True, _robust,
+    ),
+    Family(
+        "least-worst", "least worst residual of a grid over the bands", "this project",
+        "as robust, for the longest duration", False, True, _least_worst,
     ),
 )  # fmt: skip
 """Every family, in the order of tables."""

@@ -10,6 +10,7 @@ A mode without a band (uncertainty 0) is cancelled exactly at its frequency, as 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from shapegcode._core import ArgumentError, DesignError
@@ -34,6 +35,7 @@ VIBRATION_LIMIT = 0.05
 
 _LONGER = 4  # times the longest duration: how far a refusal looks for what would do
 _OTHER_PERIODS = (0.5, 0.75, 1.25, 1.5, 2.0)  # of the refused one: what a refusal looks at
+_HINT_PRECISION = 0.05  # relative, of the duration that would do
 _HINT_PERIODS = 500  # longest grid that a refusal searches, periods
 
 
@@ -49,8 +51,8 @@ def least_worst(
     """Taps on a grid whose worst residual over the bands is least, for a given duration.
 
     The optimum is proven to 0.1 %: `worst_residual` is at most that much above `least_possible` (a residual below
-    1e-7 counts as none). The exception is a damped mode on a grid where the best use of the last periods is to wait:
-    the shaper is then shorter, and its residual counts from its own last tap.
+    1e-6 counts as none). The exception is a damped mode on a grid where the best use of the last periods is to wait:
+    the residual counts from the last tap, so the shaper is then shorter, or a last tap of 0.001 marks the end.
 
     Args:
         bands: modes with their bands, at least one. One without a band is cancelled exactly.
@@ -141,27 +143,31 @@ def _refusal(task: Task, limit: float, max_duration_s: float) -> str:
         else:
             text += no_exact(task, most * task.period_s)
         longest = min(_LONGER * most, max(_HINT_PERIODS, most))
-        enough = smallest_below(task, limit, longest)
+        enough = smallest_below(task, limit, longest, too_few=most, precision=_HINT_PRECISION)
         text += f"; {ms(enough * task.period_s)} would do" if enough else f"; nor does {ms(longest * task.period_s)} do"
     return f"{text}; {_other_period(task, limit, max_duration_s)}"
 
 
 def _other_period(task: Task, limit: float, max_duration_s: float) -> str:
     """Which of some other periods does best within the duration."""
-    best: tuple[float, Task] | None = None
+    shortest_s, least = math.inf, math.inf
+    shortest_text, least_text = "", "no other period from half to twice as long has a design within that duration"
     for share in _OTHER_PERIODS:
         other = task.at_period(share * task.period_s)
         most = min(other.periods(max_duration_s), _HINT_PERIODS)
-        found = best_within(other, most) if most and not unreachable(other) else None
-        if found is not None and (best is None or found.worst_residual < best[0]):
-            best = found.worst_residual, other
-    if best is None:
-        return "no other period from half to twice as long has a design within that duration"
-    worst, other = best
-    enough = smallest_below(other, limit, other.periods(max_duration_s)) if worst <= limit else None
-    if enough is None:
-        return f"a period of {ms(other.period_s)} reaches {_percent(worst)} within that duration"
-    return f"on a period of {ms(other.period_s)} a design of {ms(enough * other.period_s)} would do"
+        if not most or unreachable(other):
+            continue
+        enough = smallest_below(other, limit, most)
+        if enough is not None:
+            if enough * other.period_s < shortest_s:
+                shortest_s = enough * other.period_s
+                shortest_text = f"on a period of {ms(other.period_s)} a design of {ms(shortest_s)} would do"
+            continue
+        found = best_within(other, most)
+        if found is not None and found.worst_residual < least:
+            least = found.worst_residual
+            least_text = f"a period of {ms(other.period_s)} reaches {_percent(least)} within that duration"
+    return shortest_text or least_text
 
 
 def _percent(ratio: float) -> str:
