@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'InPosition', 'InterpolatedTime', 'Interpolator', 'ModalState', 'Mode', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'interpolate', 'interpolate_program', 'minimal_two_mode', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'shape_path', 'simulate_circle', 'time_program', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'InPosition', 'InterpolatedTime', 'Interpolator', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'interpolate', 'interpolate_program', 'minimal_two_mode', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'shape_path', 'simulate_circle', 'time_program', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -218,6 +218,114 @@ class FirStream:
     def step(self, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Filtered sample, shape (n_axes,).
+        """
+class VaryingFir:
+    """
+    A set of filters on one grid between which the input moves.
+    
+    Each increment of the input is replaced by the whole impulse train of the filter that is valid where it begins (scatter
+    form), so that every increment keeps the zeros of its own filter, however often the filters change. Place k is filter k
+    of the set; place k + w shares an increment between filters k and k + 1.
+    
+    Args:
+        set: The filters (Fir), at least one.
+    
+    Raises:
+        ArgumentError: An empty set.
+    """
+    def __init__(self, set: collections.abc.Sequence[Fir]) -> None:
+        """
+        Make a set; ArgumentError if it is empty.
+        """
+    def apply(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], place: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> numpy.ndarray:
+        """
+        Filter samples (n, n_axes); `place` (n,) for the increment that leads to each sample. The result has duration_samples more rows. Bit-identical to VaryingFirStream. Raises ArgumentError on another shape or a value that is not finite.
+        """
+    def on_finer_grid(self, factor: typing.SupportsInt | typing.SupportsIndex) -> VaryingFir:
+        """
+        The same set on a grid `factor` times as fine. Raises ArgumentError below 1.
+        """
+    @property
+    def duration_samples(self) -> int:
+        """
+        Largest delay in samples.
+        """
+    @property
+    def mean_samples(self) -> float:
+        """
+        Mean delay, average of the set, in samples.
+        """
+    @property
+    def set(self) -> list[Fir]:
+        """
+        The filters.
+        """
+    @property
+    def variance_samples2(self) -> float:
+        """
+        Largest second central moment in samples squared: the contour cost.
+        """
+class VaryingFirStream:
+    """
+    Real-time form of VaryingFir: one sample per step.
+    """
+    def __init__(self, fir: VaryingFir, n_axes: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        At rest at zero. Raises ArgumentError on n_axes < 1.
+        """
+    def reset(self, position: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        """
+        Rest at `position`, shape (n_axes,).
+        """
+    def step(self, position: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], place: typing.SupportsFloat | typing.SupportsIndex) -> list[float]:
+        """
+        Filtered sample, n_axes values.
+        """
+class FollowingFir:
+    """
+    A set of filters followed along an axis.
+    
+    Filter k of the set is valid where the axis is at position k; in between the increments are shared, beyond the ends the
+    last filter holds. Each increment goes by its own middle in the input.
+    
+    Args:
+        fir: The set.
+        axis: 0, 1, 2 for X, Y, Z.
+        position_mm: Strictly ascending, one per filter, mm.
+    
+    Raises:
+        ArgumentError: No such axis, another number of positions, or positions that do not ascend.
+    """
+    def __init__(self, fir: VaryingFir, axis: typing.SupportsInt | typing.SupportsIndex, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        """
+        Place the filters of a set; ArgumentError if the positions do not fit.
+        """
+    def apply(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+        """
+        Filter samples (n, n_axes) in mm; the result has fir.duration_samples more rows. Raises ArgumentError on another shape, a value that is not finite, or samples without the axis.
+        """
+    def on_finer_grid(self, factor: typing.SupportsInt | typing.SupportsIndex) -> FollowingFir:
+        """
+        The same on a grid `factor` times as fine. Raises ArgumentError below 1.
+        """
+    def place(self, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Place in the set for a position (mm) of the axis.
+        """
+    @property
+    def axis(self) -> int:
+        """
+        Axis whose position counts.
+        """
+    @property
+    def fir(self) -> VaryingFir:
+        """
+        The set.
+        """
+    @property
+    def position_mm(self) -> list[float]:
+        """
+        Positions of the filters, mm.
         """
 class SegmentKind:
     """
@@ -1499,6 +1607,49 @@ class WriterOptions:
     @position_decimals.setter
     def position_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+class ModeTable:
+    """
+    How a mode depends on where an axis stands. Immutable.
+    
+    Linear in frequency and damping ratio between the rows, constant beyond the ends; without rows the mode stays as it is.
+    
+    Args:
+        axis: Whose position counts: 0, 1, 2 for X, Y, Z.
+        position_mm: Strictly ascending positions in mm, shape (n,).
+        frequency_hz: Undamped natural frequencies in Hz, one per position, above 0.
+        damping_ratio: Damping ratios (no unit), one per position, 0 <= zeta < 1; none: that of the mode.
+    
+    Raises:
+        ArgumentError: Unequal lengths, positions that do not ascend, or a value outside its range.
+    """
+    def __init__(self, axis: typing.SupportsInt | typing.SupportsIndex = 0, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], frequency_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], damping_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
+        """
+        Make a table; ArgumentError if it is not what the class asks for.
+        """
+    def mode_at(self, mode: Mode, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> Mode:
+        """
+        The mode at a position (mm) of the axis; its participation stays.
+        """
+    @property
+    def axis(self) -> int:
+        """
+        Axis whose position counts.
+        """
+    @property
+    def damping_ratio(self) -> list[float]:
+        """
+        Damping ratios, or none.
+        """
+    @property
+    def frequency_hz(self) -> list[float]:
+        """
+        Frequencies in Hz.
+        """
+    @property
+    def position_mm(self) -> list[float]:
+        """
+        Positions in mm.
+        """
 class BlockEnd:
     """
     When a block's successor starts.
@@ -1609,6 +1760,14 @@ class PlaybackOptions:
         """
     @measure_contour.setter
     def measure_contour(self, arg0: bool) -> None:
+        ...
+    @property
+    def mode_tables(self) -> typing.Annotated[list[list[ModeTable]], "FixedSize(3)"]:
+        """
+        How the modes of X, Y and Z vary with position, one table per mode; none: constant modes.
+        """
+    @mode_tables.setter
+    def mode_tables(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[ModeTable]], "FixedSize(3)"]) -> None:
         ...
     @property
     def modes(self) -> typing.Annotated[list[list[Mode]], "FixedSize(3)"]:

@@ -25,7 +25,7 @@ class Recorder {
   // `command_on_path`: the command follows the path exactly, so only the response can leave it.
   Recorder(const Path& path, const PlaybackOptions& options, bool command_on_path)
       : options_(options),
-        plant_(options.modes, options.period_s),
+        plant_(options.modes, options.period_s, options.mode_tables),
         tracks_contour_(options.measure_contour && path.length_mm() > 0.0),
         tracks_command_(tracks_contour_ && !command_on_path),
         command_tracker_(tracks_contour_ ? path : a_point()),
