@@ -43,7 +43,7 @@ def extra_insensitive_fit(mode: Mode) -> tuple[FloatArray, FloatArray]:
 
 
 def ei_convolved(bands: Sequence[ModeBand]) -> tuple[FloatArray, FloatArray]:
-    """EI shapers of all modes in series, at continuous times: of the two forms the one that leaves less over the bands."""
+    """EI shapers of all modes in series, at continuous times; of the two forms that which leaves less."""
     both = []
     for form in (extra_insensitive, extra_insensitive_fit):
         times_s, amplitudes = np.zeros(1), np.ones(1)
@@ -51,7 +51,7 @@ def ei_convolved(bands: Sequence[ModeBand]) -> tuple[FloatArray, FloatArray]:
             t, a = form(band.mode)
             times_s, amplitudes = np.add.outer(times_s, t).ravel(), np.multiply.outer(amplitudes, a).ravel()
         both.append((times_s, amplitudes))
-    return min(both, key=lambda shaper: worst_over_bands(*shaper, bands, 401))
+    return min(both, key=lambda shaper: worst_over_bands(shaper[0], shaper[1], bands, 401))
 
 
 def worst_over_bands(times_s: FloatArray, amplitudes: FloatArray, bands: Sequence[ModeBand], samples: int) -> float:

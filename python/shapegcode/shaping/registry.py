@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from shapegcode._core import ArgumentError, Shaper, convolved_zv, grid_polynomial
+from shapegcode._core import ArgumentError, DesignError, Shaper, convolved_zv, grid_polynomial
 from shapegcode.shaping.band import ModeBand
 from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
-from shapegcode.shaping.robust import least_worst, minimax_robust
+from shapegcode.shaping.robust import minimax_robust
 
 __all__ = ["FAMILIES", "DesignOptions", "Family", "design", "family_named"]
 
@@ -68,14 +68,13 @@ def _shortest_non_negative(bands: Sequence[ModeBand], options: DesignOptions) ->
 
 
 def _robust(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+    if not any(band.uncertainty for band in bands):
+        raise DesignError("no mode states a band: a robust design is the non-negative one")
     found = minimax_robust(
-        bands, _period(options), vibration_limit=options.vibration_limit, max_duration_s=options.max_duration_s
-    )
+        bands, _period(options), vibration_limit=options.vibration_limit, max_duration_s=options.max_duration_s,
+        hints=False,
+    )  # fmt: skip
     return [found.shaper]
-
-
-def _least_worst(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
-    return [least_worst(bands, _period(options), options.max_duration_s).shaper]
 
 
 def _period(options: DesignOptions) -> float:
@@ -100,10 +99,6 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "robust", "shortest shaper of a grid below a residual over the bands", "this project",
         "modes with a band; one without is cancelled exactly; no tap is negative", False, True, _robust,
-    ),
-    Family(
-        "least-worst", "least worst residual of a grid over the bands", "this project",
-        "as robust, for the longest duration", False, True, _least_worst,
     ),
 )  # fmt: skip
 """Every family, in the order of tables."""

@@ -23,6 +23,7 @@ from shapegcode.shaping.robust_search import (
     check_time,
     names,
     no_exact,
+    refusal,
     shortest_below,
     smallest_below,
     unreachable,
@@ -92,6 +93,7 @@ def minimax_robust(
     non_negative: bool = True,
     max_abs_sum: float = 10.0,
     zeros_at_nominal: bool = False,
+    hints: bool = True,
 ) -> RobustDesign:
     """Shortest taps on a grid that leave at most a given share of the vibration anywhere in the bands.
 
@@ -108,10 +110,11 @@ def minimax_robust(
         non_negative: no tap is negative.
         max_abs_sum: largest sum of the taps' magnitudes where taps may be negative, at least 1.
         zeros_at_nominal: every mode is cancelled exactly at its nominal frequency besides.
+        hints: a refusal looks for what would do, which may take seconds.
 
     Raises:
         ArgumentError: no mode, or a value outside its range.
-        DesignError: no such design within `max_duration_s`. The message says what the longest allowed duration
+        DesignError: no such design within `max_duration_s`. With hints the message says what the longest allowed one
             reaches, which duration would do (up to four times the longest), and which period would do better.
 
     Source: this project (spec 2, grid-exact shapers).
@@ -122,26 +125,21 @@ def minimax_robust(
         raise ArgumentError(f"vibration_limit is {vibration_limit}: it must be above 0 and below 1")
     found = shortest_below(task, vibration_limit, max_duration_s)
     if found is None:
-        raise DesignError(_refusal(task, vibration_limit, max_duration_s))
+        text = refusal(task, vibration_limit, max_duration_s)
+        raise DesignError(f"{text}{_hints(task, vibration_limit, max_duration_s)}" if hints else text)
     return found
 
 
-def _refusal(task: Task, limit: float, max_duration_s: float) -> str:
-    """Why there is no design, what the longest allowed one reaches, and what would do."""
-    text = (
-        f"no design within {ms(max_duration_s)} on a {ms(task.period_s)} grid leaves at most {_percent(limit)} "
-        f"of {names(task.bands)}; "
-    )
-    most = task.periods(max_duration_s)
-    reason = unreachable(task)
-    if reason:
-        text += reason
-    else:
+def _hints(task: Task, limit: float, max_duration_s: float) -> str:
+    """What the longest allowed duration reaches, which one would do, and which other period."""
+    text = ""
+    if not unreachable(task):
+        most = task.periods(max_duration_s)
         reached = best_within(task, most) if task.wide and most else None
         if reached is not None:
-            text += f"the longest allowed reaches {_percent(reached.worst_residual)}"
+            text += f"; the longest allowed reaches {_percent(reached.worst_residual)}"
         else:
-            text += no_exact(task, most * task.period_s)
+            text += f"; {no_exact(task, most * task.period_s)}"
         longest = min(_LONGER * most, max(_HINT_PERIODS, most))
         enough = smallest_below(task, limit, longest, too_few=most, precision=_HINT_PRECISION)
         text += f"; {ms(enough * task.period_s)} would do" if enough else f"; nor does {ms(longest * task.period_s)} do"

@@ -249,6 +249,15 @@ def no_exact(task: Task, duration_s: float) -> str:
     return f"{taps} up to {ms(duration_s)} on a {ms(task.period_s)} grid do not cancel {modes} exactly"
 
 
+def refusal(task: Task, limit: float, max_duration_s: float) -> str:
+    """That there is no design below the limit, and the reason if it is known, for a message."""
+    reason = unreachable(task)
+    return (
+        f"no design within {ms(max_duration_s)} on a {ms(task.period_s)} grid leaves at most {100.0 * limit:.3g} % of "
+        f"{names(task.bands)}" + (f"; {reason}" if reason else "")
+    )
+
+
 def unreachable(task: Task) -> str:
     """What no non-negative shaper of this grid can reduce, for a message; empty if there is nothing.
 
