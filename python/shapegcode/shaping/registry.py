@@ -12,6 +12,7 @@ from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.minimal_family import solve_minimal
 from shapegcode.shaping.options import DesignOptions
+from shapegcode.shaping.robust import minimax_robust
 
 __all__ = ["FAMILIES", "DesignOptions", "Family", "design", "distinct", "family_named"]
 
@@ -49,6 +50,16 @@ def _polynomial(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shape
 
 def _shortest_non_negative(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
     return [shortest_non_negative([band.mode for band in bands], options.grid_period_s, options.max_duration_s)]
+
+
+def _robust(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+    if not any(band.uncertainty for band in bands):
+        raise DesignError("no mode states a band: a robust design is the non-negative one")
+    found = minimax_robust(
+        bands, options.grid_period_s, vibration_limit=options.vibration_limit, max_duration_s=options.max_duration_s,
+        hints=False,
+    )  # fmt: skip
+    return [found.shaper]
 
 
 FAMILIES: tuple[Family, ...] = (
@@ -111,6 +122,10 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "non-negative", "shortest shaper of a grid without negative taps", "this project",
         "any modes on a grid on which one exists within the longest duration", False, True, _shortest_non_negative,
+    ),
+    Family(
+        "robust", "shortest shaper of a grid below a residual over the bands", "this project",
+        "modes with a band; one without is cancelled exactly; no tap is negative", False, True, _robust,
     ),
     Family(
         "taps", "taps as given", "the user",
