@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'InPosition', 'InterpolatedTime', 'Interpolator', 'ModalState', 'Mode', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'interpolate', 'interpolate_program', 'minimal_two_mode', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'shape_path', 'simulate_circle', 'time_program', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'InPosition', 'InterpolatedTime', 'Interpolator', 'ModalState', 'Mode', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'fastest_block_ends', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'interpolate', 'interpolate_program', 'minimal_two_mode', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'shape_path', 'simulate_circle', 'time_program', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -1634,6 +1634,54 @@ class PlaybackOptions:
     @record_samples.setter
     def record_samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+    @property
+    def starved_blocks(self) -> list[int]:
+        """
+        Blocks only: what if the block buffer ran empty behind one of these blocks (ascending)?
+        """
+    @starved_blocks.setter
+    def starved_blocks(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def starved_memory_s(self) -> float:
+        """
+        How much of the run behind such a wait is looked at, s; 0: all.
+        """
+    @starved_memory_s.setter
+    def starved_memory_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def starved_s(self) -> float:
+        """
+        How long the set-points then wait, s.
+        """
+    @starved_s.setter
+    def starved_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class StarvedFigures:
+    """
+    What a wait for the next block does to a run.
+    """
+    @property
+    def block(self) -> int:
+        """
+        The set-points wait behind it.
+        """
+    @property
+    def command(self) -> DeviationStats:
+        """
+        Deviation of the command from the path.
+        """
+    @property
+    def residual_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Largest |response - command| while the set-points rest, in the wait and at the end, (3,), mm.
+        """
+    @property
+    def response(self) -> DeviationStats:
+        """
+        Deviation of the response from the path.
+        """
 class PlaybackFigures:
     """
     Figures of one run from rest to rest.
@@ -1687,6 +1735,11 @@ class PlaybackFigures:
     def response(self) -> DeviationStats:
         """
         Deviation of the response from the path.
+        """
+    @property
+    def starved(self) -> list[StarvedFigures]:
+        """
+        One per PlaybackOptions.starved_blocks.
         """
 class MotionKind:
     """
@@ -2366,6 +2419,10 @@ def count_slowed_blocks(blocks: Path, corner_speed_difference_mm_per_s: typing.A
     """
     Blocks that a controller with look-ahead would run slower than programmed.
     """
+def fastest_block_ends(blocks: Path) -> list[int]:
+    """
+    Per axis the block, but for the last, at whose end it is fastest; ascending, each once.
+    """
 def fit_blocks(command: ShapedCommand, breaks: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: FitOptions) -> FittedBlocks:
     """
     Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. Raises ArgumentError on a position outside +-99999.999 mm.
@@ -2437,9 +2494,9 @@ def play_duration_s(blocks: Path, period_s: typing.SupportsFloat | typing.Suppor
     """
     Sum of block durations, s.
     """
-def play_path(path: Path, profile: SpeedProfile, options: PlaybackOptions) -> PlaybackFigures:
+def play_path(path: Path, profile: SpeedProfile, options: PlaybackOptions, programmed: Path = None) -> PlaybackFigures:
     """
-    Play a path under a speed profile (a controller with look-ahead) through filters and plant.
+    Play a path under a speed profile (a controller with look-ahead) through filters and plant, measured against the programmed path (None: the path itself).
     """
 def play_samples(positions_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], path: Path, options: PlaybackOptions) -> PlaybackFigures:
     """

@@ -57,6 +57,7 @@ __all__ = [
     "Shaping",
     "Times",
     "Tolerance",
+    "Verdict",
     "key_documentation",
 ]
 
@@ -381,6 +382,12 @@ class Input(Table):
     compensation_start_up: Literal["A", "B"] = key(
         "kind of the start-up and cancel moves of cutter compensation", fanuc="5003#0, #1", default="A", assumed=True
     )
+    material_side: Literal["left", "right"] | None = key(
+        "side of the programmed tool path on which the workpiece lies, seen along the travel: right where the contour "
+        "is cut as with G41, left as with G42; with it deviations are reported as gouge and excess; left out: not "
+        "known",
+        default=None,
+    )
     scale_unit: Annotated[Positive, Field(le=1)] = key(
         "unit of the factors P, I, J, K of scaling G51 without a decimal point",
         unit="1",
@@ -560,6 +567,9 @@ class Shaping(Table):
     )
 
 
+_Override = Annotated[Positive, Field(le=254)]
+
+
 class Tolerance(Table):
     """When an emitted program is good: outside these limits the conversion says so and exits with 1."""
 
@@ -581,6 +591,47 @@ class Tolerance(Table):
     )
 
 
+class Verdict(Table):
+    """The stated band: which of the cases that are played decide. All are shown; 100 % override always counts."""
+
+    override_percent: tuple[_Override, _Override] = key(
+        "lowest and highest feed override under which the program will run: every case in between must be good. The "
+        "header of a program asks for 100 %, so only that counts unless you state more",
+        unit="%",
+        default=(100.0, 100.0),
+    )
+    mode_uncertainty: Bool = key(
+        "whether every mode must be allowed to be off by its frequency_uncertainty_percent; modes that state none "
+        "are taken as exact",
+        default=True,
+    )
+    block_end: Literal["both", "own"] = key(
+        '"both": the program must be good under either rule of block timing; "own": under controller.block_end, '
+        "for a controller whose rule is known",
+        default="both",
+    )
+    look_ahead: Bool = key(
+        "whether the program must be good with the look-ahead mode left on, which plans the shaped blocks anew; "
+        "false: it is off while they run (emission.prologue)",
+        default=False,
+    )
+    starved_block: Bool = key(
+        "whether the program must be good if the block buffer runs empty once, at the worst place; false: it never "
+        "does (memory or a data server, emission.prefill_dwell_s)",
+        default=False,
+    )
+    starved_s: Annotated[Positive, Field(le=10)] = key(
+        "how long the axes then wait for the next block", unit="s", default=0.02, assumed=True
+    )
+
+    @model_validator(mode="after")
+    def _band_ascends(self) -> Verdict:
+        low, high = self.override_percent
+        if low > high:
+            raise ValueError(f"override_percent = {toml(self.override_percent)}: the lower end comes first")
+        return self
+
+
 class Machine(Table):
     """A machine tool and its controller, as a machine file describes them."""
 
@@ -596,6 +647,7 @@ class Machine(Table):
     emission: Emission = key("how shaped programs are written", default={})
     shaping: Shaping = key("what is shaped, and how", default={})
     tolerance: Tolerance = key("when an emitted program is good", default={})
+    verdict: Verdict = key("under which conditions it must be good", default={})
 
     @model_validator(mode="after")
     def _block_period_fits(self) -> Machine:
