@@ -21,44 +21,6 @@ struct FittedBlocks {
 }  // namespace
 
 void register_emission(py::module_& module) {
-  py::class_<ShapingOptions>(module, "ShapingOptions",
-                             "How a region is turned into a shaped command on the block grid.")
-      .def(py::init<>())
-      .def_readwrite("limits", &ShapingOptions::limits, "Limits of the look-ahead.")
-      .def_readwrite("block_period_s", &ShapingOptions::block_period_s, "s.")
-      .def_readwrite("interpolation_period_s", &ShapingOptions::interpolation_period_s, "s.")
-      .def_readwrite("plunge_axis_angle_rad", &ShapingOptions::plunge_axis_angle_rad,
-                     "How far a side of a corner may lean from Z and still count as plunge, rad.")
-      .def_readwrite("plunge_corner_angle_rad", &ShapingOptions::plunge_corner_angle_rad,
-                     "Least change of direction of such a corner, rad.")
-      .def_readwrite("rest_at_stop_s", &ShapingOptions::rest_at_stop_s, "Pause at a forced stop, s.");
-
-  py::class_<ShapedCommand, std::shared_ptr<ShapedCommand>>(module, "ShapedCommand",
-                                                            "A shaped command on the block grid.")
-      .def_property_readonly(
-          "grid_mm", [](const std::shared_ptr<ShapedCommand>& self) { return view(self->grid_mm, py::cast(self)); },
-          "(n+1, 3) positions at k*T_B, mm, read-only view.")
-      .def_property_readonly(
-          "middle_mm", [](const std::shared_ptr<ShapedCommand>& self) { return view(self->middle_mm, py::cast(self)); },
-          "(n, 3) positions half a period later, mm, read-only view.")
-      .def_property_readonly(
-          "arc_normal", [](const ShapedCommand& self) { return self.arc_normal; },
-          "Per period the axis across an arc's plane, or -1.")
-      .def_readonly("run_ends", &ShapedCommand::run_ends, "Periods at which the command is at rest.")
-      .def_readonly("segment_periods", &ShapedCommand::segment_periods,
-                    "Per marked segment the period in which its begin is reached.");
-
-  module.def(
-      "shape_path",
-      [](const std::shared_ptr<Path>& path, const Fir& shaper, const std::vector<std::uint32_t>& marked,
-         const ShapingOptions& options) {
-        const py::gil_scoped_release release;
-        return std::make_shared<ShapedCommand>(shape_path(path, shaper, marked, options));
-      },
-      py::arg("path"), py::arg("shaper"), py::arg("marked_segments"), py::arg("options"),
-      "Split at forced stops, plan, sample on half the block grid and shape. `shaper` has its taps in whole block "
-      "periods. Raises ArgumentError if the block period is no multiple of the interpolation period.");
-
   py::class_<FitOptions>(module, "FitOptions", "Grid on which blocks are fitted.")
       .def(py::init<>())
       .def_readwrite("increment_mm", &FitOptions::increment_mm, "Least increment of the words, mm.")

@@ -35,7 +35,11 @@ void register_simulation(py::module_& module) {
       .def_readwrite("period_s", &PlaybackOptions::period_s, "Interpolation period, s.")
       .def_readwrite("axis_filters", &PlaybackOptions::axis_filters, "Filters after the set-points, in order.")
       .def_readwrite("modes", &PlaybackOptions::modes, "Modes of X, Y and Z.")
+      .def_readwrite("mode_tables", &PlaybackOptions::mode_tables,
+                     "How the modes of X, Y and Z vary with position, one table per mode; none: constant modes.")
       .def_readwrite("measure_contour", &PlaybackOptions::measure_contour, "Deviations and orbit errors.")
+      .def_readwrite("measure_command", &PlaybackOptions::measure_command,
+                     "False: the deviation of the response alone, no orbit errors.")
       .def_readwrite("last_seconds", &PlaybackOptions::last_seconds,
                      "Blocks only: play the last so many seconds; 0: all.")
       .def_readwrite("starved_blocks", &PlaybackOptions::starved_blocks,

@@ -18,16 +18,8 @@ from shapegcode.compensation import guard_lines, header_lines, read_for_conversi
 from shapegcode.emit import Grid, emit_region, make_grid, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.program import Program
-from shapegcode.verify import (
-    Placed,
-    RegionFigures,
-    axis_modes,
-    measure,
-    other_time_s,
-    play_original,
-    read_back,
-    summarise,
-)
+from shapegcode.verdict import RegionFigures, contour_target, contour_um, measure, summarise
+from shapegcode.verify import Placed, axis_modes, other_time_s, play_original, read_back
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
 _MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin
@@ -235,7 +227,7 @@ def _tighten(
     places = {id(region): index for index, region in enumerate(program.regions)}
     tightened = False
     for place, region in zip(placed, figures, strict=True):
-        reached = max(run.command.max_abs_mm for run in region.emitted) * 1e3
+        reached = contour_um(region, machine)
         if reached > limit:
             room_um[places[id(place.region)]] *= _CONTOUR_MARGIN * limit / reached
             tightened = True
@@ -385,6 +377,7 @@ def _report(
         **figures,
         "limits": {
             "contour_um": machine.tolerance.contour_um,
+            "contour_target": contour_target(machine),
             "residual_ratio": machine.tolerance.residual_ratio,
             "residual_floor_um": machine.tolerance.residual_floor_um,
             "residual_floor_increments": machine.tolerance.residual_floor_increments,

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "shapegcode/filter/fir.hpp"
+#include "shapegcode/filter/varying_fir.hpp"
 #include "shapegcode/metrology/contour.hpp"
 #include "shapegcode/motion/block_player.hpp"
 #include "shapegcode/motion/interpolator.hpp"
@@ -135,6 +136,18 @@ int main() {
     });
   }
 
+  const FollowingFir following(VaryingFir({Fir({0, 4}, {0.5, 0.5}), Fir({0, 2, 5}, {0.3, 0.4, 0.3})}), 0, {0.0, 400.0});
+  VaryingFirStream varying(following.fir(), 3);
+  expect_none("VaryingFirStream::step", [&] {
+    varying.reset({position.data(), 3});
+    for (int i = 0; i < 5000; ++i) {
+      position = Vector3(0.1 * i, 2.0, 3.0 - 0.5 * i);
+      varying.step({position.data(), 3}, following.place(position[0]));
+      sink += position.sum();
+    }
+    return 5000L;
+  });
+
   ControllerModel controller;
   controller.rapid_bell_time_s = 0.03;
   RapidPlayer rapid({0.0, 0.0, 0.0}, {300.0, -20.0, 5.0}, controller);
@@ -162,6 +175,17 @@ int main() {
       sink += plant.step(Vector3(0.1 * i, 0.001 * i * i, 0.0)).sum() + plant.peak().sum() + plant.deflection().sum();
     }
     plant.reset_peak();
+    return 5000L;
+  });
+
+  AxisModeTables tables;
+  tables[0] = {{2, {0.0, 200.0, 400.0}, {52.0, 46.0, 41.0}, {}}};
+  ModalPlant varying_plant(modes, 1e-3, tables);
+  expect_none("ModalPlant::step varying", [&] {
+    varying_plant.reset(Vector3::Zero());
+    for (int i = 0; i < 5000; ++i) {
+      sink += varying_plant.step(Vector3(0.001 * i * i, 0.0, 0.1 * i)).sum() + varying_plant.peak().sum();
+    }
     return 5000L;
   });
 

@@ -4,9 +4,9 @@
 
 #include <cmath>
 #include <numbers>
-#include <random>
 #include <string>
 
+#include "random_blocks.hpp"
 #include "shapegcode/error.hpp"
 
 using shapegcode::CornerResult;
@@ -20,24 +20,13 @@ using shapegcode::Segment;
 using shapegcode::SegmentKind;
 using shapegcode::tangent_at;
 using shapegcode::Vector3;
+using shapegcode::tests::block_from;
+using shapegcode::tests::Random;
+using shapegcode::tests::uniform;
 
 namespace {
 
 constexpr double pi = std::numbers::pi;
-using Random = std::mt19937_64;
-
-double uniform(Random& random, double from, double to) {
-  return std::uniform_real_distribution<double>(from, to)(random);
-}
-
-/// A block that leaves `start` in direction `heading`: a line, or with a radius an arc about the normal axis Z.
-Segment block(const Vector3& start, double heading, double length, double radius, double sense, double feed) {
-  if (radius == 0.0) return make_line(start, start + length * Vector3(std::cos(heading), std::sin(heading), 0.0), feed);
-  const Vector3 centre = start + radius * sense * Vector3(-std::sin(heading), std::cos(heading), 0.0);
-  const double sweep = sense * length / radius;
-  const double angle = std::atan2(start.y() - centre.y(), start.x() - centre.x()) + sweep;
-  return make_arc(start, centre + radius * Vector3(std::cos(angle), std::sin(angle), 0.0), centre, sweep, 2, feed);
-}
 
 /// The same block run backwards: what arrives at a corner.
 Segment reversed(const Segment& segment) {
@@ -77,8 +66,8 @@ Corner random_corner(Random& random) {
   const auto part = [&](double heading, double feed, bool line) {
     const double radius = line ? 0.0 : uniform(random, 5.0, 40.0);
     const double longest = line ? 50.0 : radius * 3.0;
-    return block({1, 2, 3}, heading, uniform(random, 4.0, longest), radius, uniform(random, -1, 1) < 0 ? -1.0 : 1.0,
-                 feed);
+    return block_from({1, 2, 3}, heading, uniform(random, 4.0, longest), radius,
+                      uniform(random, -1, 1) < 0 ? -1.0 : 1.0, feed);
   };
   const double arriving = uniform(random, -pi, pi);
   corner.turn = uniform(random, 0.05, 3.0) * (uniform(random, -1, 1) < 0 ? -1.0 : 1.0);
@@ -215,7 +204,7 @@ TEST_CASE("corner words: nothing is inserted at a tangent corner or with a size 
   const Segment arc = make_arc({20, 0, 0}, {30, 10, 0}, {20, 10, 0}, pi / 2, 2, 20.0);
   for (const bool chamfer : {false, true}) {
     for (const double degrees : {0.0, 0.99, -0.99, 1.01}) {
-      const Segment after = block({20, 0, 0}, degrees * pi / 180.0, 30.0, 0.0, 1.0, 20.0);
+      const Segment after = block_from({20, 0, 0}, degrees * pi / 180.0, 30.0, 0.0, 1.0, 20.0);
       const CornerResult result = insert_corner(before, after, chamfer, 1.0, 2, 1, 1);
       CHECK(result.inserted.has_value() == (degrees > 1.0));
       if (!result.inserted) {
@@ -224,7 +213,8 @@ TEST_CASE("corner words: nothing is inserted at a tangent corner or with a size 
       }
     }
     CHECK_FALSE(insert_corner(before, arc, chamfer, 1.0, 2, 1, 1).inserted);
-    CHECK_FALSE(insert_corner(before, block({20, 0, 0}, 1.0, 30.0, 0.0, 1.0, 20.0), chamfer, 0.0, 2, 1, 1).inserted);
+    CHECK_FALSE(
+        insert_corner(before, block_from({20, 0, 0}, 1.0, 30.0, 0.0, 1.0, 20.0), chamfer, 0.0, 2, 1, 1).inserted);
   }
 }
 
@@ -277,7 +267,7 @@ TEST_CASE("corner words: arbitrary corners end in finite blocks or a refusal") {
     const auto part = [&](double heading) {
       const double radius = uniform(random, 0, 1) < 0.5 ? 0.0 : scale * std::pow(10.0, uniform(random, -2.0, 1.0));
       const double length = radius == 0.0 ? scale * uniform(random, 0.0, 10.0) : radius * uniform(random, 1e-6, 6.28);
-      return block({0, 0, 0}, heading, length, radius, uniform(random, -1, 1) < 0 ? -1.0 : 1.0, 1.0);
+      return block_from({0, 0, 0}, heading, length, radius, uniform(random, -1, 1) < 0 ? -1.0 : 1.0, 1.0);
     };
     const double turn = uniform(random, 0, 1) < 0.2 ? pi : uniform(random, -pi, pi);
     const Segment before = reversed(part(pi));

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <random>
 #include <vector>
 
+#include "random_blocks.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/gcode/arc_geometry.hpp"
 #include "shapegcode/gcode/cutter_compensation.hpp"
@@ -27,15 +27,13 @@ using shapegcode::resolve_arc;
 using shapegcode::Segment;
 using shapegcode::SegmentKind;
 using shapegcode::Vector3;
+using shapegcode::tests::block_from;
+using shapegcode::tests::Random;
+using shapegcode::tests::uniform;
 
 namespace {
 
 constexpr double pi = std::numbers::pi;
-using Random = std::mt19937_64;
-
-double uniform(Random& random, double from, double to) {
-  return std::uniform_real_distribution<double>(from, to)(random);
-}
 
 /// A chain in G17 that starts and is cancelled by lines of its own.
 struct Chain {
@@ -50,15 +48,9 @@ struct Chain {
     blocks.back().segment.line = static_cast<std::uint32_t>(blocks.size());
     at = segment.end_mm;
   }
-  void line(double length) {
-    add(make_line(at, at + length * Vector3(std::cos(heading), std::sin(heading), 0.0), 10.0));
-  }
+  void line(double length) { add(block_from(at, heading, length, 0.0, 1.0, 10.0)); }
   void arc(double arc_radius, double sweep) {
-    const double sense = sweep < 0.0 ? -1.0 : 1.0;
-    const Vector3 to_centre(-std::sin(heading) * sense, std::cos(heading) * sense, 0.0);
-    const Vector3 centre = at + arc_radius * to_centre;
-    const double angle = std::atan2(-to_centre.y(), -to_centre.x()) + sweep;
-    add(make_arc(at, centre + arc_radius * Vector3(std::cos(angle), std::sin(angle), 0.0), centre, sweep, 2, 10.0));
+    add(block_from(at, heading, arc_radius * std::abs(sweep), arc_radius, sweep < 0.0 ? -1.0 : 1.0, 10.0));
     heading += sweep;
   }
 };

@@ -13,9 +13,11 @@
 #include "shapegcode/plant/modal.hpp"
 
 using shapegcode::AxisModes;
+using shapegcode::AxisModeTables;
 using shapegcode::Error;
 using shapegcode::ModalPlant;
 using shapegcode::Mode;
+using shapegcode::ModeTable;
 using shapegcode::Vector3;
 
 namespace {
@@ -241,4 +243,126 @@ TEST_CASE("modal: a mode far above the set-point rate is propagated exactly too"
     CHECK(plant.deflection()[0] == doctest::Approx(100.0 * o.after_velocity_jump(i * 5e-3)).epsilon(1e-9));
   }
   CHECK(plant.peak()[0] > 0.97 * 100.0 / o.omega);
+}
+
+TEST_CASE("modal: tables of modes") {
+  const Mode mode{46.0, 0.02, 0.7};
+  const ModeTable table{2, {0.0, 200.0, 400.0}, {52.0, 46.0, 41.0}, {0.02, 0.03, 0.01}};
+  const auto at = [&](double position) { return shapegcode::mode_at(mode, table, position); };
+  CHECK(at(-5.0).frequency_hz == 52.0);
+  CHECK(at(0.0).frequency_hz == 52.0);
+  CHECK(at(50.0).frequency_hz == doctest::Approx(50.5));
+  CHECK(at(50.0).damping_ratio == doctest::Approx(0.0225));
+  CHECK(at(200.0).frequency_hz == 46.0);
+  CHECK(at(300.0).frequency_hz == doctest::Approx(43.5));
+  CHECK(at(400.0).frequency_hz == 41.0);
+  CHECK(at(1e9).damping_ratio == 0.01);
+  CHECK(at(300.0).participation == 0.7);
+  CHECK(shapegcode::mode_at(mode, {}, 300.0).frequency_hz == 46.0);
+  CHECK(shapegcode::mode_at(mode, {0, {5.0}, {40.0}, {}}, 300.0).frequency_hz == 40.0);
+
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const ModeTable& bad : std::vector<ModeTable>{{3, {0.0}, {50.0}, {}},
+                                                     {0, {0.0, 0.0}, {50.0, 51.0}, {}},
+                                                     {0, {0.0, nan}, {50.0, 51.0}, {}},
+                                                     {0, {0.0, 1.0}, {50.0}, {}},
+                                                     {0, {0.0, 1.0}, {50.0, 51.0}, {0.1}},
+                                                     {0, {0.0, 1.0}, {50.0, 0.0}, {}},
+                                                     {0, {0.0, 1.0}, {50.0, 51.0}, {0.1, 1.0}}}) {
+    CHECK_THROWS_AS(ModalPlant(on_x({mode}), 1e-3, {{{bad}, {}, {}}}), Error);
+  }
+  CHECK_THROWS_AS(ModalPlant(on_x({mode}), 1e-3, {{{table, table}, {}, {}}}), Error);
+}
+
+TEST_CASE("modal: a table that says the same everywhere changes nothing but rounding") {
+  const std::vector<Mode> modes{{46.0, 0.02, 0.8}, {131.0, 0.05, 0.3}};
+  const ModeTable constant{1, {0.0, 10.0, 20.0}, {46.0, 46.0, 46.0}, {}};
+  ModalPlant plain(on_x(modes), 2e-3);
+  ModalPlant tabled(on_x(modes), 2e-3, {{{constant}, {}, {}}});
+  plain.reset(Vector3::Zero());
+  tabled.reset(Vector3::Zero());
+  double worst = 0.0;
+  for (int i = 1; i <= 300; ++i) {
+    const Vector3 command(command_at(i * 2e-3), 0.1 * i, 0.0);
+    worst = std::max(worst, (plain.step(command) - tabled.step(command)).cwiseAbs().maxCoeff());
+  }
+  CHECK(worst < 1e-12);
+  CHECK(tabled.peak()[0] == doctest::Approx(plain.peak()[0]).epsilon(1e-12));
+  CHECK(tabled.residual_peak()[0] == doctest::Approx(plain.residual_peak()[0]).epsilon(1e-12));
+}
+
+TEST_CASE("modal: a mode that varies with position against a Runge-Kutta integration of the varying equation") {
+  // X swings at 52 ... 41 Hz over Z, Z moves at up to 500 mm/s and back; the second mode stays.
+  const std::vector<Mode> modes{{46.0, 0.02, 0.8}, {131.0, 0.05, 0.3}};
+  const ModeTable table{2, {0.0, 100.0, 200.0}, {52.0, 46.0, 41.0}, {0.02, 0.03, 0.01}};
+  const auto z_at = [](double t) { return 100.0 - 120.0 * std::cos(4.0 * t); };
+  for (const double period : {1e-3, 2e-3}) {
+    constexpr int fine = 200;
+    const double h = period / fine;
+    ModalPlant plant(on_x(modes), period, AxisModeTables{{{table}, {}, {}}});
+    plant.reset({0.0, 0.0, z_at(0.0)});
+    std::array<std::array<double, 2>, 2> state{};
+    double worst = 0.0;
+    double fine_peak = 0.0;
+    const int steps = static_cast<int>(0.8 / period);
+    for (int i = 1; i <= steps; ++i) {
+      const double x0 = command_at((i - 1) * period);
+      const double x1 = command_at(i * period);
+      const double xv = (x1 - x0) / period;
+      const double z0 = z_at((i - 1) * period);
+      const double z1 = z_at(i * period);
+      double deflection = 0.0;
+      for (int k = 0; k < fine; ++k) {
+        deflection = 0.0;
+        for (std::size_t m = 0; m < 2; ++m) {
+          const auto rate = [&](double t, const std::array<double, 2>& y) -> std::array<double, 2> {
+            Mode here = modes[m];
+            if (m == 0) {
+              const double z = z0 + (z1 - z0) * t / period;
+              const double share = std::clamp(z / 100.0, 0.0, 2.0);
+              here.frequency_hz = share < 1.0 ? 52.0 - 6.0 * share : 46.0 - 5.0 * (share - 1.0);
+              here.damping_ratio = share < 1.0 ? 0.02 + 0.01 * share : 0.03 - 0.02 * (share - 1.0);
+            }
+            const Oscillator o(here);
+            return {y[1], 2.0 * o.zeta * o.omega * (xv - y[1]) + o.omega * o.omega * (x0 + xv * t - y[0])};
+          };
+          const auto ahead = [](const std::array<double, 2>& y, const std::array<double, 2>& r, double dt) {
+            return std::array<double, 2>{y[0] + dt * r[0], y[1] + dt * r[1]};
+          };
+          auto& y = state[m];
+          const double t = k * h;
+          const auto k1 = rate(t, y);
+          const auto k2 = rate(t + h / 2, ahead(y, k1, h / 2));
+          const auto k3 = rate(t + h / 2, ahead(y, k2, h / 2));
+          const auto k4 = rate(t + h, ahead(y, k3, h));
+          for (std::size_t j = 0; j < 2; ++j) y[j] += h / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j]);
+          deflection += modes[m].participation * (y[0] - (x0 + xv * (t + h)));
+        }
+        fine_peak = std::max(fine_peak, std::abs(deflection));
+      }
+      worst = std::max(worst, std::abs(plant.step({x1, 0.0, z1})[0] - (x1 + deflection)));
+    }
+    CAPTURE(period);
+    CAPTURE(fine_peak);
+    // The frozen frequency errs by the square of the period; the peak deflection is some 0.3 mm.
+    CHECK(worst < 5e-5 * fine_peak * (period / 1e-3) * (period / 1e-3));
+    CHECK(plant.peak()[0] == doctest::Approx(fine_peak).epsilon(2e-4));
+  }
+}
+
+TEST_CASE("modal: the residual after a stop is that of the mode where the axis stands") {
+  const Mode mode{46.0, 0.02, 1.0};
+  const ModeTable table{2, {0.0, 400.0}, {52.0, 41.0}, {}};
+  for (const double z : {-10.0, 0.0, 123.0, 400.0, 500.0}) {
+    ModalPlant varying(on_x({mode}), 1e-3, AxisModeTables{{{table}, {}, {}}});
+    const double frequency = 52.0 - 11.0 * std::clamp(z / 400.0, 0.0, 1.0);
+    ModalPlant fixed(on_x({{frequency, 0.02, 1.0}}), 1e-3);
+    varying.reset({0.0, 0.0, z});
+    fixed.reset({0.0, 0.0, z});
+    for (int i = 1; i <= 137; ++i) {
+      varying.step({0.1 * i, 0.0, z});
+      fixed.step({0.1 * i, 0.0, z});
+    }
+    CHECK(varying.residual_peak()[0] == doctest::Approx(fixed.residual_peak()[0]).epsilon(1e-5));
+  }
 }

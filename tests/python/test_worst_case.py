@@ -15,7 +15,7 @@ from rich.console import Console
 
 import shapegcode as sg
 from acceptance import Judged, close, convert, machine_with
-from judge import Mode, Move, durations, play, residual_um, response, starts
+from judge import Mode, Move, contour_error_um, durations, play, residual_um, response, starts
 from judge.player import BlockEnd, moving_average
 from shapegcode.case_table import case_table
 from shapegcode.cli import main
@@ -84,6 +84,30 @@ def test_overrides_and_shifted_modes_are_the_judges_too(judged: Judged) -> None:
         assert abs(case["time_s"] - lasts) < 1.1 * TICK, case["name"]
         compared += 1
     assert compared == 2 + 7 + 2 * 2 + 2
+
+
+def test_the_contour_of_a_mode_that_is_off_is_the_judges_too(judged: Judged) -> None:
+    ((programmed, _, _),) = judged.regions()
+    points = play(emitted_cuts(judged), period_s=TICK, block_end="ceil")
+    compared = 0
+    for case in judged.conversion.report["cases"]:
+        if case["mode"] is None:
+            continue
+        _, _, moved = response(points, shifted_modes(judged, case["mode"], case["shift"]), TICK)
+        over = (len(moved) - 1) // (len(points) - 1)
+        theirs = contour_error_um(moved[::over], programmed).max_um
+        # The judge does not ask how near the corners the track comes; this path has one, of 27 degrees.
+        assert theirs - 0.05 <= case["contour_error_um"]["response"] <= 1.05 * theirs + 0.05, case
+        compared += 1
+    assert compared == 6
+
+
+def test_a_stated_uncertainty_is_part_of_the_feed_search(judged: Judged) -> None:
+    # The table as such has room left, so that it stays within the tolerance with its modes off.
+    report = judged.conversion.report
+    assert judged.conversion.within_tolerance
+    assert report["worst_case"]["mode"] is not None
+    assert report["worst_case"]["contour_error_um"]["response"] > report["cases"][0]["contour_error_um"]["response"]
 
 
 def starved_points(cuts: list[Move], after: int, wait_s: float, rule: BlockEnd) -> tuple[Vector, int, int]:
@@ -177,9 +201,9 @@ def test_a_band_decides_what_counts() -> None:
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        ({"verdict.override_percent": [80, 100]}, "(override 80 %)"),
-        ({"verdict.look_ahead": True}, "(look-ahead on)"),
-        ({"verdict.starved_block": True}, "(starved 20 ms)"),
+        ({"verdict.override_percent": [80, 100]}, "override"),
+        ({"verdict.look_ahead": True}, "look-ahead on"),
+        ({"verdict.starved_block": True}, "starved 20 ms"),
     ],
 )
 def test_the_worst_case_that_counts_decides(keys: dict[str, Any], words: str) -> None:
@@ -187,11 +211,11 @@ def test_the_worst_case_that_counts_decides(keys: dict[str, Any], words: str) ->
     report = judged.conversion.report
     worst = report["worst_case"]
     assert not judged.conversion.within_tolerance
-    assert worst["counts"] and not worst["within"] and f"({worst['name']})" == words
+    assert worst["counts"] and not worst["within"] and worst["name"].startswith(words)
     assert worst["value_um"] > worst["limit_um"] and worst["share_of_limit"] > 1.0
     shares = [case["share_of_limit"] for case in report["cases"] if case["counts"]]
     assert worst["share_of_limit"] == max(shares)
-    assert any(words in miss for miss in report["regions"][0]["misses"])
+    assert any(f"({worst['name']})" in miss for miss in report["regions"][0]["misses"])
     # What counts is measured in full.
     assert worst["contour_error_um"]["command"] is not None
 
@@ -244,13 +268,13 @@ def test_nothing_shaped_has_no_cases() -> None:
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_gouge_is_what_lies_on_the_side_of_the_material(side: str) -> None:
-    judged = convert(PART, machine_with({**UNCERTAIN, "input.material_side": side}))
+    judged = convert(PART, machine_with({"shaping.contour": "off", "input.material_side": side}))
     report = judged.conversion.report
     points = play(emitted_cuts(judged), period_s=TICK, block_end="ceil")[:, :2]
     # A filter cuts the counter-clockwise arc about (20, 20) short, on its inside: left of the travel.
     turn = np.degrees(np.arctan2(points[:, 0] - 20.0, 20.0 - points[:, 1]))
     inside = 1e3 * (20.0 - np.hypot(points[:, 0] - 20.0, points[:, 1] - 20.0))[(turn > 5.0) & (turn < 85.0)].max()
-    assert inside > 20.0
+    assert inside > 15.0
     found = report["contour_error_um"]["command"]["emitted"]
     assert found["left"] == pytest.approx(inside, rel=0.02)
     assert found["gouge"] == found[side]
@@ -268,7 +292,7 @@ def test_the_contour_limit_is_for_the_targeted_deviation() -> None:
     limits = {target: Limits(np.full(3, 4.0), 50.0, target) for target in ("command", "response")}
     assert [each.is_missed for each in judge_region(figures, limits["command"])] == [False] * 4
     *residuals, contour = judge_region(figures, limits["response"])
-    assert contour.is_missed and str(contour) == "contour error of the table 60.0 um, limit 50.0 um"
+    assert contour.is_missed and str(contour) == "contour error of the response 60.0 um, limit 50.0 um"
     assert [each.share for each in residuals] == pytest.approx([0.25, 0.0, 0.0])
     # Nothing allowed: whatever there is misses it by more than any number says.
     tight = judge_region(figures, Limits(np.zeros(3), 0.0, "command"))

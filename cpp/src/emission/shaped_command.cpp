@@ -2,151 +2,182 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
+#include <limits>
 #include <string>
 #include <utility>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/motion/interpolator.hpp"
 #include "shapegcode/motion/look_ahead.hpp"
 
 namespace shapegcode {
 namespace {
 
-// One run on the half grid: row 2k is the block border k, row 2k+1 the middle of period k.
-struct Run {
-  Samples half;
-  std::vector<std::int8_t> arc_normal;  // per half sample, before shaping
-  std::uint32_t periods = 0;            // after shaping
-};
-
-std::int8_t arc_normal_of(const Segment& segment) {
-  return segment.kind == SegmentKind::arc ? static_cast<std::int8_t>(segment.normal) : std::int8_t{-1};
-}
-
-Fir on_half_grid(const Fir& shaper) {
-  std::vector<int> delays = shaper.delays();
-  for (int& delay : delays) {
-    delay *= 2;
+std::shared_ptr<const Path> sub_path(const std::shared_ptr<const Path>& path, std::size_t first, std::size_t last) {
+  if (first == 0 && last == path->size()) {
+    return path;
   }
-  return Fir(std::move(delays), shaper.taps());
-}
-
-Run sample_run(const std::shared_ptr<const Path>& path, const std::shared_ptr<const SpeedProfile>& profile,
-               const ShapingOptions& options) {
-  const auto ticks = static_cast<std::size_t>(std::lround(options.block_period_s / options.interpolation_period_s));
-  // The middle of an odd number of ticks lies between two of them.
-  const std::size_t steps_per_half = ticks % 2 == 0 ? ticks / 2 : ticks;
-  const double step_s = options.block_period_s / static_cast<double>(2 * steps_per_half);
-  Interpolator interpolator(path, profile, step_s);
-  const std::size_t steps_per_period = 2 * steps_per_half;
-  const std::size_t periods = (interpolator.sample_count() - 1 + steps_per_period - 1) / steps_per_period;
-  Run run;
-  run.half.period_s = 0.5 * options.block_period_s;
-  run.half.positions_mm.resize(static_cast<Eigen::Index>(2 * periods + 1), axis_count);
-  run.arc_normal.resize(2 * periods + 1);
-  Vector3 position;
-  for (std::size_t row = 0; row < 2 * periods + 1; ++row) {
-    interpolator.step(position);
-    run.half.positions_mm.row(static_cast<Eigen::Index>(row)) = position;
-    run.arc_normal[row] = arc_normal_of((*path)[interpolator.segment()]);
-    for (std::size_t skip = 1; skip < steps_per_half; ++skip) {
-      interpolator.step(position);
-    }
-  }
-  return run;
-}
-
-std::shared_ptr<const Path> sub_path(const std::vector<Segment>& segments, std::size_t first, std::size_t last) {
+  const std::vector<Segment>& segments = path->segments();
   return std::make_shared<const Path>(std::vector<Segment>(segments.begin() + static_cast<std::ptrdiff_t>(first),
                                                            segments.begin() + static_cast<std::ptrdiff_t>(last)));
 }
 
-void shape_run(Run& run, const Fir& half_shaper) {
-  run.half = half_shaper.apply(run.half);
-  run.periods = static_cast<std::uint32_t>((run.half.positions_mm.rows() - 1) / 2);
-}
-
-// The plane in which a shaped period may bend: that of the arc last seen within the shaper's reach.
-void append_arc_normals(const Run& run, int reach_half_steps, std::vector<std::int8_t>& normals) {
-  const auto last_row = static_cast<std::int64_t>(run.arc_normal.size()) - 1;
-  std::int64_t seen = -1;
-  std::int64_t looked = 0;
-  for (std::uint32_t k = 0; k < run.periods; ++k) {
-    const std::int64_t end = std::min<std::int64_t>(2 * static_cast<std::int64_t>(k) + 2, last_row);
-    for (; looked <= end; ++looked) {
-      if (run.arc_normal[static_cast<std::size_t>(looked)] >= 0) {
-        seen = looked;
-      }
-    }
-    const bool within = seen >= 0 && 2 * static_cast<std::int64_t>(k) - reach_half_steps <= seen;
-    normals.push_back(within ? run.arc_normal[static_cast<std::size_t>(seen)] : std::int8_t{-1});
-  }
+// What the search for the highest feed takes over is taken out.
+MotionLimits without_tolerance(MotionLimits limits) {
+  limits.contour_tolerance_mm = MotionLimits::none;
+  limits.filter_variance_s2 = 0.0;
+  limits.filter_mean_deviation_s = 0.0;
+  return limits;
 }
 
 }  // namespace
 
-ShapedCommand shape_path(const std::shared_ptr<const Path>& path, const Fir& shaper,
-                         std::span<const std::uint32_t> marked_segments, const ShapingOptions& options) {
-  const double ticks = options.block_period_s / options.interpolation_period_s;
+RegionShaper::RegionShaper(std::shared_ptr<const Path> path, const Fir& shaper,
+                           std::span<const std::uint32_t> marked_segments, ShapingOptions options)
+    : path_(std::move(path)),
+      options_(std::move(options)),
+      filter_(shaper, options_.target, options_.modes, options_.block_period_s, options_.contour_smoothness),
+      marks_(marked_segments.begin(), marked_segments.end()) {
+  const double ticks = options_.block_period_s / options_.interpolation_period_s;
   if (!(ticks >= 1.0 - 1e-9) || !(std::abs(ticks - std::round(ticks)) <= 1e-6)) {
-    throw Error(ErrorKind::argument, "block period " + std::to_string(options.block_period_s) +
+    throw Error(ErrorKind::argument, "block period " + std::to_string(options_.block_period_s) +
                                          " s is not a whole multiple of the interpolation period " +
-                                         std::to_string(options.interpolation_period_s) + " s");
+                                         std::to_string(options_.interpolation_period_s) + " s");
   }
-  const Fir half_shaper = on_half_grid(shaper);
-  const std::vector<Segment>& segments = path->segments();
+  // The middle of an odd number of ticks lies between two of them.
+  const auto whole = static_cast<std::size_t>(std::lround(ticks));
+  steps_per_half_ = whole % 2 == 0 ? whole / 2 : whole;
+  rest_periods_ = static_cast<std::uint32_t>(std::ceil(options_.rest_at_stop_s / options_.block_period_s - 1e-9));
+  const MotionLimits& limits =
+      options_.target == ContourTarget::none ? options_.limits : without_tolerance(options_.limits);
   std::vector<std::size_t> borders =
-      forced_stops(segments, options.plunge_axis_angle_rad, options.plunge_corner_angle_rad, options.limits);
-  borders.push_back(segments.size());
-  const auto rest = static_cast<std::uint32_t>(std::ceil(options.rest_at_stop_s / options.block_period_s - 1e-9));
-
-  ShapedCommand command;
-  std::vector<Run> runs;
+      forced_stops(path_->segments(), options_.plunge_axis_angle_rad, options_.plunge_corner_angle_rad, limits);
+  borders.push_back(path_->size());
   std::size_t first = 0;
-  std::uint32_t start_period = 0;
-  std::size_t mark = 0;
   for (const std::size_t border : borders) {
-    const auto run_path = borders.size() == 1 ? path : sub_path(segments, first, border);
-    const auto profile = std::make_shared<const SpeedProfile>(plan_speed(*run_path, options.limits));
-    Run run = sample_run(run_path, profile, options);
-    shape_run(run, half_shaper);
-    append_arc_normals(run, half_shaper.duration_samples(), command.arc_normal);
-    const double delay_s = 0.5 * profile->jerk_time_s() + shaper.mean_samples() * options.block_period_s;
-    std::size_t cursor = 0;
-    for (; mark < marked_segments.size() && marked_segments[mark] < border; ++mark) {
-      const std::size_t local = marked_segments[mark] - first;
-      const double time = local == 0 ? 0.0 : profile->time_s(run_path->distance_mm(local), cursor) + delay_s;
-      const auto period = static_cast<std::uint32_t>(std::lround(time / options.block_period_s));
-      command.segment_periods.push_back(start_period + std::min(period, run.periods));
-    }
-    const bool last = border == segments.size();
-    for (std::uint32_t i = 0; i < (last ? 0U : rest); ++i) {
-      command.arc_normal.push_back(std::int8_t{-1});
-    }
-    start_period += run.periods + (last ? 0U : rest);
-    command.run_ends.push_back(start_period);
-    runs.push_back(std::move(run));
+    pieces_.push_back({first, border});
     first = border;
   }
-  command.segment_periods.resize(marked_segments.size(), start_period);
+  std::ranges::reverse(pieces_);
+}
 
-  command.grid_mm.resize(static_cast<Eigen::Index>(start_period) + 1, axis_count);
-  command.middle_mm.resize(static_cast<Eigen::Index>(start_period), axis_count);
-  Eigen::Index row = 0;
-  for (Run& run : runs) {
-    const auto& half = run.half.positions_mm;
-    for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(run.periods); ++k, ++row) {
-      command.grid_mm.row(row) = half.row(2 * k);
-      command.middle_mm.row(row) = half.row(2 * k + 1);
-    }
-    for (std::uint32_t i = 0; i < rest && &run != &runs.back(); ++i, ++row) {
-      command.grid_mm.row(row) = half.row(half.rows() - 1);
-      command.middle_mm.row(row) = half.row(half.rows() - 1);
-    }
-    command.grid_mm.row(row) = half.row(half.rows() - 1);
-    run.half.positions_mm.resize(0, 0);
+// Plans the next run and starts it; false if there is none.
+bool RegionShaper::begin_run() {
+  if (pieces_.empty()) {
+    return false;
   }
+  PlannedRun plan;
+  for (;;) {
+    now_ = pieces_.back();
+    pieces_.pop_back();
+    const auto part = sub_path(path_, now_.first, now_.last);
+    if (options_.target == ContourTarget::none) {
+      plan = {part, std::make_shared<const SpeedProfile>(plan_speed(*part, options_.limits)), 0.0, {}};
+      break;
+    }
+    plan = plan_within_tolerance(part, without_tolerance(options_.limits), filter_, steps_per_half_,
+                                 options_.limits.contour_tolerance_mm);
+    if (plan.stops.empty()) {
+      break;
+    }
+    stops_ += static_cast<std::uint32_t>(plan.stops.size());
+    std::size_t last = now_.last;
+    for (std::size_t i = plan.stops.size(); i-- > 0;) {
+      pieces_.push_back({now_.first + plan.stops[i], last});
+      last = now_.first + plan.stops[i];
+    }
+    pieces_.push_back({now_.first, last});
+  }
+  largest_deviation_mm_ = std::max(largest_deviation_mm_, plan.largest_deviation_mm);
+  run_ = std::make_unique<RunShaper>(plan.path, plan.profile, filter_, run_limits(options_.limits), steps_per_half_);
+  given_ = 0;
+  run_->next(at_);
+  note_marks(plan);
+  return true;
+}
+
+void RegionShaper::note_marks(const PlannedRun& run) {
+  const double delay_s = 0.5 * run.profile->jerk_time_s() + filter_.mean_delay_s;
+  std::size_t cursor = 0;
+  while (segment_periods_.size() < marks_.size() && marks_[segment_periods_.size()] < now_.last) {
+    const std::size_t local = marks_[segment_periods_.size()] - now_.first;
+    const double time = local == 0 ? 0.0 : run.profile->time_s(run.path->distance_mm(local), cursor) + delay_s;
+    const auto period = static_cast<std::uint32_t>(std::lround(time / options_.block_period_s));
+    segment_periods_.push_back(period_ + std::min(period, run_->periods()));
+  }
+}
+
+bool RegionShaper::next(ShapedCommand& piece, std::uint32_t periods) {
+  const std::uint32_t first = period_;
+  std::vector<Vector3> grid;
+  std::vector<Vector3> middle;
+  std::vector<std::int8_t> normals;
+  std::vector<std::uint32_t> run_ends;
+  const auto add = [&](const Vector3& half, const Vector3& end, std::int8_t normal) {
+    if (grid.empty()) {
+      grid.push_back(at_);
+    }
+    middle.push_back(half);
+    grid.push_back(end);
+    normals.push_back(normal);
+    at_ = end;
+    ++period_;
+  };
+  while (period_ - first < periods) {
+    if (resting_ > 0) {
+      add(at_, at_, std::int8_t{-1});
+      if (--resting_ == 0) {
+        run_ends.push_back(period_);
+      }
+      continue;
+    }
+    if (!run_ && !begin_run()) {
+      break;
+    }
+    if (given_ < run_->periods()) {
+      const std::int8_t normal = run_->arc_normal();
+      Vector3 half;
+      Vector3 end;
+      run_->next(half);
+      run_->next(end);
+      add(half, end, normal);
+      ++given_;
+    }
+    if (given_ == run_->periods()) {
+      run_.reset();
+      resting_ = pieces_.empty() ? 0 : rest_periods_;
+      if (resting_ == 0) {
+        run_ends.push_back(period_);
+      }
+    }
+  }
+  const bool over = !run_ && resting_ == 0 && pieces_.empty();
+  if (over) {
+    segment_periods_.resize(marks_.size(), period_);
+  }
+  if (grid.empty() && (first > 0 || !over)) {
+    return false;
+  }
+  piece.first_period = first;
+  piece.grid_mm.resize(static_cast<Eigen::Index>(std::max<std::size_t>(grid.size(), 1)), axis_count);
+  piece.middle_mm.resize(static_cast<Eigen::Index>(middle.size()), axis_count);
+  piece.grid_mm.row(0) = at_;
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    piece.grid_mm.row(static_cast<Eigen::Index>(i)) = grid[i];
+  }
+  for (std::size_t i = 0; i < middle.size(); ++i) {
+    piece.middle_mm.row(static_cast<Eigen::Index>(i)) = middle[i];
+  }
+  piece.arc_normal = std::move(normals);
+  piece.run_ends = std::move(run_ends);
+  piece.segment_periods = segment_periods_;
+  return true;
+}
+
+ShapedCommand shape_path(const std::shared_ptr<const Path>& path, const Fir& shaper,
+                         std::span<const std::uint32_t> marked_segments, const ShapingOptions& options) {
+  RegionShaper region(path, shaper, marked_segments, options);
+  ShapedCommand command;
+  static_cast<void>(region.next(command, std::numeric_limits<std::uint32_t>::max()));
   return command;
 }
 

@@ -1,10 +1,10 @@
 #include "shapegcode/gcode/arc_geometry.hpp"
 
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <string>
 
+#include "message.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -13,13 +13,6 @@ namespace {
 constexpr double two_pi = 2.0 * std::numbers::pi;
 // Below this two programmed points are one: far under any least increment, far over double rounding.
 constexpr double coincident_mm = 1e-7;
-
-template <class... Values>
-std::string format(const char* pattern, Values... values) {
-  char buffer[400];
-  std::snprintf(buffer, sizeof buffer, pattern, values...);
-  return buffer;
-}
 
 }  // namespace
 
@@ -42,8 +35,8 @@ Segment resolve_arc(const ArcWords& words, double feed_mm_per_s, std::uint32_t l
     if (radius == 0.0 || excess > 0.5 * words.tolerance_mm) {
       throw alarm_error(
           20,
-          format("arc radius R%.4f cannot span its chord of %.4f mm: half the chord is %.4f mm, tolerance %.4f", radius,
-                 chord, half, words.tolerance_mm),
+          format_message("arc radius R%.4f cannot span its chord of %.4f mm: half the chord is %.4f mm, tolerance %.4f",
+                         radius, chord, half, words.tolerance_mm),
           line, column);
     }
     const double height = std::sqrt(std::max(0.0, radius * radius - half * half));
@@ -60,11 +53,11 @@ Segment resolve_arc(const ArcWords& words, double feed_mm_per_s, std::uint32_t l
     constexpr char names[] = "XYZ";
     throw alarm_error(
         20,
-        format("arc end is %.4f mm off its radius: start (%c%.4f %c%.4f), end (%c%.4f %c%.4f), centre (%c%.4f "
-               "%c%.4f), start radius %.4f, end radius %.4f, tolerance %.4f mm",
-               difference, names[a], words.start_mm[a], names[b], words.start_mm[b], names[a], words.end_mm[a],
-               names[b], words.end_mm[b], names[a], centre[a], names[b], centre[b], start_radius, end_radius,
-               words.tolerance_mm),
+        format_message("arc end is %.4f mm off its radius: start (%c%.4f %c%.4f), end (%c%.4f %c%.4f), centre (%c%.4f "
+                       "%c%.4f), start radius %.4f, end radius %.4f, tolerance %.4f mm",
+                       difference, names[a], words.start_mm[a], names[b], words.start_mm[b], names[a], words.end_mm[a],
+                       names[b], words.end_mm[b], names[a], centre[a], names[b], centre[b], start_radius, end_radius,
+                       words.tolerance_mm),
         line, column);
   }
 

@@ -17,7 +17,7 @@ double code_number(int code) { return code > 100 ? code / 10.0 : code; }
 }  // namespace
 
 double ControlVariables::to_program_units(double value_mm) const {
-  return rewriter_.programmed().units == 20 ? value_mm / mm_per_inch : value_mm;
+  return value_mm / unit_mm(rewriter_.programmed().units);
 }
 
 // #4001 ...: the modal state behind the block before; #4201 ... and #4301 ... are the same here.
@@ -205,7 +205,7 @@ bool ControlVariables::read(int number, MacroValue& value) {
 }
 
 bool ControlVariables::write(int number, MacroValue value) {
-  const double number_mm = value.value_or(0.0) * (rewriter_.programmed().units == 20 ? mm_per_inch : 1.0);
+  const double number_mm = value.value_or(0.0) * unit_mm(rewriter_.programmed().units);
   int system = 0;
   int extra = 0;
   int axis = 0;

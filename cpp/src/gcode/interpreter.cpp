@@ -1,7 +1,7 @@
 #include <algorithm>
-#include <cstdio>
 
 #include "interpreter_impl.hpp"
+#include "message.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode::detail {
@@ -25,11 +25,9 @@ void Interpreter::warn_once(std::uint32_t& seen, const std::string& message) {
 }
 
 double Interpreter::length_mm(const Word& word) const noexcept {
-  const bool inch = state_.units == 20;
-  if (word.has_point || options_.calculator_decimal_point) {
-    return inch ? word.value * mm_per_inch : word.value;
-  }
-  return inch ? word.value * options_.least_increment_inch * mm_per_inch : word.value * options_.least_increment_mm;
+  const bool counts_increments = !word.has_point && !options_.calculator_decimal_point;
+  const double length = counts_increments ? word.value * least_increment(options_, state_.units) : word.value;
+  return length * unit_mm(state_.units);
 }
 
 double Interpreter::feed_mm_per_s(double move_length_mm) const {
@@ -40,7 +38,7 @@ double Interpreter::feed_mm_per_s(double move_length_mm) const {
     return state_.feed * move_length_mm / 60.0;
   }
   const double per_turn = state_.feed_mode == 95 ? state_.spindle_rev_per_min : 1.0;
-  return state_.feed * per_turn * (state_.units == 20 ? mm_per_inch : 1.0) / 60.0;
+  return state_.feed * per_turn * unit_mm(state_.units) / 60.0;
 }
 
 void Interpreter::forget_axes(std::uint32_t letters) noexcept {
@@ -155,9 +153,7 @@ void Interpreter::execute(std::uint32_t line, const LineOrigin& origin, std::siz
   if (words_.has('F')) {
     const double feed = words_['F'].value;
     if (feed < 0.0) {
-      char value[48];
-      std::snprintf(value, sizeof value, "feed F%g is negative", feed);
-      fail(value, words_['F'].column);
+      fail(format_message("feed F%g is negative", feed), words_['F'].column);
     }
     const bool hundredths = state_.units == 20 && !words_['F'].has_point && !options_.calculator_decimal_point;
     state_.feed = hundredths ? feed * 0.01 : feed;
@@ -181,7 +177,7 @@ void Interpreter::execute(std::uint32_t line, const LineOrigin& origin, std::siz
     note(segments_.size());
   }
   m_codes(flow);
-  if (block_.optional_skip && !options_.block_skip[static_cast<std::size_t>(block_.skip_switch - 1)]) {
+  if (block_.optional_skip && !block_skip(options_, block_.skip_switch)) {
     optional_skip_block(before);
     foreign_ |= foreign_before;
   }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "block_words.hpp"
+#include "input_rules.hpp"
 #include "offsets.hpp"
 #include "shapegcode/gcode/canned_cycle.hpp"
 #include "shapegcode/gcode/lexer.hpp"
@@ -20,7 +21,6 @@
 
 namespace shapegcode::detail {
 
-inline constexpr double mm_per_inch = 25.4;
 inline constexpr std::uint32_t axis_letters = letter_mask("XYZ");
 inline constexpr std::uint32_t centre_letters = letter_mask("IJK");
 inline constexpr std::uint32_t other_axis_letters = letter_mask("ABCUVW");

@@ -1,7 +1,6 @@
 // Axis moves: cutting regions, rapids, drilling cycles.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "interpreter_impl.hpp"
 #include "message.hpp"
@@ -10,13 +9,12 @@
 namespace shapegcode::detail {
 
 void Interpreter::check_range() const {
-  const double unit = state_.units == 20 ? mm_per_inch : 1.0;
+  const double unit = unit_mm(state_.units);
   const double limit = (state_.units == 20 ? 9999.9999 : 99999.999) * (1.0 + 1e-12);
   for (char letter : {'X', 'Y', 'Z', 'I', 'J', 'K', 'R'}) {
     if (words_.has(letter) && std::abs(length_mm(words_[letter])) > limit * unit) {
-      char value[80];
-      std::snprintf(value, sizeof value, "%c%.4f lies outside +-%.4f", letter, length_mm(words_[letter]) / unit, limit);
-      alarm(3, value, words_[letter].column);
+      alarm(3, format_message("%c%.4f lies outside +-%.4f", letter, length_mm(words_[letter]) / unit, limit),
+            words_[letter].column);
     }
   }
 }

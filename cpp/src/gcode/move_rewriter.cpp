@@ -2,6 +2,7 @@
 #include "move_rewriter.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -15,6 +16,11 @@ constexpr double degree = std::numbers::pi / 180.0;
 constexpr std::uint32_t coordinate_groups =
     group_bit(Group::polar) | group_bit(Group::scaling) | group_bit(Group::mirror) | group_bit(Group::rotation);
 
+// G51, G51.1, G50.1 and G68: their axis words are data of the mode.
+constexpr std::array mode_data_codes = {510, 511, 501, 680};
+// G28, G30, G53, G92, G52 and G10: their axis words are no programmed point.
+constexpr std::array machine_coordinate_codes = {280, 300, 530, 920, 520, 100};
+
 std::string code_name(int g_tenths) {
   return "G" + std::to_string(g_tenths / 10) + (g_tenths % 10 != 0 ? "." + std::to_string(g_tenths % 10) : "");
 }
@@ -26,6 +32,11 @@ bool has_code(const BlockWords& words, int g_tenths) noexcept {
     }
   }
   return false;
+}
+
+template <std::size_t Count>
+bool has_any_code(const BlockWords& words, const std::array<int, Count>& codes) noexcept {
+  return std::any_of(codes.begin(), codes.end(), [&](int code) { return has_code(words, code); });
 }
 
 }  // namespace
@@ -71,22 +82,19 @@ void MoveRewriter::block(const Block& block, const BlockWords& words, std::strin
   if (idle()) {
     synchronise();
   }
-  keeps_compensation_ = keeps_span_;
-  if (block.optional_skip && !options_.block_skip[static_cast<std::size_t>(block.skip_switch - 1)].has_value()) {
+  keeps_compensation_ = programmed_.compensation != 40;
+  if (block.optional_skip && !block_skip(options_, block.skip_switch).has_value()) {
     fail(
         "'/' under a coordinate mode or cutter compensation: whether the block runs decides where the tool goes; say "
         "it in the machine file (input.block_skip)");
   }
   // M02, M30, tool change and machine coordinates end what waits; so does a code that moves the coordinates.
-  constexpr std::uint32_t ends = group_bit(Group::coordinates) | group_bit(Group::length_offset) |
-                                 group_bit(Group::unknown_position) | group_bit(Group::foreign);
-  bool ends_span = (words.groups & (ends & ~group_bit(Group::length_offset))) != 0;
+  constexpr std::uint32_t ends =
+      group_bit(Group::coordinates) | group_bit(Group::unknown_position) | group_bit(Group::foreign);
+  bool ends_span = (words.groups & ends) != 0 || has_any_code(words, machine_coordinate_codes);
   for (int k = 0; k < words.m_count; ++k) {
     const int m = words.m_codes[static_cast<std::size_t>(k)];
     ends_span = ends_span || m == 2 || m == 30 || m == 6;
-  }
-  for (const int g : {280, 300, 530, 920, 520, 100}) {
-    ends_span = ends_span || has_code(words, g);
   }
   if (ends_span && !idle()) {
     flush();
@@ -107,10 +115,8 @@ void MoveRewriter::block(const Block& block, const BlockWords& words, std::strin
   }
   keep_words(item);
   // X Y Z of G04, G10, G28, G51, G68 ... are no move.
-  const bool own_axes = has_code(words, 510) || has_code(words, 511) || has_code(words, 501) || has_code(words, 680) ||
-                        (words.groups & group_bit(Group::unknown_position)) != 0 || has_code(words, 40) ||
-                        has_code(words, 280) || has_code(words, 300) || has_code(words, 530) || has_code(words, 920) ||
-                        has_code(words, 520) || has_code(words, 100);
+  const bool own_axes = has_any_code(words, mode_data_codes) || has_any_code(words, machine_coordinate_codes) ||
+                        (words.groups & group_bit(Group::unknown_position)) != 0 || has_code(words, 40);
   const bool drills = programmed_.cycle != 80 && !own_axes;
   if (drills && words.has_any(axis_letters | letter_mask("RKL"))) {
     // Each hole gets a block of its own: its place may be anything but a multiple of the first step.
@@ -187,7 +193,7 @@ bool MoveRewriter::drops(const Word& word, int g_tenths) const noexcept {
 
 void MoveRewriter::keep_words(Item& item) const {
   const BlockWords& words = *words_;
-  const bool taken = has_code(words, 680) || has_code(words, 510) || has_code(words, 511) || has_code(words, 501);
+  const bool taken = has_any_code(words, mode_data_codes);
   const bool raw = !taken && (words.groups & (group_bit(Group::none) | group_bit(Group::unknown_position))) != 0 &&
                    !has_code(words, 90);
   const auto add = [&](std::string& to, std::string_view text) {

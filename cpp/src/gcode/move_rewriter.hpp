@@ -24,6 +24,10 @@ class MoveRewriter {
   [[nodiscard]] bool wants(const BlockWords& words) const noexcept;
   /// Writes the block, now or as soon as the blocks behind it allow. Words and text are the interpreter's.
   void block(const Block& block, const BlockWords& words, std::string_view text, const LineOrigin& origin);
+  /// Takes note of a block that did not have to go through here: it may name the offset of a G41 to come.
+  void pass(const BlockWords& words) noexcept {
+    d_number_ = words.has('D') ? static_cast<int>(words['D'].value) : d_number_;
+  }
   /// Writes a comment in its place among the blocks that wait.
   void comment(std::string_view text, const LineOrigin& origin);
   /// Writes all that waits: before anything that is more than a block.
@@ -31,7 +35,10 @@ class MoveRewriter {
 
   /// The modal state and position as programmed: ahead of the interpreter's while blocks wait.
   [[nodiscard]] const ModalState& programmed() const noexcept { return idle() ? interpreter_.state() : programmed_; }
-  [[nodiscard]] int compensation() const noexcept { return compensation_; }
+  /// 40, 41 or 42, expanded or left to the control.
+  [[nodiscard]] int compensation() const noexcept {
+    return compensation_ != 40 ? compensation_ : programmed().compensation;
+  }
   [[nodiscard]] int radius_number() const noexcept { return d_number_; }
   [[nodiscard]] const CoordinateModes& modes() const noexcept { return modes_; }
   [[nodiscard]] bool polar() const noexcept { return polar_; }
@@ -94,8 +101,7 @@ class MoveRewriter {
   int compensation_ = 40;
   int d_number_ = -1;
   double radius_mm_ = 0.0;
-  bool keeps_span_ = false;          // G41/G42 of a radius that is not known stays as it stands
-  bool keeps_compensation_ = false;  // the block at hand belongs to such a span
+  bool keeps_compensation_ = false;  // the block at hand belongs to a G41/G42 of a radius that is not known
   std::vector<Item> waiting_;
   bool span_open_ = false;     // blocks under compensation wait for their end
   bool corner_waits_ = false;  // the last move that waits carries ,R or ,C

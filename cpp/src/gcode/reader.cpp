@@ -216,7 +216,7 @@ bool Reader::step() {
 void Reader::line(std::string_view text, std::size_t begin, std::size_t end) {
   interpreter_.scan(text, here_.line);
   const Block& block = interpreter_.block();
-  if (block.optional_skip && options_.block_skip[static_cast<std::size_t>(block.skip_switch - 1)].value_or(false)) {
+  if (block.optional_skip && block_skip(options_, block.skip_switch).value_or(false)) {
     interpreter_.close_region();  // the switch is on: the control does not run it
     return;                       // an expanded text leaves it out
   }
@@ -240,9 +240,7 @@ void Reader::program_line(std::size_t begin, std::size_t end) {
   }
   if (frames_.size() > 1) {
     // A call does not stop the motion: its comment may stand inside of a region.
-    std::string digits = std::to_string(number);
-    digits.insert(0, digits.size() < 4 ? 4 - digits.size() : 0, '0');
-    rewriter_.comment("(O" + digits + ")" + comments, origin_);
+    rewriter_.comment("(" + program_name(number) + ")" + comments, origin_);
     return;
   }
   interpreter_.close_region();
@@ -258,36 +256,57 @@ void Reader::program_line(std::size_t begin, std::size_t end) {
 
 void Reader::plain_line(std::string_view text, std::size_t begin, std::size_t end) {
   const BlockWords& words = interpreter_.words();
-  const Block& block = interpreter_.block();
+  if (program_.expanded) {
+    run_block(text, text);
+  } else if (is_call(words) || rewriter_.wants(words)) {
+    // The text moves: read the words again from where they stay.
+    const std::string line(text);
+    expand_from(begin);
+    interpreter_.scan(line, here_.line);
+    run_block(line, line);
+  } else {
+    note_words(words);
+    rewriter_.pass(words);
+    interpreter_.execute(here_.line, origin_, begin, end);
+  }
+}
+
+// Executes the block that was scanned from `text`; `raw` is the block as written.
+void Reader::run_block(std::string_view text, std::string_view raw) {
+  const BlockWords& words = interpreter_.words();
+  if (is_call(words)) {
+    note_number(words);
+    call_block(text, raw);
+    return;
+  }
+  note_words(words);
+  put_block(text);
+  modal_calls();
+}
+
+// Executes the block that was scanned from `text` and calls nothing, under the coordinate modes that are on.
+void Reader::put_block(std::string_view text) {
+  if (rewriter_.wants(interpreter_.words())) {
+    rewriter_.block(interpreter_.block(), interpreter_.words(), text, origin_);
+  } else {
+    rewriter_.pass(interpreter_.words());
+    put(text, origin_);
+  }
+}
+
+void Reader::note_number(const BlockWords& words) {
   if (words.has('N')) {
     control_.last_n = static_cast<std::int64_t>(words['N'].value);
   }
-  if (is_call(words)) {
-    expand_from(begin);
-    // The text may have moved: read the words again from where it stands now.
-    const std::string line(text.empty() ? std::string_view()
-                                        : std::string_view(*frames_.back().unit->text).substr(begin, text.size()));
-    interpreter_.scan(line, here_.line);
-    call_block(line, line);
-    return;
-  }
-  moved_ = words.has_any(axis_letters) && (words.groups & (group_bit(Group::none) | group_bit(Group::call))) == 0;
-  if (rewriter_.wants(words)) {
-    std::string line(text);
-    expand_from(begin);
-    interpreter_.scan(line, here_.line);
-    rewriter_.block(block, words, line, origin_);
-  } else if (program_.expanded) {
-    put(text, origin_);
-  } else {
-    interpreter_.execute(here_.line, origin_, begin, end);
-  }
+}
+
+// What macro statements may ask about the block before theirs, and modal calls about the one at hand.
+void Reader::note_words(const BlockWords& words) {
+  note_number(words);
   if (words.m_count > 0) {
     control_.last_m = words.m_codes[static_cast<std::size_t>(words.m_count - 1)];
   }
-  if (!modal_calls_.empty()) {
-    modal_calls();
-  }
+  moved_ = words.has_any(axis_letters) && (words.groups & (group_bit(Group::none) | group_bit(Group::call))) == 0;
 }
 
 void Reader::finish() {

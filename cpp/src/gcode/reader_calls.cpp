@@ -15,13 +15,13 @@ bool has_m(const BlockWords& words, int code) noexcept {
   return std::find(words.m_codes.data(), end, code) != end;
 }
 
+}  // namespace
+
 std::string program_name(std::int64_t number) {
   std::string digits = std::to_string(number);
   digits.insert(0, digits.size() < 4 ? 4 - digits.size() : 0, '0');
   return "O" + digits;
 }
-
-}  // namespace
 
 bool Reader::is_call(const BlockWords& words) const noexcept {
   if ((words.groups & group_bit(Group::call)) != 0) {
@@ -46,10 +46,10 @@ bool Reader::is_call(const BlockWords& words) const noexcept {
 }
 
 // `text` holds plain numbers, `raw` the block as written: arguments keep their full precision.
-bool Reader::call_block(std::string_view text, std::string_view raw) {
+void Reader::call_block(std::string_view text, std::string_view raw) {
   const BlockWords& words = interpreter_.words();
   const Block& block = interpreter_.block();
-  if (block.optional_skip && !options_.block_skip[static_cast<std::size_t>(block.skip_switch - 1)].has_value()) {
+  if (block.optional_skip && !block_skip(options_, block.skip_switch).has_value()) {
     fail(
         "'/' before a call: whether the block runs decides where the program goes; say it in the machine file "
         "(input.block_skip)");
@@ -58,7 +58,7 @@ bool Reader::call_block(std::string_view text, std::string_view raw) {
     const int g = words.g_tenths[static_cast<std::size_t>(k)];
     if (g == 650 || g == 660 || g == 661 || g == 670) {
       macro_call(text, raw, g);
-      return true;
+      return;
     }
   }
   if (has_m(words, 99) && (has_m(words, 98) || has_m(words, 198))) {
@@ -69,9 +69,8 @@ bool Reader::call_block(std::string_view text, std::string_view raw) {
   } else if (has_m(words, 98) || has_m(words, 198)) {
     subprogram_call(text);
   } else {
-    return bound_call(text, raw);
+    bound_call(text, raw);
   }
-  return true;
 }
 
 // Executes what stands in the block beside the call.
@@ -97,11 +96,7 @@ void Reader::put_without(std::string_view text, std::string_view letters, std::i
     return;
   }
   interpreter_.scan(rest, here_.line);
-  if (rewriter_.wants(interpreter_.words())) {
-    rewriter_.block(interpreter_.block(), interpreter_.words(), rest, origin_);
-  } else {
-    put(rest, origin_);
-  }
+  put_block(rest);
 }
 
 void Reader::subprogram_call(std::string_view text) {
@@ -203,39 +198,34 @@ void Reader::macro_call(std::string_view text, std::string_view raw, int g_tenth
 }
 
 // A G, M or T code that the machine builder bound to a program; inside of such a program codes are ordinary.
-bool Reader::bound_call(std::string_view text, std::string_view raw) {
+void Reader::bound_call(std::string_view text, std::string_view raw) {
   const BlockWords words = interpreter_.words();
   const CodeBindings& bound = options_.bindings;
   const bool inside = std::any_of(frames_.begin(), frames_.end(), [](const Frame& frame) { return frame.by_code; });
-  const auto execute_plain = [&] {
-    moved_ = words.has_any(axis_letters);
-    if (rewriter_.wants(interpreter_.words())) {
-      rewriter_.block(interpreter_.block(), interpreter_.words(), text, origin_);
-    } else {
-      put(text, origin_);
-    }
-    return true;
-  };
   if (inside) {
-    return execute_plain();
+    put_block(text);
+    return;
   }
-  const auto with_arguments = [&](std::int64_t number, std::uint32_t column) {
-    const MacroArguments arguments = parse_arguments(raw, here_.line, variables_, argument_scale());
-    if (enter(number, arguments, true, arguments.repeats, column, text)) {
+  const auto call = [&](std::int64_t number, const MacroArguments& arguments, bool macro, std::uint32_t column) {
+    if (enter(number, arguments, macro, arguments.repeats, column, text)) {
       frames_.back().by_code = true;
     }
-    return true;
+  };
+  const auto call_macro = [&](std::int64_t number, std::uint32_t column) {
+    call(number, parse_arguments(raw, here_.line, variables_, argument_scale()), true, column);
   };
   for (const Word& word : interpreter_.block()) {
     if (word.letter == 'G') {
       const auto found = bound.g_macros.find(static_cast<int>(std::lround(word.value * 10.0)));
       if (found != bound.g_macros.end()) {
-        return with_arguments(found->second, word.column);
+        call_macro(found->second, word.column);
+        return;
       }
     } else if (word.letter == 'M') {
       const auto found = bound.m_macros.find(static_cast<int>(word.value));
       if (found != bound.m_macros.end()) {
-        return with_arguments(found->second, word.column);
+        call_macro(found->second, word.column);
+        return;
       }
     }
   }
@@ -244,22 +234,14 @@ bool Reader::bound_call(std::string_view text, std::string_view raw) {
     const auto found = bound.m_subprograms.find(m);
     if (found != bound.m_subprograms.end()) {
       put_without(text, "", {m});
-      if (enter(found->second, {}, false, 1, 1, text)) {
-        frames_.back().by_code = true;
-      }
-      return true;
+      call(found->second, {}, false, 1);
+      return;
     }
   }
-  if (bound.tool_program >= 0 && words.has('T')) {
-    const double tool = words['T'].value;
-    variables_.write(149, tool, here_.line, words['T'].column);
-    put_without(text, "T", {});
-    if (enter(bound.tool_program, {}, false, 1, 1, text)) {
-      frames_.back().by_code = true;
-    }
-    return true;
-  }
-  return execute_plain();
+  // is_call() left nothing else.
+  variables_.write(149, words['T'].value, here_.line, words['T'].column);
+  put_without(text, "T", {});
+  call(bound.tool_program, {}, false, 1);
 }
 
 // Behind a block with a move: the macro of G66, the one given last first; its own moves call the one before it.

@@ -44,6 +44,9 @@ class ControlVariables : public SystemVariables {
   std::map<int, double> written_;  // switches such as #3003 that only the program itself sets
 };
 
+/// O0012: at least four digits.
+[[nodiscard]] std::string program_name(std::int64_t number);
+
 class Reader {
  public:
   Reader(std::string text, const ReaderOptions& options);
@@ -77,6 +80,10 @@ class Reader {
   void line(std::string_view text, std::size_t begin, std::size_t end);
   void plain_line(std::string_view text, std::size_t begin, std::size_t end);
   void program_line(std::size_t begin, std::size_t end);
+  void run_block(std::string_view text, std::string_view raw);
+  void put_block(std::string_view text);
+  void note_number(const BlockWords& words);
+  void note_words(const BlockWords& words);
   void put(std::string_view flat, const LineOrigin& origin);
   void put_raw(std::string_view flat, const LineOrigin& origin);
   void finish();
@@ -89,11 +96,11 @@ class Reader {
 
   // Calls.
   [[nodiscard]] bool is_call(const BlockWords& words) const noexcept;
-  bool call_block(std::string_view text, std::string_view raw);
+  void call_block(std::string_view text, std::string_view raw);
   void subprogram_call(std::string_view text);
   void subprogram_return(std::string_view text);
   void macro_call(std::string_view text, std::string_view raw, int g_tenths);
-  bool bound_call(std::string_view text, std::string_view raw);
+  void bound_call(std::string_view text, std::string_view raw);
   void modal_calls();
   bool enter(std::int64_t number, const MacroArguments& arguments, bool macro, int repeats, std::uint32_t column,
              std::string_view text);  // false: the call was kept as it stands

@@ -1,8 +1,7 @@
 // Macro statements: assignments, GOTO, IF, WHILE.
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 
+#include "message.hpp"
 #include "reader_impl.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/gcode/macro_expression.hpp"
@@ -36,9 +35,7 @@ class Recorder : public VariableAccess {
 };
 
 std::string number_text(double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.6f", value);
-  std::string result(text);
+  std::string result = format_message("%.6f", value);
   while (result.back() == '0') {
     result.pop_back();
   }
@@ -60,9 +57,7 @@ int lasting_target(std::string_view text, std::size_t at) noexcept {
 
 WordFormat Reader::word_format() const {
   WordFormat format;
-  const bool inch = rewriter_.programmed().units == 20;
-  const double increment = inch ? options_.least_increment_inch : options_.least_increment_mm;
-  format.length_decimals = static_cast<int>(std::lround(-std::log10(increment)));
+  format.length_decimals = length_decimals(options_, rewriter_.programmed().units);
   return format;
 }
 
@@ -71,8 +66,7 @@ std::array<double, 26> Reader::argument_scale() const {
   std::array<double, 26> scale;
   scale.fill(1.0);
   if (!options_.calculator_decimal_point) {
-    const bool inch = rewriter_.programmed().units == 20;
-    const double increment = inch ? options_.least_increment_inch : options_.least_increment_mm;
+    const double increment = least_increment(options_, rewriter_.programmed().units);
     for (const char letter : {'A', 'B', 'C', 'I', 'J', 'K', 'Q', 'R', 'U', 'V', 'W', 'X', 'Y', 'Z'}) {
       scale[static_cast<std::size_t>(letter - 'A')] = increment;
     }
@@ -88,7 +82,7 @@ void Reader::macro_line(std::string_view view, std::size_t begin) {
     control_.last_n = statement.n_number;
   }
   if (statement.optional_skip) {
-    const auto known = options_.block_skip[static_cast<std::size_t>(statement.skip_switch - 1)];
+    const auto known = block_skip(options_, statement.skip_switch);
     if (known.value_or(false)) {
       return;  // the switch is on: the control does not run it
     }
@@ -143,32 +137,13 @@ void Reader::macro_line(std::string_view view, std::size_t begin) {
 void Reader::nc_block(std::string_view text) {
   const std::string plain = substitute(text, here_.line, variables_, word_format());
   interpreter_.scan(plain, here_.line);
-  const BlockWords& words = interpreter_.words();
   if (interpreter_.block().macro) {
     alarm(114, "macro expression is not understood");
   }
   if (interpreter_.block().word_count == 0 && interpreter_.block().comment_count == 0) {
     return;  // every word was vacant
   }
-  if (is_call(words)) {
-    call_block(plain, text);
-    return;
-  }
-  moved_ = words.has_any(axis_letters) && (words.groups & (group_bit(Group::none) | group_bit(Group::call))) == 0;
-  if (words.has('N')) {
-    control_.last_n = static_cast<std::int64_t>(words['N'].value);
-  }
-  if (words.m_count > 0) {
-    control_.last_m = words.m_codes[static_cast<std::size_t>(words.m_count - 1)];
-  }
-  if (rewriter_.wants(words)) {
-    rewriter_.block(interpreter_.block(), words, plain, origin_);
-  } else {
-    put(plain, origin_);
-  }
-  if (!modal_calls_.empty()) {
-    modal_calls();
-  }
+  run_block(plain, text);
 }
 
 // The text with the values of local and common variables in place of their names; those that the control keeps stay.

@@ -78,8 +78,7 @@ void MoveRewriter::set_compensation(int code) {
     return;
   }
   if (code == 40) {
-    compensation_ = code;
-    keeps_span_ = false;
+    compensation_ = programmed_.compensation = code;
     return;
   }
   const BlockWords& words = *words_;
@@ -90,14 +89,18 @@ void MoveRewriter::set_compensation(int code) {
   }
   d_number_ = number;
   const auto radius = interpreter_.offsets().radius(number);
-  if (!radius) {
+  // While the control compensates with a radius that is not known, it cannot be told to stand where the tool would.
+  if (!radius || programmed_.compensation != 40) {
     // The moves stay as they are, and their path is not known.
-    if (!keeps_span_) {
-      interpreter_.warn("the radius of offset D" + std::to_string(number) +
-                        " is not known (input.tool_radius_mm, or G10 L12 in the program): G" + std::to_string(code) +
-                        " is kept as it stands");
+    if (programmed_.compensation == 40) {
+      program_.warnings.push_back({origin_.line,
+                                   "the radius of offset D" + std::to_string(number) +
+                                       " is not known (input.tool_radius_mm, or G10 L12 in the program): G" +
+                                       std::to_string(code) + " is kept as it stands",
+                                   0, 0, program_.files[origin_.file]});
     }
-    keeps_span_ = keeps_compensation_ = true;
+    keeps_compensation_ = true;
+    programmed_.compensation = code;
     compensation_ = 40;
     return;
   }

@@ -22,14 +22,12 @@ bool in_plane(const Segment& segment, int normal) noexcept {
 }  // namespace
 
 double MoveRewriter::increment_mm(int units) const noexcept {
-  return units == 20 ? options_.least_increment_inch * mm_per_inch : options_.least_increment_mm;
+  return least_increment(options_, units) * unit_mm(units);
 }
 
 void MoveRewriter::append_length(std::string& text, char letter, double value_mm, int units) const {
-  const double increment = units == 20 ? options_.least_increment_inch : options_.least_increment_mm;
   text += letter;
-  append_decimal(text, std::llround(value_mm / increment_mm(units)),
-                 static_cast<int>(std::lround(-std::log10(increment))));
+  append_decimal(text, std::llround(value_mm / increment_mm(units)), length_decimals(options_, units));
 }
 
 void MoveRewriter::append_axis(std::string& text, const Item& item, int axis, double target_mm, bool always) const {
@@ -248,7 +246,6 @@ void MoveRewriter::flush() {
       throw;
     }
   }
-  const Vector3 point = programmed_point_;
   for (std::size_t i = 0; i < items.size(); ++i) {
     if (!compensated) {
       write(items[i], items[i].move ? &items[i].segment : nullptr, true);
@@ -260,7 +257,6 @@ void MoveRewriter::flush() {
     }
   }
   span_open_ = false;
-  programmed_point_ = point;
 }
 
 }  // namespace shapegcode::detail

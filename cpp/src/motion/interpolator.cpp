@@ -20,22 +20,23 @@ int smoothing_length(const SpeedProfile& profile, double period_s) {
 }  // namespace
 
 Interpolator::Interpolator(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
-                           double period_s)
+                           double period_s, double delay_s)
     : path_(std::move(path)),
       profile_(std::move(profile)),
       smoothing_(Fir::moving_average(smoothing_length(*profile_, period_s)), 1),
-      period_s_(period_s) {
+      period_s_(period_s),
+      delay_s_(delay_s) {
   const double rest = 0.0;
   smoothing_.reset({&rest, 1});
   // A ramp that ends on a tick to within rounding ends there.
-  const auto ramps = static_cast<std::size_t>(std::ceil(profile_->ramp_duration_s() / period_s - 1e-9));
+  const auto ramps = static_cast<std::size_t>(std::ceil((profile_->ramp_duration_s() + delay_s) / period_s - 1e-9));
   sample_count_ = ramps + 1 + static_cast<std::size_t>(smoothing_.fir().duration_samples());
 }
 
 bool Interpolator::step(Vector3& position) noexcept {
   const bool moving = index_ < sample_count_;
   if (moving) {
-    double distance = profile_->distance_mm(static_cast<double>(index_) * period_s_, phase_cursor_);
+    double distance = profile_->distance_mm(static_cast<double>(index_) * period_s_ - delay_s_, phase_cursor_);
     ++index_;
     // The last set-point is the end itself, whatever the running sum rounds to.
     smoothing_.step({&distance, 1});

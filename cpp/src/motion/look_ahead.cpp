@@ -328,7 +328,7 @@ double corner_speed_limit(const Segment& before, const Segment& after, const Mot
   return speed;
 }
 
-SpeedProfile plan_speed(const Path& path, const MotionLimits& limits) {
+SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const SpeedCaps* caps) {
   require_positive(limits.time_constant_s, "acceleration time constant (s)");
   require_positive(limits.feed_override, "feed override");
   require_positive(limits.arc_feed_ratio, "arc feed ratio");
@@ -346,6 +346,9 @@ SpeedProfile plan_speed(const Path& path, const MotionLimits& limits) {
     require_positive(limits.contour_acceleration_mm_per_s2[i], "contour acceleration (mm/s2)");
   }
   const std::size_t n = path.size();
+  if (caps != nullptr && (caps->on_segment.size() != n || caps->at_junction.size() != n)) {
+    throw Error(ErrorKind::argument, "speed caps of a path of " + std::to_string(n) + " segments: one per segment");
+  }
   if (n == 0 || path.length_mm() <= 0.0) {
     return SpeedProfile({}, path.length_mm(), 0.0);
   }
@@ -359,6 +362,10 @@ SpeedProfile plan_speed(const Path& path, const MotionLimits& limits) {
     }
     if (i > 0) {
       corner[i] = corner_speed_limit(path[i - 1], path[i], limits);
+    }
+    if (caps != nullptr) {
+      speed[i] = std::min(speed[i], static_cast<double>(caps->on_segment[i]));
+      corner[i] = std::min(corner[i], static_cast<double>(caps->at_junction[i]));
     }
     fastest_acceleration = std::max(fastest_acceleration, segment_acceleration(path[i], speed[i], limits));
   }

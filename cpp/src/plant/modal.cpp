@@ -15,6 +15,8 @@ constexpr double peak_steps_per_swing = 20.0;
 constexpr double most_substeps = 1024.0;
 constexpr double residual_steps_per_swing = 64.0;
 constexpr double most_residual_steps = 1e6;
+constexpr double node_angle_rad = 1e-3;   // omega*period between neighbouring nodes of a mode that varies
+constexpr double most_matrices = 262144;  // of a mode that varies: 8 MB
 
 double fastest_hz(const std::vector<Mode>& modes) {
   double fastest = 0.0;
@@ -53,43 +55,144 @@ double ModalPlant::largest_between(const Motion& from, const Motion& to, double 
   return largest;
 }
 
-ModalPlant::ModalPlant(AxisModes modes, double period_s)
+ModalPlant::Transition ModalPlant::sub_transition(std::size_t axis, const Mode& mode, int substep) const {
+  Transition part = transition(mode, period_s_ * substep / substeps_[axis]);
+  part.dd *= mode.participation;
+  part.dv *= mode.participation;
+  part.vd *= mode.participation;
+  part.vv *= mode.participation;
+  return part;
+}
+
+ModalPlant::Transition ModalPlant::between(const Transition& a, const Transition& b, double share) noexcept {
+  return {a.dd + share * (b.dd - a.dd), a.dv + share * (b.dv - a.dv), a.vd + share * (b.vd - a.vd),
+          a.vv + share * (b.vv - a.vv)};
+}
+
+ModalPlant::Node ModalPlant::node_of(const Mode& mode, double period_s) {
+  const std::complex<double> s = pole(mode);
+  return {transition(mode, period_s), -s.real(), 1.0 / s.imag()};
+}
+
+ModalPlant::ModalPlant(AxisModes modes, double period_s, AxisModeTables tables)
     : modes_(std::move(modes)), period_s_(period_s), rate_hz_(1.0 / period_s) {
   if (!std::isfinite(period_s) || !(period_s > 0.0)) {
     std::ostringstream message;
     message << "interpolation period " << period_s << " s, must be finite and above 0";
     throw Error(ErrorKind::argument, message.str());
   }
+  std::vector<Varying> varying;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     const std::vector<Mode>& axis_modes = modes_[axis];
+    if (tables[axis].size() > axis_modes.size()) {
+      throw Error(ErrorKind::argument, std::to_string(tables[axis].size()) + " tables for " +
+                                           std::to_string(axis_modes.size()) + " modes of axis " +
+                                           std::to_string(axis));
+    }
+    tables[axis].resize(axis_modes.size());
     first_[axis] = states_.size();
     for (const Mode& mode : axis_modes) {
       if (!std::isfinite(mode.participation)) {
         throw Error(ErrorKind::argument, "participation of a mode of axis " + std::to_string(axis) + " is not finite");
       }
       State state;
-      const std::complex<double> s = pole(mode);
-      state.over_period = transition(mode, period_s);
+      static_cast<Node&>(state) = node_of(mode, period_s);
       state.participation = mode.participation;
-      state.decay_rate = -s.real();
-      state.damped_period_s = 1.0 / s.imag();
       states_.push_back(state);
     }
-    const double substeps = std::ceil(period_s * peak_steps_per_swing * fastest_hz(axis_modes));
+    double fastest = fastest_hz(axis_modes);
+    for (const ModeTable& table : tables[axis]) {
+      check_table(table);
+      for (const double frequency : table.frequency_hz) fastest = std::max(fastest, frequency);
+    }
+    const double substeps = std::ceil(period_s * peak_steps_per_swing * fastest);
     substeps_[axis] = static_cast<int>(std::clamp(substeps, 1.0, most_substeps));
     first_sub_[axis] = sub_.size();
     for (int k = 1; k <= substeps_[axis]; ++k) {
-      for (const Mode& mode : axis_modes) {
-        Transition part = transition(mode, period_s * k / substeps_[axis]);
-        part.dd *= mode.participation;
-        part.dv *= mode.participation;
-        part.vd *= mode.participation;
-        part.vv *= mode.participation;
-        sub_.push_back(part);
-      }
+      for (const Mode& mode : axis_modes) sub_.push_back(sub_transition(axis, mode, k));
+    }
+    for (std::size_t m = 0; m < axis_modes.size(); ++m) {
+      if (!tables[axis][m].empty()) varying.push_back(tabulate(axis, m, tables[axis][m]));
     }
   }
   first_[axis_count] = states_.size();
+  place_.resize(varying.size());
+  varying_ = std::make_shared<const std::vector<Varying>>(std::move(varying));
+  move_to(command_);
+}
+
+ModalPlant::Varying ModalPlant::tabulate(std::size_t axis, std::size_t mode, const ModeTable& table) const {
+  Varying varying{axis, mode, table, {0}, {}, {}};
+  const Mode& nominal = modes_[axis][mode];
+  const std::size_t rows = table.position_mm.size();
+  const double most_nodes = most_matrices / static_cast<double>((substeps_[axis] + 1) * static_cast<int>(rows));
+  const auto add = [&](double position) {
+    const Mode here = mode_at(nominal, table, position);
+    varying.nodes.push_back(node_of(here, period_s_));
+    for (int k = 1; k <= substeps_[axis]; ++k) varying.sub.push_back(sub_transition(axis, here, k));
+  };
+  for (std::size_t row = 0; row + 1 < rows; ++row) {
+    const double from = table.position_mm[row];
+    const double to = table.position_mm[row + 1];
+    const std::complex<double> turn = pole(mode_at(nominal, table, to)) - pole(mode_at(nominal, table, from));
+    const double wanted = std::ceil(std::abs(turn) * period_s_ / node_angle_rad);
+    const double intervals = std::clamp(wanted, 1.0, std::max(1.0, std::floor(most_nodes)));
+    for (double k = 0.0; k < intervals; ++k) add(from + k / intervals * (to - from));
+    varying.first_node.push_back(varying.nodes.size());
+  }
+  add(table.position_mm.back());
+  return varying;
+}
+
+void ModalPlant::move_to(const Vector3& position) noexcept {
+  for (std::size_t v = 0; v < place_.size(); ++v) {
+    const Varying& varying = (*varying_)[v];
+    Place& place = place_[v];
+    const double at = position[varying.table.axis];
+    if (at == place.position_mm && place.known) continue;
+    place = {at, 0, 0.0, true};
+    const std::vector<double>& rows = varying.table.position_mm;
+    const auto above = static_cast<std::size_t>(std::upper_bound(rows.begin(), rows.end(), at) - rows.begin());
+    if (above == rows.size()) {
+      place.node = varying.nodes.size() - 1;
+    } else if (above > 0) {
+      const std::size_t first = varying.first_node[above - 1];
+      const std::size_t intervals = varying.first_node[above] - first;
+      const double along = (at - rows[above - 1]) / (rows[above] - rows[above - 1]) * static_cast<double>(intervals);
+      const std::size_t whole = std::min(static_cast<std::size_t>(along), intervals - 1);
+      place.node = first + whole;
+      place.share = along - static_cast<double>(whole);
+    }
+    const Node& low = varying.nodes[place.node];
+    const Node& high = varying.nodes[std::min(place.node + 1, varying.nodes.size() - 1)];
+    Node& here = states_[first_[varying.axis] + varying.mode];
+    here.over_period = between(low.over_period, high.over_period, place.share);
+    here.decay_rate = low.decay_rate + place.share * (high.decay_rate - low.decay_rate);
+    here.damped_period_s = low.damped_period_s + place.share * (high.damped_period_s - low.damped_period_s);
+  }
+}
+
+void ModalPlant::move_sub_steps(std::size_t axis) noexcept {
+  const std::size_t modes = first_[axis + 1] - first_[axis];
+  const auto substeps = static_cast<std::size_t>(substeps_[axis]);
+  for (std::size_t v = 0; v < place_.size(); ++v) {
+    const Varying& varying = (*varying_)[v];
+    if (varying.axis != axis) continue;
+    const std::size_t next = std::min(place_[v].node + 1, varying.nodes.size() - 1);
+    for (std::size_t k = 0; k < substeps; ++k) {
+      sub_[first_sub_[axis] + k * modes + varying.mode] =
+          between(varying.sub[place_[v].node * substeps + k], varying.sub[next * substeps + k], place_[v].share);
+    }
+  }
+}
+
+Mode ModalPlant::mode_now(std::size_t axis, std::size_t mode) const noexcept {
+  for (const Varying& varying : *varying_) {
+    if (varying.axis == axis && varying.mode == mode) {
+      return mode_at(modes_[axis][mode], varying.table, command_[varying.table.axis]);
+    }
+  }
+  return modes_[axis][mode];
 }
 
 void ModalPlant::reset(const Vector3& position) noexcept {
@@ -98,6 +201,7 @@ void ModalPlant::reset(const Vector3& position) noexcept {
     state.velocity = 0.0;
   }
   command_ = position;
+  move_to(position);
   command_velocity_.setZero();
   deflection_.setZero();
   peak_.setZero();
@@ -109,6 +213,7 @@ void ModalPlant::look_between(std::size_t axis) noexcept {
   const std::size_t last = first_[axis + 1];
   const int substeps = substeps_[axis];
   const double substep_s = period_s_ / substeps;
+  move_sub_steps(axis);
   const Transition* sub = sub_.data() + first_sub_[axis];
   Motion before;
   for (std::size_t m = first; m < last; ++m) {
@@ -129,6 +234,7 @@ void ModalPlant::look_between(std::size_t axis) noexcept {
 }
 
 Vector3 ModalPlant::step(const Vector3& command) noexcept {
+  if (!place_.empty()) move_to(0.5 * (command_ + command));
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
     const double velocity = (command[a] - command_[a]) * rate_hz_;
@@ -164,14 +270,16 @@ Vector3 ModalPlant::residual_peak(int n_periods) const {
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     if (modes_[axis].empty()) continue;
     const auto a = static_cast<Eigen::Index>(axis);
+    std::vector<Mode> modes(modes_[axis].size());
+    for (std::size_t m = 0; m < modes.size(); ++m) modes[m] = mode_now(axis, m);
     std::vector<State> free(states_.begin() + static_cast<std::ptrdiff_t>(first_[axis]),
                             states_.begin() + static_cast<std::ptrdiff_t>(first_[axis + 1]));
-    const double step_s = 1.0 / (residual_steps_per_swing * fastest_hz(modes_[axis]));
-    const double steps = std::min(std::ceil(n_periods / (slowest_hz(modes_[axis]) * step_s)), most_residual_steps);
+    const double step_s = 1.0 / (residual_steps_per_swing * fastest_hz(modes));
+    const double steps = std::min(std::ceil(n_periods / (slowest_hz(modes) * step_s)), most_residual_steps);
     Motion before{deflection_[a], 0.0};
     for (std::size_t m = 0; m < free.size(); ++m) {
       free[m].velocity += command_velocity_[a];  // the command stops
-      free[m].over_period = transition(modes_[axis][m], step_s);
+      static_cast<Node&>(free[m]) = node_of(modes[m], step_s);
       before.rate += free[m].participation * free[m].velocity;
     }
     double peak = std::abs(before.deflection);

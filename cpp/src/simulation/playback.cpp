@@ -28,9 +28,9 @@ class Recorder {
   // `command_on_path`: the command follows the path exactly, so only the response can leave it.
   Recorder(const Path& path, const PlaybackOptions& options, bool command_on_path)
       : options_(options),
-        plant_(options.modes, options.period_s),
+        plant_(options.modes, options.period_s, options.mode_tables),
         tracks_contour_(options.measure_contour && path.length_mm() > 0.0),
-        tracks_command_(tracks_contour_ && !command_on_path),
+        tracks_command_(tracks_contour_ && options.measure_command && !command_on_path),
         command_tracker_(tracks_contour_ ? path : a_point()),
         response_tracker_(tracks_contour_ ? path : a_point()),
         orbit_(tracks_contour_ ? path : a_point()),
@@ -102,7 +102,9 @@ class Recorder {
     figures_.peak_acceleration_mm_per_s2 = acceleration_ / (options_.period_s * options_.period_s);
     figures_.end_mm = last_;
     if (tracks_contour_) {
-      figures_.orbit_error_percent = orbit_.percent();
+      if (options_.measure_command) {
+        figures_.orbit_error_percent = orbit_.percent();
+      }
       figures_.command.count = figures_.response.count;
       figures_.command.include_missed(command_reach_.largest_mm());
       figures_.response.include_missed(response_reach_.largest_mm());

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import re
-from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, load_machine, refuse_same_file
+from shapegcode.cli.options import add_input_arguments, load_machine, refuse_json_over_input
 
 __all__ = ["add_arguments", "run"]
 
@@ -20,15 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "of the axes, program memory, speed of the serial line. "
         "Exit code 0: nothing of both; 1: warnings; 2: at least one alarm."
     )
-    parser.add_argument("input", metavar="PROGRAM", help="CNC program")
-    add_machine_argument(parser)
-    parser.add_argument(
-        "--program",
-        type=_program_number,
-        default=None,
-        metavar="O1234",
-        help="program to check of a file that holds several; without it the first",
-    )
+    add_input_arguments(parser, metavar="PROGRAM")
     add_json_argument(parser)
 
 
@@ -45,8 +35,7 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.cli.console import output_console, progress, write_json
 
     machine = load_machine(args)
-    if args.json not in (None, "-"):
-        refuse_same_file([Path(args.json)], [Path(args.input), Path(args.machine)])
+    refuse_json_over_input(args)
     with progress(f"checking {args.input}", args.json) as bar:
         bar.wait()
         result = check(args.input, machine, program_number=args.program)
@@ -60,10 +49,3 @@ def run(args: argparse.Namespace) -> int:
     if result.refused:
         return ExitCode.BAD_INPUT
     return ExitCode.OUT_OF_TOLERANCE if result.counts["warning"] else ExitCode.OK
-
-
-def _program_number(text: str) -> int:
-    match = re.fullmatch(r"[Oo]?(\d{1,8})", text)
-    if match is None:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be a program number such as O1234")
-    return int(match[1])

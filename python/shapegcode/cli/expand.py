@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, add_program_argument, load_machine, refuse_same_file
+from shapegcode.cli.options import add_input_arguments, load_machine, refuse_same_file
 
 __all__ = ["add_arguments", "run"]
 
@@ -19,9 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "words and cutter compensation worked out: plain blocks that any control runs, also from DNC. Nothing is "
         "shaped. The input is never overwritten."
     )
-    parser.add_argument("input", metavar="IN", help="CNC program")
-    add_machine_argument(parser)
-    add_program_argument(parser)
+    add_input_arguments(parser)
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help="program to write; - for standard output")
     parser.add_argument(
         "--compensation",

@@ -15,16 +15,24 @@ if TYPE_CHECKING:
 
 _LARGEST_OVERRIDE = 2.54
 _SIZE_UNITS = {"": 1, "k": 1024, "M": 1024 * 1024}
+_LENGTH_UNITS = {"um": 1.0, "µm": 1.0, "mm": 1e3}
 _TIME_UNITS = {"ms": 1e-3, "us": 1e-6, "s": 1.0}
 
 
-def add_machine_argument(parser: argparse.ArgumentParser) -> None:
+def add_input_arguments(parser: argparse.ArgumentParser, metavar: str = "IN") -> None:
+    """Declare what a command reads: the program, ``-m MACHINE`` with ``--set``, and ``--program O1234``."""
+    parser.add_argument("input", metavar=metavar, help="CNC program")
+    add_machine_argument(parser)
+    add_program_argument(parser)
+
+
+def add_machine_argument(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Declare ``-m MACHINE`` and ``--set KEY=VALUE``."""
     parser.add_argument(
         "-m",
         "--machine",
         metavar="MACHINE",
-        required=True,
+        required=required,
         help="machine file (TOML), or name of a built-in machine such as vx500",
     )
     parser.add_argument(
@@ -52,7 +60,7 @@ def add_program_argument(parser: argparse.ArgumentParser) -> None:
         metavar="O1234",
         type=program_number,
         default=None,
-        help="program to play of a file that holds several (default: the first)",
+        help="program to read of a file that holds several (default: the first)",
     )
 
 
@@ -62,10 +70,10 @@ def program_number(text: str) -> int:
     Raises:
         ArgumentTypeError: no number from 1 to 99999999.
     """
-    digits = text.removeprefix("O").removeprefix("o")
-    if not digits.isdigit() or not 1 <= int(digits) <= 99_999_999:
-        raise argparse.ArgumentTypeError(f"{text!r} is no program number: O1 ... O99999999")
-    return int(digits)
+    match = re.fullmatch(r"[Oo]?0*([1-9][0-9]{0,7})", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a program number, O1 ... O99999999")
+    return int(match[1])
 
 
 def load_machine(args: argparse.Namespace) -> Machine:
@@ -132,6 +140,16 @@ def refuse_same_file(targets: Iterable[Path], others: Iterable[Path]) -> None:
                 )
 
 
+def refuse_json_over_input(args: argparse.Namespace) -> None:
+    """Refuse to write the report of ``--json`` over the program or the machine file.
+
+    Raises:
+        ArgumentError: ``--json`` names one of them.
+    """
+    if args.json not in (None, "-"):
+        refuse_same_file([Path(args.json)], [Path(args.input), Path(args.machine)])
+
+
 def ratio(text: str) -> float:
     """A share such as ``60%`` or ``0.6``, above 0 and at most 1."""
     value = _number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
@@ -157,6 +175,18 @@ def seconds(text: str) -> float:
         value = 0.0
     if not (math.isfinite(value) and value > 0.0):
         raise argparse.ArgumentTypeError(f"{text!r}: must be a time above 0 with its unit (s, ms, us), for example 5ms")
+    return value
+
+
+def micrometres(text: str) -> float:
+    """A length with its unit, such as ``5um`` or ``0.005mm``, in µm."""
+    match = re.fullmatch(r"([-+.\d]+(?:[eE][-+]?\d+)?)\s*(um|µm|mm)", text)
+    try:
+        value = float(match[1]) * _LENGTH_UNITS[match[2]] if match else 0.0
+    except ValueError:
+        value = 0.0
+    if not (math.isfinite(value) and value > 0.0):
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a length above 0 with its unit (um, mm), for example 5um")
     return value
 
 

@@ -3,16 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import (
-    add_machine_argument,
-    add_plots_argument,
-    add_program_argument,
-    load_machine,
-    refuse_same_file,
-)
+from shapegcode.cli.options import add_input_arguments, add_plots_argument, load_machine, refuse_json_over_input
 
 __all__ = ["add_arguments", "run"]
 
@@ -23,9 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Plays the cutting regions of a program through the controller's model and the machine's modes: time, residual "
         "and peak vibration, contour error of command and response."
     )
-    parser.add_argument("input", metavar="IN", help="CNC program")
-    add_machine_argument(parser)
-    add_program_argument(parser)
+    add_input_arguments(parser)
     parser.add_argument(
         "--shaped",
         action="store_true",
@@ -50,8 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.simulator import simulate
 
     machine = load_machine(args)
-    if args.json not in (None, "-"):
-        refuse_same_file([Path(args.json)], [Path(args.input), Path(args.machine)])
+    refuse_json_over_input(args)
     with progress(f"playing {args.input}", args.json) as bar:
         program = Program.read(args.input, machine, program_number=args.program)
         # A program of ours says so; played as an ordinary one it would show figures of nothing.

@@ -7,9 +7,8 @@ from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.options import (
-    add_machine_argument,
+    add_input_arguments,
     add_plots_argument,
-    add_program_argument,
     load_machine,
     override,
     ratio,
@@ -29,9 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "cutting, rapids, in-position, dwells, acceleration, tool changes; by tool; the slowest regions and blocks. "
         "Exit code 1 if closed form and full interpolation differ by more than 0.5 %."
     )
-    parser.add_argument("input", metavar="PROGRAM", help="CNC program")
-    add_machine_argument(parser)
-    add_program_argument(parser)
+    add_input_arguments(parser, metavar="PROGRAM")
     parser.add_argument(
         "--override",
         type=override,

@@ -14,8 +14,10 @@ namespace shapegcode {
 /// period passes over. `interpolate` is the batch form and made of the same steps.
 class Interpolator {
  public:
-  /// Throws Error(argument) on a period <= 0.
-  Interpolator(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile, double period_s);
+  /// `delay_s` >= 0: rest at the start before the motion begins; need not be a multiple of the period. Throws
+  /// Error(argument) on a period <= 0.
+  Interpolator(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile, double period_s,
+               double delay_s = 0.0);
 
   /// Next set-point. False once the last set-point was given; `position` then stays at the end.
   bool step(Vector3& position) noexcept;
@@ -32,6 +34,7 @@ class Interpolator {
   std::shared_ptr<const SpeedProfile> profile_;
   FirStream smoothing_;
   double period_s_ = 0.0;
+  double delay_s_ = 0.0;
   std::size_t sample_count_ = 0;
   std::size_t index_ = 0;
   std::size_t path_cursor_ = 0;

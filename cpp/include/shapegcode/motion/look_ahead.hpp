@@ -9,9 +9,15 @@
 
 namespace shapegcode {
 
+/// Speeds that a path may have beside its limits, mm/s; infinity where there is none.
+struct SpeedCaps {
+  std::vector<float> on_segment;   ///< of each segment
+  std::vector<float> at_junction;  ///< [i]: where segment i is entered
+};
+
 /// Tangential speed profile over a whole path from rest to rest: every segment at most at its feed, every limit kept,
 /// deceleration ended where a slower segment begins. O(n). Throws Error(argument) on a limit that is not positive
-/// or a segment without feed.
+/// or a segment without feed, or caps that are not one per segment.
 ///
 /// Forward and backward passes over the segments' boundary speeds (the planner of grbl and of LinuxCNC, in v^2); then,
 /// under the constant-time law, ramps are stretched to the time constant where a neighbouring steady stretch leaves
@@ -20,7 +26,7 @@ namespace shapegcode {
 ///
 /// Behind a jerk time the acceleration of an axis may exceed its limit where segments of different direction meet at
 /// speed (there the corner limits bound what happens), and jerk on arcs is not bounded.
-[[nodiscard]] SpeedProfile plan_speed(const Path& path, const MotionLimits& limits);
+[[nodiscard]] SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const SpeedCaps* caps = nullptr);
 
 /// Highest speed at which no axis of a segment is above its largest feed.
 [[nodiscard]] double axis_feed_limit(const Segment& segment, const MotionLimits& limits) noexcept;

@@ -2,9 +2,11 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "shapegcode/mode.hpp"
+#include "shapegcode/plant/mode_table.hpp"
 #include "shapegcode/samples.hpp"
 
 namespace shapegcode {
@@ -15,10 +17,16 @@ using AxisModes = std::array<std::vector<Mode>, axis_count>;
 /// Propagates the modes exactly (matrix exponential) for a command that is linear between set-points, as a servo's
 /// set-points are (first-order hold). Real-time safe after construction: no allocation, no exception, bounded work.
 /// Spec section 3 and 6: u'' + 2*zeta*omega*u' + omega^2*u = 2*zeta*omega*x' + omega^2*x.
+///
+/// Modes may vary with the commanded position of an axis. Frequency and damping are then held over each period at their
+/// value in its middle (an error of second order in the period), and the matrices of the period are interpolated
+/// between neighbours so close that omega*period differs by at most 1e-3 rad: an error below 2e-7 of the motion per
+/// period. (Fewer matrices, and a larger error, only where more than 2^18 would be needed.)
 class ModalPlant {
  public:
-  /// Throws Error(argument) on period <= 0 or an invalid mode.
-  ModalPlant(AxisModes modes, double period_s);
+  /// `tables`: how modes vary with position, by axis and number of the mode; none: constant modes.
+  /// Throws Error(argument) on period <= 0, an invalid mode or table, or more tables than modes of an axis.
+  ModalPlant(AxisModes modes, double period_s, AxisModeTables tables = {});
   /// At rest at `position`; peak() restarts from zero.
   void reset(const Vector3& position) noexcept;
   /// Next set-point; returns the response at that instant.
@@ -42,13 +50,16 @@ class ModalPlant {
   struct Transition {
     double dd = 1.0, dv = 0.0, vd = 0.0, vv = 1.0;
   };
-  struct State {
+  /// What the motion over a period needs to know of a mode.
+  struct Node {
     Transition over_period;
-    double participation = 1.0;
     double decay_rate = 0.0;       // 1/s: zeta*omega
     double damped_period_s = 0.0;  // over 2 pi
-    double deflection = 0.0;       // mm
-    double velocity = 0.0;         // mm/s, of the deflection
+  };
+  struct State : Node {
+    double participation = 1.0;
+    double deflection = 0.0;  // mm
+    double velocity = 0.0;    // mm/s, of the deflection
 
     void propagate() noexcept {
       const double next = over_period.dd * deflection + over_period.dv * velocity;
@@ -58,12 +69,39 @@ class ModalPlant {
     /// No later deflection of the free mode exceeds this share of the response.
     [[nodiscard]] double reachable() const noexcept;
   };
+  /// A mode that varies: nodes between the rows of its table, every interval divided evenly.
+  struct Varying {
+    std::size_t axis = 0;
+    std::size_t mode = 0;  // of the axis
+    ModeTable table;
+    std::vector<std::size_t> first_node;  // at row k of the table
+    std::vector<Node> nodes;
+    std::vector<Transition> sub;  // times participation; node, end of sub-step
+  };
+  /// Where in its nodes a varying mode stands.
+  struct Place {
+    double position_mm = 0.0;
+    std::size_t node = 0;
+    double share = 0.0;  // of the next node
+    bool known = false;
+  };
   /// Deflection of an axis and its rate, all modes together.
   struct Motion {
     double deflection = 0.0;
     double rate = 0.0;
   };
   [[nodiscard]] static Transition transition(const Mode& mode, double time_s);
+  /// The same for the ends of an axis' sub-steps, times the participation.
+  [[nodiscard]] Transition sub_transition(std::size_t axis, const Mode& mode, int substep) const;
+  [[nodiscard]] static Transition between(const Transition& a, const Transition& b, double share) noexcept;
+  [[nodiscard]] static Node node_of(const Mode& mode, double period_s);
+  [[nodiscard]] Varying tabulate(std::size_t axis, std::size_t mode, const ModeTable& table) const;
+  /// The varying modes as they are at `position`.
+  void move_to(const Vector3& position) noexcept;
+  /// Sub-step matrices of the varying modes of an axis.
+  void move_sub_steps(std::size_t axis) noexcept;
+  /// A mode of an axis at the last set-point.
+  [[nodiscard]] Mode mode_now(std::size_t axis, std::size_t mode) const noexcept;
   /// `peak_` over the period that now begins, looked at between its ends; called only where it may grow.
   void look_between(std::size_t axis) noexcept;
   /// Largest |deflection| between two instants `time_s` apart, with the turning point found by the secant of the rate.
@@ -74,9 +112,11 @@ class ModalPlant {
   double rate_hz_;
   std::array<std::size_t, axis_count + 1> first_{};  // states_ of axis a: first_[a] up to first_[a+1]
   std::vector<State> states_;
-  std::array<int, axis_count> substeps_{};           // per period and axis
-  std::array<std::size_t, axis_count> first_sub_{};  // where an axis' sub-step matrices begin
-  std::vector<Transition> sub_;                      // times participation; axis, end of sub-step, mode
+  std::array<int, axis_count> substeps_{};               // per period and axis
+  std::array<std::size_t, axis_count> first_sub_{};      // where an axis' sub-step matrices begin
+  std::vector<Transition> sub_;                          // times participation; axis, end of sub-step, mode
+  std::shared_ptr<const std::vector<Varying>> varying_;  // never changes: copies of the plant share it
+  std::vector<Place> place_;                             // one per varying mode
   Vector3 command_ = Vector3::Zero();
   Vector3 command_velocity_ = Vector3::Zero();
   Vector3 deflection_ = Vector3::Zero();

@@ -1,0 +1,51 @@
+#include "shapegcode/plant/mode_table.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+
+void check_table(const ModeTable& table) {
+  const std::size_t rows = table.position_mm.size();
+  if (table.frequency_hz.size() != rows || (!table.damping_ratio.empty() && table.damping_ratio.size() != rows)) {
+    throw Error(ErrorKind::argument, "table of a mode with " + std::to_string(rows) + " positions, " +
+                                         std::to_string(table.frequency_hz.size()) + " frequencies and " +
+                                         std::to_string(table.damping_ratio.size()) + " damping ratios");
+  }
+  if (rows > 0 && (table.axis < 0 || table.axis >= axis_count)) {
+    throw Error(ErrorKind::argument,
+                "table of a mode over axis " + std::to_string(table.axis) + ", 0 to 2 are X, Y and Z");
+  }
+  for (std::size_t k = 0; k < rows; ++k) {
+    if (!std::isfinite(table.position_mm[k]) || (k > 0 && !(table.position_mm[k] > table.position_mm[k - 1]))) {
+      throw Error(ErrorKind::argument, "positions in the table of a mode must be finite and ascend: position " +
+                                           std::to_string(k) + " is " + std::to_string(table.position_mm[k]) + " mm");
+    }
+    const double damping = table.damping_ratio.empty() ? 0.0 : table.damping_ratio[k];
+    static_cast<void>(pole({table.frequency_hz[k], damping, 1.0}));
+  }
+}
+
+Mode mode_at(const Mode& mode, const ModeTable& table, double position_mm) noexcept {
+  if (table.empty()) return mode;
+  const std::vector<double>& position = table.position_mm;
+  const auto above =
+      static_cast<std::size_t>(std::upper_bound(position.begin(), position.end(), position_mm) - position.begin());
+  const std::size_t last = position.size() - 1;
+  const std::size_t high = std::min(above, last);
+  const std::size_t low = above > 0 ? std::min(above - 1, last) : 0;
+  const double share = high > low ? (position_mm - position[low]) / (position[high] - position[low]) : 0.0;
+  const auto between = [&](const std::vector<double>& values) {
+    return values[low] + share * (values[high] - values[low]);
+  };
+  Mode here = mode;
+  here.frequency_hz = between(table.frequency_hz);
+  if (!table.damping_ratio.empty()) here.damping_ratio = between(table.damping_ratio);
+  return here;
+}
+
+}  // namespace shapegcode
