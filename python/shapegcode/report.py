@@ -209,8 +209,9 @@ def before_after_rows(report: Mapping[str, Any]) -> Iterator[Row]:
         for statistic, suffix in (("max", "largest"), ("rms", "RMS"), ("gouge", "gouge"), ("excess", "excess")):
             pair = _pair(contour.get(key), statistic)
             if pair is not None:
-                judged = (key, statistic) == ("command", "max")
-                limit = (report.get("limits") or {}).get("contour_um") if judged else None
+                limits = report.get("limits") or {}
+                judged = (key, statistic) == (limits.get("contour_target", "command"), "max")
+                limit = limits.get("contour_um") if judged else None
                 yield Row(f"{name}, {suffix}", "µm", *pair, section=section, limit=limit)
                 section = False
 

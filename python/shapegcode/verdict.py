@@ -91,7 +91,7 @@ def measure(
         )  # fmt: skip
         runs = [pool.submit(player.nominal, rule) for rule in _BLOCK_ENDS]
         planned = pool.submit(player.planned)
-        rest = pool.submit(player.others)
+        rest = [pool.submit(player.others, group) for group in player.groups()]
         slowed = pool.submit(
             _core.count_slowed_blocks, player.blocks, limits.corner_speed_difference_mm_per_s, limits.max_feed_mm_per_s
         )
@@ -99,7 +99,9 @@ def measure(
     results: list[RegionFigures] = []
     for original, (player, runs, planned, rest, slowed) in zip(originals, running, strict=True):
         nominal = tuple(run.result() for run in runs)
-        figures = player.figures(nominal, planned.result(), rest.result())
+        figures = player.figures(
+            nominal, planned.result(), {k: run for part in rest for k, run in part.result().items()}
+        )
         results.append(RegionFigures(original.result(), nominal, figures, slowed.result()))
         on_step(len(results), len(placed))
     return results
@@ -129,13 +131,18 @@ class _CasePlayer:
         wanted = any(case.look_ahead for case in self.cases)
         return play_planned(self.blocks, self.path, self.machine, offset=self.offset) if wanted else None
 
-    def others(self) -> dict[str, _core.PlaybackFigures]:
-        """Overrides and shifted modes by the name of their case."""
+    def groups(self) -> list[list[Case]]:
+        """Overrides and shifted modes: those played in full each by itself, the short ones in one task."""
+        others = [case for case in self.cases if case.override != 1.0 or case.mode is not None]
+        target = contour_target(self.machine)
+        whole = [[case] for case in others if case.needs_contour(target)]
+        return [*whole, [case for case in others if not case.needs_contour(target)]]
+
+    def others(self, cases: Sequence[Case]) -> dict[str, _core.PlaybackFigures]:
+        """A group of them by the name of their case."""
         memory_s = vibration_memory_s(self.machine)
         played = {}
-        for case in self.cases:
-            if case.override == 1.0 and case.mode is None:
-                continue
+        for case in cases:
             machine = self.machine if case.mode in (None, ALL_MODES) else with_one_uncertain(self.machine, case.mode)
             whole = case.needs_contour(contour_target(machine))
             played[case.name] = play_emitted(
