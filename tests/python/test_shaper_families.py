@@ -108,7 +108,7 @@ def test_one_mode_on_any_times(name: str, zeta: float) -> None:
             assert np.abs(steps - np.round(steps)).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", [*EXACT, *TOLERANT])
+@pytest.mark.parametrize("name", ["zvd", "mzv", "ei", "negative-zv", "si"])
 def test_two_modes_on_any_times(name: str) -> None:
     for period_s in (None, 0.005):
         found = design(name, [SLOW, FAST], options(period_s))[0]
@@ -383,7 +383,7 @@ def test_random_modes_on_random_grids() -> None:
     rng = np.random.default_rng(5)
     names = itertools.cycle(("zv", "zvd", "mzv", "ei", "negative-zv", "si"))
     designed = 0
-    for name, _ in zip(names, range(24), strict=False):
+    for name, _ in zip(names, range(18), strict=False):
         band = ModeBand(Mode(float(rng.uniform(15.0, 150.0)), float(rng.uniform(0.0, 0.08))), 0.05)
         try:
             found = design(name, [band], options(float(rng.choice(PERIODS_S))))[0]
@@ -394,7 +394,7 @@ def test_random_modes_on_random_grids() -> None:
         left = left_of(found.shaper, band.mode.frequency_hz, band.mode.damping_ratio)
         assert left <= (0.05 * (1.0 + 1e-9) if name in TOLERANT else 1e-10)
         assert found.worst_residual >= sampled_worst(found.shaper, band) * (1.0 - 2e-6) - 1e-11
-    assert designed > 20
+    assert designed > 15
 
 
 # --- figures of the documentation and of the specification ----------------------------------------------------
