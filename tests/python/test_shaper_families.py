@@ -320,6 +320,8 @@ def test_a_grid_that_sees_no_vibration_is_refused_with_what_is_nearest() -> None
         design("zvd", [SLOW], options(max_duration_s=0.02))
     with pytest.raises(DesignError, match=r"negative-zv lasts .* with sum\|a\| 27: the limits are 250 ms and 10"):
         design("negative-zv", [SLOW, FAST, ModeBand(Mode(75.0, 0.02))])
+    with pytest.raises(DesignError, match=r"within 10 ms; one ZV after the other lasts 14\.689\d ms"):
+        simultaneous_zv([SLOW.mode, FAST.mode], 0.01)
     with pytest.raises(DesignError, match="the polynomial with its zeros lasts 4 ms with sum"):
         conditions = Conditions(zeros=(Zero(SLOW.mode),), limits=(ResidualLimit(SLOW.mode, 1.0, 46.0, 0.05),))
         shortest_on_grid(conditions, 0.002, 0.02, title="design that nothing meets")
