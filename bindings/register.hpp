@@ -2,12 +2,14 @@
 
 #include <pybind11/pybind11.h>
 
-// register_shaping keeps the global namespace of its own file.
+// These two keep the global namespace of their own files.
 void register_shaping(pybind11::module_& module);
+void register_shaping_families(pybind11::module_& module);
 
 namespace shapegcode::bindings {
 
 void register_errors(pybind11::module_& module);
+void register_minimal(pybind11::module_& module);
 void register_filter(pybind11::module_& module);
 void register_path(pybind11::module_& module);
 void register_gcode(pybind11::module_& module);

@@ -73,7 +73,16 @@ if TYPE_CHECKING:
     from shapegcode.machine import MachineError as MachineError
     from shapegcode.program import Program as Program
     from shapegcode.shaping import (
+        ModeBand as ModeBand,
+    )
+    from shapegcode.shaping import (
+        Recommendation as Recommendation,
+    )
+    from shapegcode.shaping import (
         choose_block_period as choose_block_period,
+    )
+    from shapegcode.shaping import (
+        choose_shaper as choose_shaper,
     )
     from shapegcode.shaping import (
         shortest_non_negative as shortest_non_negative,
@@ -97,7 +106,9 @@ _HOME = {
     **dict.fromkeys(("Conversion", "choose_grid", "convert"), "converter"),
     **dict.fromkeys(("Machine", "MachineError"), "machine"),
     "Program": "program",
-    **dict.fromkeys(("choose_block_period", "shortest_non_negative"), "shaping"),
+    **dict.fromkeys(
+        ("ModeBand", "Recommendation", "choose_block_period", "choose_shaper", "shortest_non_negative"), "shaping"
+    ),
     **dict.fromkeys(("Simulation", "simulate"), "simulator"),
     **dict.fromkeys(("CycleTime", "cycle_time"), "timing"),
 }  # fmt: skip

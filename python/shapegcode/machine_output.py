@@ -90,6 +90,12 @@ class Shaping(Table):
         unit="1",
         default=1.0,
     )
+    contour: Literal["response", "command", "off"] = key(
+        "what is brought back to the programmed path behind the shaper, at the highest feed that keeps "
+        'tolerance.contour_um: "response" is the table with its modes, and so the part; "command" the set-points; '
+        '"off": neither, the feed alone keeps the command within the tolerance',
+        default="response",
+    )
     plunge_angle_deg: Annotated[NonNegative, Field(le=90)] = key(
         "a corner is a forced stop of the shaped command if a side of it leans from the Z axis by no more than "
         "this and the direction changes by 45 degrees or more: a shaper must not mix plunges with other cuts",
@@ -108,7 +114,9 @@ class Tolerance(Table):
     """When an emitted program is good: outside these limits the conversion says so and exits with 1."""
 
     contour_um: Positive = key(
-        "largest deviation of the emitted command from the programmed path", unit="µm", default=50.0
+        "largest deviation from the programmed path of what shaping.contour names: the response, or the command",
+        unit="µm",
+        default=20.0,
     )
     residual_ratio: Annotated[NonNegative, Field(le=1)] = key(
         "residual vibration passes if it is below this share of the original program's, or below residual_floor_um",

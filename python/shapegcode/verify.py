@@ -291,6 +291,17 @@ def summarise(figures: Sequence[RegionFigures], placed: Sequence[Placed], machin
     }
 
 
+def contour_target(machine: Machine) -> str:
+    """What the contour tolerance is about: "command" or "response"."""
+    return "response" if machine.shaping.contour == "response" else "command"
+
+
+def contour_um(runs: Iterable[_core.PlaybackFigures], machine: Machine) -> float:
+    """Largest deviation from the path of what the contour tolerance is about, µm."""
+    target = contour_target(machine)
+    return max(float(getattr(run, target).max_abs_mm) for run in runs) * 1e3
+
+
 def _region_summary(figures: RegionFigures, place: Placed, machine: Machine) -> dict[str, Any]:
     tolerance = machine.tolerance
     misses = []
@@ -302,9 +313,11 @@ def _region_summary(figures: RegionFigures, place: Placed, machine: Machine) -> 
     for axis, now, limit in zip("XYZ", after, limits, strict=True):
         if now > limit:
             misses.append(f"residual vibration {axis} {now:.2f} um, limit {limit:.2f} um")
-    contour = max(run.command.max_abs_mm for run in figures.emitted) * 1e3
+    contour = contour_um(figures.emitted, machine)
     if contour > tolerance.contour_um:
-        misses.append(f"contour error of the command {contour:.1f} um, limit {tolerance.contour_um:.1f} um")
+        misses.append(
+            f"contour error of the {contour_target(machine)} {contour:.1f} um, limit {tolerance.contour_um:.1f} um"
+        )
     return {
         "lines": [place.region.first_line, place.region.last_line],
         "emitted_lines": [place.first_line, place.last_line],

@@ -343,19 +343,19 @@ void RunShaper::forget() {
   if (keep - base_ < static_cast<std::ptrdiff_t>(forget_after)) {
     return;
   }
-  const auto drop = [&](auto& column) {
-    if (!column.empty()) {
-      column.erase(column.begin(), column.begin() + (keep - base_));
-    }
-  };
+  const auto drop = [&](auto& column) { column.erase(column.begin(), column.begin() + (keep - base_)); };
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     drop(command_[axis]);
     drop(correction_[axis]);
-    drop(error_[axis]);
+    if (target_) {
+      drop(error_[axis]);
+    }
   }
-  drop(tangent_);
-  drop(wanted_);
-  drop(segment_);
+  if (measured_ != nullptr) {
+    drop(tangent_);
+    drop(wanted_);
+    drop(segment_);
+  }
   base_ = keep;
 }
 

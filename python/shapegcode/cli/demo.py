@@ -15,9 +15,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "name",
         metavar="NAME",
-        choices=("path", "cycle-time"),
+        choices=("path", "cycle-time", "shaper"),
         help="path: line, arc, line of paper 000 at both feeds and reductions; "
-        "cycle-time: a test piece with the features of ISO 10791-7 with both sets of constants of paper 004",
+        "cycle-time: a test piece with the features of ISO 10791-7 with both sets of constants of paper 004; "
+        "shaper: the two-mode shapers of paper 002, figures 2 to 6, and its test on a stage",
+    )
+    parser.add_argument(
+        "--plots",
+        metavar="DIR",
+        default="demo-output",
+        help="folder for the pictures of `shaper` (PNG and SVG; default: %(default)s)",
     )
     add_json_argument(parser)
 
@@ -26,9 +33,41 @@ def run(args: argparse.Namespace) -> int:
     """Run one demonstration.
 
     Raises:
-        OSError: the JSON file cannot be written.
+        OSError: the JSON file or a picture cannot be written.
     """
+    if args.name == "shaper":
+        return _shaper(args.json, args.plots)
     return _cycle_time(args.json) if args.name == "cycle-time" else _path(args.json)
+
+
+def _shaper(json_target: str | None, folder: str) -> int:
+    from rich.table import Table
+
+    from shapegcode.cli import ExitCode
+    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.demo_shaper import shaper_demo
+    from shapegcode.demo_shaper_picture import write_demo_pictures
+
+    with progress("paper 002", json_target) as bar:
+        bar.wait()
+        demo = shaper_demo()
+        pictures = write_demo_pictures(demo, folder)
+    if json_target is not None:
+        write_json({**demo.report, "pictures": pictures}, json_target)
+    console = output_console(json_target)
+    table = Table(title="Paper 002: two-mode shapers for 1 Hz and 4 Hz")
+    table.add_column("figure", no_wrap=True)
+    for column in ("what", "paper", "here"):
+        table.add_column(column, overflow="fold")
+    table.add_column("agrees")
+    verdicts = {True: "yes", False: "NO", None: ""}
+    for row in demo.report["rows"]:
+        table.add_row(row["figure"], row["what"], row["paper"], row["here"], verdicts[row["agrees"]])
+    console.print(table)
+    console.print(demo.report["remark"], markup=False)
+    console.print(f"pictures: {folder}/paper002-*", markup=False)
+    console.print("next: shapegcode shaper --mode 1 --mode 4 --period continuous --max-duration 1s", markup=False)
+    return ExitCode.OK if demo.report["agrees"] else ExitCode.OUT_OF_TOLERANCE
 
 
 def _path(json_target: str | None) -> int:

@@ -1,15 +1,14 @@
-"""Shaper designs on a sample grid that need an optimiser, and the choice of the block period.
+"""Exact shaper designs on a sample grid that need an optimiser.
 
 A shaper survives being written as blocks only if its taps lie on the block grid and its zeros are exact there
 (spec 2 and 4). The shortest exact design is a polynomial (:func:`shapegcode._core.grid_polynomial`), but its
-taps may be wild; :func:`shortest_non_negative` spends a few more taps on a design that never reverses, and
-:func:`choose_block_period` compares block periods, because they decide how long that takes.
+taps may be wild; :func:`shortest_non_negative` spends a few more taps on a design that never reverses.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +16,9 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog, nnls
 
 from shapegcode._core import ArgumentError, DesignError, Mode, ShapegcodeError, Shaper, grid_polynomial
+from shapegcode.shaping.band import ModeBand
 
-__all__ = ["BlockPeriodCandidate", "BlockPeriodChoice", "choose_block_period", "shortest_non_negative"]
+__all__ = ["RESIDUAL_LIMIT", "check_modes_and_times", "exact_conditions", "lower_hull", "ms", "shortest_non_negative"]
 
 FloatArray = NDArray[np.float64]
 
@@ -31,28 +31,6 @@ _SUPPORT_THRESHOLDS = (1e-9, 1e-13)  # amplitudes above one of these are taps of
 _SAME_OBJECTIVE = 1e-9  # of the squared duration
 _SAME_DURATION = 0.02  # designs whose durations differ by less are equal, relative
 _ON_GRID = 1e-9  # periods; forgives the rounding of a quotient
-
-
-class BlockPeriodCandidate(NamedTuple):
-    """One row of the comparison of block periods."""
-
-    period_s: float
-    """Block period in s, a whole multiple of the interpolation period."""
-    shaper: Shaper | None
-    """Shortest non-negative shaper on that grid, or None if there is none."""
-    refusal: str
-    """Why there is none; empty if there is one."""
-
-
-class BlockPeriodChoice(NamedTuple):
-    """The chosen block period, its shaper, and what it was chosen from."""
-
-    period_s: float
-    """Chosen block period in s."""
-    shaper: Shaper
-    """Shortest non-negative shaper on its grid."""
-    candidates: tuple[BlockPeriodCandidate, ...]
-    """Every period that was tried, ascending, the chosen one among them."""
 
 
 def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s: float = 0.25) -> Shaper:
@@ -79,7 +57,7 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
 
     Source: this project (spec 2, grid-exact shapers).
     """
-    _check_modes_and_times(modes, period_s=period_s, max_duration_s=max_duration_s)
+    check_modes_and_times(modes, period_s=period_s, max_duration_s=max_duration_s)
     most = math.floor(max_duration_s / period_s + _ON_GRID)
     last = _smallest_feasible(modes, period_s, most)
     while last is not None and last <= most:
@@ -91,74 +69,12 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
     raise DesignError(_none_exists(modes, period_s, max_duration_s))
 
 
-def choose_block_period(
-    modes: Sequence[Mode],
-    interpolation_period_s: float,
-    block_time_s: float,
-    max_block_period_s: float = 0.02,
-    max_duration_s: float = 0.25,
-) -> BlockPeriodChoice:
-    """Block period on which the shortest non-negative shaper is shortest.
-
-    Every whole multiple of the interpolation period from the controller's block time up to
-    `max_block_period_s` is tried. The shortest duration wins; among durations within 2 % of it the longest
-    period does, because it writes the fewest blocks.
-
-    Args:
-        modes: Modes to cancel, at least one.
-        interpolation_period_s: Interpolation period of the controller in s, above 0.
-        block_time_s: Time in s that the controller needs for a block, at least 0; no block is shorter.
-        max_block_period_s: Longest block period in s; the path is sampled once per block.
-        max_duration_s: Longest duration in s of a shaper.
-
-    Returns:
-        The period, its shaper, and the table of all candidates for the report.
+def check_modes_and_times(modes: Sequence[Mode | ModeBand], **times_s: float) -> None:
+    """Refuse no mode, and times that are not finite and positive.
 
     Raises:
-        ArgumentError: No mode, a time outside its range, or no multiple of the interpolation period in the
-        range. DesignError: No candidate has a non-negative shaper within `max_duration_s`.
-
-    Source: this project (spec 2: the block period is a design choice; spec 4).
+        ArgumentError: with name and value.
     """
-    _check_modes_and_times(
-        modes,
-        interpolation_period_s=interpolation_period_s,
-        max_block_period_s=max_block_period_s,
-        max_duration_s=max_duration_s,
-    )
-    if not (math.isfinite(block_time_s) and block_time_s >= 0.0):
-        raise ArgumentError(f"block_time_s is {block_time_s} s: it must be finite and at least 0")
-    fewest = max(1, math.ceil(block_time_s / interpolation_period_s - _ON_GRID))
-    most = math.floor(max_block_period_s / interpolation_period_s + _ON_GRID)
-    if fewest > most:
-        raise ArgumentError(
-            f"no block period between the block time of {_ms(block_time_s)} and the limit of "
-            f"{_ms(max_block_period_s)} is a multiple of the interpolation period of "
-            f"{_ms(interpolation_period_s)}"
-        )
-    candidates = tuple(
-        _candidate(modes, multiple * interpolation_period_s, max_duration_s) for multiple in range(fewest, most + 1)
-    )
-    designs = [(each.period_s, each.shaper) for each in candidates if each.shaper is not None]
-    if not designs:
-        raise DesignError(
-            f"no block period from {_ms(candidates[0].period_s)} to {_ms(candidates[-1].period_s)} in steps "
-            f"of {_ms(interpolation_period_s)} has a non-negative shaper within {_ms(max_duration_s)} for "
-            f"modes {_names(modes)}; the first says: {candidates[0].refusal}"
-        )
-    limit = (1.0 + _SAME_DURATION) * min(shaper.duration_s for _, shaper in designs)
-    period_s, shaper = max((each for each in designs if each[1].duration_s <= limit), key=lambda each: each[0])
-    return BlockPeriodChoice(period_s, shaper, candidates)
-
-
-def _candidate(modes: Sequence[Mode], period_s: float, max_duration_s: float) -> BlockPeriodCandidate:
-    try:
-        return BlockPeriodCandidate(period_s, shortest_non_negative(modes, period_s, max_duration_s), "")
-    except DesignError as error:
-        return BlockPeriodCandidate(period_s, None, str(error))
-
-
-def _check_modes_and_times(modes: Sequence[Mode], **times_s: float) -> None:
     if not modes:
         raise ArgumentError("a shaper needs at least one mode: 0 given")
     for name, value in times_s.items():
@@ -166,12 +82,15 @@ def _check_modes_and_times(modes: Sequence[Mode], **times_s: float) -> None:
             raise ArgumentError(f"{name} is {value} s: it must be finite and above 0")
 
 
-def _conditions(modes: Sequence[Mode], period_s: float, last: int) -> tuple[FloatArray, FloatArray]:
+def exact_conditions(modes: Sequence[Mode], period_s: float, last: int) -> tuple[FloatArray, FloatArray]:
     """Matrix and right-hand side of the equality conditions on the taps at 0, 1 ... `last` periods.
 
     The modes' rows (each mode's residual sum, which decay keeps at most 1) are replaced by an orthonormal
-    basis of their span: near-equal modes then cost no precision, and equal ones no row.
+    basis of their span: near-equal modes then cost no precision, and equal ones no row. Without modes the sum
+    is the only condition.
     """
+    if not modes:
+        return np.ones((1, last + 1)), np.ones(1)
     steps = np.arange(last + 1)
     poles = np.array([mode.pole for mode in modes])
     decay = np.exp(np.outer(poles.real * period_s, last - steps))
@@ -188,7 +107,7 @@ def _non_negative_solution(modes: Sequence[Mode], period_s: float, last: int) ->
     Lawson and Hanson's active-set method answers to rounding, where a linear program answers to its
     tolerance.
     """
-    matrix, right = _conditions(modes, period_s, last)
+    matrix, right = exact_conditions(modes, period_s, last)
     try:
         taps, residual = nnls(matrix, right)
     except RuntimeError:  # it cycled: the linear program decides
@@ -231,50 +150,86 @@ def _vertex(matrix: FloatArray, right: FloatArray, cost: FloatArray) -> FloatArr
 
 def _vertices(modes: Sequence[Mode], period_s: float, last: int) -> Iterator[FloatArray]:
     """Solutions worth polishing, the one with the least second central moment first."""
-    matrix, right = _conditions(modes, period_s, last)
-    time = np.arange(last + 1) / last
-    moments = np.vstack([time, time**2])
-
-    def variance(taps: FloatArray) -> float:
-        first, second = moments @ taps
-        return float(second - first**2)
-
-    yield from sorted(_lower_hull(matrix, right, moments), key=variance)
+    matrix, right = exact_conditions(modes, period_s, last)
+    yield from lower_hull(lambda cost: _vertex(matrix, right, cost), last)
     # a design at the edge of what is possible may lie within the linear program's tolerance
     taps = _non_negative_solution(modes, period_s, last)
     if taps is not None:
         yield taps
 
 
-def _lower_hull(matrix: FloatArray, right: FloatArray, moments: FloatArray) -> list[FloatArray]:
-    """Vertices of the lower edge of what the first two moments of the feasible taps can be.
+class _Corner(NamedTuple):
+    """Taps at the lower edge of what their first two moments can be, and the slope of a line that supports it there."""
 
-    The second central moment is concave in the taps, so no single linear program minimises it; but it is
-    least at one of these vertices, and each of them is a linear program.
+    taps: FloatArray
+    mean: float
+    second: float
+    slope: float | None
+    """None: the edge ends here, the line is vertical."""
+
+    @property
+    def variance(self) -> float:
+        return self.second - self.mean**2
+
+
+def lower_hull(
+    cheapest: Callable[[FloatArray], FloatArray | None], last: int, tolerance: float = 0.0
+) -> list[FloatArray]:
+    """Taps among which the second central moment is least: corners of the lower edge of the first two moments.
+
+    The second central moment is concave in the taps, so no convex program minimises it; but it is least at one of
+    these corners, and each of them has the least of a linear cost. Stretches of the edge where the supporting lines
+    of their ends prove that nothing better lies are left out.
+
+    Args:
+        cheapest: the taps at 0, 1 ... `last` periods of least cost, or None if there are none.
+        last: number of periods, at least 1.
+        tolerance: share by which a left-out corner may be better than the best one found.
     """
-    leftmost = _vertex(matrix, right, moments[0])
-    rightmost = _vertex(matrix, right, -moments[0])
+    time = np.arange(last + 1) / last
+    moments = np.vstack([time, time**2])
+
+    def corner(cost: FloatArray, slope: float | None) -> _Corner | None:
+        taps = cheapest(cost)
+        if taps is None:
+            return None
+        mean, second = (moments @ taps).tolist()
+        return _Corner(taps, mean, second, slope)
+
+    leftmost, rightmost = corner(moments[0], None), corner(-moments[0], None)
     if leftmost is None or rightmost is None:
         return []
     found = [leftmost, rightmost]
     edges = [(leftmost, rightmost)]
     while edges:
-        left, right_end = edges.pop()
-        rise = moments @ (right_end - left)
-        slope = rise[1] / rise[0] if rise[0] > _SAME_OBJECTIVE else 2.0 * float(moments[0] @ left)
-        cost = moments[1] - slope * moments[0]
-        below = _vertex(matrix, right, cost)
-        if below is None or cost @ below >= min(cost @ left, cost @ right_end) - _SAME_OBJECTIVE:
+        left, right = edges.pop()
+        if _least_between(left, right) >= (1.0 - tolerance) * min(each.variance for each in found):
+            continue
+        run = right.mean - left.mean
+        slope = (right.second - left.second) / run if run > _SAME_OBJECTIVE else 2.0 * left.mean
+        below = corner(moments[1] - slope * moments[0], slope)
+        least = min(left.second - slope * left.mean, right.second - slope * right.mean)
+        if below is None or below.second - slope * below.mean >= least - _SAME_OBJECTIVE:
             continue
         found.append(below)
-        if rise[0] > _SAME_OBJECTIVE:
-            edges += [(left, below), (below, right_end)]
-    return found
+        if run > _SAME_OBJECTIVE:
+            edges += [(left, below), (below, right)]
+    return [each.taps for each in sorted(found, key=lambda each: each.variance)]
+
+
+def _least_between(left: _Corner, right: _Corner) -> float:
+    """Lower bound on the second central moment between two corners, from the lines that support the edge there."""
+    if left.slope is None or right.slope is None or right.slope - left.slope <= _SAME_OBJECTIVE:
+        return -math.inf
+    rise = right.second - left.second + left.slope * left.mean - right.slope * right.mean
+    mean = rise / (left.slope - right.slope)
+    second = left.second + left.slope * (mean - left.mean)
+    return min(left.variance, right.variance, second - mean**2)
 
 
 def _polished(vertex: FloatArray, modes: Sequence[Mode], period_s: float) -> Shaper | None:
     """The vertex solved again to rounding on its own taps, or None if that is no non-negative design."""
-    matrix, right = _conditions(modes, period_s, len(vertex) - 1)
+    matrix, right = exact_conditions(modes, period_s, len(vertex) - 1)
     for threshold in _SUPPORT_THRESHOLDS:
         support = np.flatnonzero(vertex > threshold)
         columns = matrix[:, support]
@@ -292,16 +247,17 @@ def _polished(vertex: FloatArray, modes: Sequence[Mode], period_s: float) -> Sha
 def _none_exists(modes: Sequence[Mode], period_s: float, max_duration_s: float) -> str:
     try:
         polynomial = grid_polynomial(modes, period_s)
-        what_exists = f"the shortest polynomial lasts {_ms(polynomial.duration_s)} with sum|a| {polynomial.abs_sum:.4g}"
+        what_exists = f"the shortest polynomial lasts {ms(polynomial.duration_s)} with sum|a| {polynomial.abs_sum:.4g}"
     except ShapegcodeError as error:
         what_exists = f"nor is there a polynomial: {error}"
     return (
-        f"no non-negative design within {_ms(max_duration_s)} on a {_ms(period_s)} grid for modes "
+        f"no non-negative design within {ms(max_duration_s)} on a {ms(period_s)} grid for modes "
         f"{_names(modes)}; {what_exists}; try another period"
     )
 
 
-def _ms(time_s: float) -> str:
+def ms(time_s: float) -> str:
+    """A time for a message."""
     return f"{time_s * 1e3:.6g} ms"
 
 

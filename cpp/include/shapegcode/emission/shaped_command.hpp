@@ -27,7 +27,7 @@ struct ShapingOptions {
   /// tolerance, kept by the highest feed that does; without one, `limits` holds the bounds that plain shaping needs.
   ContourTarget target = ContourTarget::none;
   AxisModes modes;                  ///< of the response; nothing else is done with them
-  double contour_smoothness = 0.1;  ///< weight of the correction's second differences on half the block grid
+  double contour_smoothness = 1.0;  ///< weight of the correction's second differences on half the block grid
 };
 
 /// A region's command, shaped and on the block grid, ready for fit_blocks.

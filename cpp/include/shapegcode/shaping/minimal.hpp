@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "shapegcode/mode.hpp"
@@ -24,5 +26,45 @@ namespace shapegcode {
 /// Sources: paper 002; the search and the elimination of the amplitudes: this project.
 [[nodiscard]] std::vector<Shaper> minimal_two_mode(const Mode& first, const Mode& second, double max_duration_s,
                                                    double max_abs_sum = 10.0);
+
+/// How hard `minimal_shapers` searches where there are three modes or more.
+struct MinimalOptions {
+  double max_abs_sum = 10.0;         ///< largest sum |A_k|, at least 1
+  int max_starts = 100'000;          ///< Newton starts; fewer are used once every solution was found three times over
+  std::int64_t max_boxes = 400'000;  ///< boxes of times that the proof may look at; 0: no proof
+};
+
+/// The minimal shapers of some modes, and what is known about there being others.
+struct MinimalShapers {
+  std::vector<Shaper> shapers;    ///< ascending in duration, then in the times
+  bool complete = false;          ///< every box was settled: there is no other up to the largest duration
+  double complete_up_to_s = 0.0;  ///< the same up to this duration; 0: nothing is proven
+  double max_duration_s = 0.0;    ///< the region: largest duration
+  double max_abs_sum = 0.0;       ///< the region: largest sum |A_k|
+  std::int64_t boxes = 0;         ///< boxes looked at
+  std::int64_t unresolved = 0;    ///< boxes too small to halve on that could not be settled (solutions not isolated)
+  int starts = 0;                 ///< Newton starts
+  int converged = 0;              ///< how many of them reached a shaper in the region
+  int found_once = 0;             ///< shapers that one start alone reached; found_once/converged estimates the share
+                                  ///< of starts that would reach a shaper not yet listed (Good 1953)
+};
+
+/// Minimal multi-mode shapers (paper 002, eq. 4-11): n+1 impulses for n = 1 ... 6 modes, damped or not. All that were
+/// found with duration up to `max_duration_s` (s) and sum |A_k| up to `options.max_abs_sum`; residual_ratio of every
+/// mode is at most 1e-12 (1e-16 to 1e-14 as a rule). Shapers with fewer taps that serve all modes are listed too.
+///
+/// One mode is closed form, two are `minimal_two_mode`: both complete. Three and more are searched twice: by Newton
+/// from many low-discrepancy starts and from mirror images, and by halving boxes of times, each of which a bound on
+/// derivatives proves empty, or shrinks onto one solution. The boxes go in ascending duration, so that
+/// `complete_up_to_s` grows with `max_boxes`; as a rule they settle three modes within twice the duration of the
+/// convolved ZV, four within about half of it. Bounds are evaluated in floating point, rounding aside. Where solutions
+/// are not isolated (undamped modes at odd ratios, which one ZV serves) boxes stay unresolved.
+///
+/// Throws Error(argument) as `pole` does, on no mode or more than 6, if two poles lie within 1e-6 of one another
+/// (relative), if `max_duration_s` is not finite and positive or exceeds 100 periods of the fastest mode, if
+/// `max_abs_sum` is not finite or below 1, or if `max_starts` or `max_boxes` is negative.
+/// Sources: paper 002; the searches: this project.
+[[nodiscard]] MinimalShapers minimal_shapers(std::span<const Mode> modes, double max_duration_s,
+                                             const MinimalOptions& options = {});
 
 }  // namespace shapegcode

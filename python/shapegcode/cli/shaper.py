@@ -1,0 +1,212 @@
+"""``shapegcode shaper``: which input shapers there are for some modes, what each costs, and which to take."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shapegcode.cli.console import add_json_argument
+from shapegcode.cli.options import (
+    add_machine_argument,
+    add_plots_argument,
+    load_machine,
+    positive,
+    ratio,
+    refuse_same_file,
+    seconds,
+)
+
+if TYPE_CHECKING:
+    from shapegcode._core import Shaper
+
+__all__ = ["add_arguments", "run"]
+
+_CONTINUOUS = "continuous"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.description = (
+        "Designs every family of input shapers for some vibration modes and compares them: duration, what is left of "
+        "the vibration if the frequencies are off, contour cost, negative taps; and recommends one. "
+        "Exit code 0: it stays within the vibration limit; 1: the best one does not; 2: bad input."
+    )
+    parser.epilog = "example: shapegcode shaper --mode 46:0.02±5% --mode 131:0.02 --period 5ms"
+    parser.add_argument(
+        "--mode",
+        metavar="HZ[:DAMPING][±BAND]",
+        action="append",
+        default=[],
+        help="a mode to cancel, such as 46:0.02±5%% or 46:0.02+-2Hz; once for each mode",
+    )
+    add_machine_argument(parser, required=False)
+    parser.add_argument(
+        "--band",
+        metavar="PERCENT",
+        type=_band,
+        default=0.0,
+        help="how far the frequency of a mode that states no band may be off, for example 5%% (default: 0)",
+    )
+    parser.add_argument(
+        "--period",
+        metavar="TIME",
+        type=_period,
+        action="append",
+        default=None,
+        help=f"block period on which the taps must lie, for example 5ms, or {_CONTINUOUS!r}; may be repeated (default: "
+        "the machine's, or the best few; without a machine continuous times too)",
+    )
+    parser.add_argument(
+        "--family", metavar="NAME", action="extend", nargs="+", default=None, help="compare only these families"
+    )
+    parser.add_argument("--list-families", action="store_true", help="say which families there are, and nothing else")
+    parser.add_argument(
+        "--max-duration",
+        metavar="TIME",
+        type=seconds,
+        default=None,
+        help="longest shaper, for example 50ms (default: the machine's, else three periods of the slowest mode)",
+    )
+    parser.add_argument(
+        "--max-abs-sum",
+        metavar="N",
+        type=positive,
+        default=10.0,
+        help="largest sum of the taps' magnitudes (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--vibration-limit",
+        metavar="RATIO",
+        type=ratio,
+        default=0.05,
+        help="largest share of the vibration that may be left anywhere in the bands (default: 5%%)",
+    )
+    parser.add_argument(
+        "--objective",
+        choices=("shortest", "contour", "robust"),
+        default="shortest",
+        help="what is least in the design to take, within the limit: duration, contour cost, or what is left of the "
+        "vibration (default: %(default)s)",
+    )
+    parser.add_argument("--negative", action="store_true", help="a design with negative taps may be recommended")
+    parser.add_argument(
+        "--taps", metavar="TIME:A,...", default=None, help='compare a shaper of your own: "0:.5,10.9ms:.5"'
+    )
+    parser.add_argument(
+        "--speed",
+        metavar="MM/S",
+        type=positive,
+        default=200.0,
+        help="speed at which the contour cost is shown (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--radius",
+        metavar="MM",
+        type=positive,
+        default=20.0,
+        help="radius of the arc on which it is shown (default: %(default)g)",
+    )
+    add_plots_argument(parser, "write pictures of the comparison (PNG and SVG) into this folder")
+    add_json_argument(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compare shapers.
+
+    Raises:
+        ArgumentError, MachineError: bad input.
+        DesignError: a mode cannot be cancelled on the grid, or no family has a design.
+        OSError: a file cannot be read or written.
+    """
+    from shapegcode._core import ArgumentError
+    from shapegcode.cli import ExitCode
+    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.shaper_table import designs_table, families_table, next_step, refusals_table, verdict
+    from shapegcode.shaping import choose_shaper
+
+    console = output_console(args.json)
+    if args.list_families:
+        console.print(families_table())
+        return ExitCode.OK
+    if bool(args.mode) == (args.machine is not None):
+        raise ArgumentError("the modes come from --mode 46:0.02 ... or from -m MACHINE: give one of both")
+    machine = None
+    if args.machine is not None:
+        machine = load_machine(args)
+        if args.json not in (None, "-"):
+            refuse_same_file([Path(args.json)], [Path(args.machine)])
+    with progress("comparing shapers", args.json) as bar:
+        bar.wait()
+        result = choose_shaper(
+            args.mode,
+            machine=machine,
+            uncertainty=args.band,
+            periods_s=None if args.period is None else [period_s or None for period_s in args.period],
+            families=args.family,
+            max_duration_s=args.max_duration,
+            max_abs_sum=args.max_abs_sum,
+            vibration_limit=args.vibration_limit,
+            objective=args.objective,
+            allow_negative=args.negative,
+            taps=None if args.taps is None else _taps(args.taps),
+        )
+    if args.plots is not None:
+        from shapegcode.shaper_picture import write_shaper_pictures
+
+        write_shaper_pictures(result, args.plots)
+    if args.json is not None:
+        write_json(result.report(), args.json)
+    console.print(designs_table(result, args.speed, args.radius))
+    if result.refusals:
+        console.print(refusals_table(result.refusals))
+    for line in verdict(result):
+        console.print(line, markup=False)
+    console.print(f"next: {next_step(result, args.machine)}", markup=False)
+    return ExitCode.OK if result.within_limit else ExitCode.OUT_OF_TOLERANCE
+
+
+def _period(text: str) -> float:
+    """A time, or 0 for continuous times."""
+    return 0.0 if text == _CONTINUOUS else seconds(text)
+
+
+def _band(text: str) -> float:
+    """A share such as ``5%`` or ``0.05``, at least 0 and below 1."""
+    try:
+        value = float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value < 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be at least 0 and below 100%, for example 5%")
+    return value
+
+
+def _taps(text: str) -> Shaper:
+    """A shaper written as ``0:.5,10.9ms:.5``.
+
+    Raises:
+        ArgumentError: not of that form, or taps that are no shaper.
+    """
+    from shapegcode._core import ArgumentError, Shaper
+
+    times_s, amplitudes = [], []
+    for part in text.split(","):
+        time, sign, amplitude = part.strip().partition(":")
+        try:
+            times_s.append(0.0 if _float_or_none(time) == 0.0 else seconds(time.strip()))
+            amplitudes.append(float(amplitude))
+        except (ValueError, argparse.ArgumentTypeError):
+            sign = ""
+        if not sign:
+            raise ArgumentError(f"--taps: {part.strip()!r} is no tap: TIME:AMPLITUDE, for example 10.9ms:.5")
+    return Shaper(times_s, amplitudes)
+
+
+def _float_or_none(text: str) -> float | None:
+    """The number, or None."""
+    try:
+        return float(text)
+    except ValueError:
+        return None

@@ -1,0 +1,222 @@
+"""The pictures of ``shapegcode shaper``: what the designs cost, what they leave, and what they do to a step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapegcode import canvas
+from shapegcode._core import Mode, Shaper
+from shapegcode.modal_response import respond, shaped_step
+from shapegcode.shaper_table import shown, times_name
+from shapegcode.shaping.band import ModeBand
+from shapegcode.shaping.choice import Recommendation
+from shapegcode.shaping.design import Design
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = [
+    "plot_impulses", "plot_pareto", "plot_sensitivity", "plot_steps", "residual_curve", "selected",
+    "write_shaper_pictures",
+]  # fmt: skip
+
+_CURVES = 6
+_FREQUENCIES = 601
+_SAMPLES_OF_A_STEP = 3000
+_SWINGS_SHOWN = 3.0  # of the slowest mode, behind the longest shaper
+
+
+def write_shaper_pictures(result: Recommendation, folder: str | Path) -> list[str]:
+    """Write ``shaper-pareto``, ``-sensitivity``, ``-impulses`` and ``-steps`` (PNG and SVG) into a folder.
+
+    Returns:
+        The files written.
+
+    Raises:
+        OSError: the folder cannot be made or a file not be written.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    designs = {name(each): each.shaper for each in selected(result)}
+    modes = [band.mode for band in result.bands]
+    pictures: dict[str, Callable[[Path], None]] = {
+        "pareto": lambda file: plot_pareto(file, result),
+        "sensitivity": lambda file: plot_sensitivity(file, designs, result.bands, result.options.vibration_limit),
+        "impulses": lambda file: plot_impulses(file, designs),
+        "steps": lambda file: plot_steps(file, designs, modes),
+    }
+    files = []
+    for kind, plot in pictures.items():
+        for suffix in canvas.FORMATS:
+            files.append(folder / f"shaper-{kind}{suffix}")
+            plot(files[-1])
+    return [str(file) for file in files]
+
+
+def name(each: Design) -> str:
+    """A design in a legend."""
+    return f"{each.family}, {each.duration_s * 1e3:.4g} ms" + (
+        f" ({times_name(each.period_s)})" if each.period_s is not None else ""
+    )
+
+
+def selected(result: Recommendation, count: int = _CURVES) -> list[Design]:
+    """The designs worth a curve: what is recommended, then the shortest of the Pareto front, one of each family."""
+    places = [result.index, *([] if result.grid_index is None else [result.grid_index])]
+    families = {result.designs[place].family for place in places}
+    front = [place for place in shown(result) if result.pareto[place]]
+    for place in [*front, *shown(result)]:
+        if result.designs[place].family not in families:
+            families.add(result.designs[place].family)
+            places.append(place)
+    return [result.designs[place] for place in dict.fromkeys(places)][:count]
+
+
+def residual_curve(shaper: Shaper, frequencies_hz: NDArray[np.float64], modes: Sequence[Mode]) -> NDArray[np.float64]:
+    """Residual ratio over frequency, each with the damping ratio of the nearest of the modes."""
+    damping = [min(modes, key=lambda mode: abs(mode.frequency_hz - f)).damping_ratio for f in frequencies_hz]
+    pairs = zip(frequencies_hz, damping, strict=True)
+    return np.array([shaper.residual_ratio(Mode(float(f), zeta)) for f, zeta in pairs])
+
+
+def plot_pareto(file: str | Path, result: Recommendation) -> None:
+    """Worst residual and contour cost over duration; the Pareto front filled, what is recommended ringed.
+
+    Raises:
+        ValueError: a wrong ending.
+        OSError: the file cannot be written.
+    """
+    figure = canvas.figure(9.0, 7.0)
+    upper, lower = canvas.panels(figure, 2, 1)[0]
+    families = list(dict.fromkeys(each.family for each in result.designs))
+    colours = {family: canvas.COLOURS[number % len(canvas.COLOURS)] for number, family in enumerate(families)}
+    markers = {family: "osD^vP*X"[number // len(canvas.COLOURS) % 8] for number, family in enumerate(families)}
+    values: tuple[tuple[Axes, Callable[[Design], float]], ...] = (
+        (upper, lambda each: 100.0 * each.worst_residual),
+        (lower, lambda each: abs(each.variance_s2) * 1e6),
+    )
+    for panel, value in values:
+        for each, pareto in zip(result.designs, result.pareto, strict=True):
+            colour = colours[each.family]
+            panel.plot(
+                each.duration_s * 1e3, value(each), marker=markers[each.family], linestyle="none", markersize=7,
+                markeredgecolor=colour, markerfacecolor=colour if pareto else "none", alpha=1.0 if pareto else 0.6,
+            )  # fmt: skip
+        panel.plot(
+            result.design.duration_s * 1e3, value(result.design), marker="o", linestyle="none", markersize=16,
+            markerfacecolor="none", markeredgecolor="black",
+        )  # fmt: skip
+        panel.margins(0.05)
+    for family in families:
+        upper.plot([], [], marker=markers[family], linestyle="none", color=colours[family], label=family)
+    upper.axhline(100.0 * result.options.vibration_limit, color=canvas.GREY, linewidth=1.0, linestyle="--")
+    upper.set_ylabel("worst residual in %")
+    lower.set_ylabel("|σ²| in ms²: µm on R20 at 200 mm/s")
+    lower.set_xlabel("duration in ms")
+    canvas.legend_above(upper)
+    canvas.heading(figure, "Duration against what is left: filled = Pareto front, ringed = recommended", _modes(result))
+    canvas.save(figure, file)
+
+
+def plot_sensitivity(
+    file: str | Path, shapers: dict[str, Shaper], bands: Sequence[ModeBand], vibration_limit: float | None = None
+) -> None:
+    """Residual ratio over frequency, the bands of the modes shaded.
+
+    Raises:
+        ValueError: a wrong ending.
+        OSError: the file cannot be written.
+    """
+    figure = canvas.figure(9.0, 4.8)
+    panel = canvas.panels(figure, 1, 1)[0][0]
+    highest = max(band.mode.frequency_hz * (1.0 + band.uncertainty) for band in bands)
+    frequencies_hz = np.linspace(0.0, 1.25 * highest, _FREQUENCIES)[1:]
+    modes = [band.mode for band in bands]
+    for number, (label, shaper) in enumerate(shapers.items()):
+        panel.plot(
+            frequencies_hz, 100.0 * residual_curve(shaper, frequencies_hz, modes), label=label,
+            color=canvas.COLOURS[number % len(canvas.COLOURS)], linewidth=1.6,
+        )  # fmt: skip
+    for band in bands:
+        frequency, width = band.mode.frequency_hz, band.mode.frequency_hz * band.uncertainty
+        panel.axvspan(frequency - width, frequency + width, color="#e4e4e4", zorder=0)
+        panel.axvline(frequency, color=canvas.GREY, linewidth=0.8, zorder=0)
+    if vibration_limit is not None:
+        panel.axhline(100.0 * vibration_limit, color=canvas.GREY, linewidth=1.0, linestyle="--")
+    panel.set_ylim(bottom=0.0)
+    panel.set_xlabel("natural frequency in Hz")
+    panel.set_ylabel("residual vibration in %")
+    _legend(panel)
+    canvas.heading(figure, "What is left if the frequency is another one", "")
+    canvas.save(figure, file)
+
+
+def plot_impulses(file: str | Path, shapers: dict[str, Shaper]) -> None:
+    """The taps of each shaper.
+
+    Raises:
+        ValueError: a wrong ending.
+        OSError: the file cannot be written.
+    """
+    figure = canvas.figure(9.0, 1.2 + 1.35 * len(shapers))
+    column = canvas.panels(figure, len(shapers), 1)[0]
+    unit, scale = _time_unit(max(shaper.duration_s for shaper in shapers.values()))
+    for number, (panel, (label, shaper)) in enumerate(zip(column, shapers.items(), strict=True)):
+        colour = canvas.COLOURS[number % len(canvas.COLOURS)]
+        panel.vlines(shaper.times_s * scale, 0.0, shaper.amplitudes, color=colour, linewidth=2.5)
+        panel.plot(shaper.times_s * scale, shaper.amplitudes, "o", color=colour, markersize=4)
+        panel.axhline(0.0, color="black", linewidth=0.8)
+        panel.set_title(label, loc="left", fontsize=9)
+        panel.margins(x=0.03, y=0.15)
+    column[-1].set_xlabel(f"time in {unit}")
+    canvas.heading(figure, "Taps", "")
+    canvas.save(figure, file)
+
+
+def plot_steps(file: str | Path, shapers: dict[str, Shaper], modes: Sequence[Mode], *, unshaped: bool = True) -> None:
+    """A shaped unit step (the staircase), and how each mode follows it; grey: unshaped.
+
+    Raises:
+        ValueError: a wrong ending.
+        OSError: the file cannot be written.
+    """
+    slowest_s = 1.0 / min(mode.frequency_hz for mode in modes)
+    until_s = max(shaper.duration_s for shaper in shapers.values()) + _SWINGS_SHOWN * slowest_s
+    period_s = until_s / _SAMPLES_OF_A_STEP
+    unit, scale = _time_unit(until_s)
+    figure = canvas.figure(9.0, 2.2 + 1.9 * (1 + len(modes)))
+    column = canvas.panels(figure, 1 + len(modes), 1)[0]
+    if unshaped:
+        run = respond(modes, shaped_step(Shaper([0.0], [1.0]), period_s, until_s), period_s)
+        for place, panel in enumerate(column[1:]):
+            panel.plot(run.times_s * scale, run.responses[:, place], color=canvas.GREY, linewidth=0.8)
+    for number, (label, shaper) in enumerate(shapers.items()):
+        run = respond(modes, shaped_step(shaper, period_s, until_s), period_s)
+        colour = canvas.COLOURS[number % len(canvas.COLOURS)]
+        column[0].plot(run.times_s * scale, run.command, color=colour, linewidth=1.6, label=label)
+        for place, panel in enumerate(column[1:]):
+            panel.plot(run.times_s * scale, run.responses[:, place], color=colour, linewidth=1.4)
+    column[0].set_ylabel("command")
+    for panel, mode in zip(column[1:], modes, strict=True):
+        panel.set_ylabel(f"{mode.frequency_hz:g} Hz")
+    column[-1].set_xlabel(f"time in {unit}")
+    _legend(column[0])
+    canvas.heading(figure, "A step behind each shaper, and how the modes follow" + " (grey: unshaped)" * unshaped, "")
+    canvas.save(figure, file)
+
+
+def _legend(panel: Axes) -> None:
+    panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False, borderaxespad=0.2, fontsize=8)
+
+
+def _time_unit(longest_s: float) -> tuple[str, float]:
+    return ("s", 1.0) if longest_s >= 1.0 else ("ms", 1e3)
+
+
+def _modes(result: Recommendation) -> str:
+    return ", ".join(map(str, result.bands))

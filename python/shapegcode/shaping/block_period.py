@@ -1,0 +1,289 @@
+"""The choice of the block period: it decides how long a shaper on its grid must be.
+
+Candidates are the multiples of the controller's interpolation period. :func:`choose_block_period` compares the
+shortest exact designs, :func:`choose_robust_grid` the robust ones where modes state a band.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
+from shapegcode.shaping.band import ModeBand
+from shapegcode.shaping.grid_designs import check_modes_and_times, ms, shortest_non_negative
+from shapegcode.shaping.robust import VIBRATION_LIMIT
+from shapegcode.shaping.robust_search import RobustDesign, Task, best_within, names, shortest_below, unreachable
+
+__all__ = [
+    "BlockPeriodCandidate",
+    "BlockPeriodChoice",
+    "choose_block_period",
+    "choose_robust_grid",
+    "robust_candidate",
+]
+
+_SAME = 0.02  # designs whose durations (or worst residuals) differ by less are equal, relative
+_ON_GRID = 1e-9  # periods; forgives the rounding of a quotient
+
+
+class BlockPeriodCandidate(NamedTuple):
+    """One row of the comparison of block periods."""
+
+    period_s: float
+    """Block period in s, a whole multiple of the interpolation period."""
+    shaper: Shaper | None
+    """Best shaper on that grid, or None if there is none."""
+    refusal: str
+    """Why there is none; empty if there is one."""
+    worst_residual: float | None = None
+    """Largest residual ratio over the modes' bands, proven; None: no shaper, or no mode states a band."""
+    note: str = ""
+    """A sentence for the report where the shaper leaves more than the vibration limit; else empty."""
+
+    @property
+    def variance_s2(self) -> float | None:
+        """Contour cost of the shaper in s², or None if there is none."""
+        return None if self.shaper is None else self.shaper.variance_s2
+
+
+class BlockPeriodChoice(NamedTuple):
+    """The chosen block period, its shaper, and what it was chosen from."""
+
+    period_s: float
+    """Chosen block period in s."""
+    shaper: Shaper
+    """Best shaper on its grid."""
+    candidates: tuple[BlockPeriodCandidate, ...]
+    """Every period that was tried, ascending, the chosen one among them."""
+    worst_residual: float | None = None
+    """Largest residual ratio over the modes' bands, proven; None: no mode states a band."""
+    note: str = ""
+    """A sentence for the report where the shaper leaves more than the vibration limit; else empty."""
+
+
+def choose_block_period(
+    modes: Sequence[Mode],
+    interpolation_period_s: float,
+    block_time_s: float,
+    max_block_period_s: float = 0.02,
+    max_duration_s: float = 0.25,
+) -> BlockPeriodChoice:
+    """Block period on which the shortest non-negative shaper is shortest.
+
+    Every whole multiple of the interpolation period from the controller's block time up to
+    `max_block_period_s` is tried. The shortest duration wins; among durations within 2 % of it the longest
+    period does, because it writes the fewest blocks.
+
+    Args:
+        modes: Modes to cancel, at least one.
+        interpolation_period_s: Interpolation period of the controller in s, above 0.
+        block_time_s: Time in s that the controller needs for a block, at least 0; no block is shorter.
+        max_block_period_s: Longest block period in s; the path is sampled once per block.
+        max_duration_s: Longest duration in s of a shaper.
+
+    Returns:
+        The period, its shaper, and the table of all candidates for the report.
+
+    Raises:
+        ArgumentError: No mode, a time outside its range, or no multiple of the interpolation period in the
+        range. DesignError: No candidate has a non-negative shaper within `max_duration_s`.
+
+    Source: this project (spec 2: the block period is a design choice; spec 4).
+    """
+    periods_s = _periods(modes, interpolation_period_s, block_time_s, max_block_period_s, max_duration_s)
+    candidates = tuple(_exact_candidate(modes, period_s, max_duration_s) for period_s in periods_s)
+    if all(each.shaper is None for each in candidates):
+        raise DesignError(
+            f"no block period from {ms(periods_s[0])} to {ms(periods_s[-1])} in steps of "
+            f"{ms(interpolation_period_s)} has a non-negative shaper within {ms(max_duration_s)} for modes "
+            f"{', '.join(f'{mode.frequency_hz:g} Hz (zeta {mode.damping_ratio:g})' for mode in modes)}; "
+            f"the first says: {candidates[0].refusal}"
+        )
+    return _shortest(candidates)
+
+
+def choose_robust_grid(
+    bands: Sequence[ModeBand],
+    interpolation_period_s: float,
+    block_time_s: float,
+    max_block_period_s: float = 0.02,
+    max_duration_s: float = 0.25,
+    vibration_limit: float = VIBRATION_LIMIT,
+) -> BlockPeriodChoice:
+    """Block period on which the shortest non-negative shaper that is robust over the modes' bands is shortest.
+
+    As :func:`choose_block_period`, with the shortest design that leaves at most `vibration_limit` anywhere in the
+    bands; a mode without a band is cancelled exactly. Without any band the two functions are the same. If no period
+    has such a design within `max_duration_s`, the design with the least worst residual of that duration is taken,
+    and `note` of the result says so; among worst residuals within 2 % of each other the longest period wins.
+
+    Args:
+        bands: Modes with their bands, at least one.
+        interpolation_period_s: Interpolation period of the controller in s, above 0.
+        block_time_s: Time in s that the controller needs for a block, at least 0; no block is shorter.
+        max_block_period_s: Longest block period in s; the path is sampled once per block.
+        max_duration_s: Longest duration in s of a shaper.
+        vibration_limit: Largest residual ratio over the bands, above 0 and below 1.
+
+    Returns:
+        The period, its shaper, the worst residual, and the table of all candidates. The contour cost is made least for
+        the chosen one only.
+
+    Raises:
+        ArgumentError: No mode, a value outside its range, or no multiple of the interpolation period in the range.
+        DesignError: No candidate has a design: the modes without a band cannot be cancelled within
+        `max_duration_s`, or every grid has a frequency of the bands that swings a whole number of times per period.
+
+    Source: this project (spec 2 and 4).
+    """
+    if not any(band.uncertainty for band in bands):
+        modes = [band.mode for band in bands]
+        return choose_block_period(modes, interpolation_period_s, block_time_s, max_block_period_s, max_duration_s)
+    _check_limit(vibration_limit)
+    periods_s = _periods(bands, interpolation_period_s, block_time_s, max_block_period_s, max_duration_s)
+    candidates = tuple(
+        _below_candidate(bands, period_s, max_duration_s, vibration_limit, least_cost=False) for period_s in periods_s
+    )
+    if any(each.shaper is not None for each in candidates):
+        period_s = _shortest(candidates).period_s
+        best = _below_candidate(bands, period_s, max_duration_s, vibration_limit, least_cost=True)
+        return _shortest(tuple(best if each.period_s == period_s else each for each in candidates))
+    candidates = tuple(_fallback(each, bands, max_duration_s, vibration_limit) for each in candidates)
+    found = [(each, each.worst_residual) for each in candidates if each.worst_residual is not None]
+    if not found:
+        raise DesignError(
+            f"no block period from {ms(periods_s[0])} to {ms(periods_s[-1])} in steps of "
+            f"{ms(interpolation_period_s)} has a design within {ms(max_duration_s)} for {names(bands)}; "
+            f"the first says: {candidates[0].refusal}"
+        )
+    least = (1.0 + _SAME) * min(worst for _, worst in found)
+    return _choice(max((each for each, worst in found if worst <= least), key=lambda each: each.period_s), candidates)
+
+
+def robust_candidate(
+    bands: Sequence[ModeBand],
+    period_s: float,
+    max_duration_s: float = 0.25,
+    vibration_limit: float = VIBRATION_LIMIT,
+) -> BlockPeriodCandidate:
+    """What :func:`choose_robust_grid` would take on one given period.
+
+    Args:
+        bands: Modes with their bands, at least one.
+        period_s: Block period in s, above 0.
+        max_duration_s: Longest duration in s of the shaper.
+        vibration_limit: Largest residual ratio over the bands, above 0 and below 1.
+
+    Returns:
+        The shortest design below the limit; failing that, the least worst one of the longest duration, and a note.
+
+    Raises:
+        ArgumentError: No mode, or a value outside its range.
+        DesignError: Neither exists; the message tells why.
+
+    Source: this project (spec 2 and 4).
+    """
+    check_modes_and_times(bands, period_s=period_s, max_duration_s=max_duration_s)
+    if not any(band.uncertainty for band in bands):
+        shaper = shortest_non_negative([band.mode for band in bands], period_s, max_duration_s)
+        return BlockPeriodCandidate(period_s, shaper, "")
+    _check_limit(vibration_limit)
+    candidate = _below_candidate(bands, period_s, max_duration_s, vibration_limit, least_cost=True)
+    if candidate.shaper is None:
+        candidate = _fallback(candidate, bands, max_duration_s, vibration_limit)
+    if candidate.shaper is None:
+        raise DesignError(candidate.refusal)
+    return candidate
+
+
+def _periods(
+    modes: Sequence[Mode | ModeBand],
+    interpolation_period_s: float,
+    block_time_s: float,
+    max_block_period_s: float,
+    max_duration_s: float,
+) -> list[float]:
+    """The block periods to try, ascending."""
+    check_modes_and_times(
+        modes,
+        interpolation_period_s=interpolation_period_s,
+        max_block_period_s=max_block_period_s,
+        max_duration_s=max_duration_s,
+    )
+    if not (math.isfinite(block_time_s) and block_time_s >= 0.0):
+        raise ArgumentError(f"block_time_s is {block_time_s} s: it must be finite and at least 0")
+    fewest = max(1, math.ceil(block_time_s / interpolation_period_s - _ON_GRID))
+    most = math.floor(max_block_period_s / interpolation_period_s + _ON_GRID)
+    if fewest > most:
+        raise ArgumentError(
+            f"no block period between the block time of {ms(block_time_s)} and the limit of "
+            f"{ms(max_block_period_s)} is a multiple of the interpolation period of {ms(interpolation_period_s)}"
+        )
+    return [multiple * interpolation_period_s for multiple in range(fewest, most + 1)]
+
+
+def _check_limit(vibration_limit: float) -> None:
+    if not 0.0 < vibration_limit < 1.0:
+        raise ArgumentError(f"vibration_limit is {vibration_limit}: it must be above 0 and below 1")
+
+
+def _shortest(candidates: tuple[BlockPeriodCandidate, ...]) -> BlockPeriodChoice:
+    durations_s = [each.shaper.duration_s for each in candidates if each.shaper is not None]
+    limit_s = (1.0 + _SAME) * min(durations_s)
+    short = [each for each in candidates if each.shaper is not None and each.shaper.duration_s <= limit_s]
+    return _choice(max(short, key=lambda each: each.period_s), candidates)
+
+
+def _choice(chosen: BlockPeriodCandidate, candidates: tuple[BlockPeriodCandidate, ...]) -> BlockPeriodChoice:
+    assert chosen.shaper is not None
+    return BlockPeriodChoice(chosen.period_s, chosen.shaper, candidates, chosen.worst_residual, chosen.note)
+
+
+def _exact_candidate(modes: Sequence[Mode], period_s: float, max_duration_s: float) -> BlockPeriodCandidate:
+    try:
+        return BlockPeriodCandidate(period_s, shortest_non_negative(modes, period_s, max_duration_s), "")
+    except DesignError as error:
+        return BlockPeriodCandidate(period_s, None, str(error))
+
+
+def _task(bands: Sequence[ModeBand], period_s: float) -> Task:
+    return Task.checked(bands, period_s, non_negative=True, max_abs_sum=1.0, zeros_at_nominal=False)
+
+
+def _below_candidate(
+    bands: Sequence[ModeBand], period_s: float, max_duration_s: float, limit: float, *, least_cost: bool
+) -> BlockPeriodCandidate:
+    """The shortest design below the limit, without the search for hints that a refusal by itself would make."""
+    task = _task(bands, period_s)
+    found = shortest_below(task, limit, max_duration_s, least_cost=least_cost)
+    if found is not None:
+        return _candidate(found)
+    reason = unreachable(task)
+    return BlockPeriodCandidate(
+        period_s, None,
+        f"no design within {ms(max_duration_s)} on a {ms(period_s)} grid leaves at most {100.0 * limit:.3g} % of "
+        f"{names(bands)}" + (f"; {reason}" if reason else ""),
+    )  # fmt: skip
+
+
+def _fallback(
+    refused: BlockPeriodCandidate, bands: Sequence[ModeBand], max_duration_s: float, limit: float
+) -> BlockPeriodCandidate:
+    """The least worst design of the longest duration, and the sentence that says so; else the refusal as it is."""
+    task = _task(bands, refused.period_s)
+    last = task.periods(max_duration_s)
+    found = best_within(task, last) if last and not unreachable(task) else None
+    if found is None:
+        return refused
+    note = (
+        f"no shaper within {ms(max_duration_s)} keeps {names(bands)} below {100.0 * limit:.3g} % of the vibration on a "
+        f"{ms(refused.period_s)} grid: the one with the least worst residual, {100.0 * found.worst_residual:.3g} %, "
+        "is used"
+    )
+    return _candidate(found)._replace(note=note)
+
+
+def _candidate(found: RobustDesign) -> BlockPeriodCandidate:
+    return BlockPeriodCandidate(found.period_s, found.shaper, "", found.worst_residual)

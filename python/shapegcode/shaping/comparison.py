@@ -1,0 +1,176 @@
+"""What a user asks of the choice among shapers: modes in words or of a machine, and the block periods worth trying."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from shapegcode._core import ArgumentError, Mode, Shaper
+from shapegcode.shaping.band import ModeBand, parse_mode_band
+from shapegcode.shaping.choice import Recommendation, choose
+from shapegcode.shaping.registry import DesignOptions
+from shapegcode.shaping.robust_search import Task, shortest_below
+
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
+
+__all__ = ["candidate_periods", "choose_shaper", "machine_bands"]
+
+_ASSUMED_TICK_S = 0.001  # interpolation period where no machine states one
+_LONGEST_BLOCK_PERIOD_S = 0.02
+_PERIODS_COMPARED = 4
+_SLOWEST_PERIODS = 3.0  # longest shaper where none is stated: three-hump EI of the slowest mode and of a faster one
+_FINEST_SHARE = 1.0 / 32.0  # of the fastest mode's period: a finer grid is as good as continuous times
+_WHOLE = 1e-6  # interpolation periods
+_BAND = re.compile(r"±|\+-|\+/-")  # a stated band, even one of 0
+
+
+def choose_shaper(
+    modes: Sequence[str | Mode | ModeBand] = (),
+    *,
+    machine: Machine | None = None,
+    uncertainty: float = 0.0,
+    periods_s: Sequence[float | None] | None = None,
+    families: Sequence[str] | None = None,
+    max_duration_s: float | None = None,
+    max_abs_sum: float = 10.0,
+    vibration_limit: float = 0.05,
+    objective: str = "shortest",
+    allow_negative: bool = False,
+    taps: Shaper | None = None,
+    on_progress: Callable[[float], None] = lambda _: None,
+) -> Recommendation:
+    """Compare every family of shapers for some modes, and recommend one.
+
+    >>> import shapegcode as sg
+    >>> sg.choose_shaper(["46:0.02±5%", "131:0.02"], periods_s=[0.005]).design.shaper
+
+    Args:
+        modes: texts such as ``46:0.02±5%`` (Hz, damping ratio, band), modes or bands; empty: those of the machine.
+        machine: its modes, unless some are given, and its controller: the block periods worth trying.
+        uncertainty: half width of the band, relative, of modes that state none.
+        periods_s: grids on which the taps may lie, s; None among them: continuous times too. None: with a machine its
+            block period or the best few, without one continuous times and the best few multiples of 1 ms.
+        families: names of the families to compare; None: all.
+        max_duration_s: longest shaper in s; None: the machine's, without one three periods of the slowest mode.
+        max_abs_sum: largest sum of the taps' magnitudes.
+        vibration_limit: largest worst residual ratio of the design to take.
+        objective: "shortest", "contour" (least contour cost) or "robust" (least worst residual).
+        allow_negative: whether a design with negative taps may be taken.
+        taps: a shaper of the user's own, compared with the others.
+        on_progress: called with the share of the work done, 0 to 1.
+
+    Raises:
+        ArgumentError: neither modes nor a machine with modes, equal modes, or a value outside its range.
+        DesignError: a mode cannot be cancelled on any of the grids, or no family has a design within the limits.
+    """
+    if modes:
+        bands = [_band(each, uncertainty) for each in modes]
+    elif machine is not None:
+        bands = machine_bands(machine, uncertainty)
+    else:
+        raise ArgumentError("a comparison of shapers needs modes or a machine: neither is given")
+    if max_duration_s is None:
+        slowest = min(band.mode.frequency_hz for band in bands)
+        max_duration_s = machine.shaping.max_duration_s if machine is not None else _SLOWEST_PERIODS / slowest
+    if periods_s is None:
+        best = candidate_periods(bands, machine, max_duration_s, vibration_limit)
+        periods_s = [*([None] if machine is None else []), *best]
+    elif machine is not None:
+        for period_s in periods_s:
+            _check_period(period_s, machine)
+    options = DesignOptions(max_duration_s=max_duration_s, max_abs_sum=max_abs_sum, vibration_limit=vibration_limit)
+    return choose(
+        bands, periods_s, options, families=families, objective=objective, allow_negative=allow_negative, taps=taps,
+        on_progress=on_progress,
+    )  # fmt: skip
+
+
+def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
+    """The modes of all axes of a machine with the bands that it states; equal ones once, with the wider band.
+
+    Args:
+        machine: its axes' modes; one shaper serves all axes, because different ones would distort the path.
+        uncertainty: half width of the band, relative, of modes that state none.
+
+    Raises:
+        ArgumentError: the machine has no mode, or an uncertainty outside its range.
+    """
+    widths: dict[tuple[float, float], float] = {}
+    for axis in machine.axes.as_tuple():
+        for mode in axis.modes:
+            stated = mode.frequency_uncertainty_percent
+            width = uncertainty if stated is None else stated / 100.0
+            key = mode.frequency_hz, mode.damping_ratio
+            widths[key] = max(width, widths.get(key, 0.0))
+    if not widths:
+        raise ArgumentError("the machine file gives no vibration mode (axes.x.modes): nothing to shape for")
+    return [ModeBand(Mode(*key), width) for key, width in widths.items()]
+
+
+def candidate_periods(
+    bands: Sequence[ModeBand], machine: Machine | None, max_duration_s: float, vibration_limit: float = 0.05
+) -> list[float]:
+    """The block periods worth comparing, ascending, s: those on which a non-negative shaper is shortest.
+
+    Args:
+        bands: the modes.
+        machine: a stated block period is the only candidate; else its interpolation period and block time say which
+            there are. None: multiples of 1 ms.
+        max_duration_s: longest shaper.
+        vibration_limit: largest worst residual ratio of the shapers that are compared.
+
+    Returns:
+        The best four of those up to 20 ms; the shortest four if none has such a shaper.
+
+    Raises:
+        ArgumentError: a value outside its range.
+    """
+    if machine is not None and machine.emission.block_period_s is not None:
+        return [machine.emission.block_period_s]
+    if machine is not None:
+        tick_s, least_s = machine.controller.interpolation_period_s, machine.controller.block_time_s
+    else:
+        least_s = _FINEST_SHARE / max(band.mode.frequency_hz for band in bands)
+        tick_s = _ASSUMED_TICK_S * max(1, math.ceil(least_s / _ASSUMED_TICK_S))
+    first = max(1, math.ceil(least_s / tick_s - _WHOLE))
+    last = max(first + _PERIODS_COMPARED - 1, math.floor(_LONGEST_BLOCK_PERIOD_S / tick_s + _WHOLE))
+    best: list[tuple[float, float]] = []  # duration, and the period with a minus: of equal durations the longer one
+    for multiple in range(first, last + 1):
+        period_s = multiple * tick_s
+        # What is longer than the worst of the best so far need not be found.
+        longest_s = best[-1][0] if len(best) == _PERIODS_COMPARED else max_duration_s
+        task = Task.checked(bands, period_s, non_negative=True, max_abs_sum=1.0, zeros_at_nominal=False)
+        found = shortest_below(task, vibration_limit, longest_s, least_cost=False)
+        if found is not None:
+            best = sorted([*best, (round(found.shaper.duration_s, 9), -period_s)])[:_PERIODS_COMPARED]
+    return sorted(-period_s for _, period_s in best) or [
+        multiple * tick_s for multiple in range(first, first + _PERIODS_COMPARED)
+    ]
+
+
+def _band(given: str | Mode | ModeBand, uncertainty: float) -> ModeBand:
+    if isinstance(given, Mode):
+        return ModeBand(given, uncertainty)
+    if isinstance(given, ModeBand):
+        return given
+    band = parse_mode_band(given)
+    return band if _BAND.search(given) else ModeBand(band.mode, uncertainty)
+
+
+def _check_period(period_s: float | None, machine: Machine) -> None:
+    """Refuse a grid that the machine's controller cannot play."""
+    if period_s is None:
+        return
+    tick_s, block_time_s = machine.controller.interpolation_period_s, machine.controller.block_time_s
+    ticks = period_s / tick_s
+    if round(ticks) < 1 or abs(ticks - round(ticks)) > _WHOLE:
+        raise ArgumentError(
+            f"period {period_s * 1e3:g} ms is no whole multiple of the interpolation period {tick_s * 1e3:g} ms"
+        )
+    if period_s < block_time_s * (1.0 - _WHOLE):
+        raise ArgumentError(
+            f"period {period_s * 1e3:g} ms is below the block time {block_time_s * 1e3:g} ms (controller.block_time_s)"
+        )

@@ -1,0 +1,290 @@
+"""The choice among shapers: the Pareto front by brute force, the rule of the recommendation, what is refused."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import shapegcode as sg
+from shapegcode._core import ArgumentError, DesignError, Mode, Shaper, convolved_zv, minimal_two_mode
+from shapegcode.shaping import (
+    Design,
+    DesignOptions,
+    ModeBand,
+    candidate_periods,
+    choose,
+    choose_shaper,
+    evaluate,
+    machine_bands,
+    pareto_front,
+    recommend,
+)
+
+PAPER = [ModeBand(Mode(46.0, 0.02), 0.05), ModeBand(Mode(131.0, 0.02))]
+
+
+def residual(times_s: list[float], amplitudes: list[float], frequency_hz: float, zeta: float) -> float:
+    """V of spec 2, written out."""
+    omega, end = 2.0 * math.pi * frequency_hz, times_s[-1]
+    damped = omega * math.sqrt(1.0 - zeta**2)
+    total = sum(
+        a * complex(math.cos(damped * t), math.sin(damped * t)) * math.exp(zeta * omega * (t - end))
+        for t, a in zip(times_s, amplitudes, strict=True)
+    )
+    return abs(total)
+
+
+def made(duration: float, worst: float, negative: bool = False, period_s: float | None = None) -> Design:
+    """A design of a given duration and worst residual."""
+    taps = (0.75, -0.25, 0.5) if negative else (0.25, 0.5, 0.25)
+    return Design("made", Shaper([0.0, duration / 2.0, duration], taps), period_s, worst, worst)
+
+
+designs = st.builds(
+    made,
+    st.sampled_from([0.008, 0.01, 0.012, 0.02]),
+    st.sampled_from([0.0, 1e-13, 0.01, 0.03, 0.05, 0.2]),
+    st.booleans(),
+    st.sampled_from([None, 0.001, 0.004]),
+)
+
+
+# --- Pareto front -------------------------------------------------------------------------------------------
+
+
+def dominates(one: Design, other: Design) -> bool:
+    if one.period_s is None and other.period_s is not None:
+        return False  # it cannot be written on a grid
+    pairs = [
+        (one.duration_s, other.duration_s),
+        (max(one.worst_residual, 1e-9), max(other.worst_residual, 1e-9)),
+        (abs(one.variance_s2), abs(other.variance_s2)),
+        (one.abs_sum, other.abs_sum),
+    ]
+    differing = [(a, b) for a, b in pairs if not math.isclose(a, b, rel_tol=1e-8)]
+    return bool(differing) and all(a < b for a, b in differing)
+
+
+@given(st.lists(designs, min_size=1, max_size=12))
+@settings(max_examples=100, deadline=None)
+def test_pareto_front_by_brute_force(found: list[Design]) -> None:
+    expected = [not any(dominates(one, other) for one in found) for other in found]
+    assert pareto_front(found) == expected
+    assert any(expected)
+
+
+def test_pareto_front_of_a_real_comparison() -> None:
+    result = choose(PAPER, [None, 0.002, 0.005])
+    expected = [not any(dominates(one, other) for one in result.designs) for other in result.designs]
+    assert list(result.pareto) == expected
+    assert pareto_front([]) == []
+
+
+# --- recommendation -----------------------------------------------------------------------------------------
+
+
+@given(st.lists(designs, min_size=1, max_size=12), st.floats(0.005, 0.3), st.floats(0.005, 0.3), st.booleans())
+@settings(max_examples=200, deadline=None)
+def test_a_tighter_limit_is_never_shorter(found: list[Design], one: float, other: float, negative: bool) -> None:
+    tight, loose = sorted((one, other))
+    chosen = [found[recommend(found, limit, allow_negative=negative)] for limit in (tight, loose)]
+    assert chosen[0].duration_s >= chosen[1].duration_s
+    assert chosen[0].worst_residual <= chosen[1].worst_residual or chosen[1].worst_residual <= tight
+    if not negative and any(not each.negative for each in found):
+        assert not chosen[0].negative
+    for limit, taken in zip((tight, loose), chosen, strict=True):
+        rivals = [each for each in found if negative or not each.negative] or found
+        good = [each for each in rivals if each.worst_residual <= limit]
+        if good:
+            assert taken.duration_s == min(each.duration_s for each in good)
+        else:
+            assert taken.worst_residual == min(each.worst_residual for each in rivals)
+
+
+def test_tighter_limits_through_all_families() -> None:
+    durations = [
+        choose_shaper(["46:0.02±5%"], periods_s=[0.004], vibration_limit=limit).design.duration_s
+        for limit in (0.3, 0.1, 0.05)
+    ]
+    assert durations == sorted(durations)
+
+
+def test_objectives_and_ties() -> None:
+    found = [made(0.02, 0.01), made(0.01, 0.04), made(0.012, 0.0, period_s=0.004), made(0.012, 0.0, period_s=0.006)]
+    assert recommend(found, 0.05) == 1
+    assert recommend(found, 0.05, "contour") == 1
+    assert recommend(found, 0.05, "robust") == 3  # equal but for the period: the longer one writes fewer blocks
+    assert recommend(found, 0.02) == 3
+    with pytest.raises(ArgumentError, match="0 given"):
+        recommend([], 0.05)
+
+
+def test_negative_taps_are_taken_only_where_allowed() -> None:
+    found = [made(0.02, 0.01), made(0.01, 0.01, negative=True)]
+    assert recommend(found, 0.05) == 0
+    assert recommend(found, 0.05, allow_negative=True) == 1
+    assert recommend(found[1:], 0.05) == 0
+
+
+def test_reasons_say_what_happened() -> None:
+    good = choose(PAPER, [0.005])
+    assert good.within_limit
+    assert "the shortest of" in good.reason
+    assert "46 Hz ±5 % and 131 Hz stays within 5 %" in good.reason
+    wide = choose([ModeBand(Mode(46.0, 0.02), 0.2)], [0.005], DesignOptions(max_duration_s=0.015))
+    assert not wide.within_limit
+    assert "this one leaves least" in wide.reason
+
+
+# --- the comparison -----------------------------------------------------------------------------------------
+
+
+def test_every_design_keeps_the_limits_and_says_its_own_figures() -> None:
+    result = choose(PAPER, [None, 0.001, 0.005], DesignOptions(max_duration_s=0.05, max_abs_sum=3.0))
+    report = result.report()
+    assert {row["period_s"] for row in report["designs"]} == {None, 0.001, 0.005}
+    for row in report["designs"]:
+        times_s, amplitudes = row["times_s"], row["amplitudes"]
+        assert row["duration_s"] == times_s[-1] <= 0.05
+        assert row["abs_sum"] == pytest.approx(sum(map(abs, amplitudes)), rel=1e-12)
+        assert row["abs_sum"] <= 3.0 + 1e-9
+        mean = np.dot(times_s, amplitudes)
+        assert row["variance_s2"] == pytest.approx(np.dot(np.square(times_s), amplitudes) - mean**2, abs=1e-15)
+        assert row["negative"] == (min(amplitudes) < 0.0)
+        nominal = max(residual(times_s, amplitudes, 46.0, 0.02), residual(times_s, amplitudes, 131.0, 0.02))
+        assert row["residual"] == pytest.approx(nominal, abs=1e-12)
+        swept = [residual(times_s, amplitudes, f, 0.02) for f in np.linspace(46.0 * 0.95, 46.0 * 1.05, 41)]
+        assert row["worst_residual"] == pytest.approx(max(*swept, nominal), rel=2e-3, abs=1e-9)
+    refused = [row for row in report["refused"] if row["family"] == "polynomial"]
+    assert [row["period_s"] for row in refused] == [0.001]
+    assert "247.9, the limit is 3" in refused[0]["reason"]
+
+
+def test_no_family_vanishes() -> None:
+    for periods_s in ([None], [0.005], [None, 0.005], [0.001, 0.008]):
+        result = choose(PAPER, periods_s)
+        named = {each.family for each in result.designs} | {each.family for each in result.refusals}
+        assert named >= {"zv", "polynomial", "non-negative"}
+
+
+def test_reference_residuals_at_a_frequency_ratio_of_two() -> None:
+    """Spec 2: zeta .03 and ±5 %: minimal 11.1 %, convolved ZV 6.8 %; undamped 12.7 and 7.75 %."""
+    for zeta, minimal, convolved in ((0.03, 11.1, 6.8), (0.0, 12.7, 7.75)):
+        bands = [ModeBand(Mode(10.0, zeta), 0.05), ModeBand(Mode(20.0, zeta), 0.05)]
+        one, other = (band.mode for band in bands)
+        shaper = next(each for each in minimal_two_mode(one, other, 0.2) if not each.has_negative)
+        assert 100.0 * evaluate("minimal", shaper, bands).worst_residual == pytest.approx(minimal, rel=0.01)
+        assert 100.0 * evaluate("zv", convolved_zv([one, other]), bands).worst_residual == pytest.approx(
+            convolved, rel=0.01
+        )
+
+
+def test_own_taps_are_compared() -> None:
+    own = Shaper([0.0, 0.010], [0.5, 0.5])
+    result = choose(PAPER, [None, 0.002, 0.005], taps=own)
+    row = next(each for each in result.designs if each.family == "taps")
+    assert row.period_s == 0.005  # the longest grid that holds them
+    assert row.worst_residual == pytest.approx(
+        max(residual([0.0, 0.01], [0.5, 0.5], f, 0.02) for f in (46.0 * 0.95, 46.0, 46.0 * 1.05, 131.0)), rel=1e-3
+    )
+    off = choose(PAPER, [0.005], taps=Shaper([0.0, 0.0109], [0.5, 0.5]))
+    assert all(each.family != "taps" for each in off.designs)
+    assert "not on a grid that was asked for" in next(each.reason for each in off.refusals if each.family == "taps")
+
+
+def test_bad_questions() -> None:
+    with pytest.raises(ArgumentError, match="0 given"):
+        choose([])
+    with pytest.raises(ArgumentError, match="modes 1 and 3 are equal"):
+        choose([PAPER[0], PAPER[1], ModeBand(Mode(46.0, 0.02), 0.1)])
+    with pytest.raises(ArgumentError, match="0 periods"):
+        choose(PAPER, [])
+    for bad in (0.0, -0.001, math.nan, math.inf):
+        with pytest.raises(ArgumentError, match="period"):
+            choose(PAPER, [0.005, bad, 0.004])
+        with pytest.raises(ArgumentError, match="max_duration_s"):
+            choose(PAPER, options=DesignOptions(max_duration_s=bad))
+    with pytest.raises(ArgumentError, match="no objective"):
+        choose(PAPER, objective="best")
+    with pytest.raises(ArgumentError, match="no family"):
+        choose(PAPER, families=["magic"])
+    with pytest.raises(DesignError, match="200 Hz cannot be cancelled on a grid of 5 ms"):
+        choose([ModeBand(Mode(200.0, 0.0))], [0.005])
+    with pytest.raises(DesignError, match=r"no family has a shaper for 46 Hz .* within 1 ms"):
+        choose(PAPER, options=DesignOptions(max_duration_s=0.001), families=["zv"])
+    partly = choose([ModeBand(Mode(200.0, 0.0))], [0.005, 0.004])
+    assert {each.period_s for each in partly.designs} == {0.004}
+    assert "200 Hz" in next(each.reason for each in partly.refusals if each.period_s == 0.005)
+
+
+# --- what a user asks ---------------------------------------------------------------------------------------
+
+
+def test_modes_as_text_mode_or_band_and_their_own_bands() -> None:
+    result = sg.choose_shaper(
+        ["46:0.02±0%", Mode(80.0, 0.01), ModeBand(Mode(131.0, 0.02), 0.03), "200"], uncertainty=0.05, periods_s=[0.003]
+    )
+    assert [band.uncertainty for band in result.bands] == [0.0, 0.05, 0.03, 0.05]
+    with pytest.raises(ArgumentError, match="neither is given"):
+        sg.choose_shaper()
+
+
+def test_without_a_period_continuous_times_and_the_best_grids() -> None:
+    result = sg.choose_shaper(["46:0.02", "131:0.02"])
+    periods_s = {each.period_s for each in result.designs}
+    assert None in periods_s
+    assert {0.001, 0.002} <= {round(each, 9) for each in periods_s if each is not None}  # spec 2: 12 ms at both
+    assert result.options.max_duration_s == pytest.approx(3.0 / 46.0)
+    on_grid = result.grid_index
+    assert on_grid is not None
+    assert result.designs[on_grid].period_s is not None
+    assert choose(PAPER).grid_index is None or choose(PAPER).designs
+
+
+def test_a_machine_gives_modes_bands_and_grids() -> None:
+    machine = sg.Machine.load("vx500")
+    result = sg.choose_shaper(machine=machine)
+    assert [band.mode for band in result.bands] == [Mode(46.0, 0.02), Mode(131.0, 0.02)]
+    assert result.design.duration_s == pytest.approx(0.02)  # spec 2: T = 5 ms
+    assert result.design.period_s == pytest.approx(0.005)
+    np.testing.assert_allclose(
+        result.design.shaper.amplitudes, [0.20394, 0.16162, 0.31387, 0.15731, 0.16327], atol=1e-5
+    )
+    assert all(each.period_s is not None and each.period_s >= 0.005 - 1e-12 for each in result.designs)
+    for period_s, message in ((0.0055, "whole multiple"), (0.003, "below the block time")):
+        with pytest.raises(ArgumentError, match=message):
+            sg.choose_shaper(machine=machine, periods_s=[period_s])
+
+
+def test_equal_modes_of_two_axes_count_once_with_the_wider_band() -> None:
+    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
+    for name, percent in (("x", 2.0), ("y", 5.0)):
+        data["axes"][name]["modes"] = [
+            {"frequency_hz": 46.0, "damping_ratio": 0.02, "frequency_uncertainty_percent": percent}
+        ]
+    data["axes"]["z"]["modes"] = [{"frequency_hz": 90.0, "damping_ratio": 0.02}]
+    machine = sg.Machine.from_data(data, "test")
+    assert machine_bands(machine, 0.03) == [ModeBand(Mode(46.0, 0.02), 0.05), ModeBand(Mode(90.0, 0.02), 0.03)]
+    for name in "xyz":
+        data["axes"][name]["modes"] = []
+    with pytest.raises(ArgumentError, match="no vibration mode"):
+        machine_bands(sg.Machine.from_data(data, "test"))
+
+
+def test_candidate_periods() -> None:
+    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
+    data["emission"]["block_period_s"] = 0.007
+    assert candidate_periods(PAPER, sg.Machine.from_data(data, "test"), 0.25) == [0.007]
+    periods_s = candidate_periods(PAPER, sg.Machine.load("vx500"), 0.25)
+    assert periods_s[0] == pytest.approx(0.005)
+    assert periods_s == sorted(periods_s)
+    # no grid has a non-negative design so short: the finest ones that the controller plays
+    assert candidate_periods(PAPER, None, 0.003) == pytest.approx([0.001, 0.002, 0.003, 0.004])
+    slow = candidate_periods([ModeBand(Mode(0.5, 0.0))], None, 6.0)
+    assert all(a < b for a, b in itertools.pairwise(slow))
+    assert slow[0] >= 2.0 / 32.0

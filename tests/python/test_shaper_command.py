@@ -1,0 +1,199 @@
+"""``shapegcode shaper``: exit codes, JSON, messages."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from shapegcode._core import ArgumentError, Mode, Shaper, convolved_zv
+from shapegcode.cli import main
+from shapegcode.modal_response import respond, shaped_step
+from shapegcode.shaper_picture import residual_curve, selected
+from shapegcode.shaper_table import radial_error_um
+from shapegcode.shaping import Design, choose_shaper
+
+PAPER = ("--mode", "46:0.02±5%", "--mode", "131:0.02")
+KEYS = {
+    "family", "times_s", "amplitudes", "duration_s", "variance_s2", "worst_residual", "residual", "period_s", "abs_sum",
+    "negative", "pareto",
+}  # fmt: skip
+
+
+def asked(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> dict[str, Any]:
+    assert main(["shaper", *words, "--json", "-"]) == code
+    result: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return result
+
+
+def test_json_of_a_grid(capsys: pytest.CaptureFixture[str]) -> None:
+    result = asked(capsys, *PAPER, "--period", "5ms")
+    assert result.keys() >= {"designs", "recommended", "reason", "refused", "modes"}
+    assert all(row.keys() == KEYS for row in result["designs"])
+    exact = next(row for row in result["designs"] if row["family"] == "non-negative")
+    assert exact["times_s"] == pytest.approx([0.0, 0.005, 0.01, 0.015, 0.02], abs=1e-12)
+    assert exact["amplitudes"] == pytest.approx([0.20394, 0.16162, 0.31387, 0.15731, 0.16327], abs=1e-5)
+    taken = result["designs"][result["recommended"]]
+    assert taken["period_s"] == 0.005
+    assert not taken["negative"]
+    assert taken["worst_residual"] <= 0.05
+    assert "±5 %" in result["reason"]
+    assert {row["family"] for row in result["refused"]} >= {"zv"}
+    assert all(row["reason"] for row in result["refused"])
+    assert result["modes"] == [
+        {"frequency_hz": 46.0, "damping_ratio": 0.02, "uncertainty": 0.05},
+        {"frequency_hz": 131.0, "damping_ratio": 0.02, "uncertainty": 0.0},
+    ]
+
+
+def test_plus_minus_in_ascii_is_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    assert asked(capsys, "--mode", "46:0.02+-5%", "--mode", "131:0.02", "--period", "5ms") == asked(
+        capsys, *PAPER, "--period", "5ms"
+    )
+
+
+def test_without_a_period_both_kinds_of_times(capsys: pytest.CaptureFixture[str]) -> None:
+    result = asked(capsys, "--mode", "46:0.02", "--mode", "131:0.02")
+    periods = {row["period_s"] for row in result["designs"]}
+    assert None in periods
+    assert len(periods) > 2
+    assert result["designs"][result["recommended_on_grid"]]["period_s"] is not None
+
+
+def test_a_file_and_the_table(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "shaper.json"
+    assert main(["shaper", "-m", "vx500", "--json", str(file)]) == 0
+    out = capsys.readouterr().out
+    result = json.loads(file.read_text(encoding="utf-8"))
+    assert result["designs"][result["recommended"]]["duration_s"] == pytest.approx(0.02)
+    assert "=> recommended" in out
+    assert "next: shapegcode convert part.nc -m vx500 --block-period 5ms -o shaped.nc" in out
+    assert "no design" in out
+    assert result["reason"] in out.replace("\n", "").replace("  ", " ") or "the shortest of" in out
+
+
+def test_exit_code_1_if_the_best_leaves_too_much(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("--mode", "46:0.02±20%", "--period", "5ms", "--max-duration", "15ms")
+    result = asked(capsys, *words, code=1)
+    best = result["designs"][result["recommended"]]
+    assert best["worst_residual"] > 0.05
+    rivals = [row["worst_residual"] for row in result["designs"] if not row["negative"]]
+    assert best["worst_residual"] == min(rivals)
+    assert main(["shaper", *words]) == 1
+    assert "the best there is" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--mode", "46", "--mode", "46"], "modes 1 and 2 are equal"),
+        (["--mode", "0:0.02"], "mode frequency 0 Hz"),
+        (["--mode=-46:0.02"], "mode frequency -46 Hz"),
+        (["--mode", "46:1.0"], "damping ratio 1"),
+        (["--mode", "46:-0.1"], "damping ratio -0.1"),
+        (["--mode", "46:0.02±100%"], "must be at least 0 and below 1"),
+        (["--mode", "fast"], "is no mode"),
+        (["--mode", "200", "--period", "5ms"], "200 Hz cannot be cancelled on a grid of 5 ms"),
+        (["--mode", "46", "--family", "magic"], "is no family"),
+        (["--mode", "46", "--taps", "0:.5,10ms"], "is no tap"),
+        (["--mode", "46", "--taps", "0:.5,10:.5"], "is no tap"),
+        (["--mode", "46", "--taps", "0:.5,10ms:.6"], "add up to 1.1"),
+        (["--mode", "46", "--family", "zv", "--max-duration", "1ms"], "no family has a shaper for 46 Hz within 1 ms"),
+        (["--mode", "46", "-m", "vx500"], "give one of both"),
+        ([], "give one of both"),
+        (["-m", "vx500", "--period", "5.5ms"], "whole multiple"),
+        (["--mode", "46", "--period", "0ms"], "must be a time above 0"),
+        (["--mode", "46", "--band", "120%"], "below 100%"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    capsys: pytest.CaptureFixture[str], words: list[str], message: str
+) -> None:
+    assert main(["shaper", *words]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert len([line for line in error.splitlines() if not line.startswith((" ", "usage"))]) == 1
+
+
+def test_the_families_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["shaper", "--list-families"]) == 0
+    out = capsys.readouterr().out
+    for name in ("zv", "polynomial", "non-negative", "Smith"):
+        assert name in out
+
+
+def test_contour_cost_in_micrometres() -> None:
+    """Moving average of length A: the manual's A²/24·v²/R; here as 1001 equal taps."""
+    length, speed, radius = 0.05, 100.0, 20.0
+    shaper = Shaper([length * k / 1000 for k in range(1001)], [1 / 1001] * 1001)
+    expected = length**2 / 24.0 * speed**2 / radius * 1e3
+    assert radial_error_um(Design("average", shaper, None, 0.0, 0.0), speed, radius) == pytest.approx(
+        expected, rel=3e-3
+    )
+
+
+# --- pictures -----------------------------------------------------------------------------------------------
+
+
+def test_pictures_are_complete_and_the_same_each_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["shaper", *PAPER, "--period", "continuous", "--period", "5ms"]
+    for folder in ("one", "two"):
+        assert main([*words, "--plots", str(tmp_path / folder)]) == 0
+    capsys.readouterr()
+    kinds = {"pareto", "sensitivity", "impulses", "steps"}
+    names = {f"shaper-{kind}{suffix}" for kind in kinds for suffix in (".png", ".svg")}
+    assert {file.name for file in (tmp_path / "one").iterdir()} >= names
+    for file in (tmp_path / "one").glob("*.svg"):
+        assert file.read_bytes() == (tmp_path / "two" / file.name).read_bytes()
+    text = (tmp_path / "one" / "shaper-sensitivity.svg").read_text(encoding="utf-8")
+    assert "residual vibration in %" in text
+    assert "non-negative, 20 ms (5 ms grid)" in text or "polynomial, 20 ms (5 ms grid)" in text
+
+
+def test_selected_curves_begin_with_the_recommended_one() -> None:
+    result = choose_shaper(["46:0.02±5%", "131:0.02"])
+    curves = selected(result)
+    assert curves[0] is result.design
+    assert len(curves) <= 6
+    assert any(each.period_s is not None for each in curves)
+
+
+def test_residual_curve_is_zero_at_the_modes() -> None:
+    modes = [Mode(46.0, 0.02), Mode(131.0, 0.05)]
+    curve = residual_curve(convolved_zv(modes), np.array([46.0, 131.0, 80.0]), modes)
+    assert curve[:2] == pytest.approx([0.0, 0.0], abs=1e-14)
+    assert curve[2] == convolved_zv(modes).residual_ratio(Mode(80.0, 0.02))  # the damping of the nearer mode
+
+
+def test_responses_of_modes_against_scipy() -> None:
+    """Any number of modes side by side; the transfer function of spec 3 by SciPy."""
+    modes = [Mode(3.0, 0.1), Mode(11.0, 0.02), Mode(7.0, 0.0), Mode(1.0, 0.05)]
+    rng = np.random.default_rng(5)
+    command = np.cumsum(rng.normal(size=400))
+    command -= command[0]
+    run = respond(modes, command, 0.002)
+    for place, mode in enumerate(modes):
+        omega = 2.0 * np.pi * mode.frequency_hz
+        damping = 2.0 * mode.damping_ratio * omega
+        system = ([[0.0, 1.0], [-(omega**2), -damping]], [[0.0], [1.0]], [[omega**2, damping]], [[0.0]])
+        expected = lsim(system, command, run.times_s)[1]
+        np.testing.assert_allclose(run.responses[:, place], expected, atol=1e-9 * np.abs(command).max())
+    with pytest.raises(ArgumentError, match="0 modes"):
+        respond([], command, 0.002)
+
+
+def test_a_shaped_step_leaves_what_the_residual_ratio_says() -> None:
+    modes = [Mode(1.0, 0.0), Mode(4.0, 0.0)]
+    shaper = Shaper([0.0, 0.2, 0.41], [0.72361, -0.44721, 0.7236])
+    step = shaped_step(shaper, 0.0005, 1.0)
+    assert (step[0], step[-1]) == (0.0, pytest.approx(1.0))
+    run = respond(modes, step, 0.0005)
+    expected = [shaper.residual_ratio(mode) for mode in modes]
+    assert run.residuals == pytest.approx(expected, rel=1e-4)
+    # taps between the samples keep their times
+    odd = respond(modes, shaped_step(Shaper([0.0, 0.2003], [0.5, 0.5]), 0.0005, 1.0), 0.0005)
+    assert odd.residuals == pytest.approx([abs(np.cos(np.pi * f * 0.2003)) for f in (1.0, 4.0)], rel=1e-4)
