@@ -188,7 +188,7 @@ def test_the_plant_solves_the_varying_equation() -> None:
         worst = max(worst, abs(state[0] - played[k + 1]))
         largest = max(largest, abs(state[0] - x[k + 1]))
     assert largest > 0.3
-    assert worst < 5e-5 * largest  # Z travels at up to 2.6 m/s; the error falls with the square of tick and speed
+    assert worst < 5e-5 * largest  # Z travels at up to 2.6 m/s; the error falls with the square of the tick
 
 
 # --- Filters that vary ------------------------------------------------------------------------------------------------

@@ -132,7 +132,7 @@ void VaryingFirStream::Lag::add(double value) noexcept {
   sum = total;
 }
 
-VaryingFirStream::VaryingFirStream(VaryingFir fir, int n_axes) : fir_(std::move(fir)), n_axes_(n_axes) {
+VaryingFirStream::VaryingFirStream(VaryingFir fir, int n_axes) : fir_(std::move(fir)) {
   if (n_axes < 1) {
     throw Error(ErrorKind::argument, "filter stream of " + std::to_string(n_axes) + " axes, at least 1 needed");
   }
@@ -185,7 +185,7 @@ void VaryingFirStream::step(std::span<double> position, double place) noexcept {
     if (upper_share > 0.0) begin_train(set[lower + 1], upper_share);
   }
   double* const arriving = &pending_[(row_ & row_mask_) * axes];
-  const bool all_arrived = at_rest_ >= static_cast<std::size_t>(row_mask_ + 1);
+  const bool all_arrived = at_rest_ >= row_mask_ + 1;
   for (std::size_t axis = 0; axis < axes; ++axis) {
     Lag& lag = lag_[axis];
     if (all_arrived) {

@@ -70,7 +70,6 @@ class VaryingFirStream {
   void begin_train(const Fir& fir, double share) noexcept;
 
   VaryingFir fir_;
-  int n_axes_ = 0;
   std::vector<double> pending_;  // increments to come, one row of n_axes values per sample; a power of two of rows
   std::size_t row_mask_ = 0;
   std::size_t row_ = 0;
