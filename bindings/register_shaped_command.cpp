@@ -36,6 +36,10 @@ void register_shaped_command(py::module_& module) {
       .def_readwrite("target", &ShapingOptions::target,
                      "What is brought back to the path; with a target, the contour tolerance of `limits` is its own.")
       .def_readwrite("modes", &ShapingOptions::modes, "Modes of X, Y and Z, for the response as target.")
+      .def_readwrite("following", &ShapingOptions::following,
+                     "Shapers along an axis in place of the one shaper, taps in whole block periods; None: none.")
+      .def_readwrite("mode_tables", &ShapingOptions::mode_tables,
+                     "How the modes vary with the position of the axis that is followed, for the response as target.")
       .def_readwrite("contour_smoothness", &ShapingOptions::contour_smoothness,
                      "Weight of the correction's second differences.");
 

@@ -3,12 +3,14 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "shapegcode/emission/feed_search.hpp"
 #include "shapegcode/emission/run_shaper.hpp"
 #include "shapegcode/filter/fir.hpp"
+#include "shapegcode/filter/varying_fir.hpp"
 #include "shapegcode/motion/limits.hpp"
 #include "shapegcode/path/path.hpp"
 #include "shapegcode/plant/modal.hpp"
@@ -26,7 +28,11 @@ struct ShapingOptions {
   /// What is brought back to the path behind the shaper (spec 5). With a target, `limits.contour_tolerance_mm` is its
   /// tolerance, kept by the highest feed that does; without one, `limits` holds the bounds that plain shaping needs.
   ContourTarget target = ContourTarget::none;
-  AxisModes modes;                  ///< of the response; nothing else is done with them
+  AxisModes modes;  ///< of the response; nothing else is done with them
+  /// Shapers along an axis (taps in whole block periods, positions as in the path) in place of the one shaper, for
+  /// modes that vary with position by `mode_tables`.
+  std::optional<FollowingFir> following;
+  AxisModeTables mode_tables;
   double contour_smoothness = 1.0;  ///< weight of the correction's second differences on half the block grid
 };
 
