@@ -127,9 +127,8 @@ def emit_region(
     The text begins with `emission.prologue` and a full safe line and ends with the modal state of the original.
     """
     notes = region.notes
-    shaper = _core.RegionShaper(
-        region.path, grid.fir, [note.segment for note in notes], shaping_options(machine, grid, limits)
-    )
+    options = shaping_options(machine, grid, limits)
+    shaper = _core.RegionShaper(region.path, grid.fir, [note.segment for note in notes], options)
 
     inch = region.exit.units == 20
     unit = MM_PER_INCH if inch else 1.0
@@ -143,6 +142,8 @@ def emit_region(
     fit.minimum_feed = max(1, math.ceil(machine.controller.minimum_feed_mm_per_min / unit * 10**feed_decimals - 1e-9))
     fit.merge_tolerance_increments = machine.emission.merge_tolerance_increments
     fit.arc_min_chord_mm = machine.emission.arc_min_chord_mm
+    if machine.emission.rounding == "vibration":
+        fit.modes = options.modes
     last = region.path[-1]
     if region.exit.motion in (2, 3) and last.kind == _core.SegmentKind.arc:
         fit.end_with_arc(region.exit.motion == 2, last.normal, last.radius_mm)
