@@ -18,18 +18,8 @@ from shapegcode.compensation import guard_lines, header_lines, read_for_conversi
 from shapegcode.emit import Grid, emit_region, make_grid, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.program import Program
-from shapegcode.verify import (
-    Placed,
-    RegionFigures,
-    axis_modes,
-    contour_target,
-    contour_um,
-    measure,
-    other_time_s,
-    play_original,
-    read_back,
-    summarise,
-)
+from shapegcode.verdict import RegionFigures, contour_target, contour_um, measure, summarise
+from shapegcode.verify import Placed, axis_modes, other_time_s, play_original, read_back
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
 _MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin
@@ -237,7 +227,7 @@ def _tighten(
     places = {id(region): index for index, region in enumerate(program.regions)}
     tightened = False
     for place, region in zip(placed, figures, strict=True):
-        reached = contour_um(region.emitted, machine)
+        reached = contour_um(region, machine)
         if reached > limit:
             room_um[places[id(place.region)]] *= _CONTOUR_MARGIN * limit / reached
             tightened = True
