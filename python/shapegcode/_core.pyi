@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -1669,7 +1669,7 @@ class ShapedCommand:
     @property
     def run_ends(self) -> list[int]:
         """
-        Periods of the region at which the command is at rest.
+        Periods of this piece at which the command is at rest.
         """
     @property
     def segment_periods(self) -> list[int]:
@@ -1689,9 +1689,15 @@ class RegionShaper:
     Raises:
         ArgumentError: The block period is no multiple of the interpolation period, or a limit is not above 0.
     """
+    @typing.overload
     def __init__(self, path: Path, shaper: Fir, marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> None:
         """
         See the class.
+        """
+    @typing.overload
+    def __init__(self, path: Path, shapers: FollowingFir, modes: collections.abc.Sequence[typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]], marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> None:
+        """
+        With shapers that follow an axis, on the block grid; `modes` of X, Y and Z at each of their positions.
         """
     def next(self, periods: typing.SupportsInt | typing.SupportsIndex) -> ShapedCommand | None:
         """
@@ -2032,6 +2038,14 @@ class PlaybackOptions:
     def last_seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def measure_command(self) -> bool:
+        """
+        False: the deviation of the response alone, no orbit errors.
+        """
+    @measure_command.setter
+    def measure_command(self, arg0: bool) -> None:
+        ...
+    @property
     def measure_contour(self) -> bool:
         """
         Deviations and orbit errors.
@@ -2071,6 +2085,54 @@ class PlaybackOptions:
     @record_samples.setter
     def record_samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+    @property
+    def starved_blocks(self) -> list[int]:
+        """
+        Blocks only: what if the block buffer ran empty behind one of these blocks (ascending)?
+        """
+    @starved_blocks.setter
+    def starved_blocks(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def starved_memory_s(self) -> float:
+        """
+        How much of the run behind such a wait is looked at, s; 0: all.
+        """
+    @starved_memory_s.setter
+    def starved_memory_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def starved_s(self) -> float:
+        """
+        How long the set-points then wait, s.
+        """
+    @starved_s.setter
+    def starved_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class StarvedFigures:
+    """
+    What a wait for the next block does to a run.
+    """
+    @property
+    def block(self) -> int:
+        """
+        The set-points wait behind it.
+        """
+    @property
+    def command(self) -> DeviationStats:
+        """
+        Deviation of the command from the path.
+        """
+    @property
+    def residual_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Largest |response - command| while the set-points rest, in the wait and at the end, (3,), mm.
+        """
+    @property
+    def response(self) -> DeviationStats:
+        """
+        Deviation of the response from the path.
+        """
 class PlaybackFigures:
     """
     Figures of one run from rest to rest.
@@ -2124,6 +2186,11 @@ class PlaybackFigures:
     def response(self) -> DeviationStats:
         """
         Deviation of the response from the path.
+        """
+    @property
+    def starved(self) -> list[StarvedFigures]:
+        """
+        One per PlaybackOptions.starved_blocks.
         """
 class MotionKind:
     """
@@ -2828,6 +2895,10 @@ def extra_insensitive(mode: Mode, vibration_limit: typing.SupportsFloat | typing
     
     Source: Singhose, Seering and Singer 1994; Singhose, Porter, Tuttle and Singer 1997; the solution: this project.
     """
+def fastest_block_ends(blocks: Path) -> list[int]:
+    """
+    Per axis the block, but for the last, at whose end it is fastest; ascending, each once.
+    """
 def fit_blocks(command: ShapedCommand, breaks: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: FitOptions) -> FittedBlocks:
     """
     Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. Raises ArgumentError on a position outside +-99999.999 mm.
@@ -2903,7 +2974,7 @@ def minimal_branches(first: Mode, second_damping: typing.SupportsFloat | typing.
     All minimal two-mode shapers over the ratio of the frequencies, joined to curves (paper 002, fig. 2 and 3).
     
     At each ratio the list is that of `minimal_two_mode`; curves are followed by continuation, also through gaps, where the
-    sum of magnitudes or the duration exceeds its limit. Steps of 0.02 and less join reliably.
+    sum of magnitudes or the duration exceeds its limit. Where two curves touch, their tails may be exchanged.
     
     Args:
         first: The mode whose frequency stays.
@@ -3021,9 +3092,9 @@ def play_duration_s(blocks: Path, period_s: typing.SupportsFloat | typing.Suppor
     """
     Sum of block durations, s.
     """
-def play_path(path: Path, profile: SpeedProfile, options: PlaybackOptions) -> PlaybackFigures:
+def play_path(path: Path, profile: SpeedProfile, options: PlaybackOptions, programmed: Path = None) -> PlaybackFigures:
     """
-    Play a path under a speed profile (a controller with look-ahead) through filters and plant.
+    Play a path under a speed profile (a controller with look-ahead) through filters and plant, measured against the programmed path (None: the path itself).
     """
 def play_samples(positions_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], path: Path, options: PlaybackOptions) -> PlaybackFigures:
     """
