@@ -508,3 +508,17 @@ TEST_CASE("playback: a planned path measured against the one it was made from") 
   CHECK(figures.duration_s == own.duration_s);
   CHECK(figures.residual_mm == own.residual_mm);
 }
+
+TEST_CASE("playback: the response alone is measured as it is beside the command") {
+  const auto path = paper_path(100.0);
+  PlaybackOptions options = vertical_machine(1e-3);
+  const PlaybackFigures both = play_blocks(path->segments(), *path, BlockEnd::ceil, 1.0, options);
+  options.measure_command = false;
+  const PlaybackFigures alone = play_blocks(path->segments(), *path, BlockEnd::ceil, 1.0, options);
+  CHECK(both.orbit_error_percent.size() == 1);
+  CHECK(alone.orbit_error_percent.empty());
+  CHECK(alone.command.max_abs_mm == 0.0);
+  CHECK(alone.response.max_abs_mm == both.response.max_abs_mm);
+  CHECK(alone.response.sum_of_squares_mm2 == both.response.sum_of_squares_mm2);
+  CHECK(alone.residual_mm == both.residual_mm);
+}
