@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'shape_path', 'simulate_circle', 'time_program', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -153,6 +153,58 @@ class Shaper:
     def variance_s2(self) -> float:
         """
         Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2 (spec 0).
+        """
+class ExtraInsensitive:
+    """
+    An extra-insensitive shaper, and where its residual vanishes and peaks.
+    """
+    @property
+    def humps_hz(self) -> list[float]:
+        """
+        Natural frequencies in Hz, ascending, at which the residual is the vibration limit.
+        """
+    @property
+    def shaper(self) -> Shaper:
+        """
+        The shaper, humps+2 non-negative taps.
+        """
+    @property
+    def zeros_hz(self) -> list[float]:
+        """
+        Natural frequencies without residual in Hz, ascending, one more than humps.
+        """
+class WorstResidual:
+    """
+    The largest residual over a band of frequencies.
+    """
+    @property
+    def frequency_hz(self) -> float:
+        """
+        Natural frequency in Hz at which it was found.
+        """
+    @property
+    def residual_ratio(self) -> float:
+        """
+        Residual ratio at frequency_hz, no unit.
+        """
+    @property
+    def upper_bound(self) -> float:
+        """
+        No frequency of the band leaves more (no unit); within 1e-6 of residual_ratio, or 1e-12.
+        """
+class FrequencyBand:
+    """
+    A band of frequencies.
+    """
+    @property
+    def highest_hz(self) -> float:
+        """
+        Upper end in Hz.
+        """
+    @property
+    def lowest_hz(self) -> float:
+        """
+        Lower end in Hz.
         """
 class MinimalShapers:
     """
@@ -2737,6 +2789,27 @@ def count_slowed_blocks(blocks: Path, corner_speed_difference_mm_per_s: typing.A
     """
     Blocks that a controller with look-ahead would run slower than programmed.
     """
+def extra_insensitive(mode: Mode, vibration_limit: typing.SupportsFloat | typing.SupportsIndex, humps: typing.SupportsInt | typing.SupportsIndex = 1) -> ExtraInsensitive:
+    """
+    Extra-insensitive (EI) shaper with one, two or three humps, damped or not, solved from its definition.
+    
+    Between its outermost zeros the residual rises to exactly the limit at each hump. The middle hump, or with two humps the
+    middle zero, lies at the mode. Without damping it is the Dolph-Chebyshev window over half periods.
+    
+    Args:
+        mode: The mode around which little is to be left.
+        vibration_limit: Residual ratio at the humps (no unit), above 0 and below 1.
+        humps: Number of humps, 1 to 3.
+    
+    Returns:
+        The shaper and its zeros and humps.
+    
+    Raises:
+        ArgumentError: A value is outside its range.
+        DesignError: No such shaper with non-negative taps was reached (high damping).
+    
+    Source: Singhose, Seering and Singer 1994; Singhose, Porter, Tuttle and Singer 1997; the solution: this project.
+    """
 def fit_blocks(command: ShapedCommand, breaks: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: FitOptions) -> FittedBlocks:
     """
     Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. Raises ArgumentError on a position outside +-99999.999 mm.
@@ -2764,6 +2837,40 @@ def grid_polynomial(modes: collections.abc.Sequence[Mode], period_s: typing.Supp
 def in_position_wait_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: ControllerModel) -> float:
     """
     Wait for in-position behind a rapid, s. Raises ArgumentError on a model that no controller can have.
+    """
+def insensitive_band(shaper: Shaper, mode: Mode, vibration_limit: typing.SupportsFloat | typing.SupportsIndex) -> FrequencyBand:
+    """
+    The band of natural frequencies around a mode in which the residual stays within a limit.
+    
+    Args:
+        shaper: The shaper.
+        mode: Nominal frequency and damping ratio.
+        vibration_limit: Residual ratio (no unit), above 0 and below 1.
+    
+    Returns:
+        The band; of no width if the limit is exceeded at the mode itself, up to ten times its frequency at most.
+    
+    Raises:
+        ArgumentError: The limit is outside its range.
+    
+    Source: this project.
+    """
+def insensitivity(shaper: Shaper, mode: Mode, vibration_limit: typing.SupportsFloat | typing.SupportsIndex) -> float:
+    """
+    Insensitivity: width of `insensitive_band` over the mode's frequency.
+    
+    Args:
+        shaper: The shaper.
+        mode: Nominal frequency and damping ratio.
+        vibration_limit: Residual ratio (no unit), above 0 and below 1.
+    
+    Returns:
+        The relative width (no unit): .064 for ZV and .399 for EI at 5 % without damping.
+    
+    Raises:
+        ArgumentError: The limit is outside its range.
+    
+    Source: Singer and Seering 1990.
     """
 def interpolate(path: Path, profile: SpeedProfile, period_s: typing.SupportsFloat | typing.SupportsIndex) -> numpy.ndarray:
     """
@@ -2842,6 +2949,48 @@ def minimal_two_mode(first: Mode, second: Mode, max_duration_s: typing.SupportsF
     
     Source: paper 002, eq. 12-17; the search is this project's.
     """
+def mzv(mode: Mode) -> Shaper:
+    """
+    Modified ZV: three non-negative taps, 3/8 of the damped period apart.
+    
+    Cancels the mode and the pole of the same decay at 5/3 of its damped frequency; half as long again as ZV, and without
+    damping .62 of ZV's slope at the mode.
+    
+    Args:
+        mode: The mode to cancel.
+    
+    Returns:
+        The shaper.
+    
+    Source: the open printer firmware Klipper, "mzv".
+    """
+def mzv_second_zero(mode: Mode) -> Mode:
+    """
+    The second pole that `mzv` cancels, as a mode: the same decay rate, 5/3 of the damped frequency.
+    
+    Args:
+        mode: The mode of the MZV shaper.
+    
+    Returns:
+        The other mode.
+    
+    Source: this project.
+    """
+def negative_zv(mode: Mode) -> Shaper:
+    """
+    Negative ZV of unity magnitude: amplitudes exactly 1, -1, 1; undamped at 0, 1/6 and 1/3 of the period.
+    
+    Args:
+        mode: The mode to cancel; its damping is met exactly, not by a fitted formula.
+    
+    Returns:
+        The shaper; its sum of magnitudes is 3.
+    
+    Raises:
+        DesignError: The damping is too high for such a shaper.
+    
+    Source: Singhose, Singer and Seering 1994; the damped solution: this project.
+    """
 def plan_speed(path: Path, limits: MotionLimits) -> SpeedProfile:
     """
     Tangential speed profile over a whole path from rest to rest. Raises ArgumentError on a limit that is not > 0.
@@ -2874,6 +3023,39 @@ def read_program(text: bytes, options: ReaderOptions = ...) -> ProgramText:
     """
     Read a program text (bytes). Raises ProgramError with line and column.
     """
+def repeated_zv(mode: Mode, zeros: typing.SupportsInt | typing.SupportsIndex) -> Shaper:
+    """
+    The ZV shaper in series with itself: 1 is ZV, 2 ZVD, 3 ZVDD.
+    
+    Args:
+        mode: The mode to cancel.
+        zeros: Zeros at the mode, 1 to 20: the residual and its first zeros-1 derivatives vanish there.
+    
+    Returns:
+        A shaper of zeros+1 non-negative taps, half a damped period apart.
+    
+    Raises:
+        ArgumentError: `zeros` is outside its range.
+    
+    Source: Singer and Seering 1990.
+    """
+def sensitivity_curve(shaper: Shaper, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, frequencies_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> list[float]:
+    """
+    Residual ratio over the natural frequency.
+    
+    Args:
+        shaper: The shaper.
+        damping_ratio: Damping ratio of the modes (no unit), at least 0 and below 1.
+        frequencies_hz: Natural frequencies in Hz, above 0.
+    
+    Returns:
+        The residual ratio (no unit) at each frequency, in their order.
+    
+    Raises:
+        ArgumentError: A value is outside its range.
+    
+    Source: spec 2.
+    """
 def shape_path(path: Path, shaper: Fir, marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> ShapedCommand:
     """
     Split at forced stops, plan, sample on half the block grid and shape. `shaper` has its taps in whole block periods. Raises ArgumentError if the block period is no multiple of the interpolation period.
@@ -2885,6 +3067,25 @@ def simulate_circle(radius_mm: typing.SupportsFloat | typing.SupportsIndex, feed
 def time_program(program: ProgramText, model: ControllerModel, per_block: bool = False) -> CycleTime:
     """
     Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in look-ahead. Raises ArgumentError on a model that no controller can have.
+    """
+def worst_residual(shaper: Shaper, mode: Mode, lowest_hz: typing.SupportsFloat | typing.SupportsIndex, highest_hz: typing.SupportsFloat | typing.SupportsIndex) -> WorstResidual:
+    """
+    Largest residual ratio over a band of natural frequencies, found and proven.
+    
+    Args:
+        shaper: The shaper.
+        mode: Gives the damping ratio.
+        lowest_hz: Lower end of the band in Hz, above 0.
+        highest_hz: Upper end of the band in Hz, at least the lower one.
+    
+    Returns:
+        The largest residual, where it is, and the proven bound.
+    
+    Raises:
+        ArgumentError: A value is outside its range.
+        DesignError: More than a million parts of the band are needed for the proof.
+    
+    Source: this project.
     """
 def write_blocks(blocks: FittedBlocks, start: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"], marks: collections.abc.Sequence[BlockMark], options: WriterOptions) -> tuple[bytes, int, int]:
     """
