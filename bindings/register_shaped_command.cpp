@@ -36,6 +36,10 @@ void register_shaped_command(py::module_& module) {
       .def_readwrite("target", &ShapingOptions::target,
                      "What is brought back to the path; with a target, the contour tolerance of `limits` is its own.")
       .def_readwrite("modes", &ShapingOptions::modes, "Modes of X, Y and Z, for the response as target.")
+      .def_readwrite("following", &ShapingOptions::following,
+                     "Shapers along an axis in place of the one shaper, taps in whole block periods; None: none.")
+      .def_readwrite("mode_tables", &ShapingOptions::mode_tables,
+                     "How the modes vary with the position of the axis that is followed, for the response as target.")
       .def_readwrite("contour_smoothness", &ShapingOptions::contour_smoothness,
                      "Weight of the correction's second differences.");
 
@@ -51,7 +55,7 @@ void register_shaped_command(py::module_& module) {
       .def_property_readonly(
           "arc_normal", [](const ShapedCommand& self) { return self.arc_normal; },
           "Per period the axis across an arc's plane, or -1.")
-      .def_readonly("run_ends", &ShapedCommand::run_ends, "Periods of the region at which the command is at rest.")
+      .def_readonly("run_ends", &ShapedCommand::run_ends, "Periods of this piece at which the command is at rest.")
       .def_readonly("segment_periods", &ShapedCommand::segment_periods,
                     "Per marked segment the period of the region in which its begin is reached.");
 

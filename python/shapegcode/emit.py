@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.block_grid import Grid
 from shapegcode.machine import Machine
+from shapegcode.moving_modes import NO_OFFSET, Offset, mode_tables, region_offset
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
+
+if TYPE_CHECKING:
+    pass
 
 _DEGREE = math.pi / 180.0
 _PLUNGE_CORNER_DEG = 45.0
@@ -23,21 +29,6 @@ _TARGETS = {
     "command": _core.ContourTarget.command,
     "off": _core.ContourTarget.none,
 }
-
-
-@dataclass(frozen=True)
-class Grid:
-    """On what a conversion is written: block period and the shaper on it.
-
-    Attributes:
-        block_period_s: T_B.
-        shaper: the design, times on the block grid.
-        fir: the same in whole block periods.
-    """
-
-    block_period_s: float
-    shaper: _core.Shaper
-    fir: _core.Fir
 
 
 @dataclass(frozen=True)
@@ -57,12 +48,6 @@ class EmittedRegion:
     periods: npt.NDArray[np.uint32]
     blocks_begin: int
     blocks_end: int
-
-
-def make_grid(block_period_s: float, shaper: _core.Shaper) -> Grid:
-    """Grid of a shaper whose times are whole block periods."""
-    delays = [round(t / block_period_s) for t in shaper.times_s]
-    return Grid(block_period_s, shaper, _core.Fir(delays, list(shaper.amplitudes)))
 
 
 def motion_limits(
@@ -96,15 +81,25 @@ def motion_limits(
     limits.arc_feed_ratio = arc_feed_ratio
     if grid is not None:
         own = controller.shaped_time_constant_s
-        limits.filter_variance_s2 = grid.shaper.variance_s2 + own * own / 12.0
-        limits.filter_mean_deviation_s = _mean_deviation_s(grid.shaper) + own / 4.0
+        limits.filter_variance_s2 = max(shaper.variance_s2 for shaper in grid.shapers) + own * own / 12.0
+        limits.filter_mean_deviation_s = max(_mean_deviation_s(shaper) for shaper in grid.shapers) + own / 4.0
         limits.contour_tolerance_mm = contour_tolerance_um * 1e-3
         limits.corner_share = _CORNER_SHARE
     return limits
 
 
-def shaping_options(machine: Machine, grid: Grid, limits: _core.MotionLimits) -> _core.ShapingOptions:
-    """How a region is shaped on a grid: what the core needs of the machine file."""
+def shaping_options(
+    machine: Machine, grid: Grid, limits: _core.MotionLimits, offset: Offset = NO_OFFSET
+) -> _core.ShapingOptions:
+    """How a region is shaped on a grid: what the core needs of the machine file.
+
+    Args:
+        machine: controller and modes.
+        grid: block period and shapers.
+        limits: see `motion_limits`.
+        offset: from the region's positions to the machine's; where it is not known of the axis that the grid's track
+            follows, the grid's one shaper is used.
+    """
     from shapegcode.verify import axis_modes  # which imports this module
 
     options = _core.ShapingOptions()
@@ -116,6 +111,9 @@ def shaping_options(machine: Machine, grid: Grid, limits: _core.MotionLimits) ->
     options.rest_at_stop_s = machine.controller.shaped_time_constant_s
     options.target = _TARGETS[machine.shaping.contour]
     options.modes = axis_modes(machine)
+    if grid.track is not None and (start := offset[grid.track.axis]) is not None:
+        options.following = grid.track.following(start)
+        options.mode_tables = mode_tables(machine, offset=offset)
     return options
 
 
@@ -127,9 +125,8 @@ def emit_region(
     The text begins with `emission.prologue` and a full safe line and ends with the modal state of the original.
     """
     notes = region.notes
-    shaper = _core.RegionShaper(
-        region.path, grid.fir, [note.segment for note in notes], shaping_options(machine, grid, limits)
-    )
+    options = shaping_options(machine, grid, limits, region_offset(region, machine))
+    shaper = _core.RegionShaper(region.path, grid.fir, [note.segment for note in notes], options)
 
     inch = region.exit.units == 20
     unit = MM_PER_INCH if inch else 1.0
@@ -143,6 +140,8 @@ def emit_region(
     fit.minimum_feed = max(1, math.ceil(machine.controller.minimum_feed_mm_per_min / unit * 10**feed_decimals - 1e-9))
     fit.merge_tolerance_increments = machine.emission.merge_tolerance_increments
     fit.arc_min_chord_mm = machine.emission.arc_min_chord_mm
+    if machine.emission.rounding == "vibration":
+        fit.modes = options.modes
     last = region.path[-1]
     if region.exit.motion in (2, 3) and last.kind == _core.SegmentKind.arc:
         fit.end_with_arc(region.exit.motion == 2, last.normal, last.radius_mm)
