@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'InPosition', 'InterpolatedTime', 'Interpolator', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'interpolate', 'interpolate_program', 'minimal_two_mode', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'shape_path', 'simulate_circle', 'time_program', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -153,6 +153,81 @@ class Shaper:
     def variance_s2(self) -> float:
         """
         Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2 (spec 0).
+        """
+class MinimalShapers:
+    """
+    The minimal shapers of some modes, and what is known about others.
+    """
+    @property
+    def boxes(self) -> int:
+        """
+        Boxes of times that the proof looked at.
+        """
+    @property
+    def complete(self) -> bool:
+        """
+        True if every box of times was settled: there is no other shaper in the region.
+        """
+    @property
+    def complete_up_to_s(self) -> float:
+        """
+        Duration in s up to which there is no other shaper; 0: nothing is proven.
+        """
+    @property
+    def converged(self) -> int:
+        """
+        Starts that reached a shaper in the region.
+        """
+    @property
+    def found_once(self) -> int:
+        """
+        Shapers that one start alone reached. Over `converged` it estimates the share of starts that would reach a shaper not listed yet (Good 1953).
+        """
+    @property
+    def max_abs_sum(self) -> float:
+        """
+        The region: largest sum of magnitudes (no unit).
+        """
+    @property
+    def max_duration_s(self) -> float:
+        """
+        The region: largest duration in s.
+        """
+    @property
+    def shapers(self) -> list[Shaper]:
+        """
+        The shapers, ascending in duration, then in the times.
+        """
+    @property
+    def starts(self) -> int:
+        """
+        Newton starts.
+        """
+    @property
+    def unresolved(self) -> int:
+        """
+        Boxes too small to halve on that could not be settled: solutions there are not isolated.
+        """
+class MinimalBranches:
+    """
+    The minimal shapers of two modes over the ratio of their frequencies, joined to curves.
+    """
+    @property
+    def amplitudes(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Amplitudes (no unit), shape (n_branches, n_ratios, 3), NaN as in `times_s`; read-only view.
+        """
+    @property
+    def ratios(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Frequency ratios (no unit), shape (n_ratios,), read-only view.
+        """
+    @property
+    def times_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Times of the taps in s, shape (n_branches, n_ratios, 3), NaN where a curve has no shaper; read-only view.
+        
+        [..., 2] is the duration.
         """
 class ExtraInsensitive:
     """
@@ -1439,6 +1514,56 @@ class ProgramText:
         """
         (line, column, alarm, message, file) each; alarm 0: none; file empty: the program's own.
         """
+class ContourTarget:
+    """
+    What shall follow the programmed path.
+    
+    Members:
+    
+      none : Nothing: the path is shaped as it is.
+    
+      command : The shaped command.
+    
+      response : The plant's response to it: the part.
+    """
+    __members__: typing.ClassVar[dict[str, ContourTarget]]
+    command: typing.ClassVar[ContourTarget]
+    none: typing.ClassVar[ContourTarget]
+    response: typing.ClassVar[ContourTarget]
+    @typing.overload
+    def __eq__(self, other: ContourTarget) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: ContourTarget) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
 class ShapingOptions:
     """
     How a region is turned into a shaped command on the block grid.
@@ -1452,6 +1577,14 @@ class ShapingOptions:
         """
     @block_period_s.setter
     def block_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def contour_smoothness(self) -> float:
+        """
+        Weight of the correction's second differences.
+        """
+    @contour_smoothness.setter
+    def contour_smoothness(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def interpolation_period_s(self) -> float:
@@ -1468,6 +1601,14 @@ class ShapingOptions:
         """
     @limits.setter
     def limits(self, arg0: MotionLimits) -> None:
+        ...
+    @property
+    def modes(self) -> typing.Annotated[list[list[Mode]], "FixedSize(3)"]:
+        """
+        Modes of X, Y and Z, for the response as target.
+        """
+    @modes.setter
+    def modes(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> None:
         ...
     @property
     def plunge_axis_angle_rad(self) -> float:
@@ -1493,6 +1634,14 @@ class ShapingOptions:
     @rest_at_stop_s.setter
     def rest_at_stop_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
+    @property
+    def target(self) -> ContourTarget:
+        """
+        What is brought back to the path; with a target, the contour tolerance of `limits` is its own.
+        """
+    @target.setter
+    def target(self, arg0: ContourTarget) -> None:
+        ...
 class ShapedCommand:
     """
     A shaped command on the block grid.
@@ -1501,6 +1650,11 @@ class ShapedCommand:
     def arc_normal(self) -> list[int]:
         """
         Per period the axis across an arc's plane, or -1.
+        """
+    @property
+    def first_period(self) -> int:
+        """
+        Periods of the region before this piece.
         """
     @property
     def grid_mm(self) -> numpy.ndarray:
@@ -1515,12 +1669,66 @@ class ShapedCommand:
     @property
     def run_ends(self) -> list[int]:
         """
-        Periods at which the command is at rest.
+        Periods of the region at which the command is at rest.
         """
     @property
     def segment_periods(self) -> list[int]:
         """
-        Per marked segment the period in which its begin is reached.
+        Per marked segment the period of the region in which its begin is reached.
+        """
+class RegionShaper:
+    """
+    A region's shaped command in pieces, so that memory does not grow with the region.
+    
+    Args:
+        path: The programmed path.
+        shaper: Taps in whole block periods, common to all axes.
+        marked_segments: Ascending indices whose begin in time is wanted.
+        options: How the region is shaped.
+    
+    Raises:
+        ArgumentError: The block period is no multiple of the interpolation period, or a limit is not above 0.
+    """
+    def __init__(self, path: Path, shaper: Fir, marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> None:
+        """
+        See the class.
+        """
+    def next(self, periods: typing.SupportsInt | typing.SupportsIndex) -> ShapedCommand | None:
+        """
+        Next piece of at most so many periods, or None behind the last.
+        """
+    @property
+    def largest_deviation_mm(self) -> float:
+        """
+        Largest deviation of what shall follow the path, as far as given out, mm.
+        """
+    @property
+    def stops(self) -> int:
+        """
+        Stops at corners that no speed passes within the tolerance.
+        """
+class ContourSolver:
+    """
+    Correction of a command before shaping that brings the shaped command back to the path.
+    
+    Minimises |e + f*c|^2 + w |second differences of c|^2 for one axis.
+    
+    Args:
+        kernel: f, taps at delays 0, 1, ... samples.
+        smoothness: w, above 0.
+    
+    Raises:
+        ArgumentError: An empty or not finite kernel, or a smoothness that is not above 0.
+    
+    Source: spec 5.
+    """
+    def __init__(self, kernel: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], smoothness: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        See the class.
+        """
+    def solve(self, error: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], carried: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Corrections (m,) for errors (m + len(kernel) - 1,); `carried`: the len(kernel) + 1 corrections before.
         """
 class FitOptions:
     """
@@ -2545,6 +2753,10 @@ def block_overlap_time_s(lengths_mm: typing.Annotated[numpy.typing.ArrayLike, nu
     """
     Time of a run of overlapping cutting blocks, s: sum of ceil(l / (F T)) T plus the length of the filters (paper 004). No override. Raises ArgumentError on unequal sizes or a feed <= 0.
     """
+def contour_kernel(shaper: Fir, modes: collections.abc.Sequence[Mode], period_s: typing.SupportsFloat | typing.SupportsIndex, target: ContourTarget) -> list[float]:
+    """
+    Kernel from a command before shaping to what shall follow the path; `shaper`: taps in samples of `period_s`.
+    """
 def convolve(first: Shaper, second: Shaper) -> Shaper:
     """
     The two shapers in series: cancels what either cancels, lasts as long as both together.
@@ -2653,7 +2865,7 @@ def insensitivity(shaper: Shaper, mode: Mode, vibration_limit: typing.SupportsFl
         vibration_limit: Residual ratio (no unit), above 0 and below 1.
     
     Returns:
-        The relative width (no unit): .065 for ZV and .399 for EI at 5 % without damping.
+        The relative width (no unit): .064 for ZV and .399 for EI at 5 % without damping.
     
     Raises:
         ArgumentError: The limit is outside its range.
@@ -2667,6 +2879,52 @@ def interpolate(path: Path, profile: SpeedProfile, period_s: typing.SupportsFloa
 def interpolate_program(program: ProgramText, model: ControllerModel) -> InterpolatedTime:
     """
     The same by full interpolation, every set-point of every step. Raises ArgumentError on a model that no controller can have, or a program of more than 4e9 set-points.
+    """
+def minimal_branches(first: Mode, second_damping: typing.SupportsFloat | typing.SupportsIndex, ratios: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], max_duration_s: typing.SupportsFloat | typing.SupportsIndex, *, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> MinimalBranches:
+    """
+    All minimal two-mode shapers over the ratio of the frequencies, joined to curves (paper 002, fig. 2 and 3).
+    
+    At each ratio the list is that of `minimal_two_mode`; curves are followed by continuation, also through gaps, where the
+    sum of magnitudes or the duration exceeds its limit. Steps of 0.02 and less join reliably.
+    
+    Args:
+        first: The mode whose frequency stays.
+        second_damping: Damping ratio of the other mode (no unit).
+        ratios: Frequencies of the other mode over that of the first, ascending, above 0, shape (n_ratios,).
+        max_duration_s: Largest duration in s, at most 100 periods of the faster mode at any ratio.
+        max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1.
+    
+    Returns:
+        The curves, ordered by the ratio at which they begin, then by duration.
+    
+    Raises:
+        ArgumentError: No ratio, ratios that do not ascend, or a value outside its range.
+    
+    Source: paper 002; the continuation is this project's.
+    """
+def minimal_shapers(modes: collections.abc.Sequence[Mode], max_duration_s: typing.SupportsFloat | typing.SupportsIndex, *, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0, max_starts: typing.SupportsInt | typing.SupportsIndex = 100000, max_boxes: typing.SupportsInt | typing.SupportsIndex = 400000) -> MinimalShapers:
+    """
+    Minimal multi-mode shapers: n+1 taps that cancel n = 1 ... 6 modes, damped or not.
+    
+    One mode is closed form and two are searched completely. Three and more are searched from many low-discrepancy starts
+    and by boxes of times, each of which is proven empty or shrunk onto a solution, in ascending duration: what the result
+    says about completeness is `complete` and `complete_up_to_s`. Shapers with fewer taps that serve all modes are listed
+    too; solutions that are not isolated (undamped modes at odd ratios, which one ZV serves) are not.
+    
+    Args:
+        modes: One to six modes, no two alike within 1e-6.
+        max_duration_s: Largest duration in s, above 0, at most 100 periods of the fastest mode.
+        max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1.
+        max_starts: Most Newton starts; fewer are used once every solution was found three times over.
+        max_boxes: Most boxes of times that the proof may look at (some 2 microseconds each for four modes); 0: no proof.
+    
+    Returns:
+        The shapers, residual_ratio of every mode at most 1e-12, and what was searched.
+    
+    Raises:
+        ArgumentError: No mode, more than six, two alike, or a value outside its range.
+    
+    Source: paper 002, eq. 4-11; the searches are this project's.
     """
 def minimal_two_mode(first: Mode, second: Mode, max_duration_s: typing.SupportsFloat | typing.SupportsIndex, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> list[Shaper]:
     """

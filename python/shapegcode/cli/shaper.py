@@ -152,10 +152,10 @@ def run(args: argparse.Namespace) -> int:
             allow_negative=args.negative,
             taps=None if args.taps is None else _taps(args.taps),
         )
-    if args.plots is not None:
-        from shapegcode.shaper_picture import write_shaper_pictures
+        if args.plots is not None:
+            from shapegcode.shaper_picture import write_shaper_pictures
 
-        write_shaper_pictures(result, args.plots)
+            write_shaper_pictures(result, args.plots)
     if args.json is not None:
         write_json(result.report(), args.json)
     console.print(designs_table(result, args.speed, args.radius))
