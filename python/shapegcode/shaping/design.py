@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from shapegcode._core import Shaper
+from shapegcode._core import Shaper, worst_residual
 from shapegcode.shaping.band import ModeBand
 
 __all__ = ["Design", "evaluate"]
-
-_SWEEP = 201  # frequencies of a band
 
 
 @dataclass(frozen=True)
@@ -55,11 +51,14 @@ class Design:
 
 
 def evaluate(family: str, shaper: Shaper, bands: Sequence[ModeBand], period_s: float | None = None) -> Design:
-    """The figures of a shaper for modes and their bands."""
+    """The figures of a shaper for modes and their bands; the worst residual is proven to 1e-6 of it."""
     residual = max(shaper.residual_ratio(band.mode) for band in bands)
-    worst = max(
-        shaper.residual_ratio(band.shifted(float(share)))
-        for band in bands
-        for share in (np.linspace(-1.0, 1.0, _SWEEP) if band.uncertainty else (0.0,))
-    )
+    worst = max(_worst(shaper, band) for band in bands)
     return Design(family, shaper, period_s, residual, worst)
+
+
+def _worst(shaper: Shaper, band: ModeBand) -> float:
+    if band.uncertainty == 0.0:
+        return shaper.residual_ratio(band.mode)
+    ends_hz = (band.shifted(-1.0).frequency_hz, band.shifted(1.0).frequency_hz)
+    return worst_residual(shaper, band.mode, *ends_hz).residual_ratio

@@ -5,29 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from shapegcode._core import ArgumentError, Shaper, convolved_zv, grid_polynomial
+from shapegcode._core import ArgumentError, DesignError, Shaper, grid_polynomial
+from shapegcode.shaping import family_solvers as solvers
 from shapegcode.shaping.band import ModeBand
 from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
+from shapegcode.shaping.options import DesignOptions
 
-__all__ = ["FAMILIES", "DesignOptions", "Family", "design", "family_named"]
+__all__ = ["FAMILIES", "DesignOptions", "Family", "design", "distinct", "family_named"]
 
-
-@dataclass(frozen=True)
-class DesignOptions:
-    """What a design may be.
-
-    Attributes:
-        period_s: grid on which the taps must lie, s; None: continuous times.
-        max_duration_s: longest shaper, s.
-        max_abs_sum: largest sum of the taps' magnitudes.
-        vibration_limit: residual ratio that a family with a tolerated residual (EI, SI, robust) may leave.
-    """
-
-    period_s: float | None = None
-    max_duration_s: float = 0.25
-    max_abs_sum: float = 10.0
-    vibration_limit: float = 0.05
+_SAME_POLE = 1e-9  # relative
+_SLACK = 1e-9  # of a limit: forgives rounding
 
 
 @dataclass(frozen=True)
@@ -54,28 +42,61 @@ class Family:
     solve: Callable[[Sequence[ModeBand], DesignOptions], Sequence[Shaper]]
 
 
-def _convolved_zv(bands: Sequence[ModeBand], _options: DesignOptions) -> list[Shaper]:
-    return [convolved_zv([band.mode for band in bands])]
-
-
 def _polynomial(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
-    return [grid_polynomial([band.mode for band in bands], _period(options))]
+    return [grid_polynomial([band.mode for band in bands], options.grid_period_s)]
 
 
 def _shortest_non_negative(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
-    return [shortest_non_negative([band.mode for band in bands], _period(options), options.max_duration_s)]
-
-
-def _period(options: DesignOptions) -> float:
-    if options.period_s is None:
-        raise ArgumentError("this family is designed on a grid: give its period")
-    return options.period_s
+    return [shortest_non_negative([band.mode for band in bands], options.grid_period_s, options.max_duration_s)]
 
 
 FAMILIES: tuple[Family, ...] = (
     Family(
         "zv", "zero vibration, one mode after the other", "paper 002, eq. 1-3; Smith 1958",
-        "any number of modes, damped or not; exact at the nominal frequencies only", True, False, _convolved_zv,
+        "any modes, damped or not; exact at the nominal frequencies only", True, True, solvers.repeated("ZV", 1),
+    ),
+    Family(
+        "zvd", "zero vibration and derivative", "Singer and Seering 1990",
+        "any modes; double zeros at the nominal frequencies, twice as long as ZV", True, True,
+        solvers.repeated("ZVD", 2),
+    ),
+    Family(
+        "zvdd", "zero vibration and two derivatives", "Singer and Seering 1990",
+        "any modes; triple zeros at the nominal frequencies, three times as long as ZV", True, True,
+        solvers.repeated("ZVDD", 3),
+    ),
+    Family(
+        "mzv", "modified zero vibration", "the printer firmware Klipper",
+        "any modes; zeros at each mode and at 5/3 of its damped frequency, half as long again as ZV", True, True,
+        solvers.modified,
+    ),
+    Family(
+        "ei", "extra-insensitive, one hump", "Singhose, Seering and Singer 1994; damped: this project",
+        "modes damped up to some .5; leaves the vibration limit at the nominal frequency", True, True,
+        solvers.hump_ei("EI", 1),
+    ),
+    Family(
+        "ei2", "extra-insensitive, two humps", "Singhose et al. 1997; damped: this project",
+        "modes damped up to some .35; zero at the nominal frequency, the vibration limit on both sides", True, True,
+        solvers.hump_ei("two-hump EI", 2),
+    ),
+    Family(
+        "ei3", "extra-insensitive, three humps", "Singhose et al. 1997; damped: this project",
+        "modes damped up to some .25; leaves the vibration limit at the nominal frequency", True, True,
+        solvers.hump_ei("three-hump EI", 3),
+    ),
+    Family(
+        "si", "specified insensitivity", "Singhose, Seering and Singer 1996; linear programs: this project",
+        "any modes with their bands, all at once; leaves up to the vibration limit; without a grid its times lie "
+        "1/64 of the fastest period apart", True, True, solvers.specified,
+    ),
+    Family(
+        "negative-zv", "unity-magnitude ZV with a negative tap", "Singhose, Singer and Seering 1994",
+        "any modes; shorter than ZV, sum |a| 3 for one mode; excites faster modes", True, True, solvers.negative,
+    ),
+    Family(
+        "simultaneous", "shortest without negative taps, all modes at once", "this project (spec 2)",
+        "any modes at continuous times; on a grid it is the family non-negative", True, False, solvers.simultaneous,
     ),
     Family(
         "polynomial", "shortest exact shaper of a grid", "this project",
@@ -84,6 +105,10 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "non-negative", "shortest shaper of a grid without negative taps", "this project",
         "any modes on a grid on which one exists within the longest duration", False, True, _shortest_non_negative,
+    ),
+    Family(
+        "taps", "taps as given", "the user",
+        "judged as they are; on a grid only if their times lie on it", True, True, solvers.user_taps,
     ),
 )  # fmt: skip
 """Every family, in the order of tables."""
@@ -101,8 +126,28 @@ def family_named(name: str) -> Family:
     raise ArgumentError(f"{name!r} is no family of shapers: {', '.join(row.name for row in FAMILIES)}")
 
 
+def distinct(bands: Sequence[ModeBand]) -> list[ModeBand]:
+    """The bands without repetition: modes whose poles agree within 1e-9 count once, with the wider band.
+
+    Their order is that of their first appearance. Without this a family that works mode by mode would cancel the
+    same mode twice, at twice the duration.
+    """
+    kept: list[ModeBand] = []
+    for band in bands:
+        pole = band.mode.pole
+        for index, other in enumerate(kept):
+            if abs(other.mode.pole - pole) <= _SAME_POLE * abs(pole):
+                kept[index] = max(other, band, key=lambda each: each.uncertainty)
+                break
+        else:
+            kept.append(band)
+    return kept
+
+
 def design(name: str, bands: Sequence[ModeBand], options: DesignOptions | None = None) -> list[Design]:
     """All shapers of a family for some modes, judged, the preferred one first.
+
+    Modes that are given twice are designed for once (:func:`distinct`).
 
     Args:
         name: of a row of `FAMILIES`.
@@ -111,7 +156,7 @@ def design(name: str, bands: Sequence[ModeBand], options: DesignOptions | None =
 
     Raises:
         ArgumentError: no mode, no such family, or one that is not designed on the asked kind of times.
-        DesignError: the family has no shaper for these modes within the limits.
+        DesignError: the family has no shaper for these modes within the limits; the message tells what is nearest.
     """
     options = options or DesignOptions()
     row = family_named(name)
@@ -120,5 +165,25 @@ def design(name: str, bands: Sequence[ModeBand], options: DesignOptions | None =
     if options.period_s is None and not row.continuous:
         raise ArgumentError(f"{name} is designed on a grid: give its period")
     if options.period_s is not None and not row.on_grid:
-        raise ArgumentError(f"{name} has no design on a grid: leave the period out")
-    return [evaluate(name, shaper, bands, options.period_s) for shaper in row.solve(bands, options)]
+        raise ArgumentError(f"{name} has no design on a grid: leave the period out ({row.validity})")
+    found = row.solve(distinct(bands), options)
+    if row.name != "taps":
+        _require_within(name, found, options)
+        found = [shaper for shaper in found if _is_within(shaper, options)]
+    return [evaluate(name, shaper, bands, options.period_s) for shaper in found]
+
+
+def _is_within(shaper: Shaper, options: DesignOptions) -> bool:
+    return shaper.duration_s <= options.max_duration_s * (1.0 + _SLACK) and shaper.abs_sum <= options.max_abs_sum * (
+        1.0 + _SLACK
+    )
+
+
+def _require_within(name: str, found: Sequence[Shaper], options: DesignOptions) -> None:
+    """Raise DesignError unless one of the shapers is within the limits."""
+    if found and not any(_is_within(shaper, options) for shaper in found):
+        nearest = min(found, key=lambda shaper: shaper.duration_s)
+        raise DesignError(
+            f"{name} lasts {nearest.duration_s * 1e3:.6g} ms with sum|a| {nearest.abs_sum:.4g}: the limits are "
+            f"{options.max_duration_s * 1e3:.6g} ms and {options.max_abs_sum:.4g}"
+        )
