@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import shapegcode as sg
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper, convolved_zv, minimal_two_mode
 from shapegcode.shaping import (
+    FAMILIES,
     Design,
     DesignOptions,
     ModeBand,
@@ -162,14 +163,14 @@ def test_every_design_keeps_the_limits_and_says_its_own_figures() -> None:
         assert row["worst_residual"] == pytest.approx(max(*swept, nominal), rel=2e-3, abs=1e-9)
     refused = [row for row in report["refused"] if row["family"] == "polynomial"]
     assert [row["period_s"] for row in refused] == [0.001]
-    assert "247.9, the limit is 3" in refused[0]["reason"]
+    assert "247.9" in refused[0]["reason"]
 
 
 def test_no_family_vanishes() -> None:
     for periods_s in ([None], [0.005], [None, 0.005], [0.001, 0.008]):
         result = choose(PAPER, periods_s)
         named = {each.family for each in result.designs} | {each.family for each in result.refusals}
-        assert named >= {"zv", "polynomial", "non-negative"}
+        assert named == {row.name for row in FAMILIES} - {"taps"}
 
 
 def test_reference_residuals_at_a_frequency_ratio_of_two() -> None:
@@ -185,16 +186,16 @@ def test_reference_residuals_at_a_frequency_ratio_of_two() -> None:
 
 
 def test_own_taps_are_compared() -> None:
-    own = Shaper([0.0, 0.010], [0.5, 0.5])
-    result = choose(PAPER, [None, 0.002, 0.005], taps=own)
-    row = next(each for each in result.designs if each.family == "taps")
-    assert row.period_s == 0.005  # the longest grid that holds them
-    assert row.worst_residual == pytest.approx(
-        max(residual([0.0, 0.01], [0.5, 0.5], f, 0.02) for f in (46.0 * 0.95, 46.0, 46.0 * 1.05, 131.0)), rel=1e-3
-    )
-    off = choose(PAPER, [0.005], taps=Shaper([0.0, 0.0109], [0.5, 0.5]))
-    assert all(each.family != "taps" for each in off.designs)
-    assert "not on a grid that was asked for" in next(each.reason for each in off.refusals if each.family == "taps")
+    result = choose_shaper(["46:0.02±5%", "131:0.02"], periods_s=[None, 0.002, 0.004], taps="0:.5,10ms:.5")
+    rows = [each for each in result.designs if each.family == "taps"]
+    assert [each.period_s for each in rows] == [None, 0.002]
+    swept = [residual([0.0, 0.01], [0.5, 0.5], f, 0.02) for f in (46.0 * 0.95, 46.0, 46.0 * 1.05, 131.0)]
+    assert rows[0].worst_residual == pytest.approx(max(swept), rel=1e-3)
+    assert "10 ms is not on the 4 ms grid" in next(each.reason for each in result.refusals if each.family == "taps")
+    assert all(each.family != "taps" for each in choose(PAPER).designs)
+    assert all(each.family != "taps" for each in choose(PAPER).refusals)
+    options = DesignOptions(taps=Shaper([0.0, 0.01], [0.5, 0.5]))
+    assert {each.family for each in choose(PAPER, [0.002], options, families=["zv"]).designs} == {"zv", "taps"}
 
 
 def test_bad_questions() -> None:

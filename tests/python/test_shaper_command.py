@@ -43,7 +43,7 @@ def test_json_of_a_grid(capsys: pytest.CaptureFixture[str]) -> None:
     assert not taken["negative"]
     assert taken["worst_residual"] <= 0.05
     assert "±5 %" in result["reason"]
-    assert {row["family"] for row in result["refused"]} >= {"zv"}
+    assert {row["family"] for row in result["refused"]} >= {"simultaneous"}
     assert all(row["reason"] for row in result["refused"])
     assert result["modes"] == [
         {"frequency_hz": 46.0, "damping_ratio": 0.02, "uncertainty": 0.05},
@@ -101,7 +101,6 @@ def test_exit_code_1_if_the_best_leaves_too_much(capsys: pytest.CaptureFixture[s
         (["--mode", "200", "--period", "5ms"], "200 Hz cannot be cancelled on a grid of 5 ms"),
         (["--mode", "46", "--family", "magic"], "is no family"),
         (["--mode", "46", "--taps", "0:.5,10ms"], "is no tap"),
-        (["--mode", "46", "--taps", "0:.5,10:.5"], "is no tap"),
         (["--mode", "46", "--taps", "0:.5,10ms:.6"], "add up to 1.1"),
         (["--mode", "46", "--family", "zv", "--max-duration", "1ms"], "no family has a shaper for 46 Hz within 1 ms"),
         (["--mode", "46", "-m", "vx500"], "give one of both"),

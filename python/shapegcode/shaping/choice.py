@@ -16,22 +16,20 @@ from typing import Any
 
 import numpy as np
 
-from shapegcode._core import ArgumentError, DesignError, ShapegcodeError, Shaper
+from shapegcode._core import ArgumentError, DesignError, ShapegcodeError
 from shapegcode.shaping.band import ModeBand
-from shapegcode.shaping.design import Design, evaluate
+from shapegcode.shaping.design import Design
 from shapegcode.shaping.registry import FAMILIES, DesignOptions, Family, design, family_named
 
-__all__ = ["OBJECTIVES", "OWN_TAPS", "Recommendation", "Refusal", "choose", "pareto_front", "recommend"]
+__all__ = ["OBJECTIVES", "Recommendation", "Refusal", "choose", "pareto_front", "recommend"]
 
-OWN_TAPS = "taps"
-"""Family name of taps that the user gives."""
+_OWN_TAPS = "taps"  # the family of taps that the user gives
 NO_RESIDUAL = 1e-9
 """A residual ratio below this is none: what is left is the rounding of the solver."""
 
 _DIGITS = 9  # designs that agree in so many digits are equally good
 _ROUNDING = 1e-6  # a design made for a limit may miss it by so much, relative
 _NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of swings per period
-_ON_GRID = 1e-6  # periods
 
 
 def _merits(each: Design) -> tuple[float, float, float, float]:
@@ -171,7 +169,6 @@ def choose(
     families: Sequence[str] | None = None,
     objective: str = "shortest",
     allow_negative: bool = False,
-    taps: Shaper | None = None,
     on_progress: Callable[[float], None] = lambda _: None,
 ) -> Recommendation:
     """Design every family on every kind of times, compare, and recommend.
@@ -179,11 +176,10 @@ def choose(
     Args:
         bands: at least one mode with its band, no two modes equal.
         periods_s: grids on which the taps may lie, s; None among them: continuous times too.
-        options: limits; `period_s` plays no part; None: the defaults.
+        options: limits, and taps to compare with the rest; `period_s` plays no part; None: the defaults.
         families: names of the families to compare; None: all.
         objective: a name of `OBJECTIVES`: what is least in the design to take.
         allow_negative: whether a design with negative taps may be taken.
-        taps: a shaper of the user's own, compared with the others and exempt from the limits.
         on_progress: called with the share of the work done, 0 to 1.
 
     Returns:
@@ -197,7 +193,7 @@ def choose(
     """
     options = options or DesignOptions()
     _check(bands, periods_s, options, objective)
-    rows = FAMILIES if families is None else tuple(family_named(name) for name in dict.fromkeys(families))
+    rows = _rows(families, options)
     usable = _usable(bands, periods_s)
     found: list[Design] = []
     refusals: list[Refusal] = []
@@ -214,10 +210,6 @@ def choose(
         for row, period_s in itertools.product(rows, periods_s)
         if period_s is not None and period_s not in usable and row.on_grid
     ]
-    if taps is not None:
-        designs, reason = _own(taps, bands, usable)
-        found += designs
-        refusals += [Refusal(OWN_TAPS, usable[0], reason)] if reason else []
     if not found:
         reasons = "; ".join(dict.fromkeys(f"{refusal.family}: {refusal.reason}" for refusal in refusals))
         raise DesignError(
@@ -291,6 +283,14 @@ def _within(each: Design, vibration_limit: float) -> bool:
     return each.worst_residual <= vibration_limit * (1.0 + _ROUNDING)
 
 
+def _rows(families: Sequence[str] | None, options: DesignOptions) -> tuple[Family, ...]:
+    """The families to compare: the user's taps only where there are some."""
+    if families is None:
+        return tuple(row for row in FAMILIES if row.name != _OWN_TAPS or options.taps is not None)
+    names = [*families, *([] if options.taps is None else [_OWN_TAPS])]
+    return tuple(family_named(name) for name in dict.fromkeys(names))
+
+
 def _check(
     bands: Sequence[ModeBand], periods_s: Sequence[float | None], options: DesignOptions, objective: str
 ) -> None:
@@ -338,20 +338,9 @@ def _aliases(bands: Sequence[ModeBand], period_s: float) -> str:
 def _designs(row: Family, bands: Sequence[ModeBand], options: DesignOptions) -> tuple[list[Design], str]:
     """The family's designs within the limits, or why there is none."""
     try:
-        found = design(row.name, bands, options)
+        return design(row.name, bands, options), ""
     except ShapegcodeError as error:
         return [], str(error)
-    short = [each for each in found if each.duration_s <= options.max_duration_s * (1.0 + _ROUNDING)]
-    tame = [each for each in short if each.abs_sum <= options.max_abs_sum * (1.0 + _ROUNDING)]
-    if tame:
-        return tame, ""
-    if short:
-        least = min(each.abs_sum for each in short)
-        return [], f"sum of the taps' magnitudes is {least:.4g}, the limit is {options.max_abs_sum:g}"
-    if found:
-        least = min(each.duration_s for each in found)
-        return [], f"lasts {_ms(least)}, the longest shaper allowed lasts {_ms(options.max_duration_s)}"
-    return [], "the family has none for these modes"
 
 
 def _never_tried(rows: Sequence[Family], usable: Sequence[float | None]) -> Iterator[Refusal]:
@@ -360,20 +349,6 @@ def _never_tried(rows: Sequence[Family], usable: Sequence[float | None]) -> Iter
             yield Refusal(row.name, usable[0], "is designed at continuous times only")
         if not row.continuous and usable == [None]:
             yield Refusal(row.name, None, "is designed on a grid: give a period")
-
-
-def _own(taps: Shaper, bands: Sequence[ModeBand], usable: Sequence[float | None]) -> tuple[list[Design], str]:
-    """The user's taps, on the longest of the grids that holds them all; or why they cannot be compared."""
-    periods_s = [period_s for period_s in usable if period_s is not None and _lies_on(taps, period_s)]
-    own = evaluate(OWN_TAPS, taps, bands, max(periods_s, default=None))
-    if own.period_s is not None or None in usable:
-        return [own], ""
-    return [], f"not on a grid that was asked for; at continuous times they leave {_percent(own.worst_residual)}"
-
-
-def _lies_on(taps: Shaper, period_s: float) -> bool:
-    steps = taps.times_s / period_s
-    return bool(np.all(np.abs(steps - np.round(steps)) < _ON_GRID))
 
 
 def _reason(

@@ -12,6 +12,7 @@ from shapegcode.shaping.band import ModeBand, parse_mode_band
 from shapegcode.shaping.choice import Recommendation, choose
 from shapegcode.shaping.registry import DesignOptions
 from shapegcode.shaping.robust_search import Task, shortest_below
+from shapegcode.shaping.taps import parse_taps
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -39,7 +40,7 @@ def choose_shaper(
     vibration_limit: float = 0.05,
     objective: str = "shortest",
     allow_negative: bool = False,
-    taps: Shaper | None = None,
+    taps: str | Shaper | None = None,
     on_progress: Callable[[float], None] = lambda _: None,
 ) -> Recommendation:
     """Compare every family of shapers for some modes, and recommend one.
@@ -59,7 +60,7 @@ def choose_shaper(
         vibration_limit: largest worst residual ratio of the design to take.
         objective: "shortest", "contour" (least contour cost) or "robust" (least worst residual).
         allow_negative: whether a design with negative taps may be taken.
-        taps: a shaper of the user's own, compared with the others.
+        taps: a shaper of the user's own, compared with the others: as text ("0:.5,10.9ms:.5") or as it is.
         on_progress: called with the share of the work done, 0 to 1.
 
     Raises:
@@ -81,9 +82,14 @@ def choose_shaper(
     elif machine is not None:
         for period_s in periods_s:
             _check_period(period_s, machine)
-    options = DesignOptions(max_duration_s=max_duration_s, max_abs_sum=max_abs_sum, vibration_limit=vibration_limit)
+    options = DesignOptions(
+        max_duration_s=max_duration_s,
+        max_abs_sum=max_abs_sum,
+        vibration_limit=vibration_limit,
+        taps=parse_taps(taps) if isinstance(taps, str) else taps,
+    )
     return choose(
-        bands, periods_s, options, families=families, objective=objective, allow_negative=allow_negative, taps=taps,
+        bands, periods_s, options, families=families, objective=objective, allow_negative=allow_negative,
         on_progress=on_progress,
     )  # fmt: skip
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from shapegcode._core import ArgumentError, DesignError, Shaper, grid_polynomial
 from shapegcode.shaping import family_solvers as solvers
 from shapegcode.shaping.band import ModeBand
+from shapegcode.shaping.block_period import robust_candidate
 from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.options import DesignOptions
@@ -48,6 +49,13 @@ def _polynomial(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shape
 
 def _shortest_non_negative(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
     return [shortest_non_negative([band.mode for band in bands], options.grid_period_s, options.max_duration_s)]
+
+
+def _robust(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+    if not any(band.uncertainty for band in bands):
+        raise DesignError("no mode states a band: the family non-negative is the same")
+    found = robust_candidate(bands, options.grid_period_s, options.max_duration_s, options.vibration_limit)
+    return [] if found.shaper is None else [found.shaper]
 
 
 FAMILIES: tuple[Family, ...] = (
@@ -105,6 +113,11 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "non-negative", "shortest shaper of a grid without negative taps", "this project",
         "any modes on a grid on which one exists within the longest duration", False, True, _shortest_non_negative,
+    ),
+    Family(
+        "robust", "shortest of a grid within the vibration limit over the bands", "this project",
+        "modes with bands, no negative tap; exact for a mode without a band; if none is short enough, the one of the "
+        "longest duration that leaves least", False, True, _robust,
     ),
     Family(
         "taps", "taps as given", "the user",
