@@ -30,7 +30,16 @@ CPP_FILES := $(shell find cpp bindings tests/cpp tests/fuzz -name '*.[ch]pp')
 # Folders too: their time changes when a file comes or goes.
 PACKAGE_INPUTS := CMakeLists.txt cmake $(shell find cpp/include cpp/src bindings python \
                     -name __pycache__ -prune -o -print)
-TIDY_STAMPS := $(CORE_SOURCES:%=build/tidy/%.ok)
+# Groups of sources that clang-tidy reads as one: the folders; of gcode, which is large, reader, macros and the rest, and
+# alone what has names in common with others.
+TIDY_READER := $(filter cpp/src/gcode/reader% cpp/src/gcode/rewriter% cpp/src/gcode/move% cpp/src/gcode/interpreter% \
+                 cpp/src/gcode/block% cpp/src/gcode/coord% cpp/src/gcode/control% cpp/src/gcode/offsets%, $(CORE_SOURCES))
+TIDY_MACRO := $(filter cpp/src/gcode/macro%, $(CORE_SOURCES))
+TIDY_ALONE := $(filter cpp/src/gcode/comp% cpp/src/gcode/corner% cpp/src/gcode/cutter%, $(CORE_SOURCES))
+TIDY_REST := $(filter-out $(TIDY_READER) $(TIDY_MACRO) $(TIDY_ALONE), $(filter cpp/src/gcode/%, $(CORE_SOURCES)))
+TIDY_FOLDERS := $(filter-out gcode, $(notdir $(shell find cpp/src -mindepth 1 -maxdepth 1 -type d)))
+TIDY_STAMPS := $(TIDY_FOLDERS:%=build/tidy/%.ok) build/tidy/gcode_reader.ok build/tidy/gcode_macro.ok \
+               build/tidy/gcode_rest.ok build/tidy/mode.ok $(TIDY_ALONE:cpp/src/gcode/%.cpp=build/tidy/gcode_%.ok)
 
 .PHONY: help demo test lint bench fuzz stubs format clean \
         build-packages test-packages package dev tidy release sanitize stub-check fuzz-parameters fuzz-merge
@@ -148,10 +157,15 @@ build/release/compile_commands.json: CMakeLists.txt CMakePresets.json $(CORE_SOU
 	cmake --preset release
 	touch $@
 
-# The compile commands are GCC's: clang-tidy need not know all its warnings.
-build/tidy/%.ok: % $(CPP_HEADERS) .clang-tidy build/release/compile_commands.json
-	clang-tidy -p build/release --quiet --extra-arg=-Wno-unknown-warning-option $<
-	@mkdir -p $(@D)
+$(foreach folder, $(TIDY_FOLDERS), \
+  $(eval build/tidy/$(folder).ok: $(filter cpp/src/$(folder)/%, $(CORE_SOURCES))))
+$(foreach source, $(TIDY_ALONE), $(eval $(source:cpp/src/gcode/%.cpp=build/tidy/gcode_%.ok): $(source)))
+build/tidy/gcode_reader.ok: $(TIDY_READER)
+build/tidy/gcode_macro.ok: $(TIDY_MACRO)
+build/tidy/gcode_rest.ok: $(TIDY_REST)
+build/tidy/mode.ok: $(filter-out $(foreach folder, gcode $(TIDY_FOLDERS), cpp/src/$(folder)/%), $(CORE_SOURCES))
+$(TIDY_STAMPS): $(CPP_HEADERS) .clang-tidy tests/tools/tidy.sh build/release/compile_commands.json
+	tests/tools/tidy.sh $(@:.ok=.cpp) $(filter cpp/%.cpp, $^)
 	@touch $@
 
 tidy: $(TIDY_STAMPS)

@@ -8,8 +8,8 @@ PYBIND11_MODULE(_core, module) {
   module.attr("__version__") = SHAPEGCODE_VERSION;
   register_errors(module);
   register_shaping(module);
-  register_minimal(module);
   register_shaping_families(module);
+  register_minimal(module);
   register_filter(module);
   register_path(module);
   register_motion(module);

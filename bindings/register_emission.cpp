@@ -1,5 +1,6 @@
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -30,6 +31,9 @@ void register_emission(py::module_& module) {
       .def_readwrite("minimum_feed", &FitOptions::minimum_feed, "In feed units.")
       .def_readwrite("merge_tolerance_increments", &FitOptions::merge_tolerance_increments,
                      "Deviation of merged blocks per axis, least increments.")
+      .def_readwrite("modes", &FitOptions::modes,
+                     "Modes of X, Y, Z, which the rounding of block ends leaves at rest; none: ends are rounded to the "
+                     "nearest increment.")
       .def(
           "end_with_arc",
           [](FitOptions& self, bool clockwise, int normal, double radius_mm) {
@@ -53,14 +57,37 @@ void register_emission(py::module_& module) {
             }
             return out;
           },
-          "Whole block periods that each lasts, (n,).");
+          "Whole block periods that each lasts, (n,).")
+      .def_property_readonly(
+          "first_periods",
+          [](const FittedBlocks& self) {
+            py::array_t<std::uint32_t> out(static_cast<py::ssize_t>(self.blocks.size()));
+            auto* to = out.mutable_data();
+            for (const FittedBlock& block : self.blocks) {
+              *to++ = block.first_period;
+            }
+            return out;
+          },
+          "Block period of the command in which each begins, (n,).")
+      .def_property_readonly(
+          "ends",
+          [](const FittedBlocks& self) {
+            py::array_t<std::int64_t> out({static_cast<py::ssize_t>(self.blocks.size()), py::ssize_t{axis_count}});
+            auto* to = out.mutable_data();
+            for (const FittedBlock& block : self.blocks) {
+              to = std::copy(block.end.begin(), block.end.end(), to);
+            }
+            return out;
+          },
+          "Absolute end positions in least increments, (n, 3).");
 
   module.def(
       "fit_blocks",
       [](const ShapedCommand& command, const std::vector<std::uint32_t>& breaks, const FitOptions& options) {
         const py::gil_scoped_release release;
         auto fitted = std::make_shared<FittedBlocks>();
-        fitted->blocks = fit_blocks(command.grid_mm, command.middle_mm, command.arc_normal, breaks, options);
+        fitted->blocks =
+            fit_blocks(command.grid_mm, command.middle_mm, command.arc_normal, breaks, options, command.run_ends);
         return fitted;
       },
       py::arg("command"), py::arg("breaks"), py::arg("options"),

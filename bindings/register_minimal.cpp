@@ -111,7 +111,7 @@ void register_branches(py::module_& m) {
       R"(All minimal two-mode shapers over the ratio of the frequencies, joined to curves (paper 002, fig. 2 and 3).
 
 At each ratio the list is that of `minimal_two_mode`; curves are followed by continuation, also through gaps, where the
-sum of magnitudes or the duration exceeds its limit. Steps of 0.02 and less join reliably.
+sum of magnitudes or the duration exceeds its limit. Where two curves touch, their tails may be exchanged.
 
 Args:
     first: The mode whose frequency stays.

@@ -51,7 +51,7 @@ void register_shaped_command(py::module_& module) {
       .def_property_readonly(
           "arc_normal", [](const ShapedCommand& self) { return self.arc_normal; },
           "Per period the axis across an arc's plane, or -1.")
-      .def_readonly("run_ends", &ShapedCommand::run_ends, "Periods of the region at which the command is at rest.")
+      .def_readonly("run_ends", &ShapedCommand::run_ends, "Periods of this piece at which the command is at rest.")
       .def_readonly("segment_periods", &ShapedCommand::segment_periods,
                     "Per marked segment the period of the region in which its begin is reached.");
 
@@ -81,6 +81,12 @@ Raises:
                [](std::shared_ptr<Path> path, const Fir& shaper, const std::vector<std::uint32_t>& marked,
                   const ShapingOptions& options) { return RegionShaper(std::move(path), shaper, marked, options); }),
            py::arg("path"), py::arg("shaper"), py::arg("marked_segments"), py::arg("options"), "See the class.")
+      .def(py::init([](std::shared_ptr<Path> path, const FollowingFir& shapers, const std::vector<AxisModes>& modes,
+                       const std::vector<std::uint32_t>& marked, const ShapingOptions& options) {
+             return RegionShaper(std::move(path), shapers, modes, marked, options);
+           }),
+           py::arg("path"), py::arg("shapers"), py::arg("modes"), py::arg("marked_segments"), py::arg("options"),
+           "With shapers that follow an axis, on the block grid; `modes` of X, Y and Z at each of their positions.")
       .def(
           "next",
           [](RegionShaper& self, std::uint32_t periods) -> std::optional<std::shared_ptr<ShapedCommand>> {

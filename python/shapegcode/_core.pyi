@@ -281,6 +281,81 @@ class FrequencyBand:
         """
         Lower end in Hz.
         """
+class MinimalShapers:
+    """
+    The minimal shapers of some modes, and what is known about others.
+    """
+    @property
+    def boxes(self) -> int:
+        """
+        Boxes of times that the proof looked at.
+        """
+    @property
+    def complete(self) -> bool:
+        """
+        True if every box of times was settled: there is no other shaper in the region.
+        """
+    @property
+    def complete_up_to_s(self) -> float:
+        """
+        Duration in s up to which there is no other shaper; 0: nothing is proven.
+        """
+    @property
+    def converged(self) -> int:
+        """
+        Starts that reached a shaper in the region.
+        """
+    @property
+    def found_once(self) -> int:
+        """
+        Shapers that one start alone reached. Over `converged` it estimates the share of starts that would reach a shaper not listed yet (Good 1953).
+        """
+    @property
+    def max_abs_sum(self) -> float:
+        """
+        The region: largest sum of magnitudes (no unit).
+        """
+    @property
+    def max_duration_s(self) -> float:
+        """
+        The region: largest duration in s.
+        """
+    @property
+    def shapers(self) -> list[Shaper]:
+        """
+        The shapers, ascending in duration, then in the times.
+        """
+    @property
+    def starts(self) -> int:
+        """
+        Newton starts.
+        """
+    @property
+    def unresolved(self) -> int:
+        """
+        Boxes too small to halve on that could not be settled: solutions there are not isolated.
+        """
+class MinimalBranches:
+    """
+    The minimal shapers of two modes over the ratio of their frequencies, joined to curves.
+    """
+    @property
+    def amplitudes(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Amplitudes (no unit), shape (n_branches, n_ratios, 3), NaN as in `times_s`; read-only view.
+        """
+    @property
+    def ratios(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Frequency ratios (no unit), shape (n_ratios,), read-only view.
+        """
+    @property
+    def times_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Times of the taps in s, shape (n_branches, n_ratios, 3), NaN where a curve has no shaper; read-only view.
+        
+        [..., 2] is the duration.
+        """
 class Fir:
     """
     Weights on the sample grid that add up to one: an acceleration filter (moving average) or an input shaper. One filter type for both (spec section 0).
@@ -1796,12 +1871,30 @@ class FitOptions:
     @minimum_feed.setter
     def minimum_feed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+    @property
+    def modes(self) -> typing.Annotated[list[list[Mode]], "FixedSize(3)"]:
+        """
+        Modes of X, Y, Z, which the rounding of block ends leaves at rest; none: ends are rounded to the nearest increment.
+        """
+    @modes.setter
+    def modes(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> None:
+        ...
 class FittedBlocks:
     """
     Blocks ready to be written.
     """
     def __len__(self) -> int:
         ...
+    @property
+    def ends(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        Absolute end positions in least increments, (n, 3).
+        """
+    @property
+    def first_periods(self) -> numpy.typing.NDArray[numpy.uint32]:
+        """
+        Block period of the command in which each begins, (n,).
+        """
     @property
     def periods(self) -> numpy.typing.NDArray[numpy.uint32]:
         """

@@ -22,6 +22,8 @@ from shapegcode.verify import (
     Placed,
     RegionFigures,
     axis_modes,
+    contour_target,
+    contour_um,
     measure,
     other_time_s,
     play_original,
@@ -235,7 +237,7 @@ def _tighten(
     places = {id(region): index for index, region in enumerate(program.regions)}
     tightened = False
     for place, region in zip(placed, figures, strict=True):
-        reached = max(run.command.max_abs_mm for run in region.emitted) * 1e3
+        reached = contour_um(region.emitted, machine)
         if reached > limit:
             room_um[places[id(place.region)]] *= _CONTOUR_MARGIN * limit / reached
             tightened = True
@@ -385,6 +387,7 @@ def _report(
         **figures,
         "limits": {
             "contour_um": machine.tolerance.contour_um,
+            "contour_target": contour_target(machine),
             "residual_ratio": machine.tolerance.residual_ratio,
             "residual_floor_um": machine.tolerance.residual_floor_um,
             "residual_floor_increments": machine.tolerance.residual_floor_increments,

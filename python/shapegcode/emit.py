@@ -14,7 +14,15 @@ from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 
 _DEGREE = math.pi / 180.0
 _PLUNGE_CORNER_DEG = 45.0
+_ALL_PERIODS = (1 << 32) - 1
 _CORNER_SHARE = 0.75  # several corners of a polyline may fall into one shaper, and then their deviations add up
+
+
+_TARGETS = {
+    "response": _core.ContourTarget.response,
+    "command": _core.ContourTarget.command,
+    "off": _core.ContourTarget.none,
+}
 
 
 @dataclass(frozen=True)
@@ -95,13 +103,10 @@ def motion_limits(
     return limits
 
 
-def emit_region(
-    program: Program, region: _core.Region, machine: Machine, grid: Grid, limits: _core.MotionLimits
-) -> EmittedRegion:
-    """Shape one region and write it.
+def shaping_options(machine: Machine, grid: Grid, limits: _core.MotionLimits) -> _core.ShapingOptions:
+    """How a region is shaped on a grid: what the core needs of the machine file."""
+    from shapegcode.verify import axis_modes  # which imports this module
 
-    The text begins with `emission.prologue` and a full safe line and ends with the modal state of the original.
-    """
     options = _core.ShapingOptions()
     options.limits = limits
     options.block_period_s = grid.block_period_s
@@ -109,8 +114,21 @@ def emit_region(
     options.plunge_axis_angle_rad = machine.shaping.plunge_angle_deg * _DEGREE
     options.plunge_corner_angle_rad = _PLUNGE_CORNER_DEG * _DEGREE
     options.rest_at_stop_s = machine.controller.shaped_time_constant_s
+    options.target = _TARGETS[machine.shaping.contour]
+    options.modes = axis_modes(machine)
+    return options
+
+
+def emit_region(
+    program: Program, region: _core.Region, machine: Machine, grid: Grid, limits: _core.MotionLimits
+) -> EmittedRegion:
+    """Shape one region and write it.
+
+    The text begins with `emission.prologue` and a full safe line and ends with the modal state of the original.
+    """
     notes = region.notes
-    command = _core.shape_path(region.path, grid.fir, [note.segment for note in notes], options)
+    options = shaping_options(machine, grid, limits)
+    shaper = _core.RegionShaper(region.path, grid.fir, [note.segment for note in notes], options)
 
     inch = region.exit.units == 20
     unit = MM_PER_INCH if inch else 1.0
@@ -124,10 +142,14 @@ def emit_region(
     fit.minimum_feed = max(1, math.ceil(machine.controller.minimum_feed_mm_per_min / unit * 10**feed_decimals - 1e-9))
     fit.merge_tolerance_increments = machine.emission.merge_tolerance_increments
     fit.arc_min_chord_mm = machine.emission.arc_min_chord_mm
+    if machine.emission.rounding == "vibration":
+        fit.modes = options.modes
     last = region.path[-1]
     if region.exit.motion in (2, 3) and last.kind == _core.SegmentKind.arc:
         fit.end_with_arc(region.exit.motion == 2, last.normal, last.radius_mm)
 
+    command = shaper.next(_ALL_PERIODS)
+    assert command is not None  # the first piece always exists
     line_end = program.core.line_end
     marks: list[_core.BlockMark] = []
     breaks = set(command.run_ends)
@@ -141,7 +163,6 @@ def emit_region(
             marks.append(_core.BlockMark(period, number, comment))
             breaks.add(period)
     fitted = _core.fit_blocks(command, sorted(breaks), fit)
-
     writer = _core.WriterOptions()
     writer.position_decimals = -round(math.log10(increment / unit))
     writer.feed_decimals = feed_decimals

@@ -2,11 +2,58 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from itertools import pairwise
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from shapegcode.machine_keys import NonNegative, Positive, Table, key
+from shapegcode.machine_keys import Float, InlineTable, NonNegative, Positive, Table, key, toml
+
+
+class FrequencyOver(InlineTable):
+    """How the frequency of a mode depends on where an axis stands or on what the part weighs."""
+
+    axis: Literal["x", "y", "z"] | None = key("axis whose position counts", default=None)
+    position_mm: tuple[Float, ...] | None = key(
+        "positions of the axis, ascending, in the machine's coordinates", unit="mm", default=None
+    )
+    mass_kg: tuple[NonNegative, ...] | None = key("masses of the part, ascending", unit="kg", default=None)
+    frequency_hz: tuple[Annotated[Positive, Field(le=10_000)], ...] = key("natural frequencies, one per row", unit="Hz")
+    damping_ratio: tuple[Annotated[NonNegative, Field(lt=1)], ...] | None = key(
+        "damping ratios, one per row", unit="1", default=None
+    )
+
+    @model_validator(mode="after")
+    def _is_a_table(self) -> FrequencyOver:
+        if self.mass_kg is not None and self.position_mm is not None:
+            raise ValueError("is either over position_mm of an axis or over mass_kg: both are given")
+        if self.mass_kg is None and self.position_mm is None:
+            raise ValueError("needs position_mm (with axis) or mass_kg: neither is given")
+        if (self.axis is None) != (self.position_mm is None):
+            given, missing = ("position_mm", "axis") if self.axis is None else ("axis", "position_mm")
+            raise ValueError(f"{given} is given, {missing} is not")
+        for name, values in (("frequency_hz", self.frequency_hz), ("damping_ratio", self.damping_ratio)):
+            if values is not None and len(values) != len(self.abscissa):
+                raise ValueError(
+                    f"{name} has {len(values)} values for {len(self.abscissa)} of {self.abscissa_name}: "
+                    "must have one for each"
+                )
+        if len(self.abscissa) < 2:
+            raise ValueError(f"{self.abscissa_name} has {len(self.abscissa)} values: must have 2 or more")
+        for before, after in pairwise(self.abscissa):
+            if not after > before:
+                raise ValueError(f"{self.abscissa_name} must ascend: {toml(after)} follows {toml(before)}")
+        return self
+
+    @property
+    def abscissa_name(self) -> str:
+        """Key that the rows are counted along."""
+        return "position_mm" if self.mass_kg is None else "mass_kg"
+
+    @property
+    def abscissa(self) -> tuple[float, ...]:
+        """Positions in mm or masses in kg, ascending."""
+        return (self.position_mm if self.mass_kg is None else self.mass_kg) or ()
 
 
 class Mode(Table):
@@ -27,6 +74,25 @@ class Mode(Table):
         unit="%",
         default=None,
     )
+    frequency_over: FrequencyOver | None = key(
+        'table of the frequency over the position of an axis, { axis = "z", position_mm = [0, 200, 400], '
+        "frequency_hz = [52, 46, 41] }, or over the mass of the part, { mass_kg = [0, 300], frequency_hz = [46, 38] }; "
+        "damping_ratio = [...] may follow. Linear between the rows, constant beyond them; positions are the machine's: "
+        "program plus work offset and tool length. frequency_hz above stays the nominal value and lies within the "
+        "table",
+        default=None,
+    )
+
+    @model_validator(mode="after")
+    def _nominal_in_table(self) -> Mode:
+        if self.frequency_over is not None:
+            low, high = min(self.frequency_over.frequency_hz), max(self.frequency_over.frequency_hz)
+            if not low <= self.frequency_hz <= high:
+                raise ValueError(
+                    f"frequency_hz is {toml(self.frequency_hz)}: must lie within frequency_over, "
+                    f"{toml(low)} to {toml(high)} (unit: Hz)"
+                )
+        return self
 
 
 class Axis(Table):

@@ -6,6 +6,7 @@ import json
 import math
 import re
 from dataclasses import dataclass
+from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
@@ -35,7 +36,11 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
 
 
-class PerAxis(Table):
+class InlineTable(Table):
+    """A table that is written in one line, as the value of a key."""
+
+
+class PerAxis(InlineTable):
     """One value per axis. A machine file may give a single number, which then holds for all three."""
 
     x: NonNegative = key("value of the X axis")
@@ -145,6 +150,9 @@ def item_type(field: FieldInfo) -> type[Table] | None:
 
 
 def _as_table(annotation: Any) -> type[Table] | None:
+    arguments = get_args(annotation)
+    if isinstance(annotation, UnionType) and len(arguments) == 2 and arguments[1] is NoneType:
+        annotation = arguments[0]  # an optional table
     return annotation if isinstance(annotation, type) and issubclass(annotation, Table) else None
 
 
@@ -173,6 +181,9 @@ def toml(value: object) -> str:
         if value.x == value.y == value.z:
             return toml(value.x)
         return "{ " + ", ".join(f"{axis} = {toml(getattr(value, axis))}" for axis in "xyz") + " }"
+    if isinstance(value, InlineTable):
+        given = {name: getattr(value, name) for name in type(value).model_fields}
+        return toml({name: item for name, item in given.items() if item is not None})
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):

@@ -58,6 +58,11 @@ class Emission(Table):
         unit="increments",
         default=0.5,
     )
+    rounding: Literal["vibration", "nearest"] = key(
+        'how the ends of blocks are rounded. "vibration": to that of the two neighbouring increments that leaves the '
+        'modes at rest; "nearest": each to the nearest increment, which leaves up to several increments of vibration',
+        default="vibration",
+    )
 
     @field_validator("prologue", "epilogue")
     @classmethod
@@ -90,11 +95,23 @@ class Shaping(Table):
         unit="1",
         default=1.0,
     )
+    contour: Literal["response", "command", "off"] = key(
+        "what is brought back to the programmed path behind the shaper, at the highest feed that keeps "
+        'tolerance.contour_um: "response" is the table with its modes, and so the part; "command" the set-points; '
+        '"off": neither, the feed alone keeps the command within the tolerance',
+        default="response",
+    )
     plunge_angle_deg: Annotated[NonNegative, Field(le=90)] = key(
         "a corner is a forced stop of the shaped command if a side of it leans from the Z axis by no more than "
         "this and the direction changes by 45 degrees or more: a shaper must not mix plunges with other cuts",
         unit="degrees",
         default=15.0,
+    )
+    part_mass_kg: NonNegative | None = key(
+        "mass of the part on the table, for modes with a table over mass_kg; left out: not known, and their "
+        "nominal frequency holds",
+        unit="kg",
+        default=None,
     )
 
 
@@ -102,7 +119,9 @@ class Tolerance(Table):
     """When an emitted program is good: outside these limits the conversion says so and exits with 1."""
 
     contour_um: Positive = key(
-        "largest deviation of the emitted command from the programmed path", unit="µm", default=50.0
+        "largest deviation from the programmed path of what shaping.contour names: the response, or the command",
+        unit="µm",
+        default=20.0,
     )
     residual_ratio: Annotated[NonNegative, Field(le=1)] = key(
         "residual vibration passes if it is below this share of the original program's, or below residual_floor_um",

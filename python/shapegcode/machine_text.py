@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from shapegcode.machine_keys import KeyInfo, KeyValue, PerAxis, Table, item_type, key_info, table_type, toml
+from shapegcode.machine_keys import InlineTable, KeyInfo, KeyValue, Table, item_type, key_info, table_type, toml
 
 _LINE_WIDTH = 110
 
@@ -24,7 +24,7 @@ def values_of(table: Table, prefix: str = "", given: bool = True) -> Iterator[Ke
     for name, field in type(table).model_fields.items():
         value, key = getattr(table, name), f"{prefix}{name}"
         from_file = given and name in table.model_fields_set
-        if isinstance(value, Table) and not isinstance(value, PerAxis):
+        if isinstance(value, Table) and not isinstance(value, InlineTable):
             yield from values_of(value, f"{key}.", from_file)
         elif item_type(field) and value:
             for number, item in enumerate(value, start=1):
@@ -84,7 +84,7 @@ class _TomlWriter:
         below: list[tuple[str, FieldInfo, Any]] = []
         for name, field in type(table).model_fields.items():
             value = getattr(table, name)
-            if (isinstance(value, Table) and not isinstance(value, PerAxis)) or item_type(field):
+            if (isinstance(value, Table) and not isinstance(value, InlineTable)) or item_type(field):
                 below.append((name, field, value))
             else:
                 self._plain(f"{prefix}{name}", name, field, value)
@@ -173,7 +173,7 @@ def _documented(model: type[Table], prefix: str) -> Iterator[tuple[str, str, lis
     below: list[tuple[str, str, type[Table]]] = []
     for name, field in model.model_fields.items():
         sub, key = table_type(field), f"{prefix}{name}"
-        if sub is None or issubclass(sub, PerAxis):
+        if sub is None or issubclass(sub, InlineTable):
             keys.append(key_info(field, key))
             continue
         alike = [other for other, inner in model.model_fields.items() if table_type(inner) is sub]

@@ -19,6 +19,7 @@ from shapegcode import _core
 from shapegcode.controller import controller_model
 from shapegcode.emit import motion_limits
 from shapegcode.machine import Machine
+from shapegcode.moving_modes import NO_OFFSET, Offset, mode_tables, region_offset, slowest_mode, still_mode
 from shapegcode.program import Program, least_increment_mm
 
 OVERRIDES = (0.8, 0.9, 1.1, 1.2)
@@ -72,15 +73,19 @@ class RegionFigures:
 
 
 def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
-    """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty."""
+    """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty.
+
+    A table over the part's mass is looked up; of one over a position the nominal frequency is taken.
+    """
     return [
         [
             _core.Mode(
-                mode.frequency_hz * (1.0 + shift * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
-                mode.damping_ratio,
-                mode.participation,
+                still.frequency_hz * (1.0 + shift * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
+                still.damping_ratio,
+                still.participation,
             )
             for mode in axis.modes
+            for still in (still_mode(mode, machine.shaping.part_mass_kg),)
         ]
         for axis in machine.axes.as_tuple()
     ]
@@ -92,12 +97,22 @@ def mode_shifts(machine: Machine) -> tuple[float, ...]:
     return (-1.0, 1.0) if stated else ()
 
 
-def playback_options(machine: Machine, *, time_constant_s: float = 0.0, shift: float = 0.0) -> _core.PlaybackOptions:
-    """Plant and interpolation period of a machine, with an acceleration filter after interpolation."""
+def playback_options(
+    machine: Machine, *, time_constant_s: float = 0.0, shift: float = 0.0, offset: Offset = NO_OFFSET
+) -> _core.PlaybackOptions:
+    """Plant and interpolation period of a machine, with an acceleration filter after interpolation.
+
+    Args:
+        machine: modes and controller.
+        time_constant_s: length of the filter; 0: none.
+        shift: see `axis_modes`.
+        offset: from the command's positions to the machine's, for modes that vary with them.
+    """
     options = _core.PlaybackOptions()
     period = machine.controller.interpolation_period_s
     options.period_s = period
     options.modes = axis_modes(machine, shift)
+    options.mode_tables = mode_tables(machine, shift, offset)
     options.axis_filters = [
         _core.Fir.moving_average(round(length / period)) for length in (time_constant_s,) if round(length / period) > 1
     ]
@@ -109,10 +124,12 @@ def _own_rule(machine: Machine) -> _core.BlockEnd:
     return rule
 
 
-def play_original(path: _core.Path, machine: Machine, *, record_samples: int = 0) -> _core.PlaybackFigures:
+def play_original(
+    path: _core.Path, machine: Machine, *, record_samples: int = 0, offset: Offset = NO_OFFSET
+) -> _core.PlaybackFigures:
     """A programmed path as the controller plays an ordinary program."""
     model = controller_model(machine)
-    options = playback_options(machine)
+    options = playback_options(machine, offset=offset)
     options.axis_filters = _core.acceleration_filters(model)
     options.record_samples = record_samples
     if model.motion == _core.MotionKind.look_ahead:
@@ -131,9 +148,11 @@ def play_emitted(
     last_seconds: float = 0.0,
     shift: float = 0.0,
     record_samples: int = 0,
+    offset: Offset = NO_OFFSET,
 ) -> _core.PlaybackFigures:
     """Emitted blocks as the controller plays them (None: by its own rule), measured against the programmed path."""
-    options = playback_options(machine, time_constant_s=machine.controller.shaped_time_constant_s, shift=shift)
+    own = machine.controller.shaped_time_constant_s
+    options = playback_options(machine, time_constant_s=own, shift=shift, offset=offset)
     options.measure_contour = contour
     options.last_seconds = last_seconds
     options.record_samples = record_samples
@@ -187,8 +206,9 @@ def measure(
     for place in placed:
         path = place.region.path
         blocks = emitted.core.cutting_path(place.first_line, place.last_line)
-        runs = [pool.submit(play_emitted, blocks, path, machine, rule) for rule in _BLOCK_ENDS]
-        residual = partial(play_emitted, blocks, path, machine, contour=False, last_seconds=memory_s)
+        play = partial(play_emitted, blocks, path, machine, offset=region_offset(place.region, machine))
+        runs = [pool.submit(play, rule) for rule in _BLOCK_ENDS]
+        residual = partial(play, contour=False, last_seconds=memory_s)
         overrides = [pool.submit(residual, override=ratio) for ratio in OVERRIDES]
         shifted = [pool.submit(residual, shift=shift) for shift in mode_shifts(machine)]
         slowed = pool.submit(
@@ -213,9 +233,10 @@ def measure(
 def _vibration_memory_s(machine: Machine) -> float:
     """Time after which a vibration is a millionth of itself; 0 where a mode has no damping to speak of."""
     rates = [
-        mode.damping_ratio * 2.0 * math.pi * mode.frequency_hz
+        damping * 2.0 * math.pi * frequency
         for axis in machine.axes.as_tuple()
         for mode in axis.modes
+        for frequency, damping in (slowest_mode(mode),)
     ]
     slowest = min(rates, default=0.0)
     return math.log(1e6) / slowest if slowest > 0.01 else 0.0
@@ -270,6 +291,17 @@ def summarise(figures: Sequence[RegionFigures], placed: Sequence[Placed], machin
     }
 
 
+def contour_target(machine: Machine) -> str:
+    """What the contour tolerance is about: "command" or "response"."""
+    return "response" if machine.shaping.contour == "response" else "command"
+
+
+def contour_um(runs: Iterable[_core.PlaybackFigures], machine: Machine) -> float:
+    """Largest deviation from the path of what the contour tolerance is about, µm."""
+    target = contour_target(machine)
+    return max(float(getattr(run, target).max_abs_mm) for run in runs) * 1e3
+
+
 def _region_summary(figures: RegionFigures, place: Placed, machine: Machine) -> dict[str, Any]:
     tolerance = machine.tolerance
     misses = []
@@ -281,9 +313,11 @@ def _region_summary(figures: RegionFigures, place: Placed, machine: Machine) -> 
     for axis, now, limit in zip("XYZ", after, limits, strict=True):
         if now > limit:
             misses.append(f"residual vibration {axis} {now:.2f} um, limit {limit:.2f} um")
-    contour = max(run.command.max_abs_mm for run in figures.emitted) * 1e3
+    contour = contour_um(figures.emitted, machine)
     if contour > tolerance.contour_um:
-        misses.append(f"contour error of the command {contour:.1f} um, limit {tolerance.contour_um:.1f} um")
+        misses.append(
+            f"contour error of the {contour_target(machine)} {contour:.1f} um, limit {tolerance.contour_um:.1f} um"
+        )
     return {
         "lines": [place.region.first_line, place.region.last_line],
         "emitted_lines": [place.first_line, place.last_line],

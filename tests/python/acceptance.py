@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,16 +21,21 @@ from judge import (
     play,
     residual_um,
     response,
+    samples,
     starts,
     verify_conversion,
 )
 from judge.player import BlockEnd
+from shapegcode import _core
 
-PROGRAMS = Path(__file__).parents[1] / "golden" / "programs"
-SAMPLES = sorted(p.name for p in PROGRAMS.iterdir() if p.suffix.lower() == ".nc")
+PROGRAMS = samples.PROGRAMS
+SAMPLES = samples.SAMPLES
+read_sample = samples.read_sample
 BLOCK_ENDS: tuple[BlockEnd, ...] = ("ceil", "carry")
 #: Settings that a sample needs to be read as it was meant.
 SAMPLE_KEYS: dict[str, dict[str, Any]] = {"BOTTLE.NC": {"input.arc_centre": "absolute"}}
+#: What the judges call the moves.
+MOVE_KINDS = {_core.SegmentKind.rapid: "rapid", _core.SegmentKind.line: "line", _core.SegmentKind.arc: "arc"}
 HEADER_LINE = re.compile(r"\([A-Z0-9 .-]{1,60}\)\r?")
 
 
@@ -47,8 +51,17 @@ def machine_with(keys: Mapping[str, Any] | None = None, base: str = "vx500") -> 
     return sg.Machine.from_data(data, "machine of a test")
 
 
-def read_sample(name: str) -> str:
-    return (PROGRAMS / name).read_bytes().decode("ascii")
+def moves_of(program: sg.Program) -> list[tuple[Any, float]]:
+    """(segment, dwell) of every step in the order in which it happens, without those that lead nowhere."""
+    core = program.core
+    moves: list[tuple[Any, float]] = []
+    for kind, index, _line in core.steps:
+        if kind == _core.StepKind.region:
+            path = core.regions[index].path
+            moves += [(path[k], 0.0) for k in range(len(path))]
+        elif kind == _core.StepKind.move:
+            moves.append(core.other_moves[index])
+    return [(segment, dwell) for segment, dwell in moves if dwell > 0.0 or segment.length_mm > 1e-9]
 
 
 @dataclass(frozen=True)

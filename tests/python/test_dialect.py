@@ -13,10 +13,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 import shapegcode as sg
-from acceptance import machine_with
+from acceptance import MOVE_KINDS, machine_with, moves_of
 from judge.dialect import Alarm, Item, play
 from judge.dialect.generate import compensated_programs, coordinate_programs, macro_programs
-from shapegcode import _core
 
 Vector = npt.NDArray[np.float64]
 DIALECT = Path(__file__).parents[1] / "golden" / "dialect"
@@ -26,20 +25,10 @@ SKIPPING = [name for name in NAMES if "/" in (DIALECT / f"{name}.nc").read_text(
 PLACE_MM = 1e-4
 #: What coordinate modes and compensation come to is written in least increments, as the plain program needs it.
 WRITTEN_MM = {False: 0.0005 + 1e-6, True: 0.00127 + 1e-6}
-KINDS = {_core.SegmentKind.rapid: "rapid", _core.SegmentKind.line: "line", _core.SegmentKind.arc: "arc"}
 
 
 def read_moves(text: str, machine: sg.Machine) -> list[tuple[Any, float]]:
-    """(segment, dwell) of every step in the order in which it happens."""
-    core = sg.Program.from_text(text, machine, source="dialect.nc").core
-    out: list[tuple[Any, float]] = []
-    for kind, index, _line in core.steps:
-        if kind == _core.StepKind.region:
-            path = core.regions[index].path
-            out += [(path[k], 0.0) for k in range(len(path))]
-        elif kind == _core.StepKind.move:
-            out.append(core.other_moves[index])
-    return [(segment, dwell) for segment, dwell in out if dwell > 0.0 or segment.length_mm > 1e-9]
+    return moves_of(sg.Program.from_text(text, machine, source="dialect.nc"))
 
 
 def played_moves(text: str, **settings: Any) -> list[Item]:
@@ -64,8 +53,8 @@ def difference(item: Item, segment: Any, dwell: float, place_mm: float) -> str:
         return "" if math.isclose(dwell, item.dwell_s, abs_tol=1e-9) else f"dwell {dwell}, judged {item.dwell_s}"
     if dwell > 0.0:
         return f"a dwell of {dwell} s, judged a {item.kind}"
-    if KINDS[segment.kind] != item.kind:
-        return f"{KINDS[segment.kind]}, judged {item.kind}"
+    if MOVE_KINDS[segment.kind] != item.kind:
+        return f"{MOVE_KINDS[segment.kind]}, judged {item.kind}"
     known = ~np.isnan(item.end)
     if np.any(np.abs(segment.end_mm - item.end)[known] > place_mm):
         return f"ends at {segment.end_mm}, judged {item.end}"

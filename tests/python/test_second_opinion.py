@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 import shapegcode as sg
-from acceptance import SAMPLE_KEYS, SAMPLES, machine_with, read_sample
+from acceptance import MOVE_KINDS, SAMPLE_KEYS, SAMPLES, machine_with, moves_of, read_sample
 from rs274_tool import CanonicalMove, canonical_moves, run_rs274
-from shapegcode import _core
 
 DIALECT = Path(__file__).parents[1] / "golden" / "dialect"
 SETTINGS: dict[str, dict[str, Any]] = {
@@ -70,7 +69,6 @@ SHAPED = [
 HALF_WAY_MM = 50000.0
 VARIABLES = "5161\t4000\n5162\t4000\n5163\t4000\n5220\t1\n"
 TOOLS = "".join(f"T{number} P{number} Z0 D0\n" for number in range(1, 100))
-KINDS = {_core.SegmentKind.rapid: "rapid", _core.SegmentKind.line: "line", _core.SegmentKind.arc: "arc"}
 
 
 def for_rs274(text: str, machine: sg.Machine, *, emitted: bool = False) -> str:
@@ -143,25 +141,12 @@ def their_moves(text: str, tmp_path: Path) -> list[CanonicalMove]:
     return moves
 
 
-def our_moves(program: sg.Program) -> list[tuple[Any, float]]:
-    """(segment, dwell) of every step in the order in which it happens."""
-    core = program.core
-    moves: list[tuple[Any, float]] = []
-    for kind, index, _line in core.steps:
-        if kind == _core.StepKind.region:
-            path = core.regions[index].path
-            moves += [(path[k], 0.0) for k in range(len(path))]
-        elif kind == _core.StepKind.move:
-            moves.append(core.other_moves[index])
-    return [(segment, dwell) for segment, dwell in moves if dwell > 0.0 or segment.length_mm > 1e-9]
-
-
 def difference(theirs: CanonicalMove, segment: Any, dwell: float, increment_mm: float) -> str:
     """What is not the same, in words; empty where nothing is."""
     if theirs.kind == "dwell" or dwell > 0.0:
         return "" if math.isclose(dwell, theirs.dwell_s, abs_tol=1e-4) else f"dwell {dwell}"
-    if KINDS[segment.kind] != theirs.kind:
-        return f"a {KINDS[segment.kind]} to {segment.end_mm}"
+    if MOVE_KINDS[segment.kind] != theirs.kind:
+        return f"a {MOVE_KINDS[segment.kind]} to {segment.end_mm}"
     count = max(2, min(200, math.ceil(segment.length_mm / 0.5)) + 1)
     shares = np.linspace(0.0, 1.0, count)
     ours = np.array([segment.point_at(share * segment.length_mm) for share in shares])
@@ -183,7 +168,7 @@ def only_the_peck(theirs: CanonicalMove, segment: Any, increment_mm: float) -> b
 
 def agree(program: sg.Program, text: str, machine: sg.Machine, tmp_path: Path) -> int:
     """How many moves and dwells of the program agree with rs274's reading of a text; a difference is a failure."""
-    theirs, ours = their_moves(text, tmp_path), our_moves(program)
+    theirs, ours = their_moves(text, tmp_path), moves_of(program)
     inches = re.search(r"G20(?!\d)", text)
     increment_mm = machine.controller.least_increment_inch * 25.4 if inches else machine.controller.least_increment_mm
     for k, (move, (segment, dwell)) in enumerate(zip(theirs, ours, strict=False)):

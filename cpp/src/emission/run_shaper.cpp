@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
+#include "shapegcode/error.hpp"
 #include "shapegcode/motion/limits.hpp"
 
 namespace shapegcode {
@@ -27,6 +29,14 @@ Fir on_half_grid(const Fir& shaper) {
   return Fir(std::move(delays), shaper.taps());
 }
 
+RunFilter::Node node_of(Fir half_shaper, const AxisModes& modes, double half_period_s, ContourTarget target) {
+  RunFilter::Node node{std::move(half_shaper), {}};
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    node.kernels[axis] = contour_kernel(node.half_shaper, modes[axis], half_period_s, target);
+  }
+  return node;
+}
+
 double smooth_step(double x) noexcept { return x * x * (3.0 - 2.0 * x); }
 
 bool is_corner(const Path& path, std::size_t before, std::size_t after) noexcept {
@@ -42,14 +52,36 @@ bool is_corner(const Path& path, std::size_t before, std::size_t after) noexcept
 
 RunFilter::RunFilter(const Fir& shaper, ContourTarget contour_target, const AxisModes& modes, double block_period_s,
                      double weight)
-    : half_shaper(on_half_grid(shaper)),
-      target(contour_target),
+    : target(contour_target),
       half_period_s(0.5 * block_period_s),
       mean_delay_s(shaper.mean_samples() * block_period_s),
       smoothness(weight) {
-  for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    kernels[axis] = contour_kernel(half_shaper, modes[axis], half_period_s, target);
+  nodes.push_back(node_of(on_half_grid(shaper), modes, half_period_s, target));
+}
+
+RunFilter::RunFilter(const FollowingFir& shapers, ContourTarget contour_target, std::span<const AxisModes> modes,
+                     double block_period_s, double weight)
+    : following(shapers.on_finer_grid(2)),
+      target(contour_target),
+      half_period_s(0.5 * block_period_s),
+      mean_delay_s(shapers.fir().mean_samples() * block_period_s),
+      smoothness(weight) {
+  const std::vector<Fir>& set = following->fir().set();
+  if (modes.size() != set.size()) {
+    throw Error(ErrorKind::argument, "modes at " + std::to_string(modes.size()) + " positions for " +
+                                         std::to_string(set.size()) + " shapers");
   }
+  for (std::size_t k = 0; k < set.size(); ++k) {
+    nodes.push_back(node_of(set[k], modes[k], half_period_s, target));
+  }
+}
+
+std::size_t RunFilter::periods() const noexcept {
+  int longest = 0;
+  for (const Node& node : nodes) {
+    longest = std::max(longest, node.half_shaper.duration_samples());
+  }
+  return static_cast<std::size_t>(longest) / 2;
 }
 
 RunShaper::RunShaper(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
@@ -64,16 +96,20 @@ RunShaper::RunShaper(std::shared_ptr<const Path> path, std::shared_ptr<const Spe
   const std::size_t steps_per_period = 2 * steps_per_half_;
   const std::size_t periods_in = (ahead_.sample_count() - 1 + steps_per_period - 1) / steps_per_period;
   rows_in_ = 2 * periods_in + 1;
-  const auto shaper_rows = static_cast<std::size_t>(filter_.half_shaper.duration_samples());
-  periods_ = static_cast<std::uint32_t>(periods_in + shaper_rows / 2);
-  reach_ = shaper_rows;
+  periods_ = static_cast<std::uint32_t>(periods_in + filter_.periods());
+  reach_ = 2 * filter_.periods();
   if (filter_.target != ContourTarget::none) {
     target_ = std::make_unique<Interpolator>(path_, std::move(profile), ahead_.period_s(), filter_.mean_delay_s);
-    for (const std::vector<double>& kernel : filter_.kernels) {
-      solvers_.emplace_back(kernel, filter_.smoothness);
-      reach_ = std::max(reach_, kernel.size() - 1);
+    for (const RunFilter::Node& node : filter_.nodes) {
+      for (const std::vector<double>& kernel : node.kernels) {
+        solvers_.emplace_back(kernel, filter_.smoothness);
+        reach_ = std::max(reach_, kernel.size() - 1);
+      }
     }
     margin_ = std::max<std::size_t>(reach_, 8);
+  }
+  if (filter_.following) {
+    stream_.emplace(filter_.following->fir(), axis_count);
   }
   rows_error_ = rows_in_ + reach_;
   history_ = static_cast<std::ptrdiff_t>(2 * reach_ + 8);
@@ -122,7 +158,7 @@ void RunShaper::read_row() {
   Vector3 error;
   const auto row = static_cast<std::ptrdiff_t>(read_ - 1);
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    const std::vector<double>& kernel = filter_.kernels[axis];
+    const std::vector<double>& kernel = node(row).kernels[axis];
     const double* now = command_[axis].data() + (row - base_);
     double sum = 0.0;
     for (std::size_t j = 0; j < kernel.size(); ++j) {
@@ -203,8 +239,11 @@ void RunShaper::decide_to(std::size_t row) {
 
 void RunShaper::correct(std::size_t begin, std::size_t end, std::size_t accepted) {
   const std::size_t m = end - begin;
+  // Shapers that follow an axis change slowly over a window: that of its middle stands for all.
+  const auto first_node =
+      static_cast<std::size_t>(&node(static_cast<std::ptrdiff_t>(begin + m / 2)) - filter_.nodes.data());
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    ContourSolver& solver = solvers_[axis];
+    ContourSolver& solver = solvers_[axis_count * first_node + axis];
     const std::size_t past = solver.reach() + 2;
     const double* error = error_[axis].data() + index(begin);
     double* correction = correction_[axis].data() + index(begin);
@@ -230,7 +269,7 @@ void RunShaper::correct(std::size_t begin, std::size_t end, std::size_t accepted
 
 // Whether the corrected command leaves a limit that the plain one keeps; where it does, `stiffness_` is raised.
 bool RunShaper::asks_too_much(std::size_t begin, std::size_t end, std::size_t axis) {
-  const auto shaper_rows = static_cast<std::size_t>(filter_.half_shaper.duration_samples());
+  const std::size_t shaper_rows = 2 * filter_.periods();
   const double period = 2.0 * filter_.half_period_s;
   const std::size_t from = begin + begin % 2;
   const std::size_t to = end + shaper_rows + 4;
@@ -276,9 +315,30 @@ bool RunShaper::asks_too_much(std::size_t begin, std::size_t end, std::size_t ax
   return found;
 }
 
+const RunFilter::Node& RunShaper::node(std::ptrdiff_t row) const noexcept {
+  if (!filter_.following) {
+    return filter_.nodes.front();
+  }
+  const FollowingFir& following = *filter_.following;
+  const Column& along = command_[static_cast<std::size_t>(following.axis())];
+  const double place = following.place(along[static_cast<std::size_t>(row - base_)]);
+  return filter_.nodes[static_cast<std::size_t>(std::lround(place))];
+}
+
+// The command before shaping with its correction.
+Vector3 RunShaper::corrected(std::ptrdiff_t row) const noexcept {
+  Vector3 position;
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    const auto i = static_cast<std::size_t>(row - base_);
+    position[static_cast<Eigen::Index>(axis)] = command_[axis][i] + correction_[axis][i];
+  }
+  return position;
+}
+
 double RunShaper::shaped(std::size_t axis, std::ptrdiff_t row, bool corrected) const noexcept {
-  const std::vector<int>& delays = filter_.half_shaper.delays();
-  const std::vector<double>& taps = filter_.half_shaper.taps();
+  const Fir& shaper = node(row).half_shaper;
+  const std::vector<int>& delays = shaper.delays();
+  const std::vector<double>& taps = shaper.taps();
   const double* command = command_[axis].data() + (row - base_);
   double sum = 0.0;
   for (std::size_t k = 0; k < taps.size(); ++k) {
@@ -298,7 +358,7 @@ Vector3 RunShaper::deviation(std::size_t row) const noexcept {
   const std::size_t i = index(row);
   Vector3 result;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    const std::vector<double>& kernel = filter_.kernels[axis];
+    const std::vector<double>& kernel = node(static_cast<std::ptrdiff_t>(row)).kernels[axis];
     double sum = error_[axis][i];
     for (std::size_t j = 0; j < kernel.size(); ++j) {
       sum += kernel[j] * correction_[axis][i - j];
@@ -309,7 +369,7 @@ Vector3 RunShaper::deviation(std::size_t row) const noexcept {
 }
 
 void RunShaper::measure(std::size_t row) {
-  const std::size_t half = static_cast<std::size_t>(filter_.half_shaper.duration_samples()) / 2 + 1;
+  const std::size_t half = filter_.periods() + 1;
   read_to(row + half + 1);
   const std::size_t i = index(row);
   const Vector3 left = deviation(row);
@@ -343,26 +403,37 @@ void RunShaper::forget() {
   if (keep - base_ < static_cast<std::ptrdiff_t>(forget_after)) {
     return;
   }
-  const auto drop = [&](auto& column) {
-    if (!column.empty()) {
-      column.erase(column.begin(), column.begin() + (keep - base_));
-    }
-  };
+  const auto drop = [&](auto& column) { column.erase(column.begin(), column.begin() + (keep - base_)); };
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     drop(command_[axis]);
     drop(correction_[axis]);
-    drop(error_[axis]);
+    if (target_) {
+      drop(error_[axis]);
+    }
   }
-  drop(tangent_);
-  drop(wanted_);
-  drop(segment_);
+  if (measured_ != nullptr) {
+    drop(tangent_);
+    drop(wanted_);
+    drop(segment_);
+  }
   base_ = keep;
 }
 
 void RunShaper::next(Vector3& position) {
   decide_to(out_ + 1);
-  for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    position[static_cast<Eigen::Index>(axis)] = shaped(axis, static_cast<std::ptrdiff_t>(out_), target_ != nullptr);
+  const auto row = static_cast<std::ptrdiff_t>(out_);
+  if (stream_) {
+    position = corrected(row);
+    if (out_ == 0) {
+      stream_->reset({position.data(), axis_count});
+    }
+    const int along = filter_.following->axis();
+    const double middle = 0.5 * (position[along] + corrected(row - 1)[along]);
+    stream_->step({position.data(), axis_count}, filter_.following->place(middle));
+  } else {
+    for (std::size_t axis = 0; axis < axis_count; ++axis) {
+      position[static_cast<Eigen::Index>(axis)] = shaped(axis, row, target_ != nullptr);
+    }
   }
   if (measured_ != nullptr) {
     measure(out_);
@@ -376,7 +447,7 @@ std::int8_t RunShaper::arc_normal() {
   const std::size_t lead = target_ ? reach_ + margin_ : 0;
   const std::size_t row = out_ - 1;
   read_to(std::min(row + 3 + lead, rows_in_));
-  const auto behind = static_cast<std::size_t>(filter_.half_shaper.duration_samples()) + lead;
+  const std::size_t behind = 2 * filter_.periods() + lead;
   while (!arcs_.empty() && arcs_.front().row <= row + 2 + lead) {
     seen_ = arcs_.front();
     arcs_.pop_front();

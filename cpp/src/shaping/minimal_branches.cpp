@@ -6,6 +6,7 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <sstream>
 
@@ -17,11 +18,13 @@ namespace shapegcode {
 
 namespace {
 
-constexpr double same_pole = 1e-6;     // relative, as in minimal_two_mode
-constexpr double same_time = 1e-4;     // rad of the faster mode: Newton's answer and a listed shaper are one
-constexpr double longest_step = 0.5;   // rad from where the curve is expected
-constexpr double smallest_gap = 1e-3;  // rad between two taps
-constexpr int most_failures = 2;       // ratios in turn without an answer of Newton
+constexpr double same_pole = 1e-6;      // relative, as in minimal_two_mode
+constexpr double same_time = 1e-4;      // rad of the faster mode: Newton's answer and a listed shaper are one
+constexpr double smallest_gap = 1e-3;   // rad between two taps
+constexpr double phase_step = 0.02;     // rad by which the second mode may turn within a shaper from step to step
+constexpr double smallest_step = 1e-4;  // of the ratio
+constexpr double farthest = 0.1;        // rad from where the curve is expected
+constexpr int most_failures = 3;        // times in turn that not even the smallest step has an answer of Newton
 
 /// Times of the second and third tap, s.
 using Times = Eigen::Vector2d;
@@ -87,18 +90,18 @@ class Tracer {
         list = minimal_two_mode(first_, second, max_duration_s_, max_abs_sum_);
         std::erase_if(list, [](const Shaper& each) { return each.times_s.size() != 3; });
       }
-      step(at, list, minimal::System<2>(poles, omega), omega);
+      step(at, list, omega);
       lists_.push_back(std::move(list));
     }
     return result();
   }
 
  private:
-  void step(std::size_t at, const std::vector<Shaper>& list, const minimal::System<2>& system, double omega) {
+  void step(std::size_t at, const std::vector<Shaper>& list, double omega) {
     std::vector<bool> taken(list.size(), false);
     for (Curve& curve : curves_) {
       if (!curve.ended) {
-        go_on(curve, at, list, taken, system, omega);
+        go_on(curve, at, list, taken, omega);
       }
     }
     for (std::size_t i = 0; i < list.size(); ++i) {
@@ -113,20 +116,35 @@ class Tracer {
     }
   }
 
+  /// Takes the curve to the next ratio in small steps and looks up where it has come.
   void go_on(Curve& curve, std::size_t at, const std::vector<Shaper>& list, std::vector<bool>& taken,
-             const minimal::System<2>& system, double omega) const {
-    const double ratio = ratios_[at];
-    const Times expected = curve.expected(ratio);
-    const auto taps = system.newton(expected * omega, 2.0 * max_duration_s_ * omega);
-    if (!taps || (taps->phases / omega - expected).cwiseAbs().maxCoeff() * omega > longest_step) {
-      curve.ended = ++curve.failures > most_failures;
+             double omega) const {
+    const double target = ratios_[at];
+    const double longest =
+        std::max(smallest_step, phase_step / (2.0 * std::numbers::pi * first_.frequency_hz * max_duration_s_));
+    const double shortest = longest / 256.0;  // a curve that has just begun may be as steep as a square root
+    double step = curve.before ? longest : shortest;
+    double reached = curve.ratio_now;
+    while (reached < target) {
+      const double next = reached + step < target - 0.5 * shortest ? reached + step : target;
+      if (advance(curve, next)) {
+        reached = next;
+        step = std::min(2.0 * step, longest);
+      } else if (step > shortest) {
+        step *= 0.5;
+      } else {  // no answer here: try behind it
+        curve.ended = ++curve.failures > most_failures;
+        reached += longest;
+        step = longest;
+      }
+      if (curve.ended) {
+        return;
+      }
+    }
+    if (curve.ratio_now != target) {
       return;
     }
-    const Times times = taps->phases / omega;
-    if (taps->phases(0) < smallest_gap || taps->phases(1) - taps->phases(0) < smallest_gap) {
-      curve.ended = true;
-      return;
-    }
+    const Times times = curve.now;
     for (std::size_t i = 0; i < list.size(); ++i) {
       const Times listed(list[i].times_s[1], list[i].times_s[2]);
       if ((times - listed).cwiseAbs().maxCoeff() * omega < same_time) {
@@ -139,7 +157,20 @@ class Tracer {
         break;
       }
     }
-    curve.advance(ratio, times);
+  }
+
+  /// One step of the continuation; false if Newton has no answer there. Ends the curve where two taps meet.
+  [[nodiscard]] bool advance(Curve& curve, double ratio) const {
+    const std::array<std::complex<double>, 2> poles{pole(first_), pole({first_.frequency_hz * ratio, second_damping_})};
+    const double omega = std::max(std::abs(poles[0]), std::abs(poles[1]));
+    const Times expected = curve.expected(ratio);
+    const auto taps = minimal::System<2>(poles, omega).newton(expected * omega, 2.0 * max_duration_s_ * omega);
+    if (!taps || (taps->phases - expected * omega).cwiseAbs().maxCoeff() > farthest) {
+      return false;
+    }
+    curve.ended = taps->phases(0) < smallest_gap || taps->phases(1) - taps->phases(0) < smallest_gap;
+    curve.advance(ratio, taps->phases / omega);
+    return true;
   }
 
   [[nodiscard]] MinimalBranches result() const {

@@ -13,6 +13,7 @@ from shapegcode.cli.options import (
     add_plots_argument,
     add_program_argument,
     load_machine,
+    micrometres,
     positive,
     ratio,
     refuse_same_file,
@@ -39,6 +40,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=ratio,
         default=None,
         help="feed on arcs relative to the programmed feed, for example 60%%",
+    )
+    parser.add_argument(
+        "--contour-tolerance",
+        metavar="LENGTH",
+        type=micrometres,
+        default=None,
+        help="largest deviation from the programmed path, for example 5um: the feed is the highest that keeps it "
+        "(default: tolerance.contour_um of the machine file)",
+    )
+    parser.add_argument(
+        "--contour",
+        choices=("response", "command", "off"),
+        default=None,
+        help="what is brought back to the programmed path: see shaping.contour (default: the machine file's)",
     )
     parser.add_argument(
         "--block-period",
@@ -102,10 +117,13 @@ def run(args: argparse.Namespace) -> int:
     limits = (args.max_bytes, args.baud, args.max_blocks_per_second)
     budget = None if limits == (None, None, None) else Budget(*limits)
     machine = load_machine(args)
-    if args.compensation is not None:
-        machine = machine.model_copy(
-            update={"input": machine.input.model_copy(update={"compensation": args.compensation})}
-        )
+    for table, key, value in (
+        ("input", "compensation", args.compensation),
+        ("tolerance", "contour_um", args.contour_tolerance),
+        ("shaping", "contour", args.contour),
+    ):
+        if value is not None:
+            machine = machine.model_copy(update={table: getattr(machine, table).model_copy(update={key: value})})
     failed = output.with_name(output.name + machine.emission.failed_suffix)
     read = [Path(args.input), Path(args.machine)]
     refuse_same_file([output, failed], read)

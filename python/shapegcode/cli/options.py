@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _LARGEST_OVERRIDE = 2.54
 _SIZE_UNITS = {"": 1, "k": 1024, "M": 1024 * 1024}
+_LENGTH_UNITS = {"um": 1.0, "µm": 1.0, "mm": 1e3}
 _TIME_UNITS = {"ms": 1e-3, "us": 1e-6, "s": 1.0}
 
 
@@ -174,6 +175,18 @@ def seconds(text: str) -> float:
         value = 0.0
     if not (math.isfinite(value) and value > 0.0):
         raise argparse.ArgumentTypeError(f"{text!r}: must be a time above 0 with its unit (s, ms, us), for example 5ms")
+    return value
+
+
+def micrometres(text: str) -> float:
+    """A length with its unit, such as ``5um`` or ``0.005mm``, in µm."""
+    match = re.fullmatch(r"([-+.\d]+(?:[eE][-+]?\d+)?)\s*(um|µm|mm)", text)
+    try:
+        value = float(match[1]) * _LENGTH_UNITS[match[2]] if match else 0.0
+    except ValueError:
+        value = 0.0
+    if not (math.isfinite(value) and value > 0.0):
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a length above 0 with its unit (um, mm), for example 5um")
     return value
 
 

@@ -48,7 +48,8 @@ _FIRST_DIRECTIONS = 8
 _FIRST_FREQUENCIES = 5
 _SWEEP = 65  # frequencies of a band at which new planes are looked for
 _MOST_ROUNDS = 60
-_CENTRINGS = 4  # steps towards the least second central moment
+_CENTRES = (0.0, 0.5, 1.0)  # of the duration: starts on the way to the least second central moment
+_CENTRINGS = 4  # steps of that way
 _LONGER = 4  # times the longest duration: how far a refusal looks for what would do
 
 
@@ -93,8 +94,8 @@ class Conditions:
 def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: float, *, title: str) -> Shaper:
     """Shortest shaper with taps at multiples of a period that meets the conditions.
 
-    Among the shapers of the shortest duration, one without negative taps has the least second central moment (a
-    local minimum of the contour cost), one with them the least sum of magnitudes.
+    Among the shapers of the shortest duration, one without negative taps has the least second central moment that
+    was found (the contour cost; a local minimum from three starts), one with them the least sum of magnitudes.
 
     Args:
         conditions: zeros, limits and the range of the taps.
@@ -182,14 +183,14 @@ class _Search:
     def _smallest_feasible(self, most: int) -> int | None:
         """A solution stays one with further taps at zero, so doubling and then halving finds the smallest."""
         too_few, enough = -1, 0
-        while enough < most and self._taps(enough, None) is None:
+        while enough < most and self._feasible(enough) is None:
             too_few, enough = enough, 2 * enough + 1
         enough = min(enough, most)
-        if enough <= too_few or self._taps(enough, None) is None:
+        if enough <= too_few or self._feasible(enough) is None:
             return None
         while enough - too_few > 1:
             middle = (too_few + enough) // 2
-            if self._taps(middle, None) is None:
+            if self._feasible(middle) is None:
                 too_few = middle
             else:
                 enough = middle
@@ -197,59 +198,91 @@ class _Search:
 
     def _candidates(self, last: int) -> list[FloatArray]:
         """Taps of that many periods, the best first."""
+        feasible = self._feasible(last)
+        rest = [] if feasible is None else [feasible]
+        if self._conditions.largest_tap is not None:
+            best = self._best(last, 0.0)
+            return rest if best is None else [best, *rest]
+
+        def variance(taps: FloatArray) -> float:
+            steps = np.arange(last + 1)
+            return float(taps @ (steps - taps @ steps) ** 2)
+
+        centred = [taps for share in _CENTRES for taps in self._centred(last, share * last)]
+        return [*sorted(centred, key=variance), *rest]
+
+    def _centred(self, last: int, centre: float) -> list[FloatArray]:
+        """Taps on the way from a centre (periods) to a local minimum of the second central moment."""
         found: list[FloatArray] = []
-        centre = 0.5 * last
-        for _ in range(1 if self._conditions.largest_tap is not None else _CENTRINGS):
-            taps = self._taps(last, centre)
+        for _ in range(_CENTRINGS):
+            taps = self._best(last, centre)
             if taps is None:
                 break
-            found.insert(0, taps)
+            found.append(taps)
             mean = float(taps @ np.arange(last + 1))
             if abs(mean - centre) < 1e-6 * (last + 1):
                 break
             centre = mean  # the second central moment is concave in the taps: each step lowers it
-        feasible = self._taps(last, None)
-        return found if feasible is None else [*found, feasible]
+        return found
 
-    def _taps(self, last: int, centre: float | None) -> FloatArray | None:
+    def _feasible(self, last: int) -> FloatArray | None:
         """Taps at 0 ... `last` periods that meet the conditions, or None.
 
-        The second moment about `centre` (periods) is least, or the sum of magnitudes if taps may be negative;
-        None: any.
+        With limits: those whose largest share of its limit is least, until it is below 1 or proven not to be.
         """
-        steps = np.arange(last + 1)
-        cost = np.zeros(last + 1) if centre is None else ((steps - centre) / max(1, last)) ** 2
         for _ in range(_MOST_ROUNDS):
-            taps = self._program(last, cost, feasible_only=centre is None)
-            if taps is None or not self._cut(taps):
+            found = self._program(last, None)
+            if found is None:
+                return None
+            taps, share = found
+            if share > 1.0 - LIMIT_MARGIN:
+                return None
+            if not self._cut(taps):
                 return taps
         return None
 
-    def _program(self, last: int, cost: FloatArray, *, feasible_only: bool) -> FloatArray | None:
+    def _best(self, last: int, centre: float) -> FloatArray | None:
+        """Taps that meet the conditions with the least second moment about `centre`, or None if none was found.
+
+        `centre` is in periods; taps that may be negative have the least sum of magnitudes instead.
+        """
+        cost = ((np.arange(last + 1) - centre) / max(1, last)) ** 2
+        for _ in range(_MOST_ROUNDS):
+            found = self._program(last, cost)
+            if found is None or not self._cut(found[0]):
+                return None if found is None else found[0]
+        return None
+
+    def _program(self, last: int, cost: FloatArray | None) -> tuple[FloatArray, float] | None:
+        """The taps of least cost, or (None) with the least share of the limits used, and that share.
+
+        The last variable is the share; with a cost it stays below what the margin leaves.
+        """
         matrix, right = self._equalities(last)
         planes = self._inequalities(last)
-        limits = [(1.0 - LIMIT_MARGIN) * plane.limit for plane in self._planes]
+        limits = np.array([plane.limit for plane in self._planes])
+        objective = np.zeros(last + 1) if cost is None else cost
         largest = self._conditions.largest_tap
-        bounds: tuple[float | None, float | None] = (0.0, None)
         if largest is not None:
             # a tap is the difference of two that are not negative, so that its magnitude is linear
             matrix, planes = np.hstack([matrix, -matrix]), np.hstack([planes, -planes])
-            cost = np.full(2 * last + 2, 0.0 if feasible_only else 1.0)
-            bounds = (0.0, largest)
+            objective = np.full(2 * last + 2, 0.0 if cost is None else 1.0)
+        bounds = [(0.0, largest)] * matrix.shape[1] + [(0.0, None if cost is None else 1.0 - LIMIT_MARGIN)]
         for tolerance in _TOLERANCES:
             result = linprog(
-                cost,
-                A_eq=matrix,
+                np.append(objective, 1.0 if cost is None else 0.0),
+                A_eq=np.hstack([matrix, np.zeros((len(matrix), 1))]),
                 b_eq=right,
-                A_ub=planes if len(planes) else None,
-                b_ub=limits if len(planes) else None,
+                A_ub=np.hstack([planes / limits[:, None], -np.ones((len(planes), 1))]) if len(planes) else None,
+                b_ub=np.zeros(len(planes)) if len(planes) else None,
                 bounds=bounds,
                 method="highs-ds",
                 options={"primal_feasibility_tolerance": tolerance, "dual_feasibility_tolerance": tolerance},
             )
             if result.status == 0:
-                taps = np.asarray(result.x, dtype=np.float64)
-                return taps if largest is None else taps[: last + 1] - taps[last + 1 :]
+                *_, share = solution = np.asarray(result.x, dtype=np.float64)
+                taps = solution[: last + 1]
+                return taps if largest is None else taps - solution[last + 1 : -1], float(share)
             if result.status == _INFEASIBLE:
                 return None
         return None

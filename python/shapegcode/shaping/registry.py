@@ -11,6 +11,7 @@ from shapegcode.shaping.band import ModeBand
 from shapegcode.shaping.block_period import robust_candidate
 from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
+from shapegcode.shaping.minimal_family import solve_minimal
 from shapegcode.shaping.options import DesignOptions
 
 __all__ = ["FAMILIES", "DesignOptions", "Family", "design", "distinct", "family_named"]
@@ -105,6 +106,11 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "simultaneous", "shortest without negative taps, all modes at once", "this project (spec 2)",
         "any modes at continuous times; on a grid it is the family non-negative", True, False, solvers.simultaneous,
+    ),
+    Family(
+        "minimal", "one tap more than modes", "paper 002, eq. 4-17; searches of this project",
+        "one to six modes, damped or not, at continuous times (on a grid the polynomial stands for it); exact at the "
+        "nominal frequencies only; taps may be negative", True, False, solve_minimal,
     ),
     Family(
         "polynomial", "shortest exact shaper of a grid", "this project",

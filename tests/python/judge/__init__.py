@@ -7,9 +7,10 @@ not imported here).
 """
 
 from .conversion import regions, split, verify_conversion
-from .interpreter import Interpretation, JudgeError, LineRecord, Move, initial_state, interpret
+from .interpreter import initial_state, interpret
 from .plant import ContourError, Mode, contour_error_um, path_polyline, residual_um, response, rest_index
 from .player import durations, moving_average, play, starts
+from .records import Interpretation, JudgeError, LineRecord, Move
 
 __all__ = [
     "ContourError",

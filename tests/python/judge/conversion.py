@@ -18,17 +18,9 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from .interpreter import (
-    INCH_MM,
-    MODAL_GROUPS,
-    Interpretation,
-    JudgeError,
-    LineRecord,
-    Move,
-    canonical_g,
-    interpret,
-)
+from .interpreter import interpret
 from .plant import contour_error_um, path_polyline
+from .records import INCH_MM, MODAL_GROUPS, Interpretation, JudgeError, LineRecord, Move, canonical_g
 
 Vector = npt.NDArray[np.float64]
 Ranges = Sequence[tuple[int, int]]

@@ -16,8 +16,8 @@ import numpy.typing as npt
 from scipy.signal import lfilter
 from scipy.spatial import KDTree
 
-from .interpreter import Move
 from .player import starts
+from .records import Move
 
 Vector = npt.NDArray[np.float64]
 #: Finest time step on which responses are looked at: 76 points per oscillation at 131 Hz.

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from .interpreter import Move
+from .records import Move
 
 Vector = npt.NDArray[np.float64]
 BlockEnd = Literal["ceil", "carry"]

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "shapegcode/mode.hpp"
 #include "shapegcode/samples.hpp"
 
 namespace shapegcode {
@@ -38,6 +39,10 @@ struct FitOptions {
   std::uint8_t last_normal = 2;
   double last_radius_mm = 0.0;
   double max_sweep_rad = 1.3962634;  ///< 80 degrees: no piece can be mistaken for the long way round
+  /// Vibration modes of X, Y, Z, excited by the command of that axis. Where an axis has some, the ends of blocks are
+  /// rounded to that of the two neighbouring increments that leaves them at rest (see ModalRounder); else to the
+  /// nearest.
+  std::array<std::vector<Mode>, axis_count> modes;
 };
 
 /// Turns a shaped command into blocks that each last a whole number of block periods.
@@ -45,13 +50,16 @@ struct FitOptions {
 /// `grid_mm`: positions at k*T_B, (n+1, 3). `middle_mm`: positions half a period later, (n, 3), from which the
 /// curvature within a block is read. `arc_normal`: per period the axis across the plane of an arc that the command
 /// follows there, or -1: (n). `breaks`: ascending period indices at which a block must end (program marks). Every word
-/// is rounded once, to the nearest increment, so nothing drifts. F is rounded up, so that a controller that starts
-/// blocks on its interpolation ticks takes exactly the intended number of ticks. A block that rounds to nothing lends
-/// its time to its successor; at the very end it is rest and left out. Throws Error(argument) on mismatched sizes or a
-/// position outside +-99999.999 mm.
+/// is rounded once, to the nearest increment or, with modes, to one of its two neighbours, so nothing drifts: the
+/// blocks stay within an increment of the command, and where it rests they are on the nearest increment. `rests`:
+/// ascending periods at which the command is at rest, besides its end. F is rounded up, so that a controller that
+/// starts blocks on its interpolation ticks takes exactly the intended number of ticks. A block that rounds to nothing
+/// lends its time to its successor; at the very end it is rest and left out. Throws Error(argument) on mismatched sizes
+/// or a position outside +-99999.999 mm.
 [[nodiscard]] std::vector<FittedBlock> fit_blocks(const Eigen::Ref<const Eigen::MatrixXd>& grid_mm,
                                                   const Eigen::Ref<const Eigen::MatrixXd>& middle_mm,
                                                   std::span<const std::int8_t> arc_normal,
-                                                  std::span<const std::uint32_t> breaks, const FitOptions& options);
+                                                  std::span<const std::uint32_t> breaks, const FitOptions& options,
+                                                  std::span<const std::uint32_t> rests = {});
 
 }  // namespace shapegcode

@@ -5,9 +5,12 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "shapegcode/filter/fir.hpp"
+#include "shapegcode/filter/varying_fir.hpp"
 #include "shapegcode/motion/interpolator.hpp"
 #include "shapegcode/path/path.hpp"
 #include "shapegcode/plant/modal.hpp"
@@ -18,14 +21,28 @@ namespace shapegcode {
 
 /// What follows the look-ahead of a run, on half the block grid, and how the contour is kept.
 struct RunFilter {
-  /// `shaper`: taps in whole block periods, common to all axes. Throws as `contour_kernel` and ContourSolver do.
-  RunFilter(const Fir& shaper, ContourTarget target, const AxisModes& modes, double block_period_s, double smoothness);
+  /// A shaper and what it makes of a command before shaping, per axis (see contour_kernel).
+  struct Node {
+    Fir half_shaper;  ///< taps in half block periods
+    std::array<std::vector<double>, axis_count> kernels;
+  };
 
-  Fir half_shaper;  ///< taps in half block periods
+  /// One shaper everywhere. `shaper`: taps in whole block periods, common to all axes. Throws as `contour_kernel` and
+  /// ContourSolver do.
+  RunFilter(const Fir& shaper, ContourTarget target, const AxisModes& modes, double block_period_s, double smoothness);
+  /// Shapers that follow an axis; `modes` as they are at each of its positions. Throws Error(argument) on another
+  /// number of them.
+  RunFilter(const FollowingFir& shapers, ContourTarget target, std::span<const AxisModes> modes, double block_period_s,
+            double smoothness);
+
+  /// Whole block periods by which the shaped run is longer.
+  [[nodiscard]] std::size_t periods() const noexcept;
+
+  std::vector<Node> nodes;
+  std::optional<FollowingFir> following;  ///< on half the block grid
   ContourTarget target;
   double half_period_s;
-  double mean_delay_s;  ///< of the shaper
-  std::array<std::vector<double>, axis_count> kernels;
+  double mean_delay_s;  ///< of the shapers
   double smoothness;
 };
 
@@ -81,6 +98,8 @@ class RunShaper {
   void measure(std::size_t row);
   void forget();
   [[nodiscard]] double shaped(std::size_t axis, std::ptrdiff_t row, bool corrected) const noexcept;
+  [[nodiscard]] const RunFilter::Node& node(std::ptrdiff_t row) const noexcept;
+  [[nodiscard]] Vector3 corrected(std::ptrdiff_t row) const noexcept;
   [[nodiscard]] std::size_t index(std::size_t row) const noexcept {
     return static_cast<std::size_t>(static_cast<std::ptrdiff_t>(row) - base_);
   }
@@ -92,7 +111,8 @@ class RunShaper {
   std::size_t steps_per_half_;
   Interpolator ahead_;                    // the command before shaping
   std::unique_ptr<Interpolator> target_;  // where the path should be: later by the shaper's mean delay
-  std::vector<ContourSolver> solvers_;
+  std::vector<ContourSolver> solvers_;    // axes of every node
+  std::optional<VaryingFirStream> stream_;
   std::size_t reach_ = 0;   // samples by which any kernel acts ahead
   std::size_t margin_ = 0;  // samples by which a window is longer than what it corrects
 

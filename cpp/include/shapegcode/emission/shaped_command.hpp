@@ -9,6 +9,7 @@
 #include "shapegcode/emission/feed_search.hpp"
 #include "shapegcode/emission/run_shaper.hpp"
 #include "shapegcode/filter/fir.hpp"
+#include "shapegcode/filter/varying_fir.hpp"
 #include "shapegcode/motion/limits.hpp"
 #include "shapegcode/path/path.hpp"
 #include "shapegcode/plant/modal.hpp"
@@ -27,7 +28,7 @@ struct ShapingOptions {
   /// tolerance, kept by the highest feed that does; without one, `limits` holds the bounds that plain shaping needs.
   ContourTarget target = ContourTarget::none;
   AxisModes modes;                  ///< of the response; nothing else is done with them
-  double contour_smoothness = 0.1;  ///< weight of the correction's second differences on half the block grid
+  double contour_smoothness = 1.0;  ///< weight of the correction's second differences on half the block grid
 };
 
 /// A region's command, shaped and on the block grid, ready for fit_blocks.
@@ -36,7 +37,7 @@ struct ShapedCommand {
   Eigen::MatrixXd grid_mm;              ///< (n+1, 3) at k*T_B
   Eigen::MatrixXd middle_mm;            ///< (n, 3) half a period later
   std::vector<std::int8_t> arc_normal;  ///< (n) see fit_blocks
-  std::vector<std::uint32_t> run_ends;  ///< periods, of the region, at which the command is at rest
+  std::vector<std::uint32_t> run_ends;  ///< periods, of this piece, at which the command is at rest
   std::vector<std::uint32_t>
       segment_periods;  ///< per marked segment: period of the region in which its begin is reached
 };
@@ -49,7 +50,10 @@ class RegionShaper {
   /// `marked_segments`: ascending indices (up to path->size()) whose begin in time is wanted. Throws Error(argument) if
   /// the block period is not a whole multiple of the interpolation period, and as the planner and the filter do.
   RegionShaper(std::shared_ptr<const Path> path, const Fir& shaper, std::span<const std::uint32_t> marked_segments,
-               ShapingOptions options);
+               const ShapingOptions& options);
+  /// The same with shapers that follow an axis; `modes` as they are at each of its positions.
+  RegionShaper(std::shared_ptr<const Path> path, const FollowingFir& shapers, std::span<const AxisModes> modes,
+               std::span<const std::uint32_t> marked_segments, const ShapingOptions& options);
 
   /// Next piece of at most `periods` periods; false once the region was given out, and `piece` is then left alone.
   /// `piece.segment_periods` then holds all marks of the runs that were begun.
@@ -64,6 +68,8 @@ class RegionShaper {
     std::size_t first, last;  // segments
   };
 
+  RegionShaper(std::shared_ptr<const Path> path, RunFilter filter, std::span<const std::uint32_t> marked_segments,
+               const ShapingOptions& options);
   [[nodiscard]] bool begin_run();
   void note_marks(const PlannedRun& run);
 

@@ -18,14 +18,14 @@ struct MinimalBranches {
 
 /// All minimal two-mode shapers of `first` and a second mode of `ratio` times its frequency and damping
 /// `second_damping`, for each of `ratios`, joined across the ratios by continuation: from the last two shapers of a
-/// curve Newton goes to the next ratio, and what it finds there is looked up in the complete list of
+/// curve Newton goes in small steps to the next ratio, and what it finds there is looked up in the complete list of
 /// `minimal_two_mode`.
 ///
 /// A curve has a gap where its amplitudes exceed `max_abs_sum` (about the ratios at which their sum is zero), its
 /// duration `max_duration_s` (s), or the shaper has fewer taps: the continuation goes on through the gap without being
-/// listed. A curve ends where two taps meet, where it meets another one and turns back, or where Newton fails at two
-/// ratios in turn. Steps of the ratio of 0.02 and less join reliably; a ratio within 1e-6 of 1 (equal damping) has
-/// none.
+/// listed. A curve ends where two taps meet, where it meets another one and turns back, or where Newton fails at
+/// several steps in turn; where two curves touch, their tails may be exchanged. A ratio within 1e-6 of 1 (equal
+/// damping) has no shaper.
 ///
 /// Throws Error(argument) if `ratios` is empty, not ascending or not finite and positive, and as `minimal_two_mode`
 /// does at each ratio. Sources: paper 002; the continuation: this project.

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ..interpreter import MODAL_GROUPS, canonical_g
+from ..records import MODAL_GROUPS, canonical_g
 from .items import Item
 from .motion import Motion
 from .offsets import Offsets

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from ..interpreter import JudgeError
+from ..records import JudgeError
 
 
 class Alarm(JudgeError):

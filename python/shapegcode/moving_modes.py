@@ -1,0 +1,218 @@
+"""Modes that move: what the machine file's tables say, for the plant, for the shapers and for people.
+
+A table over the mass of the part fixes a mode for a whole program; one over the position of an axis lets it vary
+along the program. Positions in tables are the machine's: those of the program plus work offset and tool length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shapegcode import _core
+from shapegcode.machine import Machine, Mode
+
+if TYPE_CHECKING:
+    from shapegcode.shaping.track import ShaperTrack
+
+__all__ = [
+    "NO_OFFSET",
+    "Offset",
+    "machine_warnings",
+    "mode_tables",
+    "moving_axis",
+    "region_offset",
+    "region_range_warnings",
+    "shaper_track",
+    "slowest_mode",
+    "still_mode",
+]
+
+Offset = tuple[float | None, float | None, float | None]
+"""Machine position minus program position of X, Y, Z in mm; None where it is not known."""
+
+NO_OFFSET: Offset = (0.0, 0.0, 0.0)
+"""Program positions are machine positions."""
+
+_AXES = "xyz"
+
+
+def still_mode(mode: Mode, part_mass_kg: float | None) -> _core.Mode:
+    """The mode that holds where no axis position counts: nominal, or as a stated mass of the part makes it.
+
+    Args:
+        mode: of the machine file.
+        part_mass_kg: mass of the part; None: not known.
+    """
+    nominal = _core.Mode(mode.frequency_hz, mode.damping_ratio, mode.participation)
+    over = mode.frequency_over
+    if over is None or over.mass_kg is None or part_mass_kg is None:
+        return nominal
+    # The core interpolates over any abscissa.
+    return _core.ModeTable(0, over.mass_kg, over.frequency_hz, over.damping_ratio or ()).mode_at(nominal, part_mass_kg)
+
+
+def slowest_mode(mode: Mode) -> tuple[float, float]:
+    """Lowest frequency (Hz) and least damping ratio that a mode may have, by its tables."""
+    over = mode.frequency_over
+    if over is None:
+        return mode.frequency_hz, mode.damping_ratio
+    return min(over.frequency_hz), min(over.damping_ratio or (mode.damping_ratio,))
+
+
+def mode_tables(machine: Machine, shift: float = 0.0, offset: Offset = NO_OFFSET) -> list[list[_core.ModeTable]]:
+    """How the modes of X, Y, Z vary with the position of the command: `PlaybackOptions.mode_tables`.
+
+    Args:
+        machine: whose modes.
+        shift: share of each mode's stated uncertainty by which its frequencies are moved.
+        offset: from the command's positions to the machine's; where it is None for the axis of a table, the mode
+            stays nominal.
+    """
+    return [[_table(mode, shift, offset) for mode in axis.modes] for axis in machine.axes.as_tuple()]
+
+
+def moving_axis(machine: Machine) -> int | None:
+    """The axis over whose position modes vary: 0, 1, 2 for X, Y, Z; None: there is none.
+
+    Raises:
+        ArgumentError: modes vary over the positions of several axes; shapers can follow one.
+    """
+    named = {mode.frequency_over.axis for _, _, mode in _modes(machine) if mode.frequency_over is not None}
+    axes = sorted(axis for axis in named if axis is not None)
+    if len(axes) > 1:
+        raise _core.ArgumentError(
+            f"modes vary over the positions of {' and '.join(name.upper() for name in axes)} (frequency_over): "
+            "shapers can follow one axis"
+        )
+    return _AXES.index(axes[0]) if axes else None
+
+
+def shaper_track(
+    machine: Machine, period_s: float, max_duration_s: float | None = None, *, residual_limit: float = 0.01
+) -> ShaperTrack:
+    """Shapers for all modes of a machine along the axis over which some of them vary.
+
+    Args:
+        machine: whose modes; the whole span of their tables is covered.
+        period_s: grid of the shapers (block period), s.
+        max_duration_s: longest shaper, s; None: `shaping.max_duration_s`.
+        residual_limit: largest residual ratio of a mode anywhere along the axis.
+
+    Raises:
+        ArgumentError: no mode varies with position, or modes vary over several axes.
+        DesignError: somewhere there is no shaper within the duration and the limit.
+    """
+    # SciPy's solvers take a quarter of a second to load: not before they are needed.
+    from shapegcode.shaping.track import MovingMode, design_track
+
+    axis = moving_axis(machine)
+    if axis is None:
+        raise _core.ArgumentError("no mode of the machine file varies with the position of an axis (frequency_over)")
+    tables = [table for of_axis in mode_tables(machine) for table in of_axis]
+    modes = [
+        MovingMode(still_mode(mode, machine.shaping.part_mass_kg), table if len(table.position_mm) else None)
+        for (_, _, mode), table in zip(_modes(machine), tables, strict=True)
+    ]
+    reached = [position for table in tables for position in table.position_mm]
+    longest = machine.shaping.max_duration_s if max_duration_s is None else max_duration_s
+    span = (min(reached), max(reached))
+    return design_track(modes, axis, span, period_s, longest, residual_limit=residual_limit)
+
+
+def region_offset(region: _core.Region, machine: Machine) -> Offset:
+    """From the program's positions in a region to the machine's.
+
+    The work offset is that of `input.work_offsets`, zero if it is left out there; tool length counts for Z where
+    `input.tool_length_mm` gives it. Nothing is known of an axis whose position the program does not state.
+    """
+    state = region.entry
+    system = f"G54.1P{state.coordinate_number}" if state.coordinate_system == 541 else f"G{state.coordinate_system}"
+    offsets = list(machine.input.work_offsets.get(system, (0.0, 0.0, 0.0)))
+    sign = {43: 1.0, 44: -1.0}.get(state.length_offset, 0.0)
+    number = str(state.length_number)
+    length = machine.input.tool_length_mm.get(number, 0.0) + machine.input.tool_length_wear_mm.get(number, 0.0)
+    offsets[2] += sign * length
+    x, y, z = (value if known else None for value, known in zip(offsets, state.known, strict=True))
+    return (x, y, z)
+
+
+def machine_warnings(machine: Machine) -> list[str]:
+    """What a user should know of the tables before any program is read: a mass that is missing, unused or outside."""
+    mass = machine.shaping.part_mass_kg
+    over_mass = [
+        (name, mode, mode.frequency_over.mass_kg)
+        for name, _, mode in _modes(machine)
+        if mode.frequency_over is not None and mode.frequency_over.mass_kg is not None
+    ]
+    if mass is None:
+        return [
+            f"{name} has a table over mass_kg, but shaping.part_mass_kg is not given: its nominal "
+            f"{mode.frequency_hz:g} Hz holds"
+            for name, mode, _ in over_mass
+        ]
+    if not over_mass:
+        return [f"shaping.part_mass_kg = {mass:g}: no mode has a table over mass_kg, so it changes nothing"]
+    return [
+        f"shaping.part_mass_kg = {mass:g} lies outside the table of {name}, {masses[0]:g} to {masses[-1]:g} kg: its "
+        f"nearest row holds, {still_mode(mode, mass).frequency_hz:g} Hz"
+        for name, mode, masses in over_mass
+        if not masses[0] <= mass <= masses[-1]
+    ]
+
+
+def region_range_warnings(regions: Sequence[_core.Region], machine: Machine) -> list[str]:
+    """Tables that the program leaves, or whose axis' position it does not state; one sentence for each mode."""
+    warnings = []
+    for name, _, mode in _modes(machine):
+        over = mode.frequency_over
+        if over is None or over.axis is None:
+            continue
+        axis = _AXES.index(over.axis)
+        reached: list[float] = []
+        unknown = None
+        for region in regions:
+            offset = region_offset(region, machine)[axis]
+            if offset is None:
+                unknown = unknown or region
+                continue
+            positions = np.asarray(region.path.polyline())[:, axis] + offset
+            reached += [float(positions.min()), float(positions.max())]
+        if unknown is not None:
+            warnings.append(
+                f"line {unknown.first_line}: the position of {over.axis.upper()} is not known, over which {name} "
+                f"varies: its nominal {mode.frequency_hz:g} Hz holds"
+            )
+        low, high = over.abscissa[0], over.abscissa[-1]
+        if reached and (min(reached) < low or max(reached) > high):
+            warnings.append(
+                f"{over.axis.upper()} moves between {min(reached):g} and {max(reached):g} mm (machine coordinates), "
+                f"the table of {name} covers {low:g} to {high:g} mm: beyond it the nearest row holds"
+            )
+    return warnings
+
+
+def _table(mode: Mode, shift: float, offset: Offset) -> _core.ModeTable:
+    over = mode.frequency_over
+    if over is None or over.axis is None:
+        return _core.ModeTable()
+    axis = _AXES.index(over.axis)
+    start = offset[axis]
+    if start is None:
+        return _core.ModeTable()
+    scale = 1.0 + shift * (mode.frequency_uncertainty_percent or 0.0) / 100.0
+    return _core.ModeTable(
+        axis,
+        [position - start for position in over.abscissa],
+        [frequency * scale for frequency in over.frequency_hz],
+        over.damping_ratio or (),
+    )
+
+
+def _modes(machine: Machine) -> Iterator[tuple[str, int, Mode]]:
+    """Key, axis and mode of every mode."""
+    for axis, (letter, table) in enumerate(zip(_AXES, machine.axes.as_tuple(), strict=True)):
+        for number, mode in enumerate(table.modes, start=1):
+            yield f"axes.{letter}.modes.{number}", axis, mode

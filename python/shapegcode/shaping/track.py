@@ -1,0 +1,278 @@
+"""Shapers that follow modes along an axis: one design per node, shared linearly in between.
+
+An increment of the command that begins between two nodes is split between their shapers
+(:class:`shapegcode._core.FollowingFir`). Of a mode that both cancel nothing is left; of one that moves, what the two
+leave at the frequency in between points in opposite directions, so that few nodes keep a small residual. All shapers
+of a track have the same mean delay where the grid permits it: then the speed along the path does not change either.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode, ModeTable, Shaper, VaryingFir
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, shortest_non_negative
+
+__all__ = ["MovingMode", "ShaperTrack", "TrackNode", "design_track", "shaper_of_mean"]
+
+FloatArray = NDArray[np.float64]
+
+_LOOKS = 16  # positions between two nodes at which the residual is looked at
+_SUPPORT = 1e-9  # amplitudes above this are taps
+_LONGER = 1.3  # how much longer shapers may become for a common mean delay
+_SAME_MEAN = 1e-9  # periods
+_ON_GRID = 1e-9  # periods
+
+NodeDesign = Callable[[Sequence[Mode]], Shaper]
+
+
+@dataclass(frozen=True)
+class MovingMode:
+    """A mode and how it depends on the position of the axis that is followed.
+
+    Attributes:
+        mode: nominal frequency and damping.
+        table: over the axis' position; None: the mode stays.
+    """
+
+    mode: Mode
+    table: ModeTable | None = None
+
+    def at(self, position_mm: float) -> Mode:
+        """The mode where the axis stands at `position_mm`."""
+        return self.mode if self.table is None else self.table.mode_at(self.mode, position_mm)
+
+
+@dataclass(frozen=True)
+class TrackNode:
+    """A position of the axis and the shaper for it.
+
+    Attributes:
+        position_mm: of the axis, in the coordinates of the tables.
+        modes: what the shaper cancels there.
+        shaper: the taps, on the grid.
+    """
+
+    position_mm: float
+    modes: tuple[Mode, ...]
+    shaper: Shaper
+
+
+@dataclass(frozen=True)
+class ShaperTrack:
+    """Shapers along an axis.
+
+    Attributes:
+        axis: 0, 1, 2 for X, Y, Z.
+        period_s: grid of all shapers, s.
+        nodes: at ascending positions.
+        worst_residual: largest residual ratio of any mode anywhere on the track.
+    """
+
+    axis: int
+    period_s: float
+    nodes: tuple[TrackNode, ...]
+    worst_residual: float
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last tap of the longest shaper, s."""
+        return max(node.shaper.duration_s for node in self.nodes)
+
+    @property
+    def variance_s2(self) -> float:
+        """Largest contour cost, s²."""
+        return max(node.shaper.variance_s2 for node in self.nodes)
+
+    @property
+    def mean_spread_s(self) -> float:
+        """Largest difference between the mean delays of two shapers, s."""
+        means = [node.shaper.mean_s for node in self.nodes]
+        return max(means) - min(means)
+
+    @cached_property
+    def filters(self) -> VaryingFir:
+        """The shapers in whole periods."""
+        return VaryingFir(
+            [
+                Fir([round(time / self.period_s) for time in node.shaper.times_s], list(node.shaper.amplitudes))
+                for node in self.nodes
+            ]
+        )
+
+    def following(self, offset_mm: float = 0.0) -> FollowingFir:
+        """The filter that follows the axis.
+
+        Args:
+            offset_mm: what must be added to a position of the command to get one of the tables (work offset).
+        """
+        return FollowingFir(self.filters, self.axis, [node.position_mm - offset_mm for node in self.nodes])
+
+
+def design_track(
+    modes: Sequence[MovingMode],
+    axis: int,
+    span_mm: tuple[float, float],
+    period_s: float,
+    max_duration_s: float = 0.25,
+    *,
+    residual_limit: float = 0.01,
+    most_nodes: int = 100,
+    design: NodeDesign | None = None,
+) -> ShaperTrack:
+    """Shapers along an axis that keep the residual of every mode below a limit, between the nodes as well.
+
+    Nodes are added in the middle of every interval in which a mode keeps more than the limit, at first where the
+    tables have their rows.
+
+    Args:
+        modes: all modes of the machine, at least one; one shaper serves all axes.
+        axis: whose position counts: 0, 1, 2 for X, Y, Z.
+        span_mm: positions between which the axis moves, ascending or equal.
+        period_s: grid, s, above 0.
+        max_duration_s: longest shaper, s.
+        residual_limit: largest residual ratio, above 0.
+        most_nodes: more are not tried.
+        design: shaper for the modes at a node; None: non-negative, least second central moment, equal means.
+
+    Raises:
+        ArgumentError: no mode, a span or limit outside its range, or a table over another axis.
+        DesignError: a node has no shaper within `max_duration_s`, or the limit needs more than `most_nodes`.
+    """
+    low, high = span_mm
+    if not modes:
+        raise ArgumentError("a shaper needs at least one mode: 0 given")
+    if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+        raise ArgumentError(f"span is {low} to {high} mm: must be finite and ascend")
+    if not residual_limit > 0.0:
+        raise ArgumentError(f"residual limit is {residual_limit}: must be above 0")
+    tables = [moving.table for moving in modes if moving.table is not None]
+    if any(table.axis != axis for table in tables):
+        names = sorted({"XYZ"[table.axis] for table in tables})
+        raise ArgumentError(f"modes depend on the positions of {' and '.join(names)}: shapers can follow one axis")
+    rows = {row for table in tables for row in table.position_mm if low < row < high}
+    positions = sorted({low, high} | rows)
+    while True:
+        found = [tuple(moving.at(position) for moving in modes) for position in positions]
+        shapers = [design(here) for here in found] if design else _equal_means(found, period_s, max_duration_s)
+        nodes = [TrackNode(*each) for each in zip(positions, found, shapers, strict=True)]
+        residuals = [_worst_between(left, right, modes) for left, right in pairwise(nodes)]
+        middles = [
+            0.5 * (left + right)
+            for (left, right), residual in zip(pairwise(positions), residuals, strict=True)
+            if residual > residual_limit
+        ]
+        if not middles:
+            ends = max(node.shaper.residual_ratio(mode) for node in nodes for mode in node.modes)
+            return ShaperTrack(axis, period_s, tuple(nodes), max([ends, *residuals]))
+        if len(positions) + len(middles) > most_nodes:
+            raise DesignError(
+                f"{len(positions)} shapers between {low:g} and {high:g} mm leave up to {max(residuals):.3g} of the "
+                f"vibration, limit {residual_limit:g}; more than {most_nodes} are not tried"
+            )
+        positions = sorted([*positions, *middles])
+
+
+def shaper_of_mean(modes: Sequence[Mode], period_s: float, periods: int, mean_s: float | None = None) -> Shaper | None:
+    """Non-negative shaper of a mean delay, of least second central moment, that cancels every mode exactly.
+
+    With the mean delay given, the second central moment is linear in the taps: one linear program finds its least.
+
+    Args:
+        modes: to cancel, at least one.
+        period_s: grid, s.
+        periods: longest delay in periods.
+        mean_s: mean delay in s; None: the shaper of least mean delay.
+
+    Returns:
+        The shaper, residual ratio of every mode at most 1e-10, or None if there is none.
+    """
+    steps = np.arange(periods + 1.0)
+    matrix, right = _conditions(modes, period_s, steps)
+    cost = steps
+    if mean_s is not None:
+        matrix, right = np.vstack([matrix, steps / periods]), np.append(right, mean_s / period_s / periods)
+        cost = steps**2
+    taps = _vertex(cost, matrix, right)
+    if taps is None:
+        return None
+    support = np.flatnonzero(taps > _SUPPORT)
+    taps = taps[support]
+    for _ in range(3):  # the optimiser's tolerance, then rounding
+        taps = taps + np.linalg.lstsq(matrix[:, support], right - matrix[:, support] @ taps, rcond=1e-14)[0]
+    if not (np.all(taps > 0.0) and abs(taps.sum() - 1.0) <= RESIDUAL_LIMIT and support[0] == 0):
+        return None
+    shaper = Shaper((support * period_s).tolist(), (taps / taps.sum()).tolist())
+    return shaper if max(shaper.residual_ratio(mode) for mode in modes) <= RESIDUAL_LIMIT else None
+
+
+def _conditions(modes: Sequence[Mode], period_s: float, steps: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sum 1, and of every mode both parts of the residual sum 0; scaled so that no entry exceeds 1."""
+    poles = np.array([mode.pole for mode in modes])
+    terms = np.exp(np.outer(poles, (steps[-1] - steps) * period_s))
+    matrix = np.vstack([terms.real, terms.imag, np.ones(len(steps))])
+    return matrix, np.append(np.zeros(len(matrix) - 1), 1.0)
+
+
+def _vertex(cost: FloatArray, matrix: FloatArray, right: FloatArray) -> FloatArray | None:
+    result = linprog(
+        cost / np.abs(cost).max(),
+        A_eq=matrix,
+        b_eq=right,
+        bounds=(0.0, None),
+        method="highs-ds",
+        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+    )
+    return np.asarray(result.x, dtype=np.float64) if result.status == 0 else None
+
+
+def _equal_means(found: Sequence[Sequence[Mode]], period_s: float, max_duration_s: float) -> list[Shaper]:
+    """One shaper for each set of modes, with equal mean delays where the grid permits it, else as close as it does."""
+    shortest = [shortest_non_negative(modes, period_s, max_duration_s) for modes in found]
+    fewest = max(round(shaper.duration_s / period_s) for shaper in shortest)
+    most = min(math.floor(max_duration_s / period_s + _ON_GRID), math.ceil(_LONGER * fewest))
+    for periods in range(fewest, most + 1):
+        ranges = [_mean_range(modes, period_s, periods) for modes in found]
+        least = max(low for low, _ in ranges)
+        largest = min(high for _, high in ranges)
+        if least <= largest:
+            usual = sum(shaper.mean_s for shaper in shortest) / len(shortest) / period_s
+            mean = min(max(usual, least), largest)
+            designs = [shaper_of_mean(modes, period_s, periods, mean * period_s) for modes in found]
+            whole = [shaper for shaper in designs if shaper is not None]
+            if len(whole) == len(found):
+                return whole
+    return shortest
+
+
+def _mean_range(modes: Sequence[Mode], period_s: float, periods: int) -> tuple[float, float]:
+    """Least and largest mean delay of non-negative taps, in periods."""
+    steps = np.arange(periods + 1.0)
+    matrix, right = _conditions(modes, period_s, steps)
+    least, largest = _vertex(steps, matrix, right), _vertex(-steps, matrix, right)
+    if least is None or largest is None:
+        return math.inf, -math.inf
+    return float(steps @ least) + _SAME_MEAN, float(steps @ largest) - _SAME_MEAN
+
+
+def _worst_between(left: TrackNode, right: TrackNode, modes: Sequence[MovingMode]) -> float:
+    """Largest residual ratio of a mode for increments that begin between two nodes."""
+    times = sorted({*left.shaper.times_s.tolist(), *right.shaper.times_s.tolist()})
+    first, second = (
+        np.array([dict(zip(s.times_s.tolist(), s.amplitudes.tolist(), strict=True)).get(t, 0.0) for t in times])
+        for s in (left.shaper, right.shaper)
+    )
+    worst = 0.0
+    for share in np.arange(1, _LOOKS) / _LOOKS:
+        mixed = Shaper(times, ((1.0 - share) * first + share * second).tolist())
+        position = left.position_mm + float(share) * (right.position_mm - left.position_mm)
+        worst = max(worst, *(mixed.residual_ratio(moving.at(position)) for moving in modes))
+    return worst

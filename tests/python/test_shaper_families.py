@@ -1,0 +1,394 @@
+"""The families of shapers: residuals by simulation and by a formula of its own, on continuous times and on grids."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.linalg import expm
+from scipy.optimize import linprog
+
+from shapegcode._core import (
+    ArgumentError,
+    DesignError,
+    Mode,
+    Shaper,
+    extra_insensitive,
+    minimal_two_mode,
+    mzv_second_zero,
+    worst_residual,
+    zv,
+)
+from shapegcode.shaping import FAMILIES, DesignOptions, ModeBand, design, parse_mode_band, shortest_non_negative
+from shapegcode.shaping.grid_families import Conditions, ResidualLimit, Zero, shortest_on_grid
+from shapegcode.shaping.registry import distinct
+from shapegcode.shaping.simultaneous import simultaneous_zv
+from shapegcode.shaping.taps import parse_taps
+
+SLOW = parse_mode_band("46:0.02±5%")
+FAST = parse_mode_band("131:0.02±5%")
+PERIODS_S = (0.001, 0.002, 0.004, 0.005)
+EXACT = ("zv", "zvd", "zvdd", "mzv", "ei2", "negative-zv")
+TOLERANT = ("ei", "ei3", "si")
+
+
+def left_of(shaper: Shaper, frequency_hz: float, zeta: float) -> float:
+    """V of spec 2, written out."""
+    omega = 2.0 * np.pi * frequency_hz
+    t = shaper.times_s
+    terms = shaper.amplitudes * np.exp((zeta + 1j * math.sqrt(1.0 - zeta**2)) * omega * t)
+    return float(np.exp(-zeta * omega * t[-1]) * abs(np.sum(terms)))
+
+
+def simulated(shaper: Shaper, mode: Mode) -> float:
+    """Size of the free motion after the last tap over that of one unit impulse then, by the matrix exponential.
+
+    The size is that of the state in the modal coordinates, in which an undisturbed motion only turns and decays.
+    """
+    omega = 2.0 * np.pi * mode.frequency_hz
+    matrix = np.array([[0.0, 1.0], [-(omega**2), -2.0 * mode.damping_ratio * omega]])
+    state = np.zeros(2)
+    now = 0.0
+    for time, amplitude in zip(shaper.times_s, shaper.amplitudes, strict=True):
+        state = expm(matrix * (time - now)) @ state + np.array([0.0, amplitude])
+        now = time
+
+    def size(motion: NDArray[np.float64]) -> float:
+        position, speed = motion
+        damped = omega * math.sqrt(1.0 - mode.damping_ratio**2)
+        return math.hypot(position, (speed + mode.damping_ratio * omega * position) / damped)
+
+    return size(state) / size(np.array([0.0, 1.0]))
+
+
+def sampled_worst(shaper: Shaper, band: ModeBand, count: int = 101) -> float:
+    low, high = band.shifted(-1.0).frequency_hz, band.shifted(1.0).frequency_hz
+    return max(left_of(shaper, float(f), band.mode.damping_ratio) for f in np.linspace(low, high, count))
+
+
+def options(
+    period_s: float | None = None,
+    *,
+    max_duration_s: float = 0.25,
+    max_abs_sum: float = 10.0,
+    vibration_limit: float = 0.05,
+) -> DesignOptions:
+    return DesignOptions(period_s, max_duration_s, max_abs_sum, vibration_limit)
+
+
+# --- every family ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.02, 0.1])
+@pytest.mark.parametrize("name", [*EXACT, *TOLERANT])
+def test_one_mode_on_any_times(name: str, zeta: float) -> None:
+    band = ModeBand(Mode(46.0, zeta), 0.05)
+    for period_s in (None, 0.002 if zeta else 0.005):
+        found = design(name, [band], options(period_s))[0]
+        shaper = found.shaper
+        assert shaper.amplitudes.sum() == pytest.approx(1.0, abs=1e-12)
+        assert found.residual == pytest.approx(simulated(shaper, band.mode), abs=1e-11)
+        sampled = sampled_worst(shaper, band)
+        assert sampled * (1.0 - 2e-6) - 1e-11 <= found.worst_residual <= sampled * (1.0 + 1e-3) + 1e-11
+        assert found.residual <= (1e-10 if name in EXACT else 0.05 * (1.0 + 1e-9))
+        if name == "si":
+            assert found.worst_residual <= 0.05
+        if name == "negative-zv":
+            assert np.abs(shaper.amplitudes).max() <= 1.0 + 1e-9
+        else:
+            assert shaper.amplitudes.min() > 0.0
+        if period_s is not None:
+            steps = shaper.times_s / period_s
+            assert np.abs(steps - np.round(steps)).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", [*EXACT, *TOLERANT])
+def test_two_modes_on_any_times(name: str) -> None:
+    for period_s in (None, 0.005):
+        found = design(name, [SLOW, FAST], options(period_s))[0]
+        left = [simulated(found.shaper, band.mode) for band in (SLOW, FAST)]
+        assert max(left) == pytest.approx(found.residual, abs=1e-11)
+        assert max(left) <= (1e-10 if name in EXACT else 0.05 * (1.0 + 1e-9))
+
+
+def test_every_row_says_what_it_is_and_is_designed_or_refused_as_it_says() -> None:
+    assert len({row.name for row in FAMILIES}) == len(FAMILIES)
+    for row in FAMILIES:
+        assert row.title
+        assert row.source
+        assert row.validity
+        given = zv(SLOW.mode) if row.name == "taps" else None
+        if row.continuous:
+            assert design(row.name, [SLOW], DesignOptions(taps=given))
+        else:
+            with pytest.raises(ArgumentError, match="give its period"):
+                design(row.name, [SLOW])
+        if not row.on_grid:
+            with pytest.raises(ArgumentError, match="leave the period out"):
+                design(row.name, [SLOW], options(0.005))
+
+
+# --- conditions on a grid -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "multiplicity"), [("zv", 1), ("zvd", 2), ("zvdd", 3)])
+@pytest.mark.parametrize("period_s", [*PERIODS_S, 0.008])
+def test_zeros_on_a_grid_have_their_multiplicity(name: str, multiplicity: int, period_s: float) -> None:
+    shaper = design(name, [SLOW], options(period_s))[0].shaper
+    far, near = (left_of(shaper, 46.0 * (1.0 + step), 0.02) for step in (2e-3, 1e-3))
+    assert near / far == pytest.approx(0.5**multiplicity, rel=0.02)
+
+
+def feasible(rows: list[NDArray[np.complex128]], last: int) -> bool:
+    """A linear program of its own: non-negative taps of sum 1 with these sums zero."""
+    matrix = np.vstack([np.ones(last + 1), *[part for row in rows for part in (row.real, row.imag)]])
+    right = np.zeros(len(matrix))
+    right[0] = 1.0
+    return bool(
+        linprog(
+            np.zeros(last + 1),
+            A_eq=matrix,
+            b_eq=right,
+            options={"primal_feasibility_tolerance": 1e-10},
+            method="highs-ds",
+        ).status
+        == 0
+    )
+
+
+@pytest.mark.parametrize("multiplicity", [1, 2, 3])
+@pytest.mark.parametrize("period_s", PERIODS_S)
+def test_no_shorter_design_has_the_zeros(multiplicity: int, period_s: float) -> None:
+    name = ("zv", "zvd", "zvdd")[multiplicity - 1]
+    steps = round(design(name, [SLOW], options(period_s))[0].duration_s / period_s)
+    for last, expected in ((steps, True), (steps - 1, False)):
+        k = np.arange(last + 1)
+        term = np.exp(-SLOW.mode.pole * period_s * (k - last))
+        assert feasible([term * ((k - last / 2) / last) ** power for power in range(multiplicity)], last) == expected
+
+
+@pytest.mark.parametrize("humps", [1, 2, 3])
+def test_extra_insensitive_on_a_grid_keeps_its_zeros_and_humps(humps: int) -> None:
+    zeros_hz = extra_insensitive(SLOW.mode, 0.05, humps).zeros_hz
+    for period_s in PERIODS_S:
+        shaper = design(f"ei{humps}" if humps > 1 else "ei", [SLOW], options(period_s))[0].shaper
+        for frequency_hz in zeros_hz:
+            assert left_of(shaper, frequency_hz, 0.02) < 1e-10
+        between = np.linspace(zeros_hz[0], zeros_hz[-1], 1001)
+        assert max(left_of(shaper, float(f), 0.02) for f in between) <= 0.05 * (1.0 + 1e-9)
+
+
+def test_modified_zv_on_a_grid_keeps_both_zeros() -> None:
+    for period_s in PERIODS_S:
+        shaper = design("mzv", [SLOW], options(period_s))[0].shaper
+        second = mzv_second_zero(SLOW.mode)
+        assert left_of(shaper, 46.0, 0.02) < 1e-10
+        assert left_of(shaper, second.frequency_hz, second.damping_ratio) < 1e-10
+
+
+def test_zv_on_a_grid_is_the_shortest_non_negative_design() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(16):
+        mode = Mode(float(rng.uniform(15.0, 150.0)), float(rng.uniform(0.0, 0.05)))
+        period_s = float(rng.choice(PERIODS_S))
+        try:
+            expected = shortest_non_negative([mode], period_s)
+        except DesignError:
+            with pytest.raises(DesignError):
+                design("zv", [ModeBand(mode)], options(period_s))
+            continue
+        found = design("zv", [ModeBand(mode)], options(period_s))[0].shaper
+        assert found.duration_s == pytest.approx(expected.duration_s, rel=1e-9)
+        assert found.variance_s2 == pytest.approx(expected.variance_s2, rel=0.05)
+
+
+def test_negative_zv_on_a_grid_is_no_longer_than_the_polynomial_with_such_taps() -> None:
+    for period_s in (0.002, 0.004, 0.005):
+        shaper = design("negative-zv", [SLOW], options(period_s))[0].shaper
+        polynomial = design("polynomial", [SLOW], options(period_s, max_abs_sum=100.0))[0].shaper
+        if np.abs(polynomial.amplitudes).max() <= 1.0:
+            assert shaper.duration_s == pytest.approx(polynomial.duration_s)
+        assert shaper.duration_s <= design("zv", [SLOW], options(period_s))[0].duration_s + 1e-12
+
+
+# --- specified insensitivity ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("period_s", [0.002, 0.004])
+def test_no_shorter_design_stays_below_the_limit(period_s: float) -> None:
+    """Sampled frequencies and directions relax the problem: where even they forbid it, nothing shorter exists."""
+    band = ModeBand(Mode(46.0, 0.02), 0.15)
+    shaper = design("si", [band], options(period_s))[0].shaper
+    assert sampled_worst(shaper, band) <= 0.05
+    last = round(shaper.duration_s / period_s) - 1
+    k = np.arange(last + 1)
+    rows = [
+        np.real(np.exp(-1j * direction) * np.exp(Mode(float(f), 0.02).pole.conjugate() * period_s * (last - k)))
+        for f in np.linspace(46.0 * 0.85, 46.0 * 1.15, 21)
+        for direction in np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+    ]
+    relaxed = linprog(np.zeros(last + 1), A_ub=np.array(rows), b_ub=np.full(len(rows), 0.999 * 0.05),
+                      A_eq=np.ones((1, last + 1)), b_eq=[1.0])  # fmt: skip
+    assert relaxed.status == 2
+
+
+def test_specified_insensitivity_over_a_zero_band_and_a_wide_one() -> None:
+    narrow = design("si", [ModeBand(Mode(46.0, 0.0))], options(0.001))[0]
+    wide = design("si", [ModeBand(Mode(46.0, 0.0), 0.3)], options(0.001))[0]
+    assert narrow.worst_residual <= 0.05
+    assert wide.worst_residual <= 0.05
+    assert narrow.duration_s < wide.duration_s
+    # EI with one hump has an insensitivity of .399: a band of .39 needs about its taps, one period
+    ei_like = design("si", [ModeBand(Mode(46.0, 0.0), 0.195)], options(1.0 / (46.0 * 64)))[0]
+    assert ei_like.duration_s == pytest.approx(1.0 / 46.0, rel=0.05)
+    with pytest.raises(ArgumentError, match="above 0 and below 1"):
+        design("si", [SLOW], options(0.001, vibration_limit=0.0))
+
+
+# --- simultaneous ---------------------------------------------------------------------------------------------
+
+
+def test_simultaneous_of_the_paper() -> None:
+    shaper = design("simultaneous", [SLOW, FAST])[0].shaper
+    assert shaper.times_s * 1e3 == pytest.approx([0.0, 6.514, 11.326], abs=5e-4)
+    assert shaper.amplitudes == pytest.approx([0.49156, 0.06297, 0.44547], abs=5e-6)
+
+
+def test_simultaneous_of_two_modes_is_the_shortest_non_negative_minimal_shaper() -> None:
+    rng = np.random.default_rng(11)
+    for _ in range(6):
+        slow = float(rng.uniform(20.0, 60.0))
+        modes = [Mode(slow, float(rng.uniform(0.0, 0.05))), Mode(slow * float(rng.uniform(1.3, 2.8)), 0.02)]
+        minimal = [each for each in minimal_two_mode(modes[0], modes[1], 0.06) if not each.has_negative]
+        shaper = simultaneous_zv(modes, 0.25)
+        assert max(simulated(shaper, mode) for mode in modes) < 1e-11
+        assert shaper.duration_s <= minimal[0].duration_s * (1.0 + 1e-9)
+        if len(shaper.times_s) == 3:
+            assert shaper.times_s == pytest.approx(minimal[0].times_s, rel=1e-7, abs=1e-12)
+
+
+def test_simultaneous_of_three_and_four_modes() -> None:
+    for frequencies in ((46.0, 131.0, 75.0), (30.0, 52.0, 87.0, 131.0)):
+        modes = [Mode(f, 0.02) for f in frequencies]
+        shaper = simultaneous_zv(modes, 0.25)
+        assert max(simulated(shaper, mode) for mode in modes) < 1e-11
+        assert shaper.amplitudes.min() > 0.0
+        assert shaper.duration_s < sum(0.5 / f for f in frequencies)
+        # no grid of a quarter of a millisecond holds a much shorter one
+        assert shaper.duration_s <= shortest_non_negative(modes, 0.00025).duration_s
+        assert shaper.duration_s >= shortest_non_negative(modes, 0.00025).duration_s - 0.0006
+
+
+# --- what is refused, and what is said ------------------------------------------------------------------------
+
+
+def test_equal_modes_count_once() -> None:
+    twice = [SLOW, ModeBand(Mode(46.0 * (1.0 + 1e-12), 0.02), 0.1)]
+    assert [band.uncertainty for band in distinct(twice)] == [0.1]
+    for name in (*EXACT, *TOLERANT, "simultaneous"):
+        assert design(name, [SLOW, SLOW])[0].duration_s == design(name, [SLOW])[0].duration_s, (
+            f"{name} designed for the same mode twice"
+        )
+
+
+def test_bad_modes_are_refused_with_their_numbers() -> None:
+    with pytest.raises(ArgumentError, match="46 Hz has damping ratio 1, must be at least 0 and below 1"):
+        parse_mode_band("46:1")
+    with pytest.raises(ArgumentError, match=r"46 Hz has damping ratio 1\.2"):
+        Mode(46.0, 1.2)
+    with pytest.raises(ArgumentError, match="mode frequency 0 Hz, must be finite and above 0"):
+        Mode(0.0, 0.02)
+    for name in ("zvd", "taps", "si"):
+        with pytest.raises(ArgumentError, match="0 given"):
+            design(name, [])
+
+
+def test_a_grid_that_sees_no_vibration_is_refused_with_what_is_nearest() -> None:
+    # 200 Hz at 5 ms: each tap meets the mode in the same phase
+    with pytest.raises(DesignError, match=r"no ZVD for 200 Hz .* within 250 ms on a 5 ms grid, nor within 1000 ms; "
+                       r"nor is there a polynomial: mode 200 Hz cannot be cancelled"):  # fmt: skip
+        design("zvd", [ModeBand(Mode(200.0, 0.0))], options(0.005))
+    with pytest.raises(DesignError, match="within 20 ms on a 5 ms grid; the shortest lasts 25 ms"):
+        design("zvd", [SLOW], options(0.005, max_duration_s=0.02))
+    with pytest.raises(DesignError, match=r"zvd lasts 21\.7\d* ms with sum\|a\| 1: the limits are 20 ms and 10"):
+        design("zvd", [SLOW], options(max_duration_s=0.02))
+    with pytest.raises(DesignError, match=r"negative-zv lasts .* with sum\|a\| 27: the limits are 250 ms and 10"):
+        design("negative-zv", [SLOW, FAST, ModeBand(Mode(75.0, 0.02))])
+    with pytest.raises(DesignError, match="the polynomial with its zeros lasts 4 ms with sum"):
+        conditions = Conditions(zeros=(Zero(SLOW.mode),), limits=(ResidualLimit(SLOW.mode, 1.0, 46.0, 0.05),))
+        shortest_on_grid(conditions, 0.002, 0.02, title="design that nothing meets")
+
+
+def test_close_zeros_cost_no_precision() -> None:
+    for distance in (1e-9, 1e-6, 1e-3):
+        pair = (Zero(SLOW.mode), Zero(Mode(46.0 * (1.0 + distance), 0.02)))
+        shaper = shortest_on_grid(Conditions(zeros=pair), 0.002, 0.25, title="pair")
+        assert max(left_of(shaper, zero.mode.frequency_hz, 0.02) for zero in pair) < 1e-10
+
+
+def test_a_limit_is_proven_over_its_band() -> None:
+    limit = ResidualLimit(SLOW.mode, 35.0, 60.0, 0.1)
+    shaper = shortest_on_grid(Conditions(limits=(limit,)), 0.002, 0.25, title="limit")
+    assert worst_residual(shaper, SLOW.mode, 35.0, 60.0).upper_bound <= 0.1
+
+
+# --- given taps -----------------------------------------------------------------------------------------------
+
+
+def test_taps_in_every_form() -> None:
+    expected = Shaper([0.0, 0.01], [0.75, 0.25])
+    for given in (
+        "0:0.75,0.01:0.25",
+        " 0s : 0.75 , 10ms : .25 ",
+        "[[0, 0.75], [0.01, 0.25]]",
+        '{"times_s": [0, 0.01], "amplitudes": [0.75, 0.25]}',
+        [[0, 0.75], (0.01, 0.25)],
+        {"times_s": [0.0, 0.01], "amplitudes": [0.75, 0.25]},
+    ):
+        assert parse_taps(given) == expected
+    found = design("taps", [SLOW], DesignOptions(taps=expected))[0]
+    assert found.residual == pytest.approx(simulated(expected, SLOW.mode), rel=1e-9)
+    assert design("taps", [SLOW], DesignOptions(taps=expected, period_s=0.005))[0].period_s == 0.005
+
+
+def test_taps_that_are_none() -> None:
+    for given, message in (
+        ("", "is no tap"),
+        ("0:0.5,0.01", "is no tap: TIME:AMPLITUDE"),
+        ("0:0.5,0.01:0.4", "add up to"),
+        ("0.01:1", "first time"),
+        ("[[0, 1", "no JSON"),
+        ("[[0, 1, 2]]", "pairs"),
+        ("[[0, true]]", "no number"),
+        ("[1]", "list of numbers"),
+        ('{"times_s": [0]}', "keys times_s and amplitudes"),
+    ):
+        with pytest.raises(ArgumentError, match=message):
+            parse_taps(given)
+    with pytest.raises(ArgumentError, match="none are"):
+        design("taps", [SLOW])
+    off = DesignOptions(taps=zv(SLOW.mode), period_s=0.005)
+    with pytest.raises(DesignError, match=r"the tap at 10\.87\d* ms is not on the 5 ms grid, nearest 10 ms"):
+        design("taps", [SLOW], off)
+
+
+def test_random_modes_on_random_grids() -> None:
+    """Every grid design that is handed out cancels what it says, by a formula of the test."""
+    rng = np.random.default_rng(5)
+    names = itertools.cycle(("zv", "zvd", "mzv", "ei", "negative-zv", "si"))
+    designed = 0
+    for name, _ in zip(names, range(24), strict=False):
+        band = ModeBand(Mode(float(rng.uniform(15.0, 150.0)), float(rng.uniform(0.0, 0.08))), 0.05)
+        try:
+            found = design(name, [band], options(float(rng.choice(PERIODS_S))))[0]
+        except DesignError as error:
+            assert "lasts" in str(error) or "try another period" in str(error)
+            continue
+        designed += 1
+        left = left_of(found.shaper, band.mode.frequency_hz, band.mode.damping_ratio)
+        assert left <= (0.05 * (1.0 + 1e-9) if name in TOLERANT else 1e-10)
+        assert found.worst_residual >= sampled_worst(found.shaper, band) * (1.0 - 2e-6) - 1e-11
+    assert designed > 20
