@@ -54,7 +54,7 @@ def _shortest_non_negative(bands: Sequence[ModeBand], options: DesignOptions) ->
 
 def _robust(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
     if not any(band.uncertainty for band in bands):
-        raise DesignError("no mode states a band: the family non-negative is the same")
+        raise DesignError("no mode states a band: a robust design is the non-negative one")
     found = robust_candidate(bands, options.grid_period_s, options.max_duration_s, options.vibration_limit)
     return [] if found.shaper is None else [found.shaper]
 
@@ -121,7 +121,7 @@ FAMILIES: tuple[Family, ...] = (
         "any modes on a grid on which one exists within the longest duration", False, True, _shortest_non_negative,
     ),
     Family(
-        "robust", "shortest of a grid within the vibration limit over the bands", "this project",
+        "robust", "shortest shaper of a grid below a residual over the bands", "this project",
         "modes with bands, no negative tap; exact for a mode without a band; if none is short enough, the one of the "
         "longest duration that leaves least", False, True, _robust,
     ),
