@@ -18,6 +18,7 @@ from shapegcode.shaper_picture import plot_pareto, residual_curve, selected
 from shapegcode.shaper_table import radial_error_um
 from shapegcode.shaping import Design, choose_shaper
 
+FEW = ("--family", "zv", "mzv", "minimal", "polynomial", "non-negative", "robust")  # quick ones
 PAPER = ("--mode", "46:0.02±5%", "--mode", "131:0.02")
 KEYS = {
     "family", "times_s", "amplitudes", "duration_s", "variance_s2", "worst_residual", "residual", "period_s", "abs_sum",
@@ -43,7 +44,7 @@ def test_json_of_a_grid(capsys: pytest.CaptureFixture[str]) -> None:
     assert not taken["negative"]
     assert taken["worst_residual"] <= 0.05
     assert "±5 %" in result["reason"]
-    assert {row["family"] for row in result["refused"]} >= {"simultaneous"}
+    assert {row["family"] for row in result["refused"]} >= {"minimal", "simultaneous"}
     assert all(row["reason"] for row in result["refused"])
     assert result["modes"] == [
         {"frequency_hz": 46.0, "damping_ratio": 0.02, "uncertainty": 0.05},
@@ -52,13 +53,12 @@ def test_json_of_a_grid(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_plus_minus_in_ascii_is_the_same(capsys: pytest.CaptureFixture[str]) -> None:
-    assert asked(capsys, "--mode", "46:0.02+-5%", "--mode", "131:0.02", "--period", "5ms") == asked(
-        capsys, *PAPER, "--period", "5ms"
-    )
+    few = ("--period", "5ms", *FEW)
+    assert asked(capsys, "--mode", "46:0.02+-5%", "--mode", "131:0.02", *few) == asked(capsys, *PAPER, *few)
 
 
 def test_without_a_period_both_kinds_of_times(capsys: pytest.CaptureFixture[str]) -> None:
-    result = asked(capsys, "--mode", "46:0.02", "--mode", "131:0.02")
+    result = asked(capsys, "--mode", "46:0.02", "--mode", "131:0.02", *FEW)
     periods = {row["period_s"] for row in result["designs"]}
     assert None in periods
     assert len(periods) > 2
@@ -78,7 +78,7 @@ def test_a_file_and_the_table(capsys: pytest.CaptureFixture[str], tmp_path: Path
 
 
 def test_exit_code_1_if_the_best_leaves_too_much(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ("--mode", "46:0.02±20%", "--period", "5ms", "--max-duration", "15ms")
+    words = ("--mode", "46:0.02±20%", "--period", "5ms", "--max-duration", "15ms", *FEW)
     result = asked(capsys, *words, code=1)
     best = result["designs"][result["recommended"]]
     assert best["worst_residual"] > 0.05
@@ -119,6 +119,18 @@ def test_bad_input_is_one_line_and_exit_code_2(
     assert len([line for line in error.splitlines() if not line.startswith((" ", "usage"))]) == 1
 
 
+def test_the_table_shows_some_and_all(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["shaper", *PAPER, "--period", "continuous", "--period", "2ms", "--period", "5ms", *FEW]
+    rows = []
+    for more in ([], ["--all"]):
+        assert main([*words, *more]) == 0
+        rows.append([line for line in capsys.readouterr().out.splitlines() if line.count("│") > 5])
+    result = asked(capsys, *words[1:])
+    assert len(rows[1]) == len(result["designs"]) > len(rows[0])
+    families = {row["family"] for row in result["designs"]}
+    assert {line.split("│")[1].strip() for line in rows[0]} == families
+
+
 def test_the_families_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["shaper", "--list-families"]) == 0
     out = capsys.readouterr().out
@@ -143,7 +155,7 @@ def test_pictures_are_complete(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(canvas, "FORMATS", (".svg",))  # PNG takes three times as long
-    assert main(["shaper", *PAPER, "--period", "continuous", "--period", "5ms", "--plots", str(tmp_path)]) == 0
+    assert main(["shaper", *PAPER, "--period", "continuous", "--period", "5ms", *FEW, "--plots", str(tmp_path)]) == 0
     assert "next:" in capsys.readouterr().out
     kinds = {"branches", "pareto", "sensitivity", "impulses", "steps"}
     assert {file.name for file in tmp_path.iterdir()} == {f"shaper-{kind}.svg" for kind in kinds}
@@ -153,7 +165,7 @@ def test_pictures_are_complete(
 
 
 def test_the_same_picture_gives_the_same_bytes(tmp_path: Path) -> None:
-    result = choose_shaper(["46:0.02±5%"], periods_s=[0.005])
+    result = choose_shaper(["46:0.02±5%"], periods_s=[0.005], families=FEW[1:])
     for name in ("one.png", "two.png", "one.svg", "two.svg"):
         plot_pareto(tmp_path / name, result)
     for suffix in (".png", ".svg"):
@@ -161,7 +173,7 @@ def test_the_same_picture_gives_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_selected_curves_begin_with_the_recommended_one() -> None:
-    result = choose_shaper(["46:0.02±5%", "131:0.02"])
+    result = choose_shaper(["46:0.02±5%", "131:0.02"], families=FEW[1:])
     curves = selected(result)
     assert curves[0] is result.design
     assert len(curves) <= 6

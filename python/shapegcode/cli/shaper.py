@@ -104,6 +104,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=20.0,
         help="radius of the arc on which it is shown (default: %(default)g)",
     )
+    parser.add_argument("--all", action="store_true", help="show every design in the table")
     add_plots_argument(parser, "write pictures of the comparison (PNG and SVG) into this folder")
     add_json_argument(parser)
 
@@ -154,7 +155,7 @@ def run(args: argparse.Namespace) -> int:
             write_shaper_pictures(result, args.plots)
     if args.json is not None:
         write_json(result.report(), args.json)
-    console.print(designs_table(result, args.speed, args.radius))
+    console.print(designs_table(result, args.speed, args.radius, everything=args.all))
     if result.refusals:
         console.print(refusals_table(result.refusals))
     for line in verdict(result):

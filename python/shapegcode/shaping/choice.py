@@ -8,6 +8,7 @@ user's objective; :func:`recommend` is the whole rule.
 from __future__ import annotations
 
 import cmath
+import contextlib
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -18,11 +19,13 @@ import numpy as np
 
 from shapegcode._core import ArgumentError, DesignError, ShapegcodeError
 from shapegcode.shaping.band import ModeBand
-from shapegcode.shaping.design import Design
+from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.registry import FAMILIES, DesignOptions, Family, design, family_named
+from shapegcode.shaping.robust import least_worst
 
 __all__ = ["OBJECTIVES", "Recommendation", "Refusal", "choose", "pareto_front", "recommend"]
 
+_ROBUST = "robust"  # the family of which a design is shown even if it leaves more than the limit
 _OWN_TAPS = "taps"  # the family of taps that the user gives
 NO_RESIDUAL = 1e-9
 """A residual ratio below this is none: what is left is the rounding of the solver."""
@@ -117,11 +120,23 @@ class Recommendation:
     @property
     def grid_index(self) -> int | None:
         """Index of the design to take of those on a grid, which alone can be written as blocks; None: there is none."""
-        places = [place for place, each in enumerate(self.designs) if each.period_s is not None]
+        return self._best_of([place for place, each in enumerate(self.designs) if each.period_s is not None])
+
+    @property
+    def best_by_period(self) -> dict[float, int]:
+        """Index of the design to take on each grid, by its period in s, ascending."""
+        places: dict[float, list[int]] = {}
+        for place, each in enumerate(self.designs):
+            if each.period_s is not None:
+                places.setdefault(each.period_s, []).append(place)
+        best = {period_s: self._best_of(places[period_s]) for period_s in sorted(places)}
+        return {period_s: place for period_s, place in best.items() if place is not None}
+
+    def _best_of(self, places: Sequence[int]) -> int | None:
         if not places:
             return None
-        on_grid = [self.designs[place] for place in places]
-        return places[recommend(on_grid, self.options.vibration_limit, self.objective, self.allow_negative)]
+        designs = [self.designs[place] for place in places]
+        return places[recommend(designs, self.options.vibration_limit, self.objective, self.allow_negative)]
 
     def report(self) -> dict[str, Any]:
         """Everything as plain values: `modes`, `designs`, `recommended` (index), `reason`, `refused`, limits."""
@@ -209,6 +224,11 @@ def choose(
         Refusal(row.name, period_s, _aliases(bands, period_s))
         for row, period_s in itertools.product(rows, periods_s)
         if period_s is not None and period_s not in usable and row.on_grid
+    ]
+    least = _least_worst(rows, usable, bands, options, found)
+    found += least
+    refusals = [
+        each for each in refusals if (each.family, each.period_s) not in {(d.family, d.period_s) for d in least}
     ]
     if not found:
         reasons = "; ".join(dict.fromkeys(f"{refusal.family}: {refusal.reason}" for refusal in refusals))
@@ -341,6 +361,26 @@ def _designs(row: Family, bands: Sequence[ModeBand], options: DesignOptions) -> 
         return design(row.name, bands, options), ""
     except ShapegcodeError as error:
         return [], str(error)
+
+
+def _least_worst(
+    rows: Sequence[Family],
+    usable: Sequence[float | None],
+    bands: Sequence[ModeBand],
+    options: DesignOptions,
+    found: Sequence[Design],
+) -> list[Design]:
+    """What leaves least within the longest duration, on each grid; none if a design without negative taps is good."""
+    wanted = any(row.name == _ROBUST for row in rows) and any(band.uncertainty for band in bands)
+    if not wanted or any(not each.negative and _within(each, options.vibration_limit) for each in found):
+        return []
+    designs = []
+    for period_s in usable:
+        if period_s is not None:
+            with contextlib.suppress(DesignError):
+                shaper = least_worst(bands, period_s, options.max_duration_s).shaper
+                designs.append(evaluate(_ROBUST, shaper, bands, period_s))
+    return designs
 
 
 def _never_tried(rows: Sequence[Family], usable: Sequence[float | None]) -> Iterator[Refusal]:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from shapegcode._core import ArgumentError, DesignError, Shaper, grid_polynomial
 from shapegcode.shaping import family_solvers as solvers
 from shapegcode.shaping.band import ModeBand
-from shapegcode.shaping.block_period import robust_candidate
 from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.minimal_family import solve_minimal
 from shapegcode.shaping.options import DesignOptions
+from shapegcode.shaping.robust import minimax_robust
 
 __all__ = ["FAMILIES", "DesignOptions", "Family", "design", "distinct", "family_named"]
 
@@ -55,8 +55,11 @@ def _shortest_non_negative(bands: Sequence[ModeBand], options: DesignOptions) ->
 def _robust(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
     if not any(band.uncertainty for band in bands):
         raise DesignError("no mode states a band: a robust design is the non-negative one")
-    found = robust_candidate(bands, options.grid_period_s, options.max_duration_s, options.vibration_limit)
-    return [] if found.shaper is None else [found.shaper]
+    found = minimax_robust(
+        bands, options.grid_period_s, vibration_limit=options.vibration_limit, max_duration_s=options.max_duration_s,
+        hints=False,
+    )  # fmt: skip
+    return [found.shaper]
 
 
 FAMILIES: tuple[Family, ...] = (
@@ -122,8 +125,7 @@ FAMILIES: tuple[Family, ...] = (
     ),
     Family(
         "robust", "shortest shaper of a grid below a residual over the bands", "this project",
-        "modes with bands, no negative tap; exact for a mode without a band; if none is short enough, the one of the "
-        "longest duration that leaves least", False, True, _robust,
+        "modes with a band; one without is cancelled exactly; no tap is negative", False, True, _robust,
     ),
     Family(
         "taps", "taps as given", "the user",
