@@ -103,16 +103,19 @@ def designs_table(
 
 
 def refusals_table(refusals: Sequence[Refusal]) -> Table:
-    """The families without a design on some kind of times, and why."""
+    """The families without a design on some kind of times, and why; the same reason on several is one row."""
     from rich.table import Table
     from rich.text import Text
 
     table = Table(title="no design", show_edge=False, pad_edge=False)
     table.add_column("family", no_wrap=True)
-    table.add_column("times", no_wrap=True)
+    table.add_column("times", overflow="fold", max_width=24)
     table.add_column("why", overflow="fold")
+    times: dict[tuple[str, str], list[float | None]] = {}
     for refusal in refusals:
-        table.add_row(Text(refusal.family), times_name(refusal.period_s), Text(refusal.reason))
+        times.setdefault((refusal.family, refusal.reason), []).append(refusal.period_s)
+    for (family, reason), periods_s in times.items():
+        table.add_row(Text(family), ", ".join(map(times_name, periods_s)), Text(reason))
     return table
 
 

@@ -67,7 +67,7 @@ def test_without_a_period_both_kinds_of_times(capsys: pytest.CaptureFixture[str]
 
 def test_a_file_and_the_table(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "shaper.json"
-    assert main(["shaper", "-m", "vx500", "--json", str(file)]) == 0
+    assert main(["shaper", "-m", "vx500", *FEW, "--json", str(file)]) == 0
     out = capsys.readouterr().out
     result = json.loads(file.read_text(encoding="utf-8"))
     assert result["designs"][result["recommended"]]["duration_s"] == pytest.approx(0.02)

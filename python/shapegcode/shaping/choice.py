@@ -30,6 +30,7 @@ _OWN_TAPS = "taps"  # the family of taps that the user gives
 NO_RESIDUAL = 1e-9
 """A residual ratio below this is none: what is left is the rounding of the solver."""
 
+_FOR_GRIDS = {row.name for row in FAMILIES if not row.continuous}
 _DIGITS = 9  # designs that agree in so many digits are equally good
 _ROUNDING = 1e-6  # a design made for a limit may miss it by so much, relative
 _NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of swings per period
@@ -274,8 +275,9 @@ def recommend(
 
     Of the designs without negative taps (of all with `allow_negative`, or where every design has some) those whose
     worst residual is at most the limit compete for the objective; if there is none, the one that leaves least is
-    taken. Of equally short ones the one with the longest period is taken, because it writes the fewest blocks. A
-    tighter limit never makes the shortest one shorter.
+    taken. Of equally short ones the one with the longest period is taken, because it writes the fewest blocks; of the
+    same taps found by two families the one of a family that is made for grids. A tighter limit never makes the
+    shortest one shorter.
 
     Args:
         designs: at least one.
@@ -291,7 +293,7 @@ def recommend(
     places = _eligible(designs, allow_negative)
     good = [place for place in places if _within(designs[place], vibration_limit)]
     least = OBJECTIVES[objective][1] if good else _flattest
-    return min(good or places, key=lambda place: least(designs[place]))
+    return min(good or places, key=lambda place: (*least(designs[place]), designs[place].family not in _FOR_GRIDS))
 
 
 def _eligible(designs: Sequence[Design], allow_negative: bool) -> list[int]:
