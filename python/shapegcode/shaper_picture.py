@@ -74,15 +74,31 @@ def name(each: Design) -> str:
 
 
 def selected(result: Recommendation, count: int = _CURVES) -> list[Design]:
-    """The designs worth a curve: what is recommended, then the shortest of the Pareto front, one of each family."""
-    places = [result.index, *([] if result.grid_index is None else [result.grid_index])]
-    families = {result.designs[place].family for place in places}
+    """The designs worth a curve: what is recommended, then one of each family on the Pareto front, from short to long.
+
+    Designs with negative taps are left out where they may not be recommended and there are others.
+    """
+    places = list(dict.fromkeys([result.index, *([] if result.grid_index is None else [result.grid_index])]))
+    negative = result.allow_negative or result.design.negative
     front = [place for place in shown(result) if result.pareto[place]]
-    for place in [*front, *shown(result)]:
-        if result.designs[place].family not in families:
-            families.add(result.designs[place].family)
-            places.append(place)
-    return [result.designs[place] for place in dict.fromkeys(places)][:count]
+    front = [place for place in front if negative or not result.designs[place].negative]
+    families = {result.designs[place].family for place in places}
+    drawn = {_taps(result.designs[place]) for place in places}
+    others = []
+    for place in front:
+        each = result.designs[place]
+        if each.family not in families and _taps(each) not in drawn:
+            families.add(each.family)
+            drawn.add(_taps(each))
+            others.append(place)
+    room = min(count - len(places), len(others))
+    places += [others[round(step)] for step in np.linspace(0, len(others) - 1, room)] if room > 0 else []
+    return [result.designs[place] for place in places]
+
+
+def _taps(each: Design) -> tuple[float, ...]:
+    """Times and amplitudes, to nine digits."""
+    return tuple(float(f"{value:.9g}") for value in (*each.shaper.times_s, *each.shaper.amplitudes))
 
 
 def residual_curve(shaper: Shaper, frequencies_hz: NDArray[np.float64], modes: Sequence[Mode]) -> NDArray[np.float64]:

@@ -63,8 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="TIME",
         type=seconds,
         default=None,
-        help="longest shaper, for example 50ms (default: three periods of the slowest mode; the machine's limit if that "
-        "is not enough)",
+        help="longest shaper, for example 50ms (default: three periods of the slowest mode; the machine's limit if "
+        "that is not enough)",
     )
     parser.add_argument(
         "--max-abs-sum",
