@@ -9,7 +9,7 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from shapegcode import _core
 from shapegcode.advice import controller_warnings, region_warnings, worse_warnings
@@ -17,19 +17,19 @@ from shapegcode.budget import Budget, Load, Spending, measure_load
 from shapegcode.compensation import guard_lines, header_lines, read_for_conversion, require_decision
 from shapegcode.emit import Grid, emit_region, make_grid, motion_limits
 from shapegcode.machine import Machine
-from shapegcode.program import Program
-from shapegcode.verify import (
-    Placed,
-    RegionFigures,
-    axis_modes,
-    contour_target,
-    contour_um,
-    measure,
-    other_time_s,
-    play_original,
-    read_back,
-    summarise,
+from shapegcode.moving_modes import (
+    machine_warnings,
+    moving_axis,
+    region_offset,
+    region_range_warnings,
+    shaper_track,
 )
+from shapegcode.program import Program
+from shapegcode.verdict import RegionFigures, contour_target, contour_um, measure, summarise
+from shapegcode.verify import Placed, axis_modes, other_time_s, play_original, read_back
+
+if TYPE_CHECKING:
+    from shapegcode.shaping.track import ShaperTrack
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
 _MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin
@@ -77,7 +77,7 @@ class Conversion:
 
 
 def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
-    """Block period and shortest non-negative shaper for all modes of a machine.
+    """Block period and shortest non-negative shaper for all modes of a machine, and shapers that follow moving modes.
 
     Args:
         machine: modes and controller.
@@ -85,7 +85,8 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
 
     Raises:
         DesignError: no shaper exists within `shaping.max_duration_s`.
-        ArgumentError: the machine has no mode, or the period does not fit the controller.
+        ArgumentError: the machine has no mode, its modes vary over several axes, or the period does not fit the
+            controller.
     """
     # SciPy's solvers take a quarter of a second to load: not before they are needed.
     from shapegcode.shaping import choose_block_period, shortest_non_negative
@@ -102,7 +103,7 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
             modes, controller.interpolation_period_s, controller.block_time_s,
             max_duration_s=machine.shaping.max_duration_s,
         )  # fmt: skip
-        return make_grid(choice.period_s, choice.shaper)
+        return make_grid(choice.period_s, choice.shaper, _track(machine, choice.period_s))
     ticks = period / controller.interpolation_period_s
     if round(ticks) < 1 or not math.isclose(ticks, round(ticks), abs_tol=1e-6):
         raise _core.ArgumentError(
@@ -114,7 +115,12 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
             f"block period {period * 1e3:g} ms is below the block time {controller.block_time_s * 1e3:g} ms "
             "(controller.block_time_s)"
         )
-    return make_grid(period, shortest_non_negative(modes, period, machine.shaping.max_duration_s))
+    shaper = shortest_non_negative(modes, period, machine.shaping.max_duration_s)
+    return make_grid(period, shaper, _track(machine, period))
+
+
+def _track(machine: Machine, period_s: float) -> ShaperTrack | None:
+    return None if moving_axis(machine) is None else shaper_track(machine, period_s)
 
 
 def written_by_shapegcode(program: Program) -> bool:
@@ -166,7 +172,10 @@ def convert(
     # The originals are played on the other cores while this one shapes.
     pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
     try:
-        playbacks = [pool.submit(play_original, region.path, machine) for region in program.regions]
+        playbacks = [
+            pool.submit(play_original, region.path, machine, offset=region_offset(region, machine))
+            for region in program.regions
+        ]
         settle = partial(
             _settle, program, machine, arc_feed_ratio=ratio, room_um=room_um, playbacks=playbacks, pool=pool,
             spending=spending, on_progress=on_progress,
@@ -237,7 +246,7 @@ def _tighten(
     places = {id(region): index for index, region in enumerate(program.regions)}
     tightened = False
     for place, region in zip(placed, figures, strict=True):
-        reached = contour_um(region.emitted, machine)
+        reached = contour_um(region, machine)
         if reached > limit:
             room_um[places[id(place.region)]] *= _CONTOUR_MARGIN * limit / reached
             tightened = True
@@ -320,13 +329,14 @@ def _header(machine: Machine, grid: Grid) -> list[str]:
 
     modes = [
         f"{axis} {mode.frequency_hz:g} HZ {mode.damping_ratio:g}"
-        for axis, modes in zip("XYZ", machine.axes.as_tuple(), strict=True)
-        for mode in modes.modes
+        for axis, modes in zip("XYZ", axis_modes(machine), strict=True)
+        for mode in modes
     ]
     lines = [
         f"SHAPEGCODE {__version__} MACHINE {machine.name}",
         *(f"MODE {mode}" for mode in modes),
-        f"BLOCK PERIOD {grid.block_period_s * 1e3:g} MS SHAPER {grid.shaper.duration_s * 1e3:g} MS",
+        f"BLOCK PERIOD {grid.block_period_s * 1e3:g} MS SHAPER {grid.duration_s * 1e3:g} MS",
+        *([f"{len(grid.track.nodes)} SHAPERS FOLLOW {'XYZ'[grid.track.axis]}"] if grid.track else []),
         "SET FEED OVERRIDE 100 PCT",
         f"TIME CONSTANT AFTER INTERPOLATION {machine.controller.shaped_time_constant_s * 1e3:g} MS",
     ]
@@ -349,7 +359,8 @@ def _report(
     spending: Spending | None,
 ) -> dict[str, Any]:
     placed = written.placed
-    warnings = [*program.warnings, *written.kept_warnings]
+    warnings = [*program.warnings, *written.kept_warnings, *machine_warnings(machine)]
+    warnings += region_range_warnings(program.regions, machine)
     cutting = {
         which: sum(region["time_s"][which] for region in figures["regions"]) for which in ("original", "emitted")
     }
@@ -398,6 +409,14 @@ def _report(
     if spending is not None:
         report["budget"] = spending.report(grid, written)
     keep = report.pop("shaper")
+    if grid.track is not None:
+        keep["following"] = {
+            "axis": "xyz"[grid.track.axis],
+            "position_mm": [node.position_mm for node in grid.track.nodes],
+            "times_s": [[float(t) for t in node.shaper.times_s] for node in grid.track.nodes],
+            "amplitudes": [[float(a) for a in node.shaper.amplitudes] for node in grid.track.nodes],
+            "worst_residual": grid.track.worst_residual,
+        }
     return {**_tidy(report), "shaper": keep}
 
 

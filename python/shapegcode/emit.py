@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
+from shapegcode.moving_modes import NO_OFFSET, Offset, mode_tables, region_offset
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
+
+if TYPE_CHECKING:
+    from shapegcode.shaping.track import ShaperTrack
 
 _DEGREE = math.pi / 180.0
 _PLUNGE_CORNER_DEG = 45.0
@@ -33,11 +38,23 @@ class Grid:
         block_period_s: T_B.
         shaper: the design, times on the block grid.
         fir: the same in whole block periods.
+        track: shapers along an axis, used instead where its position is known; None: no mode varies with position.
     """
 
     block_period_s: float
     shaper: _core.Shaper
     fir: _core.Fir
+    track: ShaperTrack | None = None
+
+    @property
+    def shapers(self) -> tuple[_core.Shaper, ...]:
+        """All shapers that may act."""
+        return (self.shaper, *(node.shaper for node in (self.track.nodes if self.track else ())))
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last tap of the longest shaper, s."""
+        return max(shaper.duration_s for shaper in self.shapers)
 
 
 @dataclass(frozen=True)
@@ -59,10 +76,10 @@ class EmittedRegion:
     blocks_end: int
 
 
-def make_grid(block_period_s: float, shaper: _core.Shaper) -> Grid:
-    """Grid of a shaper whose times are whole block periods."""
+def make_grid(block_period_s: float, shaper: _core.Shaper, track: ShaperTrack | None = None) -> Grid:
+    """Grid of a shaper whose times are whole block periods, and of shapers that follow an axis."""
     delays = [round(t / block_period_s) for t in shaper.times_s]
-    return Grid(block_period_s, shaper, _core.Fir(delays, list(shaper.amplitudes)))
+    return Grid(block_period_s, shaper, _core.Fir(delays, list(shaper.amplitudes)), track)
 
 
 def motion_limits(
@@ -96,15 +113,25 @@ def motion_limits(
     limits.arc_feed_ratio = arc_feed_ratio
     if grid is not None:
         own = controller.shaped_time_constant_s
-        limits.filter_variance_s2 = grid.shaper.variance_s2 + own * own / 12.0
-        limits.filter_mean_deviation_s = _mean_deviation_s(grid.shaper) + own / 4.0
+        limits.filter_variance_s2 = max(shaper.variance_s2 for shaper in grid.shapers) + own * own / 12.0
+        limits.filter_mean_deviation_s = max(_mean_deviation_s(shaper) for shaper in grid.shapers) + own / 4.0
         limits.contour_tolerance_mm = contour_tolerance_um * 1e-3
         limits.corner_share = _CORNER_SHARE
     return limits
 
 
-def shaping_options(machine: Machine, grid: Grid, limits: _core.MotionLimits) -> _core.ShapingOptions:
-    """How a region is shaped on a grid: what the core needs of the machine file."""
+def shaping_options(
+    machine: Machine, grid: Grid, limits: _core.MotionLimits, offset: Offset = NO_OFFSET
+) -> _core.ShapingOptions:
+    """How a region is shaped on a grid: what the core needs of the machine file.
+
+    Args:
+        machine: controller and modes.
+        grid: block period and shapers.
+        limits: see `motion_limits`.
+        offset: from the region's positions to the machine's; where it is not known of the axis that the grid's track
+            follows, the grid's one shaper is used.
+    """
     from shapegcode.verify import axis_modes  # which imports this module
 
     options = _core.ShapingOptions()
@@ -116,6 +143,9 @@ def shaping_options(machine: Machine, grid: Grid, limits: _core.MotionLimits) ->
     options.rest_at_stop_s = machine.controller.shaped_time_constant_s
     options.target = _TARGETS[machine.shaping.contour]
     options.modes = axis_modes(machine)
+    if grid.track is not None and (start := offset[grid.track.axis]) is not None:
+        options.following = grid.track.following(start)
+        options.mode_tables = mode_tables(machine, offset=offset)
     return options
 
 
@@ -127,7 +157,7 @@ def emit_region(
     The text begins with `emission.prologue` and a full safe line and ends with the modal state of the original.
     """
     notes = region.notes
-    options = shaping_options(machine, grid, limits)
+    options = shaping_options(machine, grid, limits, region_offset(region, machine))
     shaper = _core.RegionShaper(region.path, grid.fir, [note.segment for note in notes], options)
 
     inch = region.exit.units == 20
