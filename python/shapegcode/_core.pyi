@@ -154,6 +154,58 @@ class Shaper:
         """
         Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2 (spec 0).
         """
+class ExtraInsensitive:
+    """
+    An extra-insensitive shaper, and where its residual vanishes and peaks.
+    """
+    @property
+    def humps_hz(self) -> list[float]:
+        """
+        Natural frequencies in Hz, ascending, at which the residual is the vibration limit.
+        """
+    @property
+    def shaper(self) -> Shaper:
+        """
+        The shaper, humps+2 non-negative taps.
+        """
+    @property
+    def zeros_hz(self) -> list[float]:
+        """
+        Natural frequencies without residual in Hz, ascending, one more than humps.
+        """
+class WorstResidual:
+    """
+    The largest residual over a band of frequencies.
+    """
+    @property
+    def frequency_hz(self) -> float:
+        """
+        Natural frequency in Hz at which it was found.
+        """
+    @property
+    def residual_ratio(self) -> float:
+        """
+        Residual ratio at frequency_hz, no unit.
+        """
+    @property
+    def upper_bound(self) -> float:
+        """
+        No frequency of the band leaves more (no unit); within 1e-6 of residual_ratio, or 1e-12.
+        """
+class FrequencyBand:
+    """
+    A band of frequencies.
+    """
+    @property
+    def highest_hz(self) -> float:
+        """
+        Upper end in Hz.
+        """
+    @property
+    def lowest_hz(self) -> float:
+        """
+        Lower end in Hz.
+        """
 class MinimalShapers:
     """
     The minimal shapers of some modes, and what is known about others.
@@ -2985,10 +3037,6 @@ def extra_insensitive(mode: Mode, vibration_limit: typing.SupportsFloat | typing
         DesignError: No such shaper with non-negative taps was reached (high damping).
     
     Source: Singhose, Seering and Singer 1994; Singhose, Porter, Tuttle and Singer 1997; the solution: this project.
-    """
-def fastest_block_ends(blocks: Path) -> list[int]:
-    """
-    Per axis the block, but for the last, at whose end it is fastest; ascending, each once.
     """
 def fit_blocks(command: ShapedCommand, breaks: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: FitOptions) -> FittedBlocks:
     """
