@@ -3038,6 +3038,10 @@ def extra_insensitive(mode: Mode, vibration_limit: typing.SupportsFloat | typing
     
     Source: Singhose, Seering and Singer 1994; Singhose, Porter, Tuttle and Singer 1997; the solution: this project.
     """
+def fastest_block_ends(blocks: Path) -> list[int]:
+    """
+    Per axis the block, but for the last, at whose end it is fastest; ascending, each once.
+    """
 def fit_blocks(command: ShapedCommand, breaks: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: FitOptions) -> FittedBlocks:
     """
     Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. Raises ArgumentError on a position outside +-99999.999 mm.

@@ -56,13 +56,13 @@ def main() -> int:
         times_s, amplitudes = ei_convolved(bands)
         theirs = worst_over_bands(times_s, amplitudes, bands, 2001)
         fine_s = fine_enough_period_s(bands)
-        for name in ratios:
+        for name, values in ratios.items():
             period_s = fine_s if name == "fine enough" else 1e-3 * int(name.split()[0])
             start = time.process_time()
             found = least_worst(bands, period_s, float(times_s.max()))
             least_s.append(time.process_time() - start)
             ours = worst_over_bands(found.shaper.times_s, found.shaper.amplitudes, bands, 2001)
-            ratios[name].append(ours / theirs)
+            values.append(ours / theirs)
             if ours > theirs:
                 worse.append(_worse(bands, name, period_s, ours, theirs))
         shortest = minimax_robust(bands, fine_s, vibration_limit=theirs)
