@@ -281,133 +281,6 @@ class MinimalBranches:
         
         [..., 2] is the duration.
         """
-class ExtraInsensitive:
-    """
-    An extra-insensitive shaper, and where its residual vanishes and peaks.
-    """
-    @property
-    def humps_hz(self) -> list[float]:
-        """
-        Natural frequencies in Hz, ascending, at which the residual is the vibration limit.
-        """
-    @property
-    def shaper(self) -> Shaper:
-        """
-        The shaper, humps+2 non-negative taps.
-        """
-    @property
-    def zeros_hz(self) -> list[float]:
-        """
-        Natural frequencies without residual in Hz, ascending, one more than humps.
-        """
-class WorstResidual:
-    """
-    The largest residual over a band of frequencies.
-    """
-    @property
-    def frequency_hz(self) -> float:
-        """
-        Natural frequency in Hz at which it was found.
-        """
-    @property
-    def residual_ratio(self) -> float:
-        """
-        Residual ratio at frequency_hz, no unit.
-        """
-    @property
-    def upper_bound(self) -> float:
-        """
-        No frequency of the band leaves more (no unit); within 1e-6 of residual_ratio, or 1e-12.
-        """
-class FrequencyBand:
-    """
-    A band of frequencies.
-    """
-    @property
-    def highest_hz(self) -> float:
-        """
-        Upper end in Hz.
-        """
-    @property
-    def lowest_hz(self) -> float:
-        """
-        Lower end in Hz.
-        """
-class MinimalShapers:
-    """
-    The minimal shapers of some modes, and what is known about others.
-    """
-    @property
-    def boxes(self) -> int:
-        """
-        Boxes of times that the proof looked at.
-        """
-    @property
-    def complete(self) -> bool:
-        """
-        True if every box of times was settled: there is no other shaper in the region.
-        """
-    @property
-    def complete_up_to_s(self) -> float:
-        """
-        Duration in s up to which there is no other shaper; 0: nothing is proven.
-        """
-    @property
-    def converged(self) -> int:
-        """
-        Starts that reached a shaper in the region.
-        """
-    @property
-    def found_once(self) -> int:
-        """
-        Shapers that one start alone reached. Over `converged` it estimates the share of starts that would reach a shaper not listed yet (Good 1953).
-        """
-    @property
-    def max_abs_sum(self) -> float:
-        """
-        The region: largest sum of magnitudes (no unit).
-        """
-    @property
-    def max_duration_s(self) -> float:
-        """
-        The region: largest duration in s.
-        """
-    @property
-    def shapers(self) -> list[Shaper]:
-        """
-        The shapers, ascending in duration, then in the times.
-        """
-    @property
-    def starts(self) -> int:
-        """
-        Newton starts.
-        """
-    @property
-    def unresolved(self) -> int:
-        """
-        Boxes too small to halve on that could not be settled: solutions there are not isolated.
-        """
-class MinimalBranches:
-    """
-    The minimal shapers of two modes over the ratio of their frequencies, joined to curves.
-    """
-    @property
-    def amplitudes(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Amplitudes (no unit), shape (n_branches, n_ratios, 3), NaN as in `times_s`; read-only view.
-        """
-    @property
-    def ratios(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Frequency ratios (no unit), shape (n_ratios,), read-only view.
-        """
-    @property
-    def times_s(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Times of the taps in s, shape (n_branches, n_ratios, 3), NaN where a curve has no shaper; read-only view.
-        
-        [..., 2] is the duration.
-        """
 class Fir:
     """
     Weights on the sample grid that add up to one: an acceleration filter (moving average) or an input shaper. One filter type for both (spec section 0).
@@ -1641,49 +1514,6 @@ class ProgramText:
         """
         (line, column, alarm, message, file) each; alarm 0: none; file empty: the program's own.
         """
-class ModeTable:
-    """
-    How a mode depends on where an axis stands. Immutable.
-    
-    Linear in frequency and damping ratio between the rows, constant beyond the ends; without rows the mode stays as it is.
-    
-    Args:
-        axis: Whose position counts: 0, 1, 2 for X, Y, Z.
-        position_mm: Strictly ascending positions in mm, shape (n,).
-        frequency_hz: Undamped natural frequencies in Hz, one per position, above 0.
-        damping_ratio: Damping ratios (no unit), one per position, 0 <= zeta < 1; none: that of the mode.
-    
-    Raises:
-        ArgumentError: Unequal lengths, positions that do not ascend, or a value outside its range.
-    """
-    def __init__(self, axis: typing.SupportsInt | typing.SupportsIndex = 0, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], frequency_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], damping_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
-        """
-        Make a table; ArgumentError if it is not what the class asks for.
-        """
-    def mode_at(self, mode: Mode, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> Mode:
-        """
-        The mode at a position (mm) of the axis; its participation stays.
-        """
-    @property
-    def axis(self) -> int:
-        """
-        Axis whose position counts.
-        """
-    @property
-    def damping_ratio(self) -> list[float]:
-        """
-        Damping ratios, or none.
-        """
-    @property
-    def frequency_hz(self) -> list[float]:
-        """
-        Frequencies in Hz.
-        """
-    @property
-    def position_mm(self) -> list[float]:
-        """
-        Positions in mm.
-        """
 class ContourTarget:
     """
     What shall follow the programmed path.
@@ -1757,14 +1587,6 @@ class ShapingOptions:
     def contour_smoothness(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
-    def following(self) -> FollowingFir | None:
-        """
-        Shapers along an axis in place of the one shaper, taps in whole block periods; None: none.
-        """
-    @following.setter
-    def following(self, arg0: FollowingFir | None) -> None:
-        ...
-    @property
     def interpolation_period_s(self) -> float:
         """
         s.
@@ -1779,14 +1601,6 @@ class ShapingOptions:
         """
     @limits.setter
     def limits(self, arg0: MotionLimits) -> None:
-        ...
-    @property
-    def mode_tables(self) -> typing.Annotated[list[list[ModeTable]], "FixedSize(3)"]:
-        """
-        How the modes vary with the position of the axis that is followed, for the response as target.
-        """
-    @mode_tables.setter
-    def mode_tables(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[ModeTable]], "FixedSize(3)"]) -> None:
         ...
     @property
     def modes(self) -> typing.Annotated[list[list[Mode]], "FixedSize(3)"]:
@@ -2077,6 +1891,49 @@ class WriterOptions:
     @position_decimals.setter
     def position_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+class ModeTable:
+    """
+    How a mode depends on where an axis stands. Immutable.
+    
+    Linear in frequency and damping ratio between the rows, constant beyond the ends; without rows the mode stays as it is.
+    
+    Args:
+        axis: Whose position counts: 0, 1, 2 for X, Y, Z.
+        position_mm: Strictly ascending positions in mm, shape (n,).
+        frequency_hz: Undamped natural frequencies in Hz, one per position, above 0.
+        damping_ratio: Damping ratios (no unit), one per position, 0 <= zeta < 1; none: that of the mode.
+    
+    Raises:
+        ArgumentError: Unequal lengths, positions that do not ascend, or a value outside its range.
+    """
+    def __init__(self, axis: typing.SupportsInt | typing.SupportsIndex = 0, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], frequency_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], damping_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
+        """
+        Make a table; ArgumentError if it is not what the class asks for.
+        """
+    def mode_at(self, mode: Mode, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> Mode:
+        """
+        The mode at a position (mm) of the axis; its participation stays.
+        """
+    @property
+    def axis(self) -> int:
+        """
+        Axis whose position counts.
+        """
+    @property
+    def damping_ratio(self) -> list[float]:
+        """
+        Damping ratios, or none.
+        """
+    @property
+    def frequency_hz(self) -> list[float]:
+        """
+        Frequencies in Hz.
+        """
+    @property
+    def position_mm(self) -> list[float]:
+        """
+        Positions in mm.
+        """
 class BlockEnd:
     """
     When a block's successor starts.
