@@ -1514,6 +1514,49 @@ class ProgramText:
         """
         (line, column, alarm, message, file) each; alarm 0: none; file empty: the program's own.
         """
+class ModeTable:
+    """
+    How a mode depends on where an axis stands. Immutable.
+    
+    Linear in frequency and damping ratio between the rows, constant beyond the ends; without rows the mode stays as it is.
+    
+    Args:
+        axis: Whose position counts: 0, 1, 2 for X, Y, Z.
+        position_mm: Strictly ascending positions in mm, shape (n,).
+        frequency_hz: Undamped natural frequencies in Hz, one per position, above 0.
+        damping_ratio: Damping ratios (no unit), one per position, 0 <= zeta < 1; none: that of the mode.
+    
+    Raises:
+        ArgumentError: Unequal lengths, positions that do not ascend, or a value outside its range.
+    """
+    def __init__(self, axis: typing.SupportsInt | typing.SupportsIndex = 0, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], frequency_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], damping_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
+        """
+        Make a table; ArgumentError if it is not what the class asks for.
+        """
+    def mode_at(self, mode: Mode, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> Mode:
+        """
+        The mode at a position (mm) of the axis; its participation stays.
+        """
+    @property
+    def axis(self) -> int:
+        """
+        Axis whose position counts.
+        """
+    @property
+    def damping_ratio(self) -> list[float]:
+        """
+        Damping ratios, or none.
+        """
+    @property
+    def frequency_hz(self) -> list[float]:
+        """
+        Frequencies in Hz.
+        """
+    @property
+    def position_mm(self) -> list[float]:
+        """
+        Positions in mm.
+        """
 class ContourTarget:
     """
     What shall follow the programmed path.
@@ -1587,6 +1630,14 @@ class ShapingOptions:
     def contour_smoothness(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def following(self) -> FollowingFir | None:
+        """
+        Shapers along an axis in place of the one shaper, taps in whole block periods; None: none.
+        """
+    @following.setter
+    def following(self, arg0: FollowingFir | None) -> None:
+        ...
+    @property
     def interpolation_period_s(self) -> float:
         """
         s.
@@ -1601,6 +1652,14 @@ class ShapingOptions:
         """
     @limits.setter
     def limits(self, arg0: MotionLimits) -> None:
+        ...
+    @property
+    def mode_tables(self) -> typing.Annotated[list[list[ModeTable]], "FixedSize(3)"]:
+        """
+        How the modes vary with the position of the axis that is followed, for the response as target.
+        """
+    @mode_tables.setter
+    def mode_tables(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[ModeTable]], "FixedSize(3)"]) -> None:
         ...
     @property
     def modes(self) -> typing.Annotated[list[list[Mode]], "FixedSize(3)"]:
@@ -1891,49 +1950,6 @@ class WriterOptions:
     @position_decimals.setter
     def position_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
-class ModeTable:
-    """
-    How a mode depends on where an axis stands. Immutable.
-    
-    Linear in frequency and damping ratio between the rows, constant beyond the ends; without rows the mode stays as it is.
-    
-    Args:
-        axis: Whose position counts: 0, 1, 2 for X, Y, Z.
-        position_mm: Strictly ascending positions in mm, shape (n,).
-        frequency_hz: Undamped natural frequencies in Hz, one per position, above 0.
-        damping_ratio: Damping ratios (no unit), one per position, 0 <= zeta < 1; none: that of the mode.
-    
-    Raises:
-        ArgumentError: Unequal lengths, positions that do not ascend, or a value outside its range.
-    """
-    def __init__(self, axis: typing.SupportsInt | typing.SupportsIndex = 0, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], frequency_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], damping_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
-        """
-        Make a table; ArgumentError if it is not what the class asks for.
-        """
-    def mode_at(self, mode: Mode, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> Mode:
-        """
-        The mode at a position (mm) of the axis; its participation stays.
-        """
-    @property
-    def axis(self) -> int:
-        """
-        Axis whose position counts.
-        """
-    @property
-    def damping_ratio(self) -> list[float]:
-        """
-        Damping ratios, or none.
-        """
-    @property
-    def frequency_hz(self) -> list[float]:
-        """
-        Frequencies in Hz.
-        """
-    @property
-    def position_mm(self) -> list[float]:
-        """
-        Positions in mm.
-        """
 class BlockEnd:
     """
     When a block's successor starts.
