@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from shapegcode._core import Fir, MinimalBranches, Mode, Shaper, convolved_zv, minimal_branches, minimal_two_mode
 from shapegcode.modal_response import ModalRun, respond, shaped_step
 from shapegcode.shaping.band import ModeBand
-from shapegcode.shaping.choice import NO_RESIDUAL
 from shapegcode.shaping.design import evaluate
+from shapegcode.shaping.ranking import NO_RESIDUAL
 
 __all__ = ["MODES", "ShaperDemo", "shaper_demo"]
 

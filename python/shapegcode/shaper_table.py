@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from shapegcode.shaping.choice import NO_RESIDUAL, Recommendation, Refusal
+from shapegcode.shaping.choice import Recommendation, Refusal
 from shapegcode.shaping.design import Design
+from shapegcode.shaping.ranking import NO_RESIDUAL
 from shapegcode.shaping.registry import FAMILIES
 
 if TYPE_CHECKING:
@@ -133,7 +134,7 @@ def verdict(result: Recommendation) -> list[str]:
         compared = ", ".join(
             f"{times_name(each.period_s)}: {each.family} {each.duration_s * 1e3:.4g} ms" for each in best
         )
-        lines.append(f"block periods: {compared}")
+        lines.append(f"best of each grid: {compared}")
     return lines
 
 

@@ -1,8 +1,6 @@
 """The choice among shapers: every family that can be designed, which designs are worth a look, and which to take.
 
-A design is worth a look (it is on the Pareto front) if no other one is at least as good in duration, worst residual
-over the bands, contour cost and sum of the taps' magnitudes, and better in one of them. Which of those to take is the
-user's objective; :func:`recommend` is the whole rule.
+How designs rank is said in :mod:`shapegcode.shaping.ranking`.
 """
 
 from __future__ import annotations
@@ -15,56 +13,18 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from shapegcode._core import ArgumentError, DesignError, ShapegcodeError
 from shapegcode.shaping.band import ModeBand
 from shapegcode.shaping.design import Design, evaluate
+from shapegcode.shaping.ranking import OBJECTIVES, is_within, pareto_front, reason_for, recommend, spoken
 from shapegcode.shaping.registry import FAMILIES, DesignOptions, Family, design, family_named
 from shapegcode.shaping.robust import least_worst
 
-__all__ = ["OBJECTIVES", "Recommendation", "Refusal", "choose", "pareto_front", "recommend"]
+__all__ = ["Recommendation", "Refusal", "choose"]
 
 _ROBUST = "robust"  # the family of which a design is shown even if it leaves more than the limit
 _OWN_TAPS = "taps"  # the family of taps that the user gives
-NO_RESIDUAL = 1e-9
-"""A residual ratio below this is none: what is left is the rounding of the solver."""
-
-_FOR_GRIDS = {row.name for row in FAMILIES if not row.continuous}
-_DIGITS = 9  # designs that agree in so many digits are equally good
-_ROUNDING = 1e-6  # a design made for a limit may miss it by so much, relative
 _NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of swings per period
-
-
-def _merits(each: Design) -> tuple[float, float, float, float]:
-    """What is better small: duration, worst residual, contour cost (either sign), sum of magnitudes."""
-    values = (each.duration_s, max(each.worst_residual, NO_RESIDUAL), abs(each.variance_s2), each.abs_sum)
-    duration, residual, contour, magnitudes = (float(f"{value:.{_DIGITS}g}") for value in values)
-    return duration, residual, contour, magnitudes
-
-
-def _shortest(each: Design) -> tuple[float, ...]:
-    duration, residual, contour, _ = _merits(each)
-    # Of equal durations the longest period writes the fewest blocks.
-    return duration, -(each.period_s or 0.0), residual, contour
-
-
-def _flattest(each: Design) -> tuple[float, ...]:
-    duration, residual, contour, _ = _merits(each)
-    return residual, duration, -(each.period_s or 0.0), contour
-
-
-def _truest(each: Design) -> tuple[float, ...]:
-    duration, residual, contour, _ = _merits(each)
-    return contour, duration, -(each.period_s or 0.0), residual
-
-
-OBJECTIVES: dict[str, tuple[str, Callable[[Design], tuple[float, ...]]]] = {
-    "shortest": ("the shortest", _shortest),
-    "contour": ("the one with the least contour cost", _truest),
-    "robust": ("the one with the least worst residual", _flattest),
-}
-"""Objectives by name: how the reason calls the winner, and what is least in it."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +76,7 @@ class Recommendation:
     @property
     def within_limit(self) -> bool:
         """Whether its worst residual stays within the vibration limit."""
-        return _within(self.design, self.options.vibration_limit)
+        return is_within(self.design, self.options.vibration_limit)
 
     @property
     def grid_index(self) -> int | None:
@@ -217,9 +177,9 @@ def choose(
     for done, (row, period_s) in enumerate(work):
         on_progress(done / len(work))
         if row.continuous if period_s is None else row.on_grid:
-            designs, reason = _designs(row, bands, replace(options, period_s=period_s))
+            designs, refusal = _designs(row, bands, replace(options, period_s=period_s))
             found += designs
-            refusals += [Refusal(row.name, period_s, reason)] if reason else []
+            refusals += [Refusal(row.name, period_s, refusal)] if refusal else []
     refusals += _never_tried(rows, usable)
     refusals += [
         Refusal(row.name, period_s, _aliases(bands, period_s))
@@ -228,14 +188,11 @@ def choose(
     ]
     least = _least_worst(rows, usable, bands, options, found)
     found += least
-    refusals = [
-        each for each in refusals if (each.family, each.period_s) not in {(d.family, d.period_s) for d in least}
-    ]
+    shown_anyway = {(each.family, each.period_s) for each in least}
+    refusals = [each for each in refusals if (each.family, each.period_s) not in shown_anyway]
     if not found:
         reasons = "; ".join(dict.fromkeys(f"{refusal.family}: {refusal.reason}" for refusal in refusals))
-        raise DesignError(
-            f"no family has a shaper for {_spoken(bands)} within {_ms(options.max_duration_s)}: {reasons}"
-        )
+        raise DesignError(f"no family has a shaper for {spoken(bands)} within {_ms(options.max_duration_s)}: {reasons}")
     index = recommend(found, options.vibration_limit, objective, allow_negative)
     return Recommendation(
         bands=tuple(bands),
@@ -245,64 +202,9 @@ def choose(
         designs=tuple(found),
         pareto=tuple(pareto_front(found)),
         index=index,
-        reason=_reason(found, index, bands, options.vibration_limit, objective, allow_negative),
+        reason=reason_for(found, index, bands, options.vibration_limit, objective, allow_negative),
         refusals=tuple(refusals),
     )
-
-
-def pareto_front(designs: Sequence[Design]) -> list[bool]:
-    """For each design whether no other one is at least as good in everything and better in something.
-
-    Compared are duration, worst residual, magnitude of the contour cost and sum of the taps' magnitudes, each to nine
-    digits, a residual below 1e-9 as none. A design on a grid serves where continuous times are asked for, not the
-    other way round: so designs on grids are compared with each other only.
-    """
-    if not designs:
-        return []
-    merits = np.array([_merits(each) for each in designs])
-    on_grid = np.array([each.period_s is not None for each in designs])
-    front = []
-    for own, grid in zip(merits, on_grid, strict=True):
-        better = (merits <= own).all(axis=1) & (merits < own).any(axis=1)
-        front.append(not bool((better & (on_grid | ~grid)).any()))
-    return front
-
-
-def recommend(
-    designs: Sequence[Design], vibration_limit: float, objective: str = "shortest", allow_negative: bool = False
-) -> int:
-    """Index of the design to take.
-
-    Of the designs without negative taps (of all with `allow_negative`, or where every design has some) those whose
-    worst residual is at most the limit compete for the objective; if there is none, the one that leaves least is
-    taken. Of equally short ones the one with the longest period is taken, because it writes the fewest blocks; of the
-    same taps found by two families the one of a family that is made for grids. A tighter limit never makes the
-    shortest one shorter.
-
-    Args:
-        designs: at least one.
-        vibration_limit: largest worst residual ratio.
-        objective: a name of `OBJECTIVES`.
-        allow_negative: whether a design with negative taps may be taken.
-
-    Raises:
-        ArgumentError: no design.
-    """
-    if not designs:
-        raise ArgumentError("there is no design to choose from: 0 given")
-    places = _eligible(designs, allow_negative)
-    good = [place for place in places if _within(designs[place], vibration_limit)]
-    least = OBJECTIVES[objective][1] if good else _flattest
-    return min(good or places, key=lambda place: (*least(designs[place]), designs[place].family not in _FOR_GRIDS))
-
-
-def _eligible(designs: Sequence[Design], allow_negative: bool) -> list[int]:
-    places = range(len(designs))
-    return [place for place in places if allow_negative or not designs[place].negative] or list(places)
-
-
-def _within(each: Design, vibration_limit: float) -> bool:
-    return each.worst_residual <= vibration_limit * (1.0 + _ROUNDING)
 
 
 def _rows(families: Sequence[str] | None, options: DesignOptions) -> tuple[Family, ...]:
@@ -374,7 +276,7 @@ def _least_worst(
 ) -> list[Design]:
     """What leaves least within the longest duration, on each grid; none if a design without negative taps is good."""
     wanted = any(row.name == _ROBUST for row in rows) and any(band.uncertainty for band in bands)
-    if not wanted or any(not each.negative and _within(each, options.vibration_limit) for each in found):
+    if not wanted or any(not each.negative and is_within(each, options.vibration_limit) for each in found):
         return []
     designs = []
     for period_s in usable:
@@ -391,43 +293,6 @@ def _never_tried(rows: Sequence[Family], usable: Sequence[float | None]) -> Iter
             yield Refusal(row.name, usable[0], "is designed at continuous times only")
         if not row.continuous and usable == [None]:
             yield Refusal(row.name, None, "is designed on a grid: give a period")
-
-
-def _reason(
-    designs: Sequence[Design], index: int, bands: Sequence[ModeBand], limit: float, objective: str, allow_negative: bool
-) -> str:
-    taken = designs[index]
-    places = _eligible(designs, allow_negative)
-    good = sum(_within(designs[place], limit) for place in places)
-    only_negative = not allow_negative and taken.negative
-    kind = "" if allow_negative or only_negative else "non-negative "
-    if good:
-        text = (
-            f"{OBJECTIVES[objective][0]} of {good} {kind}design{'' if good == 1 else 's'} whose worst residual over "
-            f"{_spoken(bands)} stays within {_percent(limit)} (it leaves {_percent(taken.worst_residual)})"
-        )
-    else:
-        text = (
-            f"none of {len(places)} {kind}design{'' if len(places) == 1 else 's'} stays within {_percent(limit)} over "
-            f"{_spoken(bands)}; this one leaves least, {_percent(taken.worst_residual)}"
-        )
-        others = [each for each in designs if each.negative and _within(each, limit)]
-        if others and not allow_negative:
-            other = min(others, key=_shortest)
-            text += f"; with negative taps {other.family} ({_ms(other.duration_s)}) would leave less"
-    return text + ("; every design has negative taps" if only_negative else "")
-
-
-def _spoken(bands: Sequence[ModeBand]) -> str:
-    def spoken(band: ModeBand) -> str:
-        text = f"{band.mode.frequency_hz:g} Hz"
-        return f"{text} ±{100.0 * band.uncertainty:g} %" if band.uncertainty else text
-
-    return " and ".join(map(spoken, bands))
-
-
-def _percent(ratio: float) -> str:
-    return "nothing" if ratio < NO_RESIDUAL else f"{100.0 * ratio:.3g} %"
 
 
 def _ms(time_s: float) -> str:
