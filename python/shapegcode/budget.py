@@ -16,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.emit import EmittedRegion, Grid
+from shapegcode.block_grid import Grid
+from shapegcode.emit import EmittedRegion
 from shapegcode.machine import Machine
 from shapegcode.program import Program, least_increment_mm
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
@@ -13,23 +12,22 @@ from typing import TYPE_CHECKING, Any
 
 from shapegcode import _core
 from shapegcode.advice import controller_warnings, region_warnings, worse_warnings
+from shapegcode.block_grid import Grid, choose_grid
 from shapegcode.budget import Budget, Load, Spending, measure_load
 from shapegcode.compensation import guard_lines, header_lines, read_for_conversion, require_decision
-from shapegcode.emit import Grid, emit_region, make_grid, motion_limits
+from shapegcode.emit import emit_region, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.moving_modes import (
     machine_warnings,
-    moving_axis,
     region_offset,
     region_range_warnings,
-    shaper_track,
 )
 from shapegcode.program import Program
 from shapegcode.verdict import RegionFigures, contour_target, contour_um, measure, summarise
 from shapegcode.verify import Placed, axis_modes, other_time_s, play_original, read_back
 
 if TYPE_CHECKING:
-    from shapegcode.shaping.track import ShaperTrack
+    pass
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
 _MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin
@@ -74,53 +72,6 @@ class Conversion:
         return (
             f"<Conversion of {self.report['program']}: {len(self.placed)} regions, {len(self.text)} bytes, {verdict}>"
         )
-
-
-def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
-    """Block period and shortest non-negative shaper for all modes of a machine, and shapers that follow moving modes.
-
-    Args:
-        machine: modes and controller.
-        block_period_s: a period to use; None: `emission.block_period_s`, or the best one.
-
-    Raises:
-        DesignError: no shaper exists within `shaping.max_duration_s`.
-        ArgumentError: the machine has no mode, its modes vary over several axes, or the period does not fit the
-            controller.
-    """
-    # SciPy's solvers take a quarter of a second to load: not before they are needed.
-    from shapegcode.shaping import choose_block_period, shortest_non_negative
-
-    modes = [mode for axis in axis_modes(machine) for mode in axis]
-    if not modes:
-        raise _core.ArgumentError("the machine file gives no vibration mode (axes.x.modes): nothing to shape for")
-    controller = machine.controller
-    period = block_period_s if block_period_s is not None else machine.emission.block_period_s
-    if period is not None and not (math.isfinite(period) and period > 0.0):
-        raise _core.ArgumentError(f"block period is {period} s, must be finite and above 0")
-    if period is None:
-        choice = choose_block_period(
-            modes, controller.interpolation_period_s, controller.block_time_s,
-            max_duration_s=machine.shaping.max_duration_s,
-        )  # fmt: skip
-        return make_grid(choice.period_s, choice.shaper, _track(machine, choice.period_s))
-    ticks = period / controller.interpolation_period_s
-    if round(ticks) < 1 or not math.isclose(ticks, round(ticks), abs_tol=1e-6):
-        raise _core.ArgumentError(
-            f"block period {period * 1e3:g} ms is no whole multiple of the interpolation period "
-            f"{controller.interpolation_period_s * 1e3:g} ms"
-        )
-    if period < controller.block_time_s * (1 - 1e-9):
-        raise _core.ArgumentError(
-            f"block period {period * 1e3:g} ms is below the block time {controller.block_time_s * 1e3:g} ms "
-            "(controller.block_time_s)"
-        )
-    shaper = shortest_non_negative(modes, period, machine.shaping.max_duration_s)
-    return make_grid(period, shaper, _track(machine, period))
-
-
-def _track(machine: Machine, period_s: float) -> ShaperTrack | None:
-    return None if moving_axis(machine) is None else shaper_track(machine, period_s)
 
 
 def written_by_shapegcode(program: Program) -> bool:
@@ -360,6 +311,7 @@ def _report(
 ) -> dict[str, Any]:
     placed = written.placed
     warnings = [*program.warnings, *written.kept_warnings, *machine_warnings(machine)]
+    warnings += [grid.note] if grid.note else []
     warnings += region_range_warnings(program.regions, machine)
     cutting = {
         which: sum(region["time_s"][which] for region in figures["regions"]) for which in ("original", "emitted")
@@ -389,6 +341,7 @@ def _report(
         "shaper": {
             "times_s": [float(t) for t in grid.shaper.times_s],
             "amplitudes": [float(a) for a in grid.shaper.amplitudes],
+            "family": grid.family,
         },
         "blocks": {"read": program.core.block_count, "emitted": written.blocks},
         "expanded": program.core.expanded,

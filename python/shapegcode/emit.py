@@ -10,12 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.block_grid import Grid
 from shapegcode.machine import Machine
 from shapegcode.moving_modes import NO_OFFSET, Offset, mode_tables, region_offset
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 
 if TYPE_CHECKING:
-    from shapegcode.shaping.track import ShaperTrack
+    pass
 
 _DEGREE = math.pi / 180.0
 _PLUNGE_CORNER_DEG = 45.0
@@ -28,33 +29,6 @@ _TARGETS = {
     "command": _core.ContourTarget.command,
     "off": _core.ContourTarget.none,
 }
-
-
-@dataclass(frozen=True)
-class Grid:
-    """On what a conversion is written: block period and the shaper on it.
-
-    Attributes:
-        block_period_s: T_B.
-        shaper: the design, times on the block grid.
-        fir: the same in whole block periods.
-        track: shapers along an axis, used instead where its position is known; None: no mode varies with position.
-    """
-
-    block_period_s: float
-    shaper: _core.Shaper
-    fir: _core.Fir
-    track: ShaperTrack | None = None
-
-    @property
-    def shapers(self) -> tuple[_core.Shaper, ...]:
-        """All shapers that may act."""
-        return (self.shaper, *(node.shaper for node in (self.track.nodes if self.track else ())))
-
-    @property
-    def duration_s(self) -> float:
-        """Time of the last tap of the longest shaper, s."""
-        return max(shaper.duration_s for shaper in self.shapers)
 
 
 @dataclass(frozen=True)
@@ -74,12 +48,6 @@ class EmittedRegion:
     periods: npt.NDArray[np.uint32]
     blocks_begin: int
     blocks_end: int
-
-
-def make_grid(block_period_s: float, shaper: _core.Shaper, track: ShaperTrack | None = None) -> Grid:
-    """Grid of a shaper whose times are whole block periods, and of shapers that follow an axis."""
-    delays = [round(t / block_period_s) for t in shaper.times_s]
-    return Grid(block_period_s, shaper, _core.Fir(delays, list(shaper.amplitudes)), track)
 
 
 def motion_limits(

@@ -90,6 +90,30 @@ class Shaping(Table):
     """What is shaped, and how."""
 
     max_duration_s: Annotated[Positive, Field(le=10)] = key("longest shaper that is accepted", unit="s", default=0.25)
+    family: Literal[
+        "auto",
+        "zv",
+        "zvd",
+        "zvdd",
+        "mzv",
+        "ei",
+        "ei2",
+        "ei3",
+        "si",
+        "negative-zv",
+        "polynomial",
+        "non-negative",
+        "robust",
+    ] = key(
+        'family of the shaper (`shapegcode shaper` compares them); "auto": the shortest without negative taps, exact '
+        "at the modes, or below vibration_limit over their bands where frequency_uncertainty_percent states them",
+        default="auto",
+    )
+    vibration_limit: Annotated[Positive, Field(lt=1)] = key(
+        "largest residual vibration over the modes' bands as a share of the unshaped one, for families that leave some",
+        unit="1",
+        default=0.05,
+    )
     arc_feed_ratio: Annotated[Positive, Field(le=1)] = key(
         "feed in arcs as a share of the programmed feed, reached before the arc begins; 1: no reduction",
         unit="1",

@@ -116,12 +116,15 @@ def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
     Raises:
         ArgumentError: the machine has no mode, or an uncertainty outside its range.
     """
+    from shapegcode.moving_modes import still_mode
+
     widths: dict[tuple[float, float], float] = {}
     for axis in machine.axes.as_tuple():
         for mode in axis.modes:
             stated = mode.frequency_uncertainty_percent
             width = uncertainty if stated is None else stated / 100.0
-            key = mode.frequency_hz, mode.damping_ratio
+            still = still_mode(mode, machine.shaping.part_mass_kg)
+            key = still.frequency_hz, still.damping_ratio
             widths[key] = max(width, widths.get(key, 0.0))
     if not widths:
         raise ArgumentError("the machine file gives no vibration mode (axes.x.modes): nothing to shape for")
