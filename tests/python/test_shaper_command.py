@@ -106,6 +106,7 @@ def test_exit_code_1_if_the_best_leaves_too_much(capsys: pytest.CaptureFixture[s
         (["--mode", "46", "-m", "vx500"], "give one of both"),
         ([], "give one of both"),
         (["-m", "vx500", "--period", "5.5ms"], "whole multiple"),
+        (["--mode", "46", "--period", "1us"], "at most 5000 can be searched"),
         (["--mode", "46", "--period", "0ms"], "must be a time above 0"),
         (["--mode", "46", "--band", "120%"], "below 100%"),
     ],

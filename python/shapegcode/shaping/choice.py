@@ -24,6 +24,7 @@ __all__ = ["Recommendation", "Refusal", "choose"]
 
 _ROBUST = "robust"  # the family of which a design is shown even if it leaves more than the limit
 _OWN_TAPS = "taps"  # the family of taps that the user gives
+_MOST_PERIODS = 5000  # of the longest shaper: finer grids are as good as continuous times
 _NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of swings per period
 
 
@@ -230,6 +231,13 @@ def _check(
     for name, value in positive:
         if not (math.isfinite(value) and value > 0.0):
             raise ArgumentError(f"{name} is {value:g}: it must be finite and above 0")
+    finest_s = min((period_s for period_s in periods_s if period_s is not None), default=math.inf)
+    if options.max_duration_s > _MOST_PERIODS * finest_s:
+        raise ArgumentError(
+            f"a shaper of {_ms(options.max_duration_s)} on a grid of {_ms(finest_s)} has up to "
+            f"{options.max_duration_s / finest_s:.3g} taps, at most {_MOST_PERIODS} can be searched: take a longer period "
+            "or a shorter duration"
+        )
     if objective not in OBJECTIVES:
         raise ArgumentError(f"{objective!r} is no objective: {', '.join(OBJECTIVES)}")
 
