@@ -235,8 +235,8 @@ def _check(
     if options.max_duration_s > _MOST_PERIODS * finest_s:
         raise ArgumentError(
             f"a shaper of {_ms(options.max_duration_s)} on a grid of {_ms(finest_s)} has up to "
-            f"{options.max_duration_s / finest_s:.3g} taps, at most {_MOST_PERIODS} can be searched: take a longer period "
-            "or a shorter duration"
+            f"{options.max_duration_s / finest_s:.3g} taps, at most {_MOST_PERIODS} can be searched: take a longer "
+            "period or a shorter duration"
         )
     if objective not in OBJECTIVES:
         raise ArgumentError(f"{objective!r} is no objective: {', '.join(OBJECTIVES)}")
