@@ -1748,15 +1748,9 @@ class RegionShaper:
     Raises:
         ArgumentError: The block period is no multiple of the interpolation period, or a limit is not above 0.
     """
-    @typing.overload
     def __init__(self, path: Path, shaper: Fir, marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> None:
         """
         See the class.
-        """
-    @typing.overload
-    def __init__(self, path: Path, shapers: FollowingFir, modes: collections.abc.Sequence[typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]], marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> None:
-        """
-        With shapers that follow an axis, on the block grid; `modes` of X, Y and Z at each of their positions.
         """
     def next(self, periods: typing.SupportsInt | typing.SupportsIndex) -> ShapedCommand | None:
         """

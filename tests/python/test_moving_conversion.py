@@ -7,8 +7,8 @@ import pytest
 
 import shapegcode as sg
 from shapegcode import _core
-from shapegcode.converter import choose_grid
-from shapegcode.emit import make_grid, motion_limits, shaping_options
+from shapegcode.block_grid import choose_grid, make_grid
+from shapegcode.emit import motion_limits, shaping_options
 from shapegcode.moving_modes import region_offset
 from shapegcode.program import Program
 from shapegcode.simulator import simulate
