@@ -1840,6 +1840,14 @@ class FitOptions:
     def interpolation_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def lent_periods(self) -> int:
+        """
+        Periods that the blocks before did not last.
+        """
+    @lent_periods.setter
+    def lent_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
     def merge_tolerance_increments(self) -> float:
         """
         Deviation of merged blocks per axis, least increments.
@@ -1878,6 +1886,11 @@ class FittedBlocks:
     def first_periods(self) -> numpy.typing.NDArray[numpy.uint32]:
         """
         Block period of the command in which each begins, (n,).
+        """
+    @property
+    def left_periods(self) -> int:
+        """
+        Time that the blocks do not last: `FitOptions.lent_periods` of the next piece.
         """
     @property
     def periods(self) -> numpy.typing.NDArray[numpy.uint32]:
@@ -1927,6 +1940,14 @@ class WriterOptions:
         """
     @line_end.setter
     def line_end(self, arg0: str) -> None:
+        ...
+    @property
+    def motion(self) -> int:
+        """
+        Motion code active before the first block.
+        """
+    @motion.setter
+    def motion(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def plane(self) -> int:
