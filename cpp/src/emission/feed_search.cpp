@@ -64,13 +64,15 @@ class FeedSearch {
   PlannedRun measured() {
     PlannedRun plan{path_, std::make_shared<const SpeedProfile>(plan_speed(*path_, limits_, &caps_)), 0.0, {}};
     deviation_.at_junction.assign(path_->size(), 0.0F);
-    deviation_.on_segment.assign(path_->size(), 0.0F);
+    deviation_.on_segment.assign(path_->size(), -1.0F);
+    deviation_.near_corner.assign(path_->size(), 0.0F);
     RunShaper shaper(path_, plan.profile, filter_, run_limits(limits_), steps_per_half_, &deviation_);
     Vector3 position;
     for (std::size_t row = 0; row < 2 * static_cast<std::size_t>(shaper.periods()) + 1; ++row) {
       shaper.next(position);
     }
-    plan.largest_deviation_mm = *std::ranges::max_element(deviation_.on_segment);
+    plan.largest_deviation_mm = std::max(
+        {0.0F, *std::ranges::max_element(deviation_.on_segment), *std::ranges::max_element(deviation_.near_corner)});
     return plan;
   }
 
@@ -93,7 +95,8 @@ class FeedSearch {
       const Segment& segment = (*path_)[i];
       const double speed = std::min(static_cast<double>(caps_.on_segment[i]), segment_speed_limit(segment, limits_));
       if (segment.kind == SegmentKind::arc) {
-        adjust_one(caps_.on_segment[i], speed, deviation_.on_segment[i], true);
+        const float clear = deviation_.on_segment[i];
+        adjust_one(caps_.on_segment[i], speed, clear >= 0.0F ? clear : deviation_.near_corner[i], true);
       }
       if (i == 0) {
         continue;
