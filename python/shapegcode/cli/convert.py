@@ -63,6 +63,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="duration of the shortest block, for example 5ms (default: chosen for the modes)",
     )
     parser.add_argument(
+        "--shape-rapids",
+        action="store_const",
+        const=True,
+        default=None,
+        help="write rapids as shaped cutting moves where the table is settled for the next cut sooner (default: "
+        "shaping.rapids of the machine file); rapid override does not act on them",
+    )
+    parser.add_argument(
         "--compensation",
         choices=("refuse", "expand", "keep"),
         default=None,
@@ -121,6 +129,7 @@ def run(args: argparse.Namespace) -> int:
         ("input", "compensation", args.compensation),
         ("tolerance", "contour_um", args.contour_tolerance),
         ("shaping", "contour", args.contour),
+        ("shaping", "rapids", args.shape_rapids),
     ):
         if value is not None:
             machine = machine.model_copy(update={table: getattr(machine, table).model_copy(update={key: value})})
