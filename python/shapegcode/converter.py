@@ -184,7 +184,7 @@ def convert(
             written, emitted, figures = settle(grid, reasons)
         rapids: ShapedRapids | None = None
         if machine.shaping.rapids:
-            rapids = shape_rapids(written.text, emitted, written.placed, machine, grid, pool, budget)
+            rapids = shape_rapids(emitted, written.placed, machine, grid, pool, budget)
             written, emitted = replace(written, text=rapids.text, placed=rapids.placed), rapids.emitted
         kept_s = sum(play.result().duration_s for play, reason in zip(playbacks, reasons, strict=True) if reason)
     finally:

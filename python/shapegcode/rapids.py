@@ -88,7 +88,6 @@ def _without_contour(machine: Machine) -> Machine:
 
 
 def shape_rapids(
-    text: bytes,
     emitted: Program,
     placed: Sequence[Placed],
     machine: Machine,
@@ -99,9 +98,8 @@ def shape_rapids(
     """Replace the rapids of an emitted text where that brings the next cut closer.
 
     Args:
-        text: a program with shaped regions.
-        emitted: the same, read back.
-        placed: its regions.
+        emitted: a program with shaped regions, read back.
+        placed: the regions and their places in it.
         machine: controller, modes and tolerances.
         grid: block period and shaper.
         pool: runs playbacks.
@@ -118,7 +116,7 @@ def shape_rapids(
     machine = _without_contour(machine)
     plant = RapidPlant(machine)
     kept: Counter[str] = Counter()
-    gaps = find_gaps(emitted, machine) if emitted.core.size == len(text) else []
+    gaps = find_gaps(emitted, machine)
     found = sum(len(gap.rapids) for gap in gaps)
     open_gaps: list[_OpenGap] = []
     for gap in gaps:
@@ -137,13 +135,13 @@ def shape_rapids(
         if budget is not None and _too_fast(choice, grid, machine, budget):
             kept[BUDGET] += 1
             choice.text = b""
-    splice = partial(_splice, text, placed)
+    splice = partial(_splice, emitted.core.text, placed)
     _judge([choice for choice in choices if choice.text], splice, machine, plant, pool)
     for open_gap in open_gaps:
         open_gap.drop(OUT_OF_TOLERANCE, kept, lambda choice: bool(choice.summary["misses"]))
         open_gap.drop_useless(kept)
     if budget is not None and budget.max_bytes is not None:
-        _save_bytes(open_gaps, budget.max_bytes - len(text), kept)
+        _save_bytes(open_gaps, budget.max_bytes - emitted.core.size, kept)
     shaped = [choice for gap in open_gaps for choice in gap.choices if choice.text]
     spliced = splice(shaped)
     read = read_back(spliced.text, spliced.everything, machine)
