@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import deque
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.program import Program
+from shapegcode.program import MM_PER_INCH, Program
 
 __all__ = ["NO_CUT", "Gap", "Rapid", "find_gaps"]
 
@@ -164,9 +165,10 @@ class _Reader:
         if reason:
             return Rapid(line, start_mm, end_mm, None, reason, "")
         source = self._source(line)
-        path = _core.Path([_core.Segment.line(start_mm, end_mm, self._feed_mm_per_s(end_mm - start_mm))])
         begin, end = self._begins[line - 1], min(self._begins[line], self._core.size)
         entry, after = self._states[line - 1], self._states[line]
+        feed = self._feed_mm_per_s(end_mm - start_mm, entry.units)
+        path = _core.Path([_core.Segment.line(start_mm, end_mm, feed)])
         region = _core.Region(path=path, entry=entry, exit=after, line=line, text_begin=begin, text_end=end)
         number = next((f"N{value}" for letter, value in _words(source) or () if letter == "N"), "")
         return Rapid(line, start_mm, end_mm, region, "", number + "".join(_COMMENT.findall(source)))
@@ -203,12 +205,13 @@ class _Reader:
             return NEW_STATE
         return ""
 
-    def _feed_mm_per_s(self, travel_mm: Vector) -> float:
-        """Largest cutting feed along a way: of each axis for itself, and tangentially of the fastest axis."""
+    def _feed_mm_per_s(self, travel_mm: Vector, units: int) -> float:
+        """Largest cutting feed along a way, a whole F word: of each axis for itself, of the fastest tangentially."""
         share = np.abs(travel_mm) / np.linalg.norm(travel_mm)
         moved = share > 0.0
         along = float((self._largest_mm_per_s[moved] / share[moved]).min())
-        return min(along, float(self._largest_mm_per_s.max()))
+        unit = (MM_PER_INCH if units == 20 else 1.0) / 60.0
+        return max(1.0, math.floor(min(along, float(self._largest_mm_per_s.max())) / unit + 1e-9)) * unit
 
 
 def _words(source: str) -> list[tuple[str, str]] | None:
