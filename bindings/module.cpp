@@ -14,9 +14,9 @@ PYBIND11_MODULE(_core, module) {
   register_path(module);
   register_motion(module);
   register_gcode(module);
+  register_plant(module);
   register_shaped_command(module);
   register_emission(module);
-  register_plant(module);
   register_simulation(module);
   register_timing(module);
 }

@@ -36,6 +36,10 @@ void register_shaped_command(py::module_& module) {
       .def_readwrite("target", &ShapingOptions::target,
                      "What is brought back to the path; with a target, the contour tolerance of `limits` is its own.")
       .def_readwrite("modes", &ShapingOptions::modes, "Modes of X, Y and Z, for the response as target.")
+      .def_readwrite("following", &ShapingOptions::following,
+                     "Shapers along an axis in place of the one shaper, taps in whole block periods; None: none.")
+      .def_readwrite("mode_tables", &ShapingOptions::mode_tables,
+                     "How the modes vary with the position of the axis that is followed, for the response as target.")
       .def_readwrite("contour_smoothness", &ShapingOptions::contour_smoothness,
                      "Weight of the correction's second differences.");
 
@@ -81,12 +85,6 @@ Raises:
                [](std::shared_ptr<Path> path, const Fir& shaper, const std::vector<std::uint32_t>& marked,
                   const ShapingOptions& options) { return RegionShaper(std::move(path), shaper, marked, options); }),
            py::arg("path"), py::arg("shaper"), py::arg("marked_segments"), py::arg("options"), "See the class.")
-      .def(py::init([](std::shared_ptr<Path> path, const FollowingFir& shapers, const std::vector<AxisModes>& modes,
-                       const std::vector<std::uint32_t>& marked, const ShapingOptions& options) {
-             return RegionShaper(std::move(path), shapers, modes, marked, options);
-           }),
-           py::arg("path"), py::arg("shapers"), py::arg("modes"), py::arg("marked_segments"), py::arg("options"),
-           "With shapers that follow an axis, on the block grid; `modes` of X, Y and Z at each of their positions.")
       .def(
           "next",
           [](RegionShaper& self, std::uint32_t periods) -> std::optional<std::shared_ptr<ShapedCommand>> {

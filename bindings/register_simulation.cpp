@@ -38,9 +38,23 @@ void register_simulation(py::module_& module) {
       .def_readwrite("mode_tables", &PlaybackOptions::mode_tables,
                      "How the modes of X, Y and Z vary with position, one table per mode; none: constant modes.")
       .def_readwrite("measure_contour", &PlaybackOptions::measure_contour, "Deviations and orbit errors.")
+      .def_readwrite("measure_command", &PlaybackOptions::measure_command,
+                     "False: the deviation of the response alone, no orbit errors.")
       .def_readwrite("last_seconds", &PlaybackOptions::last_seconds,
                      "Blocks only: play the last so many seconds; 0: all.")
+      .def_readwrite("starved_blocks", &PlaybackOptions::starved_blocks,
+                     "Blocks only: what if the block buffer ran empty behind one of these blocks (ascending)?")
+      .def_readwrite("starved_s", &PlaybackOptions::starved_s, "How long the set-points then wait, s.")
+      .def_readwrite("starved_memory_s", &PlaybackOptions::starved_memory_s,
+                     "How much of the run behind such a wait is looked at, s; 0: all.")
       .def_readwrite("record_samples", &PlaybackOptions::record_samples, "Samples kept for pictures; 0: none.");
+
+  py::class_<StarvedFigures>(module, "StarvedFigures", "What a wait for the next block does to a run.")
+      .def_readonly("block", &StarvedFigures::block, "The set-points wait behind it.")
+      .def_readonly("residual_mm", &StarvedFigures::residual_mm,
+                    "Largest |response - command| while the set-points rest, in the wait and at the end, (3,), mm.")
+      .def_readonly("command", &StarvedFigures::command, "Deviation of the command from the path.")
+      .def_readonly("response", &StarvedFigures::response, "Deviation of the response from the path.");
 
   py::class_<PlaybackFigures, std::shared_ptr<PlaybackFigures>>(module, "PlaybackFigures",
                                                                 "Figures of one run from rest to rest.")
@@ -54,6 +68,7 @@ void register_simulation(py::module_& module) {
       .def_readonly("response", &PlaybackFigures::response, "Deviation of the response from the path.")
       .def_readonly("orbit_error_percent", &PlaybackFigures::orbit_error_percent, "Per arc of the path.")
       .def_readonly("end_mm", &PlaybackFigures::end_mm, "Last set-point, (3,), mm.")
+      .def_readonly("starved", &PlaybackFigures::starved, "One per PlaybackOptions.starved_blocks.")
       .def_property_readonly(
           "recorded_command", [](const PlaybackFigures& self) { return recorded(self.recorded_command); },
           "(n, 3), mm.")
@@ -63,12 +78,16 @@ void register_simulation(py::module_& module) {
 
   module.def(
       "play_path",
-      [](std::shared_ptr<Path> path, std::shared_ptr<SpeedProfile> profile, const PlaybackOptions& options) {
+      [](std::shared_ptr<Path> path, std::shared_ptr<SpeedProfile> profile, const PlaybackOptions& options,
+         const std::shared_ptr<Path>& programmed) {
         const py::gil_scoped_release release;
-        return std::make_shared<PlaybackFigures>(play_path(std::move(path), std::move(profile), options));
+        return std::make_shared<PlaybackFigures>(
+            programmed ? play_path(std::move(path), std::move(profile), *programmed, options)
+                       : play_path(std::move(path), std::move(profile), options));
       },
-      py::arg("path"), py::arg("profile"), py::arg("options"),
-      "Play a path under a speed profile (a controller with look-ahead) through filters and plant.");
+      py::arg("path"), py::arg("profile"), py::arg("options"), py::arg("programmed") = py::none(),
+      "Play a path under a speed profile (a controller with look-ahead) through filters and plant, measured against "
+      "the programmed path (None: the path itself).");
 
   module.def(
       "play_blocks",
@@ -99,6 +118,10 @@ void register_simulation(py::module_& module) {
       },
       py::arg("blocks"), py::arg("period_s"), py::arg("block_end"), py::arg("override_ratio") = 1.0,
       "Sum of block durations, s.");
+
+  module.def(
+      "fastest_block_ends", [](const std::shared_ptr<Path>& blocks) { return fastest_block_ends(blocks->segments()); },
+      py::arg("blocks"), "Per axis the block, but for the last, at whose end it is fastest; ascending, each once.");
 
   module.def(
       "count_slowed_blocks",

@@ -62,12 +62,12 @@ if TYPE_CHECKING:
     from shapegcode._core import (
         zv as zv,
     )
+    from shapegcode.block_grid import choose_grid as choose_grid
     from shapegcode.budget import Budget as Budget
     from shapegcode.checker import Check as Check
     from shapegcode.checker import Finding as Finding
     from shapegcode.checker import check as check
     from shapegcode.converter import Conversion as Conversion
-    from shapegcode.converter import choose_grid as choose_grid
     from shapegcode.converter import convert as convert
     from shapegcode.machine import Machine as Machine
     from shapegcode.machine import MachineError as MachineError
@@ -103,7 +103,8 @@ _HOME = {
     ),
     **dict.fromkeys(("Check", "Finding", "check"), "checker"),
     "Budget": "budget",
-    **dict.fromkeys(("Conversion", "choose_grid", "convert"), "converter"),
+    "choose_grid": "block_grid",
+    **dict.fromkeys(("Conversion", "convert"), "converter"),
     **dict.fromkeys(("Machine", "MachineError"), "machine"),
     "Program": "program",
     **dict.fromkeys(

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fit_blocks', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -1523,6 +1523,49 @@ class ProgramText:
         """
         (line, column, alarm, message, file) each; alarm 0: none; file empty: the program's own.
         """
+class ModeTable:
+    """
+    How a mode depends on where an axis stands. Immutable.
+    
+    Linear in frequency and damping ratio between the rows, constant beyond the ends; without rows the mode stays as it is.
+    
+    Args:
+        axis: Whose position counts: 0, 1, 2 for X, Y, Z.
+        position_mm: Strictly ascending positions in mm, shape (n,).
+        frequency_hz: Undamped natural frequencies in Hz, one per position, above 0.
+        damping_ratio: Damping ratios (no unit), one per position, 0 <= zeta < 1; none: that of the mode.
+    
+    Raises:
+        ArgumentError: Unequal lengths, positions that do not ascend, or a value outside its range.
+    """
+    def __init__(self, axis: typing.SupportsInt | typing.SupportsIndex = 0, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], frequency_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], damping_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
+        """
+        Make a table; ArgumentError if it is not what the class asks for.
+        """
+    def mode_at(self, mode: Mode, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> Mode:
+        """
+        The mode at a position (mm) of the axis; its participation stays.
+        """
+    @property
+    def axis(self) -> int:
+        """
+        Axis whose position counts.
+        """
+    @property
+    def damping_ratio(self) -> list[float]:
+        """
+        Damping ratios, or none.
+        """
+    @property
+    def frequency_hz(self) -> list[float]:
+        """
+        Frequencies in Hz.
+        """
+    @property
+    def position_mm(self) -> list[float]:
+        """
+        Positions in mm.
+        """
 class ContourTarget:
     """
     What shall follow the programmed path.
@@ -1596,6 +1639,14 @@ class ShapingOptions:
     def contour_smoothness(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def following(self) -> FollowingFir | None:
+        """
+        Shapers along an axis in place of the one shaper, taps in whole block periods; None: none.
+        """
+    @following.setter
+    def following(self, arg0: FollowingFir | None) -> None:
+        ...
+    @property
     def interpolation_period_s(self) -> float:
         """
         s.
@@ -1610,6 +1661,14 @@ class ShapingOptions:
         """
     @limits.setter
     def limits(self, arg0: MotionLimits) -> None:
+        ...
+    @property
+    def mode_tables(self) -> typing.Annotated[list[list[ModeTable]], "FixedSize(3)"]:
+        """
+        How the modes vary with the position of the axis that is followed, for the response as target.
+        """
+    @mode_tables.setter
+    def mode_tables(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[ModeTable]], "FixedSize(3)"]) -> None:
         ...
     @property
     def modes(self) -> typing.Annotated[list[list[Mode]], "FixedSize(3)"]:
@@ -1698,15 +1757,9 @@ class RegionShaper:
     Raises:
         ArgumentError: The block period is no multiple of the interpolation period, or a limit is not above 0.
     """
-    @typing.overload
     def __init__(self, path: Path, shaper: Fir, marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> None:
         """
         See the class.
-        """
-    @typing.overload
-    def __init__(self, path: Path, shapers: FollowingFir, modes: collections.abc.Sequence[typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]], marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> None:
-        """
-        With shapers that follow an axis, on the block grid; `modes` of X, Y and Z at each of their positions.
         """
     def next(self, periods: typing.SupportsInt | typing.SupportsIndex) -> ShapedCommand | None:
         """
@@ -1796,6 +1849,14 @@ class FitOptions:
     def interpolation_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def lent_periods(self) -> int:
+        """
+        Periods that the blocks before did not last.
+        """
+    @lent_periods.setter
+    def lent_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
     def merge_tolerance_increments(self) -> float:
         """
         Deviation of merged blocks per axis, least increments.
@@ -1834,6 +1895,11 @@ class FittedBlocks:
     def first_periods(self) -> numpy.typing.NDArray[numpy.uint32]:
         """
         Block period of the command in which each begins, (n,).
+        """
+    @property
+    def left_periods(self) -> int:
+        """
+        Time that the blocks do not last: `FitOptions.lent_periods` of the next piece.
         """
     @property
     def periods(self) -> numpy.typing.NDArray[numpy.uint32]:
@@ -1885,6 +1951,14 @@ class WriterOptions:
     def line_end(self, arg0: str) -> None:
         ...
     @property
+    def motion(self) -> int:
+        """
+        Motion code active before the first block.
+        """
+    @motion.setter
+    def motion(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
     def plane(self) -> int:
         """
         Plane active before the first block.
@@ -1900,49 +1974,6 @@ class WriterOptions:
     @position_decimals.setter
     def position_decimals(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
-class ModeTable:
-    """
-    How a mode depends on where an axis stands. Immutable.
-    
-    Linear in frequency and damping ratio between the rows, constant beyond the ends; without rows the mode stays as it is.
-    
-    Args:
-        axis: Whose position counts: 0, 1, 2 for X, Y, Z.
-        position_mm: Strictly ascending positions in mm, shape (n,).
-        frequency_hz: Undamped natural frequencies in Hz, one per position, above 0.
-        damping_ratio: Damping ratios (no unit), one per position, 0 <= zeta < 1; none: that of the mode.
-    
-    Raises:
-        ArgumentError: Unequal lengths, positions that do not ascend, or a value outside its range.
-    """
-    def __init__(self, axis: typing.SupportsInt | typing.SupportsIndex = 0, position_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], frequency_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], damping_ratio: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
-        """
-        Make a table; ArgumentError if it is not what the class asks for.
-        """
-    def mode_at(self, mode: Mode, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> Mode:
-        """
-        The mode at a position (mm) of the axis; its participation stays.
-        """
-    @property
-    def axis(self) -> int:
-        """
-        Axis whose position counts.
-        """
-    @property
-    def damping_ratio(self) -> list[float]:
-        """
-        Damping ratios, or none.
-        """
-    @property
-    def frequency_hz(self) -> list[float]:
-        """
-        Frequencies in Hz.
-        """
-    @property
-    def position_mm(self) -> list[float]:
-        """
-        Positions in mm.
-        """
 class BlockEnd:
     """
     When a block's successor starts.
@@ -2047,6 +2078,14 @@ class PlaybackOptions:
     def last_seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def measure_command(self) -> bool:
+        """
+        False: the deviation of the response alone, no orbit errors.
+        """
+    @measure_command.setter
+    def measure_command(self, arg0: bool) -> None:
+        ...
+    @property
     def measure_contour(self) -> bool:
         """
         Deviations and orbit errors.
@@ -2086,6 +2125,54 @@ class PlaybackOptions:
     @record_samples.setter
     def record_samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+    @property
+    def starved_blocks(self) -> list[int]:
+        """
+        Blocks only: what if the block buffer ran empty behind one of these blocks (ascending)?
+        """
+    @starved_blocks.setter
+    def starved_blocks(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
+        ...
+    @property
+    def starved_memory_s(self) -> float:
+        """
+        How much of the run behind such a wait is looked at, s; 0: all.
+        """
+    @starved_memory_s.setter
+    def starved_memory_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def starved_s(self) -> float:
+        """
+        How long the set-points then wait, s.
+        """
+    @starved_s.setter
+    def starved_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class StarvedFigures:
+    """
+    What a wait for the next block does to a run.
+    """
+    @property
+    def block(self) -> int:
+        """
+        The set-points wait behind it.
+        """
+    @property
+    def command(self) -> DeviationStats:
+        """
+        Deviation of the command from the path.
+        """
+    @property
+    def residual_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Largest |response - command| while the set-points rest, in the wait and at the end, (3,), mm.
+        """
+    @property
+    def response(self) -> DeviationStats:
+        """
+        Deviation of the response from the path.
+        """
 class PlaybackFigures:
     """
     Figures of one run from rest to rest.
@@ -2139,6 +2226,11 @@ class PlaybackFigures:
     def response(self) -> DeviationStats:
         """
         Deviation of the response from the path.
+        """
+    @property
+    def starved(self) -> list[StarvedFigures]:
+        """
+        One per PlaybackOptions.starved_blocks.
         """
 class MotionKind:
     """
@@ -2843,6 +2935,10 @@ def extra_insensitive(mode: Mode, vibration_limit: typing.SupportsFloat | typing
     
     Source: Singhose, Seering and Singer 1994; Singhose, Porter, Tuttle and Singer 1997; the solution: this project.
     """
+def fastest_block_ends(blocks: Path) -> list[int]:
+    """
+    Per axis the block, but for the last, at whose end it is fastest; ascending, each once.
+    """
 def fit_blocks(command: ShapedCommand, breaks: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: FitOptions) -> FittedBlocks:
     """
     Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. Raises ArgumentError on a position outside +-99999.999 mm.
@@ -3040,9 +3136,9 @@ def play_duration_s(blocks: Path, period_s: typing.SupportsFloat | typing.Suppor
     """
     Sum of block durations, s.
     """
-def play_path(path: Path, profile: SpeedProfile, options: PlaybackOptions) -> PlaybackFigures:
+def play_path(path: Path, profile: SpeedProfile, options: PlaybackOptions, programmed: Path = None) -> PlaybackFigures:
     """
-    Play a path under a speed profile (a controller with look-ahead) through filters and plant.
+    Play a path under a speed profile (a controller with look-ahead) through filters and plant, measured against the programmed path (None: the path itself).
     """
 def play_samples(positions_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], path: Path, options: PlaybackOptions) -> PlaybackFigures:
     """

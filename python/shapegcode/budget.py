@@ -16,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.emit import EmittedRegion, Grid
+from shapegcode.block_grid import Grid
+from shapegcode.emit import EmittedRegion
 from shapegcode.machine import Machine
 from shapegcode.program import Program, least_increment_mm
 
@@ -96,7 +97,7 @@ def busiest_per_s(durations_s: npt.ArrayLike, amounts: npt.ArrayLike, stretch_s:
 def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, machine: Machine) -> Load:
     """The load of a shaped region; a stretch lasts as long as the shaper: no transition is shorter."""
     durations = shaped.periods * grid.block_period_s
-    stretch = max(grid.shaper.duration_s, grid.block_period_s)
+    stretch = max(grid.duration_s, grid.block_period_s)
     characters = busiest_per_s(durations, _block_bytes(shaped), stretch)
     return Load(
         len(shaped.text) - (region.text_end - region.text_begin),
@@ -306,7 +307,7 @@ class Spending:
     def _worth(self, grid: Grid, loads: Mapping[int, Load], weights: Sequence[float]) -> tuple[float, int, int]:
         """Gain of the regions that are not too fast, how many they are, and how short the shaper is, in ticks."""
         slow = [index for index, load in loads.items() if not self._too_fast(load)]
-        duration = round(grid.shaper.duration_s / self.machine.controller.interpolation_period_s)
+        duration = round(grid.duration_s / self.machine.controller.interpolation_period_s)
         return math.fsum(weights[index] for index in slow), len(slow), -duration
 
     def _too_large(

@@ -2,35 +2,33 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from shapegcode import _core
 from shapegcode.advice import controller_warnings, region_warnings, worse_warnings
+from shapegcode.block_grid import Grid, choose_grid
 from shapegcode.budget import Budget, Load, Spending, measure_load
 from shapegcode.compensation import guard_lines, header_lines, read_for_conversion, require_decision
-from shapegcode.emit import Grid, emit_region, make_grid, motion_limits
+from shapegcode.emit import emit_region, motion_limits
 from shapegcode.machine import Machine
+from shapegcode.moving_modes import (
+    machine_warnings,
+    region_offset,
+    region_range_warnings,
+)
 from shapegcode.program import Program
 from shapegcode.rapids import ShapedRapids, rapid_warnings, shape_rapids
-from shapegcode.verify import (
-    Placed,
-    RegionFigures,
-    axis_modes,
-    contour_target,
-    contour_um,
-    measure,
-    other_time_s,
-    play_original,
-    read_back,
-    summarise,
-)
+from shapegcode.verdict import RegionFigures, contour_target, contour_um, measure, summarise
+from shapegcode.verify import Placed, axis_modes, other_time_s, play_original, read_back
+
+if TYPE_CHECKING:
+    pass
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
 _MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin
@@ -75,47 +73,6 @@ class Conversion:
         return (
             f"<Conversion of {self.report['program']}: {len(self.placed)} regions, {len(self.text)} bytes, {verdict}>"
         )
-
-
-def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
-    """Block period and shortest non-negative shaper for all modes of a machine.
-
-    Args:
-        machine: modes and controller.
-        block_period_s: a period to use; None: `emission.block_period_s`, or the best one.
-
-    Raises:
-        DesignError: no shaper exists within `shaping.max_duration_s`.
-        ArgumentError: the machine has no mode, or the period does not fit the controller.
-    """
-    # SciPy's solvers take a quarter of a second to load: not before they are needed.
-    from shapegcode.shaping import choose_block_period, shortest_non_negative
-
-    modes = [mode for axis in axis_modes(machine) for mode in axis]
-    if not modes:
-        raise _core.ArgumentError("the machine file gives no vibration mode (axes.x.modes): nothing to shape for")
-    controller = machine.controller
-    period = block_period_s if block_period_s is not None else machine.emission.block_period_s
-    if period is not None and not (math.isfinite(period) and period > 0.0):
-        raise _core.ArgumentError(f"block period is {period} s, must be finite and above 0")
-    if period is None:
-        choice = choose_block_period(
-            modes, controller.interpolation_period_s, controller.block_time_s,
-            max_duration_s=machine.shaping.max_duration_s,
-        )  # fmt: skip
-        return make_grid(choice.period_s, choice.shaper)
-    ticks = period / controller.interpolation_period_s
-    if round(ticks) < 1 or not math.isclose(ticks, round(ticks), abs_tol=1e-6):
-        raise _core.ArgumentError(
-            f"block period {period * 1e3:g} ms is no whole multiple of the interpolation period "
-            f"{controller.interpolation_period_s * 1e3:g} ms"
-        )
-    if period < controller.block_time_s * (1 - 1e-9):
-        raise _core.ArgumentError(
-            f"block period {period * 1e3:g} ms is below the block time {controller.block_time_s * 1e3:g} ms "
-            "(controller.block_time_s)"
-        )
-    return make_grid(period, shortest_non_negative(modes, period, machine.shaping.max_duration_s))
 
 
 def written_by_shapegcode(program: Program) -> bool:
@@ -167,7 +124,10 @@ def convert(
     # The originals are played on the other cores while this one shapes.
     pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
     try:
-        playbacks = [pool.submit(play_original, region.path, machine) for region in program.regions]
+        playbacks = [
+            pool.submit(play_original, region.path, machine, offset=region_offset(region, machine))
+            for region in program.regions
+        ]
         settle = partial(
             _settle, program, machine, arc_feed_ratio=ratio, room_um=room_um, playbacks=playbacks, pool=pool,
             spending=spending, on_progress=on_progress,
@@ -246,7 +206,7 @@ def _tighten(
     places = {id(region): index for index, region in enumerate(program.regions)}
     tightened = False
     for place, region in zip(placed, figures, strict=True):
-        reached = contour_um(region.emitted, machine)
+        reached = contour_um(region, machine)
         if reached > limit:
             room_um[places[id(place.region)]] *= _CONTOUR_MARGIN * limit / reached
             tightened = True
@@ -329,13 +289,14 @@ def _header(machine: Machine, grid: Grid) -> list[str]:
 
     modes = [
         f"{axis} {mode.frequency_hz:g} HZ {mode.damping_ratio:g}"
-        for axis, modes in zip("XYZ", machine.axes.as_tuple(), strict=True)
-        for mode in modes.modes
+        for axis, modes in zip("XYZ", axis_modes(machine), strict=True)
+        for mode in modes
     ]
     lines = [
         f"SHAPEGCODE {__version__} MACHINE {machine.name}",
         *(f"MODE {mode}" for mode in modes),
-        f"BLOCK PERIOD {grid.block_period_s * 1e3:g} MS SHAPER {grid.shaper.duration_s * 1e3:g} MS",
+        f"BLOCK PERIOD {grid.block_period_s * 1e3:g} MS SHAPER {grid.duration_s * 1e3:g} MS",
+        *([f"{len(grid.track.nodes)} SHAPERS FOLLOW {'XYZ'[grid.track.axis]}"] if grid.track else []),
         "SET FEED OVERRIDE 100 PCT",
         f"TIME CONSTANT AFTER INTERPOLATION {machine.controller.shaped_time_constant_s * 1e3:g} MS",
     ]
@@ -358,7 +319,9 @@ def _report(
     spending: Spending | None,
 ) -> dict[str, Any]:
     placed = written.placed
-    warnings = [*program.warnings, *written.kept_warnings]
+    warnings = [*program.warnings, *written.kept_warnings, *machine_warnings(machine)]
+    warnings += [grid.note] if grid.note else []
+    warnings += region_range_warnings(program.regions, machine)
     cutting = {
         which: sum(region["time_s"][which] for region in figures["regions"]) for which in ("original", "emitted")
     }
@@ -387,6 +350,7 @@ def _report(
         "shaper": {
             "times_s": [float(t) for t in grid.shaper.times_s],
             "amplitudes": [float(a) for a in grid.shaper.amplitudes],
+            "family": grid.family,
         },
         "blocks": {"read": program.core.block_count, "emitted": written.blocks},
         "expanded": program.core.expanded,
@@ -407,6 +371,14 @@ def _report(
     if spending is not None:
         report["budget"] = spending.report(grid, written)
     keep = report.pop("shaper")
+    if grid.track is not None:
+        keep["following"] = {
+            "axis": "xyz"[grid.track.axis],
+            "position_mm": [node.position_mm for node in grid.track.nodes],
+            "times_s": [[float(t) for t in node.shaper.times_s] for node in grid.track.nodes],
+            "amplitudes": [[float(a) for a in node.shaper.amplitudes] for node in grid.track.nodes],
+            "worst_residual": grid.track.worst_residual,
+        }
     return {**_tidy(report), "shaper": keep}
 
 

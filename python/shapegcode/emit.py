@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.block_grid import Grid
 from shapegcode.machine import Machine
+from shapegcode.moving_modes import NO_OFFSET, Offset, mode_tables, region_offset
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
+
+if TYPE_CHECKING:
+    pass
 
 _DEGREE = math.pi / 180.0
 _PLUNGE_CORNER_DEG = 45.0
-_ALL_PERIODS = (1 << 32) - 1
+_PIECE_PERIODS = 1 << 17  # of a region in one go: what bounds the memory
 _CORNER_SHARE = 0.75  # several corners of a polyline may fall into one shaper, and then their deviations add up
 
 
@@ -23,21 +30,6 @@ _TARGETS = {
     "command": _core.ContourTarget.command,
     "off": _core.ContourTarget.none,
 }
-
-
-@dataclass(frozen=True)
-class Grid:
-    """On what a conversion is written: block period and the shaper on it.
-
-    Attributes:
-        block_period_s: T_B.
-        shaper: the design, times on the block grid.
-        fir: the same in whole block periods.
-    """
-
-    block_period_s: float
-    shaper: _core.Shaper
-    fir: _core.Fir
 
 
 @dataclass(frozen=True)
@@ -57,12 +49,6 @@ class EmittedRegion:
     periods: npt.NDArray[np.uint32]
     blocks_begin: int
     blocks_end: int
-
-
-def make_grid(block_period_s: float, shaper: _core.Shaper) -> Grid:
-    """Grid of a shaper whose times are whole block periods."""
-    delays = [round(t / block_period_s) for t in shaper.times_s]
-    return Grid(block_period_s, shaper, _core.Fir(delays, list(shaper.amplitudes)))
 
 
 def motion_limits(
@@ -96,15 +82,25 @@ def motion_limits(
     limits.arc_feed_ratio = arc_feed_ratio
     if grid is not None:
         own = controller.shaped_time_constant_s
-        limits.filter_variance_s2 = grid.shaper.variance_s2 + own * own / 12.0
-        limits.filter_mean_deviation_s = _mean_deviation_s(grid.shaper) + own / 4.0
+        limits.filter_variance_s2 = max(shaper.variance_s2 for shaper in grid.shapers) + own * own / 12.0
+        limits.filter_mean_deviation_s = max(_mean_deviation_s(shaper) for shaper in grid.shapers) + own / 4.0
         limits.contour_tolerance_mm = contour_tolerance_um * 1e-3
         limits.corner_share = _CORNER_SHARE
     return limits
 
 
-def shaping_options(machine: Machine, grid: Grid, limits: _core.MotionLimits) -> _core.ShapingOptions:
-    """How a region is shaped on a grid: what the core needs of the machine file."""
+def shaping_options(
+    machine: Machine, grid: Grid, limits: _core.MotionLimits, offset: Offset = NO_OFFSET
+) -> _core.ShapingOptions:
+    """How a region is shaped on a grid: what the core needs of the machine file.
+
+    Args:
+        machine: controller and modes.
+        grid: block period and shapers.
+        limits: see `motion_limits`.
+        offset: from the region's positions to the machine's; where it is not known of the axis that the grid's track
+            follows, the grid's one shaper is used.
+    """
     from shapegcode.verify import axis_modes  # which imports this module
 
     options = _core.ShapingOptions()
@@ -116,7 +112,40 @@ def shaping_options(machine: Machine, grid: Grid, limits: _core.MotionLimits) ->
     options.rest_at_stop_s = machine.controller.shaped_time_constant_s
     options.target = _TARGETS[machine.shaping.contour]
     options.modes = axis_modes(machine)
+    if grid.track is not None and (start := offset[grid.track.axis]) is not None:
+        options.following = grid.track.following(start)
+        options.mode_tables = mode_tables(machine, offset=offset)
     return options
+
+
+class _Marks:
+    """N words and comments of a region, in the pieces in which it is written."""
+
+    def __init__(self, program: Program, notes: Sequence[_core.RegionNote]) -> None:
+        self._program = program
+        self._notes = notes
+        self._next = 0
+        self.first_number = -1
+        """N word at the region's begin, which belongs before its prologue; -1: none."""
+
+    def within(self, piece: _core.ShapedCommand, *, last: bool) -> tuple[list[_core.BlockMark], list[int]]:
+        """Marks of a piece and the periods at which its blocks must end for them, both counted from its begin."""
+        first = piece.first_period
+        end = first + len(piece.middle_mm)
+        reached = piece.segment_periods
+        marks: list[_core.BlockMark] = []
+        breaks: list[int] = []
+        while self._next < len(reached) and (last or reached[self._next] < end):
+            note, period = self._notes[self._next], reached[self._next] - first
+            self._next += 1
+            number = note.n_number
+            if note.segment == 0 and self.first_number < 0 <= number:
+                self.first_number, number = number, -1
+            comment = self._program.core.slice(note.comment_offset, note.comment_offset + note.comment_length)
+            if number >= 0 or comment:
+                marks.append(_core.BlockMark(period, number, comment))
+                breaks.append(period)
+        return marks, breaks
 
 
 def emit_region(
@@ -127,7 +156,7 @@ def emit_region(
     The text begins with `emission.prologue` and a full safe line and ends with the modal state of the original.
     """
     notes = region.notes
-    options = shaping_options(machine, grid, limits)
+    options = shaping_options(machine, grid, limits, region_offset(region, machine))
     shaper = _core.RegionShaper(region.path, grid.fir, [note.segment for note in notes], options)
 
     inch = region.exit.units == 20
@@ -145,33 +174,38 @@ def emit_region(
     if machine.emission.rounding == "vibration":
         fit.modes = options.modes
     last = region.path[-1]
-    if region.exit.motion in (2, 3) and last.kind == _core.SegmentKind.arc:
-        fit.end_with_arc(region.exit.motion == 2, last.normal, last.radius_mm)
-
-    command = shaper.next(_ALL_PERIODS)
-    assert command is not None  # the first piece always exists
-    line_end = program.core.line_end
-    marks: list[_core.BlockMark] = []
-    breaks = set(command.run_ends)
-    first_number = -1
-    for note, period in zip(notes, command.segment_periods, strict=True):
-        number = note.n_number
-        if note.segment == 0 and first_number < 0 <= number:
-            first_number, number = number, -1
-        comment = program.core.slice(note.comment_offset, note.comment_offset + note.comment_length)
-        if number >= 0 or comment:
-            marks.append(_core.BlockMark(period, number, comment))
-            breaks.add(period)
-    fitted = _core.fit_blocks(command, sorted(breaks), fit)
     writer = _core.WriterOptions()
     writer.position_decimals = -round(math.log10(increment / unit))
     writer.feed_decimals = feed_decimals
     writer.incremental = region.incremental
     writer.plane = region.entry.plane
-    writer.exact_stop_at_end = region.exact_stop_at_end
-    writer.line_end = line_end
-    start = [round(float(x) / increment) for x in command.grid_mm[0]]
-    text, motion, plane = _core.write_blocks(fitted, start, marks, writer)
+    writer.line_end = program.core.line_end
+    marks = _Marks(program, notes)
+    texts: list[bytes] = []
+    periods: list[npt.NDArray[np.uint32]] = []
+    piece = shaper.next(_PIECE_PERIODS)
+    assert piece is not None  # the first one always exists
+    start = [round(float(x) / increment) for x in piece.grid_mm[0]]
+    motion, plane = 1, region.entry.plane
+    while piece is not None:
+        following = shaper.next(_PIECE_PERIODS)
+        if following is None:
+            writer.exact_stop_at_end = region.exact_stop_at_end
+            if region.exit.motion in (2, 3) and last.kind == _core.SegmentKind.arc:
+                fit.end_with_arc(region.exit.motion == 2, last.normal, last.radius_mm)
+        here, breaks = marks.within(piece, last=following is None)
+        fitted = _core.fit_blocks(piece, sorted({*piece.run_ends, *breaks}), fit)
+        fit.lent_periods = fitted.left_periods
+        text, motion, plane = _core.write_blocks(
+            fitted, [round(float(x) / increment) for x in piece.grid_mm[0]], here, writer
+        )
+        writer.motion, writer.plane = motion, plane
+        texts.append(text)
+        periods.append(fitted.periods)
+        piece = following
+    text = b"".join(texts)
+    all_periods = np.concatenate(periods)
+    first_number, line_end = marks.first_number, program.core.line_end
 
     # A search for the region's N word must not skip the prologue.
     head = [*machine.emission.prologue, _safe_line(region, start, writer.position_decimals, machine)]
@@ -183,7 +217,7 @@ def emit_region(
     end = line_end.encode()
     before = b"".join(line.encode("latin-1") + end for line in head)
     after = b"".join(line.encode("latin-1") + end for line in tail)
-    return EmittedRegion(before + text + after, len(fitted), fitted.periods, len(before), len(before) + len(text))
+    return EmittedRegion(before + text + after, len(all_periods), all_periods, len(before), len(before) + len(text))
 
 
 def decimal(value: float, decimals: int) -> str:

@@ -23,7 +23,7 @@ from shapegcode.machine_controller import Controller, PowerOn, Times
 from shapegcode.machine_errors import MachineError, Problem, problems_of, syntax_problem
 from shapegcode.machine_input import Input
 from shapegcode.machine_keys import KeyInfo, KeyValue, PerAxis, Table, Text, key, toml
-from shapegcode.machine_output import Emission, Shaping, Tolerance
+from shapegcode.machine_output import Emission, Shaping, Tolerance, Verdict
 from shapegcode.machine_text import documentation, values_of, write_toml
 
 __all__ = [
@@ -43,6 +43,7 @@ __all__ = [
     "Shaping",
     "Times",
     "Tolerance",
+    "Verdict",
     "key_documentation",
 ]
 
@@ -62,6 +63,7 @@ class Machine(Table):
     emission: Emission = key("how shaped programs are written", default={})
     shaping: Shaping = key("what is shaped, and how", default={})
     tolerance: Tolerance = key("when an emitted program is good", default={})
+    verdict: Verdict = key("under which conditions it must be good", default={})
 
     @model_validator(mode="after")
     def _block_period_fits(self) -> Machine:

@@ -55,6 +55,12 @@ class Input(Table):
     compensation_start_up: Literal["A", "B"] = key(
         "kind of the start-up and cancel moves of cutter compensation", fanuc="5003#0, #1", default="A", assumed=True
     )
+    material_side: Literal["left", "right"] | None = key(
+        "side of the programmed tool path on which the workpiece lies, seen along the travel: right where the contour "
+        "is cut as with G41, left as with G42; with it deviations are reported as gouge and excess; left out: not "
+        "known",
+        default=None,
+    )
     scale_unit: Annotated[Positive, Field(le=1)] = key(
         "unit of the factors P, I, J, K of scaling G51 without a decimal point",
         unit="1",

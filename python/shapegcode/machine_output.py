@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict, field_validator, model_validator
 
-from shapegcode.machine_keys import Bool, NonNegative, Positive, Table, Text, key
+from shapegcode.machine_keys import Bool, NonNegative, Positive, Table, Text, key, toml
 
 _BLOCK_CHARACTERS = re.compile(r"[A-Z0-9 .,+\-*/=#\[\]()<>_:;&]*")
 
@@ -90,6 +90,30 @@ class Shaping(Table):
     """What is shaped, and how."""
 
     max_duration_s: Annotated[Positive, Field(le=10)] = key("longest shaper that is accepted", unit="s", default=0.25)
+    family: Literal[
+        "auto",
+        "zv",
+        "zvd",
+        "zvdd",
+        "mzv",
+        "ei",
+        "ei2",
+        "ei3",
+        "si",
+        "negative-zv",
+        "polynomial",
+        "non-negative",
+        "robust",
+    ] = key(
+        'family of the shaper (`shapegcode shaper` compares them); "auto": the shortest without negative taps, exact '
+        "at the modes, or below vibration_limit over their bands where frequency_uncertainty_percent states them",
+        default="auto",
+    )
+    vibration_limit: Annotated[Positive, Field(lt=1)] = key(
+        "largest residual vibration over the modes' bands as a share of the unshaped one, for families that leave some",
+        unit="1",
+        default=0.05,
+    )
     arc_feed_ratio: Annotated[Positive, Field(le=1)] = key(
         "feed in arcs as a share of the programmed feed, reached before the arc begins; 1: no reduction",
         unit="1",
@@ -120,6 +144,9 @@ class Shaping(Table):
     )
 
 
+_Override = Annotated[Positive, Field(le=254)]
+
+
 class Tolerance(Table):
     """When an emitted program is good: outside these limits the conversion says so and exits with 1."""
 
@@ -141,3 +168,44 @@ class Tolerance(Table):
         unit="increments",
         default=5.0,
     )
+
+
+class Verdict(Table):
+    """The stated band: which of the cases that are played decide. All are shown; 100 % override always counts."""
+
+    override_percent: tuple[_Override, _Override] = key(
+        "lowest and highest feed override under which the program will run: every case in between must be good. The "
+        "header of a program asks for 100 %, so only that counts unless you state more",
+        unit="%",
+        default=(100.0, 100.0),
+    )
+    mode_uncertainty: Bool = key(
+        "whether every mode must be allowed to be off by its frequency_uncertainty_percent; modes that state none "
+        "are taken as exact",
+        default=True,
+    )
+    block_end: Literal["both", "own"] = key(
+        '"both": the program must be good under either rule of block timing; "own": under controller.block_end, '
+        "for a controller whose rule is known",
+        default="both",
+    )
+    look_ahead: Bool = key(
+        "whether the program must be good with the look-ahead mode left on, which plans the shaped blocks anew; "
+        "false: it is off while they run (emission.prologue)",
+        default=False,
+    )
+    starved_block: Bool = key(
+        "whether the program must be good if the block buffer runs empty once, at the worst place; false: it never "
+        "does (memory or a data server, emission.prefill_dwell_s)",
+        default=False,
+    )
+    starved_s: Annotated[Positive, Field(le=10)] = key(
+        "how long the axes then wait for the next block", unit="s", default=0.02, assumed=True
+    )
+
+    @model_validator(mode="after")
+    def _band_ascends(self) -> Verdict:
+        low, high = self.override_percent
+        if low > high:
+            raise ValueError(f"override_percent = {toml(self.override_percent)}: the lower end comes first")
+        return self

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from shapegcode import _core, plotting
 from shapegcode.converter import Conversion
 from shapegcode.machine import Machine
+from shapegcode.moving_modes import region_offset
 from shapegcode.plotting import View
 from shapegcode.report import Trace
 from shapegcode.simulator import Simulation
@@ -44,9 +45,10 @@ def write_pictures(conversion: Conversion, machine: Machine, folder: str | Path)
     place = conversion.placed[int(np.argmax(residuals))]
     path = place.region.path
     blocks = conversion.emitted.core.cutting_path(place.first_line, place.last_line)
+    offset = region_offset(place.region, machine)
     runs = {
-        "original": play_original(path, machine, record_samples=_RECORD_SAMPLES),
-        "emitted": play_emitted(blocks, path, machine, record_samples=_RECORD_SAMPLES),
+        "original": play_original(path, machine, record_samples=_RECORD_SAMPLES, offset=offset),
+        "emitted": play_emitted(blocks, path, machine, record_samples=_RECORD_SAMPLES, offset=offset),
     }
     traces = [_trace(label, run, machine) for label, run in runs.items()]
     part = _part(place.region.first_line, place.region.last_line, len(residuals), runs["original"], traces[0])

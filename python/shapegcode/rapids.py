@@ -20,13 +20,15 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.block_grid import Grid
 from shapegcode.budget import Budget, measure_load
-from shapegcode.emit import EmittedRegion, Grid, emit_region, motion_limits
+from shapegcode.emit import EmittedRegion, emit_region, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.rapid_candidates import NO_CUT, Gap, Rapid, find_gaps
 from shapegcode.rapid_plant import RapidPlant, Timing
-from shapegcode.verify import Placed, measure, read_back, summarise
+from shapegcode.verdict import measure, summarise
+from shapegcode.verify import Placed, read_back
 
 __all__ = ["ShapedRapids", "rapid_warnings", "shape_rapids"]
 

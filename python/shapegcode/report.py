@@ -12,6 +12,8 @@ The report itself is a plain dictionary, the JSON that ``--json`` writes. Its ke
     override_residual                         [{override, residual_um: {x, y, z}}]
     within_tolerance                          true or false
     frequency_residual                        [{shift, residual_um: {x, y, z}}]
+    cases                                     [{name, counts, within, residual_um: {x, y, z}, ...}]
+    worst_case                                the one of them that decides
     limits                                    {contour_um, ...}
     budget                                    {limits, before, after, block_period_s, given_up: [...]}
     regions                                   [{lines: [first, last], misses: [text]}], and more
@@ -204,11 +206,12 @@ def before_after_rows(report: Mapping[str, Any]) -> Iterator[Row]:
     section = True
     contour = report.get("contour_error_um") or {}
     for key, name in _CONTOURS.items():
-        for statistic, suffix in (("max", "largest"), ("rms", "RMS")):
+        for statistic, suffix in (("max", "largest"), ("rms", "RMS"), ("gouge", "gouge"), ("excess", "excess")):
             pair = _pair(contour.get(key), statistic)
             if pair is not None:
-                judged = (key, statistic) == ("command", "max")
-                limit = (report.get("limits") or {}).get("contour_um") if judged else None
+                limits = report.get("limits") or {}
+                judged = (key, statistic) == (limits.get("contour_target", "command"), "max")
+                limit = limits.get("contour_um") if judged else None
                 yield Row(f"{name}, {suffix}", "µm", *pair, section=section, limit=limit)
                 section = False
 
@@ -253,7 +256,9 @@ def _program_rows(report: Mapping[str, Any]) -> Iterator[Row]:
 
 
 def _robustness_rows(report: Mapping[str, Any]) -> Iterator[Row]:
-    """Residual vibration at other feed overrides and at other frequencies, one row per axis."""
+    """Residual vibration at other feed overrides and at other frequencies, one row per axis; the cases say more."""
+    if report.get("cases"):
+        return
     overrides = report.get("override_residual") or []
     shifts = report.get("frequency_residual") or []
     at = "/".join(f"{entry['override'] * 100:g}" for entry in overrides)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
+from shapegcode.moving_modes import NO_OFFSET, Offset, machine_warnings, region_offset, region_range_warnings
 from shapegcode.program import Program
 from shapegcode.verify import deviation_um, largest_um, other_time_s, play_emitted, play_original
 
@@ -30,6 +31,7 @@ class RegionRun:
         response_mm: the table at the same instants, (n, 3).
         path: the programmed path.
         figures: what the core measured.
+        offset: from the path's positions to the machine's, for modes that vary with them.
     """
 
     first_line: int
@@ -39,6 +41,7 @@ class RegionRun:
     response_mm: FloatArray
     path: _core.Path
     figures: _core.PlaybackFigures
+    offset: Offset = NO_OFFSET
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +63,7 @@ class Simulation:
 
     def play(self, run: RegionRun, *, record_samples: int) -> _core.PlaybackFigures:
         """Play a region again, with another number of recorded samples."""
-        return _play(run.path, self.machine, self.shaped, record_samples)
+        return _play(run.path, self.machine, self.shaped, record_samples, run.offset)
 
 
 def simulate(
@@ -89,7 +92,8 @@ def simulate(
     runs = []
     for done, region in enumerate(program.regions, start=1):
         path = region.path
-        figures = _play(path, machine, shaped, record_samples)
+        offset = region_offset(region, machine)
+        figures = _play(path, machine, shaped, record_samples, offset)
         runs.append(
             RegionRun(
                 region.first_line,
@@ -99,6 +103,7 @@ def simulate(
                 figures.recorded_response,
                 path,
                 figures,
+                offset,
             )
         )
         on_progress(done, len(program.regions))
@@ -124,12 +129,14 @@ def simulate(
             }
             for run in runs
         ],
-        "warnings": program.warnings,
+        "warnings": [*program.warnings, *machine_warnings(machine), *region_range_warnings(program.regions, machine)],
     }
     return Simulation(machine, shaped, tuple(runs), report)
 
 
-def _play(path: _core.Path, machine: Machine, shaped: bool, record_samples: int) -> _core.PlaybackFigures:
+def _play(
+    path: _core.Path, machine: Machine, shaped: bool, record_samples: int, offset: Offset
+) -> _core.PlaybackFigures:
     if not shaped:
-        return play_original(path, machine, record_samples=record_samples)
-    return play_emitted(path, path, machine, record_samples=record_samples)
+        return play_original(path, machine, record_samples=record_samples, offset=offset)
+    return play_emitted(path, path, machine, record_samples=record_samples, offset=offset)

@@ -6,11 +6,8 @@ Nothing here looks at what the converter meant to write; the figures are those o
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import Executor, Future
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,11 +16,10 @@ from shapegcode import _core
 from shapegcode.controller import controller_model
 from shapegcode.emit import motion_limits
 from shapegcode.machine import Machine
-from shapegcode.moving_modes import NO_OFFSET, Offset, mode_tables, region_offset, slowest_mode, still_mode
+from shapegcode.moving_modes import NO_OFFSET, Offset, mode_tables, slowest_mode, still_mode
 from shapegcode.program import Program, least_increment_mm
+from shapegcode.worst_case import Deviation
 
-OVERRIDES = (0.8, 0.9, 1.1, 1.2)
-_BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 _LARGEST_SWEEP_RAD = math.pi / 2
 _STATE_FIELDS = (
     "motion", "plane", "distance", "feed_mode", "units", "compensation", "length_offset",
@@ -31,7 +27,6 @@ _STATE_FIELDS = (
 )  # fmt: skip
 
 Vector = npt.NDArray[np.float64]
-Step = Callable[[int, int], None]
 
 
 class RoundTripError(_core.ShapegcodeError):
@@ -53,25 +48,6 @@ class Placed:
     last_line: int
 
 
-@dataclass(frozen=True)
-class RegionFigures:
-    """One region played: as programmed, and as emitted under both rules of block end.
-
-    Attributes:
-        original: the programmed path under the controller's own motion.
-        emitted: the emitted blocks, one entry per rule (ceil, carry).
-        overrides: residual of the emitted blocks per feed override, mm, (3,).
-        shifted: the same per shift of the modes (see `mode_shifts`).
-        slowed_blocks: emitted blocks that the controller's look-ahead limits would slow.
-    """
-
-    original: _core.PlaybackFigures
-    emitted: tuple[_core.PlaybackFigures, ...]
-    overrides: tuple[Vector, ...]
-    shifted: tuple[Vector, ...]
-    slowed_blocks: int
-
-
 def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
     """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty.
 
@@ -89,12 +65,6 @@ def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
         ]
         for axis in machine.axes.as_tuple()
     ]
-
-
-def mode_shifts(machine: Machine) -> tuple[float, ...]:
-    """-1 and +1 where a mode states an uncertainty of its frequency, else nothing."""
-    stated = any(mode.frequency_uncertainty_percent for axis in machine.axes.as_tuple() for mode in axis.modes)
-    return (-1.0, 1.0) if stated else ()
 
 
 def playback_options(
@@ -119,7 +89,8 @@ def playback_options(
     return options
 
 
-def _own_rule(machine: Machine) -> _core.BlockEnd:
+def own_rule(machine: Machine) -> _core.BlockEnd:
+    """The controller's own rule of block timing."""
     rule: _core.BlockEnd = getattr(_core.BlockEnd, machine.controller.block_end)
     return rule
 
@@ -145,18 +116,53 @@ def play_emitted(
     *,
     override: float = 1.0,
     contour: bool = True,
+    command_contour: bool = True,
     last_seconds: float = 0.0,
     shift: float = 0.0,
     record_samples: int = 0,
     offset: Offset = NO_OFFSET,
+    starved_blocks: Sequence[int] = (),
+    memory_s: float = 0.0,
 ) -> _core.PlaybackFigures:
-    """Emitted blocks as the controller plays them (None: by its own rule), measured against the programmed path."""
-    own = machine.controller.shaped_time_constant_s
+    """Emitted blocks as the controller plays them, measured against the programmed path.
+
+    Args:
+        blocks: what was emitted.
+        path: what was programmed.
+        machine: controller and modes.
+        block_end: rule of block timing; None: the controller's own.
+        override: feed override, 1 = 100 %.
+        contour: measure the deviations too.
+        command_contour: that of the command among them.
+        last_seconds: play no more than the end; 0: all.
+        shift: see `axis_modes`.
+        record_samples: samples kept for pictures.
+        offset: see `playback_options`.
+        starved_blocks: behind each of these, tried one by one, the buffer is empty for `verdict.starved_s`.
+        memory_s: how long after that its vibration is looked at; 0: to the end.
+    """
+    controller = machine.controller
+    own = controller.shaped_time_constant_s
     options = playback_options(machine, time_constant_s=own, shift=shift, offset=offset)
     options.measure_contour = contour
+    options.measure_command = command_contour
     options.last_seconds = last_seconds
     options.record_samples = record_samples
-    return _core.play_blocks(blocks, path, block_end or _own_rule(machine), override, options)
+    if starved_blocks:
+        options.starved_blocks = list(starved_blocks)
+        options.starved_s = machine.verdict.starved_s
+        options.starved_memory_s = memory_s + own if memory_s > 0.0 else 0.0
+    return _core.play_blocks(blocks, path, block_end or own_rule(machine), override, options)
+
+
+def play_planned(
+    blocks: _core.Path, path: _core.Path, machine: Machine, *, offset: Offset = NO_OFFSET
+) -> _core.PlaybackFigures:
+    """Emitted blocks as the controller's look-ahead plans them anew if it is left on, against the programmed path."""
+    options = playback_options(
+        machine, time_constant_s=machine.controller.look_ahead_filter_time_constant_s, offset=offset
+    )
+    return _core.play_path(blocks, _core.plan_speed(blocks, motion_limits(machine)), options, path)
 
 
 def read_back(text: bytes, placed: Sequence[Placed], machine: Machine) -> Program:
@@ -182,55 +188,7 @@ def read_back(text: bytes, placed: Sequence[Placed], machine: Machine) -> Progra
     return emitted
 
 
-def measure(
-    emitted: Program,
-    placed: Sequence[Placed],
-    originals: Sequence[Future[_core.PlaybackFigures]],
-    machine: Machine,
-    pool: Executor,
-    on_step: Step = lambda _done, _total: None,
-) -> list[RegionFigures]:
-    """Play every emitted region beside its original.
-
-    Args:
-        emitted: the program read back.
-        placed: the regions and their places in it.
-        originals: the originals' playbacks under way, one per region (`play_original`).
-        machine: controller model and plant.
-        pool: runs the playbacks.
-        on_step: called with regions done and regions in all.
-    """
-    limits = motion_limits(machine)
-    memory_s = _vibration_memory_s(machine)
-    running = []
-    for place in placed:
-        path = place.region.path
-        blocks = emitted.core.cutting_path(place.first_line, place.last_line)
-        play = partial(play_emitted, blocks, path, machine, offset=region_offset(place.region, machine))
-        runs = [pool.submit(play, rule) for rule in _BLOCK_ENDS]
-        residual = partial(play, contour=False, last_seconds=memory_s)
-        overrides = [pool.submit(residual, override=ratio) for ratio in OVERRIDES]
-        shifted = [pool.submit(residual, shift=shift) for shift in mode_shifts(machine)]
-        slowed = pool.submit(
-            _core.count_slowed_blocks, blocks, limits.corner_speed_difference_mm_per_s, limits.max_feed_mm_per_s
-        )
-        running.append((runs, overrides, shifted, slowed))
-    results: list[RegionFigures] = []
-    for original, (runs, overrides, shifted, slowed) in zip(originals, running, strict=True):
-        results.append(
-            RegionFigures(
-                original.result(),
-                tuple(run.result() for run in runs),
-                tuple(run.result().residual_mm for run in overrides),
-                tuple(run.result().residual_mm for run in shifted),
-                slowed.result(),
-            )
-        )
-        on_step(len(results), len(placed))
-    return results
-
-
-def _vibration_memory_s(machine: Machine) -> float:
+def vibration_memory_s(machine: Machine) -> float:
     """Time after which a vibration is a millionth of itself; 0 where a mode has no damping to speak of."""
     rates = [
         damping * 2.0 * math.pi * frequency
@@ -248,88 +206,6 @@ def other_time_s(program: _core.ProgramText, machine: Machine) -> float:
     Moves of which an axis' position is not known count with what is known of them.
     """
     return _core.time_program(program, controller_model(machine)).outside_regions_s
-
-
-def summarise(figures: Sequence[RegionFigures], placed: Sequence[Placed], machine: Machine) -> dict[str, Any]:
-    """The figures of all regions as the stable keys of the report; the emitted ones are the worse of both rules."""
-    emitted = [run for region in figures for run in region.emitted]
-    originals = [region.original for region in figures]
-    return {
-        "residual_vibration_um": {
-            "original": largest_um(run.residual_mm for run in originals),
-            "emitted": largest_um(run.residual_mm for run in emitted),
-        },
-        "peak_vibration_um": {
-            "original": largest_um(run.peak_mm for run in originals),
-            "emitted": largest_um(run.peak_mm for run in emitted),
-        },
-        "contour_error_um": {
-            "command": {
-                "original": deviation_um(run.command for run in originals),
-                "emitted": deviation_um(run.command for run in emitted),
-            },
-            "response": {
-                "original": deviation_um(run.response for run in originals),
-                "emitted": deviation_um(run.response for run in emitted),
-            },
-        },
-        "orbit_error_percent": [
-            max(pair)
-            for region in figures
-            for pair in zip(*(run.orbit_error_percent for run in region.emitted), strict=True)
-        ],
-        "override_residual": [
-            {"override": ratio, "residual_um": largest_um(region.overrides[k] for region in figures)}
-            for k, ratio in enumerate(OVERRIDES)
-        ],
-        "frequency_residual": [
-            {"shift": shift, "residual_um": largest_um(region.shifted[k] for region in figures)}
-            for k, shift in enumerate(mode_shifts(machine))
-        ],
-        "slowed_blocks": sum(region.slowed_blocks for region in figures),
-        "regions": [_region_summary(region, place, machine) for region, place in zip(figures, placed, strict=True)],
-    }
-
-
-def contour_target(machine: Machine) -> str:
-    """What the contour tolerance is about: "command" or "response"."""
-    return "response" if machine.shaping.contour == "response" else "command"
-
-
-def contour_um(runs: Iterable[_core.PlaybackFigures], machine: Machine) -> float:
-    """Largest deviation from the path of what the contour tolerance is about, µm."""
-    target = contour_target(machine)
-    return max(float(getattr(run, target).max_abs_mm) for run in runs) * 1e3
-
-
-def _region_summary(figures: RegionFigures, place: Placed, machine: Machine) -> dict[str, Any]:
-    tolerance = machine.tolerance
-    misses = []
-    increment_um = least_increment_mm(machine, place.region.exit.units) * 1e3
-    rounding_um = tolerance.residual_floor_increments * increment_um
-    before = figures.original.residual_mm * 1e3
-    after = np.max([run.residual_mm for run in figures.emitted], axis=0) * 1e3
-    limits = [max(tolerance.residual_ratio * was, tolerance.residual_floor_um, rounding_um) for was in before]
-    for axis, now, limit in zip("XYZ", after, limits, strict=True):
-        if now > limit:
-            misses.append(f"residual vibration {axis} {now:.2f} um, limit {limit:.2f} um")
-    contour = contour_um(figures.emitted, machine)
-    if contour > tolerance.contour_um:
-        misses.append(
-            f"contour error of the {contour_target(machine)} {contour:.1f} um, limit {tolerance.contour_um:.1f} um"
-        )
-    return {
-        "lines": [place.region.first_line, place.region.last_line],
-        "emitted_lines": [place.first_line, place.last_line],
-        "time_s": {
-            "original": figures.original.duration_s,
-            "emitted": max(run.duration_s for run in figures.emitted),
-        },
-        "residual_vibration_um": {"original": _xyz(before), "emitted": _xyz(after)},
-        "residual_limit_um": _xyz(limits),
-        "contour_error_um": contour,
-        "misses": misses,
-    }
 
 
 def _compare_states(
@@ -367,24 +243,32 @@ def _end_tolerance_mm(machine: Machine, units: int) -> float:
     return 0.5 * least_increment_mm(machine, units) + 1e-9
 
 
-def _xyz(values: Iterable[float]) -> dict[str, float]:
+def xyz(values: Iterable[float]) -> dict[str, float]:
+    """One value per axis under its letter."""
     return {axis: float(value) for axis, value in zip("xyz", values, strict=True)}
 
 
 def largest_um(vectors: Iterable[Vector]) -> dict[str, float]:
     """Largest of each axis, mm to µm."""
     rows = list(vectors)
-    return _xyz(np.max(rows, axis=0) * 1e3 if rows else np.zeros(3))
+    return xyz(np.max(rows, axis=0) * 1e3 if rows else np.zeros(3))
 
 
-def deviation_um(stats: Iterable[_core.DeviationStats]) -> dict[str, float]:
-    """Largest magnitude, RMS over all samples and largest on either side of the path, µm."""
+def deviation_um(stats: Iterable[_core.DeviationStats], material_side: str | None = None) -> dict[str, float]:
+    """Largest magnitude, RMS over all samples and largest on either side of the path, µm.
+
+    Args:
+        stats: of one or several runs.
+        material_side: "left" or "right" of the travel, where the workpiece is: adds `gouge` and `excess`.
+    """
     rows = list(stats)
     count = sum(row.count for row in rows)
     squares = sum(row.sum_of_squares_mm2 for row in rows)
-    return {
-        "max": max((row.max_abs_mm for row in rows), default=0.0) * 1e3,
+    largest = Deviation.of(rows) if rows else Deviation(0.0, 0.0, 0.0)
+    found = {
+        "max": largest.largest_mm * 1e3,
         "rms": math.sqrt(squares / count) * 1e3 if count else 0.0,
-        "left": max((row.most_positive_mm for row in rows), default=0.0) * 1e3,
-        "right": -min((row.most_negative_mm for row in rows), default=0.0) * 1e3,
+        "left": largest.left_mm * 1e3,
+        "right": largest.right_mm * 1e3,
     }
+    return found if material_side is None else found | largest.gouge_and_excess_um(material_side)

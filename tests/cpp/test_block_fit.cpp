@@ -270,6 +270,28 @@ TEST_CASE("block fit: pieces below the chord limit are lines, straight ones too"
   for (const FittedBlock& block : fit(straight)) CHECK(block.kind == BlockKind::line);
 }
 
+TEST_CASE("block fit: R has no more digits than a word can have") {
+  // In steps of 0.1 um a radius of 10 m has nine digits.
+  for (const double radius : {8000.0, 12000.0, 60000.0}) {
+    const Command flat = sampled(
+        60,
+        [&](double k) {
+          return on_circle({0, 0, 0}, radius, 50.0 * k / radius, 2, 0.0);
+        },
+        2);
+    for (const double increment : {0.001, 0.0001}) {
+      FitOptions options;
+      options.increment_mm = increment;
+      int arcs = 0;
+      for (const FittedBlock& block : fit(flat, options)) {
+        CHECK(block.radius <= 99999999);
+        arcs += block.kind == BlockKind::line ? 0 : 1;
+      }
+      CHECK((arcs > 0) == (radius / increment < 1e8));
+    }
+  }
+}
+
 TEST_CASE("block fit: no piece sweeps more than asked for") {
   // A quarter turn per period cannot be one arc of 80 degrees.
   for (const double turn : {0.3, 1.0, 1.39, 1.5}) {

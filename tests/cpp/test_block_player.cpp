@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "shapegcode/error.hpp"
@@ -171,4 +172,57 @@ TEST_CASE("block player: refuses a period, an override or a feed that is not pos
     const auto without_feed = row_of_lines({1.0, 1.0}, {10.0, bad});
     CHECK_THROWS_AS(BlockPlayer(without_feed, 1e-3, BlockEnd::ceil), Error);
   }
+}
+
+TEST_CASE("block player: a pause holds the end of its block, and the next one starts when it is over") {
+  // Period 1 ms: 0.25 mm at 100 mm/s (2.5 ms), then 0.2 mm at 50 mm/s (4 ms).
+  const auto blocks = row_of_lines({0.25, 0.2}, {100.0, 50.0});
+  const auto paused = [&](BlockEnd end, double seconds, std::size_t steps_before) {
+    BlockPlayer player(blocks, 1e-3, end);
+    std::vector<double> x;
+    std::vector<std::size_t> pausing;
+    Vector3 position;
+    for (std::size_t i = 0; i < steps_before; ++i) {
+      REQUIRE(player.step(position));
+      x.push_back(position.x());
+    }
+    player.pause_after(0, seconds);
+    while (player.step(position)) {
+      if (player.pausing()) pausing.push_back(x.size());
+      x.push_back(position.x());
+    }
+    return std::pair(x, pausing);
+  };
+  // ceil: the block ends at 3 ms, 1.5 ms are two periods, the next one starts at 5 ms.
+  for (const std::size_t before : {0U, 1U, 2U}) {
+    const auto [x, pausing] = paused(BlockEnd::ceil, 0.0015, before);
+    check_set_points(x, {0.0, 0.1, 0.2, 0.25, 0.25, 0.25, 0.3, 0.35, 0.4, 0.45});
+    CHECK(pausing == std::vector<std::size_t>{3, 4});
+  }
+  // carry: it ends at 2.5 ms, the next one starts at 4.8 ms.
+  const auto [x, pausing] = paused(BlockEnd::carry, 0.0023, 1);
+  check_set_points(x, {0.0, 0.1, 0.2, 0.25, 0.25, 0.26, 0.31, 0.36, 0.41, 0.45});
+  CHECK(pausing == std::vector<std::size_t>{3, 4});
+  // No time is no pause.
+  const auto [same, none] = paused(BlockEnd::carry, 0.0, 1);
+  check_set_points(same, played(blocks, 1e-3, BlockEnd::carry));
+  CHECK(none.empty());
+}
+
+TEST_CASE("block player: a pause behind a later block, and pauses that cannot be") {
+  const auto blocks = row_of_lines({0.1, 0.1, 0.1}, {100.0, 100.0, 100.0});
+  BlockPlayer player(blocks, 1e-3, BlockEnd::ceil);
+  player.pause_after(0, 0.003);
+  player.pause_after(1, 0.002);  // takes its place
+  std::vector<double> x;
+  Vector3 position;
+  while (player.step(position)) x.push_back(position.x());
+  check_set_points(x, {0.0, 0.1, 0.2, 0.2, 0.2, 0.3});
+
+  BlockPlayer other(blocks, 1e-3, BlockEnd::ceil);
+  CHECK_THROWS_AS(other.pause_after(3, 0.001), Error);
+  CHECK_THROWS_AS(other.pause_after(0, -0.001), Error);
+  CHECK_THROWS_AS(other.pause_after(0, std::numeric_limits<double>::infinity()), Error);
+  while (other.block() == 0) REQUIRE(other.step(position));
+  CHECK_THROWS_AS(other.pause_after(0, 0.001), Error);
 }

@@ -6,14 +6,18 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <span>
 #include <vector>
 
+#include "shapegcode/error.hpp"
 #include "shapegcode/motion/interpolator.hpp"
 #include "shapegcode/motion/look_ahead.hpp"
 #include "shapegcode/simulation/playback.hpp"
 
 using shapegcode::BlockEnd;
 using shapegcode::count_slowed_blocks;
+using shapegcode::Error;
+using shapegcode::fastest_block_ends;
 using shapegcode::Fir;
 using shapegcode::LookAheadLimits;
 using shapegcode::make_arc;
@@ -372,4 +376,149 @@ TEST_CASE("playback: blocks that a look-ahead would slow down, counted by hand")
   CHECK(count_slowed_blocks(row_of_lines({1, 1}, {100, 101}), limits) == 1);
   const std::vector<Segment> plunge{make_line({0, 0, 0}, {0, 0, -1}, 51)};
   CHECK(count_slowed_blocks(plunge, limits) == 1);
+}
+
+TEST_CASE("playback: a buffer that runs empty stops the axis dead, and the table swings as the closed form says") {
+  // 60 mm/s for 6 s, older vibration is gone; a stop from v rings as an impulse: peak (v/omega)*exp(-zeta*phi/root).
+  const auto blocks = row_of_lines(std::vector<double>(1200, 0.3), std::vector<double>(1200, 60.0));
+  const Path path(blocks);
+  PlaybackOptions options = vertical_machine(1e-3);
+  const PlaybackFigures alone = play_blocks(blocks, path, BlockEnd::ceil, 1.0, options);
+  options.starved_blocks = {700, 800};
+  options.starved_s = 0.030;
+  const double omega = 2.0 * pi * 46.0;
+  const double zeta = 0.02;
+  const double root = std::sqrt(1.0 - zeta * zeta);
+  const double swing = 60.0 / omega * std::exp(-zeta / root * std::atan2(root, zeta));
+  for (const double memory : {0.0, 1.5}) {
+    options.starved_memory_s = memory;
+    for (const BlockEnd end : {BlockEnd::ceil, BlockEnd::carry}) {
+      const PlaybackFigures figures = play_blocks(blocks, path, end, 1.0, options);
+      REQUIRE(figures.starved.size() == 2);
+      CHECK(figures.starved[0].block == 700);
+      CHECK(figures.starved[1].block == 800);
+      for (const auto& starved : figures.starved) {
+        CHECK(starved.residual_mm.x() == doctest::Approx(swing).epsilon(2e-3));
+        CHECK(starved.residual_mm.y() == 0.0);
+        CHECK(starved.command.max_abs_mm < 1e-9);  // along the path
+      }
+      // The run itself knows nothing of it.
+      CHECK(figures.duration_s == doctest::Approx(alone.duration_s));
+      CHECK((figures.residual_mm - alone.residual_mm).norm() < 1e-12);
+      CHECK((figures.peak_mm - alone.peak_mm).norm() < 1e-12);
+    }
+  }
+}
+
+TEST_CASE("playback: a wait against the same set-points written down by hand") {
+  // A slanting run behind a moving average: X and Y swing at their own frequencies, so the table leaves the line.
+  const Vector3 direction(0.8, 0.6, 0.0);
+  std::vector<Segment> blocks;
+  for (int i = 0; i < 200; ++i) blocks.push_back(make_line(0.3 * i * direction, 0.3 * (i + 1) * direction, 60.0));
+  const Path path(blocks);
+  for (const int taps : {1, 8, 25}) {
+    PlaybackOptions options = vertical_machine(1e-3);
+    if (taps > 1) options.axis_filters = {Fir::moving_average(taps)};
+    options.starved_blocks = {119};
+    options.starved_s = 0.020;
+    const PlaybackFigures figures = play_blocks(blocks, path, BlockEnd::ceil, 1.0, options);
+    REQUIRE(figures.starved.size() == 1);
+
+    // 5 periods each: 120 blocks, 20 ms of rest, 80 blocks.
+    constexpr Eigen::Index stop = 600;
+    Samples samples{1e-3, Eigen::MatrixXd(1021, 3)};
+    for (Eigen::Index i = 0; i <= 1020; ++i)
+      samples.positions_mm.row(i) = 0.06 * static_cast<double>(i <= stop ? i : std::max(stop, i - 20)) * direction;
+    options.starved_blocks.clear();
+    options.record_samples = 10000;
+    const PlaybackFigures by_hand = play_samples(samples, path, options);
+    CAPTURE(taps);
+    const auto& starved = figures.starved[0];
+    CHECK(starved.response.max_abs_mm == doctest::Approx(by_hand.response.max_abs_mm).epsilon(1e-9));
+    CHECK(starved.response.most_negative_mm == doctest::Approx(by_hand.response.most_negative_mm).epsilon(1e-9));
+    CHECK(starved.response.count == by_hand.response.count);
+    const Eigen::MatrixXd swing =
+        (by_hand.recorded_response.positions_mm - by_hand.recorded_command.positions_mm).cwiseAbs();
+    for (const Eigen::Index axis : {0, 1}) {
+      double expected = by_hand.residual_mm[axis];
+      // At rest from the stop plus the filter's length to the restart, if that long.
+      for (Eigen::Index i = stop + taps - 1; i <= stop + 20; ++i) expected = std::max(expected, swing(i, axis));
+      CAPTURE(axis);
+      CHECK(starved.residual_mm[axis] >= expected * (1.0 - 1e-9));
+      CHECK(starved.residual_mm[axis] <= expected * 1.08 + 1e-6);  // between the set-points it may be a little more
+    }
+  }
+}
+
+TEST_CASE("playback: a corner behind what was looked at is no corner missed") {
+  // Half a second behind the wait is looked at; the corner lies 0.4 mm further on.
+  const std::vector<Segment> legs{make_line({0, 0, 0}, {30, 0, 0}, 60), make_line({30, 0, 0}, {30.9, 0, 0}, 1),
+                                  make_line({30.9, 0, 0}, {30.9, 20, 0}, 60)};
+  PlaybackOptions options = vertical_machine(1e-3);
+  options.starved_blocks = {0};
+  options.starved_s = 0.01;
+  options.starved_memory_s = 0.5;
+  const PlaybackFigures figures = play_blocks(legs, Path(legs), BlockEnd::ceil, 1.0, options);
+  REQUIRE(figures.starved.size() == 1);
+  CHECK(figures.starved[0].command.max_abs_mm < 1e-9);
+}
+
+TEST_CASE("playback: starved blocks that cannot be are refused") {
+  const auto blocks = row_of_lines({1.0, 1.0}, {10.0, 10.0});
+  const Path path(blocks);
+  PlaybackOptions options;
+  options.starved_s = 0.01;
+  options.starved_blocks = {2};
+  CHECK_THROWS_AS(play_blocks(blocks, path, BlockEnd::ceil, 1.0, options), Error);
+  options.starved_blocks = {1, 0};
+  CHECK_THROWS_AS(play_blocks(blocks, path, BlockEnd::ceil, 1.0, options), Error);
+  options.starved_blocks = {0};
+  options.starved_s = -1.0;
+  CHECK_THROWS_AS(play_blocks(blocks, path, BlockEnd::ceil, 1.0, options), Error);
+  options.starved_s = 0.01;
+  options.last_seconds = 1.0;
+  CHECK_THROWS_AS(play_blocks(blocks, path, BlockEnd::ceil, 1.0, options), Error);
+}
+
+TEST_CASE("playback: the places at which a stop excites most, by hand") {
+  // Speeds at the ends: X 10, X 30, (18, 24), the last one ends in a stop.
+  const std::vector<Segment> blocks{make_line({0, 0, 0}, {1, 0, 0}, 10), make_line({1, 0, 0}, {2, 0, 0}, 30),
+                                    make_line({2, 0, 0}, {2, 0, 0}, 99), make_line({2, 0, 0}, {5, 4, 0}, 30),
+                                    make_line({5, 4, 0}, {9, 4, 9}, 50), make_line({9, 4, 9}, {9, 4, 9}, 10)};
+  CHECK(fastest_block_ends(blocks) == std::vector<std::size_t>{1, 3});
+  CHECK(fastest_block_ends(std::span(blocks).first(1)).empty());
+  CHECK(fastest_block_ends({}).empty());
+  // A quarter turn from X to Y: at its end only Y moves.
+  const std::vector<Segment> turn{make_arc({10, 0, 0}, {0, 10, 0}, {0, 0, 0}, pi / 2, 2, 20.0),
+                                  make_line({0, 10, 0}, {-5, 10, 0}, 5.0), make_line({-5, 10, 0}, {-6, 10, 0}, 5.0)};
+  CHECK(fastest_block_ends(turn).size() <= 2);
+  CHECK(fastest_block_ends(turn).front() == 0);
+}
+
+TEST_CASE("playback: a planned path measured against the one it was made from") {
+  // The path that is run lies 4 um to the left of the programmed one.
+  const auto run =
+      path_of({make_line({0, 0.004, 0}, {20, 0.004, 0}, 50.0), make_line({20, 0.004, 0}, {40, 0.004, 0}, 80.0)});
+  const auto programmed = path_of({make_line({0, 0, 0}, {40, 0, 0}, 50.0)});
+  const PlaybackFigures figures = play_path(run, plan(run, 1.0), *programmed, vertical_machine(1e-3));
+  CHECK(figures.command.most_positive_mm == doctest::Approx(0.004));
+  CHECK(figures.command.most_negative_mm == 0.0);
+  const PlaybackFigures own = play_path(run, plan(run, 1.0), vertical_machine(1e-3));
+  CHECK(own.command.max_abs_mm == 0.0);
+  CHECK(figures.duration_s == own.duration_s);
+  CHECK(figures.residual_mm == own.residual_mm);
+}
+
+TEST_CASE("playback: the response alone is measured as it is beside the command") {
+  const auto path = paper_path(100.0);
+  PlaybackOptions options = vertical_machine(1e-3);
+  const PlaybackFigures both = play_blocks(path->segments(), *path, BlockEnd::ceil, 1.0, options);
+  options.measure_command = false;
+  const PlaybackFigures alone = play_blocks(path->segments(), *path, BlockEnd::ceil, 1.0, options);
+  CHECK(both.orbit_error_percent.size() == 1);
+  CHECK(alone.orbit_error_percent.empty());
+  CHECK(alone.command.max_abs_mm == 0.0);
+  CHECK(alone.response.max_abs_mm == both.response.max_abs_mm);
+  CHECK(alone.response.sum_of_squares_mm2 == both.response.sum_of_squares_mm2);
+  CHECK(alone.residual_mm == both.residual_mm);
 }

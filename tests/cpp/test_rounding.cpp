@@ -421,6 +421,28 @@ TEST_CASE("rounding: a slow axis alone makes no empty block and does not turn ba
   }
 }
 
+TEST_CASE("rounding: blocks of minutes are nothing special") {
+  const Command command = sampled(60000, [](double k) { return Vector3(0.00000833 * k, 0.0, 0.0); });
+  for (const int normal : {-1, 2}) {
+    Command with_plane = command;
+    with_plane.normals.assign(with_plane.normals.size(), static_cast<std::int8_t>(normal));
+    const FitOptions options = with_modes(0.0001);
+    const Findings found = judge(with_plane, fit(with_plane, options), options);
+    CHECK(found.empty + found.wrong_ticks + found.late + found.reversals == 0);
+    // The judge takes the last block's periods for its command's, but some of its time was lent.
+    FitOptions plain = options;
+    plain.modes = {};
+    CHECK(found.end_error <= std::max(1.0, judge(with_plane, fit(with_plane, plain), plain).end_error));
+  }
+  ModalRounder rounder(two_modes, 0.005, 5);
+  Problem problem = random_problem(20, 1, rounder);
+  for (RoundingNode& node : problem.nodes) node.periods = 60000;
+  const State late{{0.5, 0.1}, {-0.1, 0.3}};
+  std::vector<std::int8_t> shift(20);
+  rounder.choose(problem.nodes, problem.excitation, {true, late, 0, {}}, shift);
+  for (std::size_t n = 0; n < shift.size(); ++n) CHECK(std::abs(problem.nodes[n].error + shift[n]) < 1.0);
+}
+
 TEST_CASE("rounding: at a rest on the way the blocks are on the nearest increment, and a resting axis stays") {
   // There and, after a pause, on; Y rests off an increment all the time.
   const auto at = [](double k) {

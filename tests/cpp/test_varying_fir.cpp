@@ -82,6 +82,20 @@ TEST_CASE("varying fir: each increment carries its own train (against the double
   }
   CHECK(worst < 1e-12);
   CHECK(out.positions_mm.row(out.positions_mm.rows() - 1) == in.positions_mm.row(199));
+
+  // One output at a time, out of a kept input.
+  std::vector<double> kept(12, in.positions_mm(0, 1));
+  std::vector<double> kept_place(12, std::numeric_limits<double>::quiet_NaN());
+  for (Index row = 0; row < out.positions_mm.rows(); ++row) {
+    kept.push_back(in.positions_mm(std::min<Index>(row, 199), 1));
+    kept_place.push_back(place[static_cast<std::size_t>(std::min<Index>(row, 199))]);
+  }
+  worst = 0.0;
+  for (Index row = 0; row < out.positions_mm.rows(); ++row) {
+    const auto at = static_cast<std::size_t>(row) + 12;
+    worst = std::max(worst, std::abs(varying.value(&kept[at], &kept_place[at]) - out.positions_mm(row, 1)));
+  }
+  CHECK(worst < 1e-12);
 }
 
 TEST_CASE("varying fir: stream and batch agree to the last bit, no drift over a million samples") {

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from shapegcode._core import (
     Mode,
     Shaper,
     extra_insensitive,
+    insensitivity,
     minimal_two_mode,
     mzv_second_zero,
     worst_residual,
@@ -105,7 +108,7 @@ def test_one_mode_on_any_times(name: str, zeta: float) -> None:
             assert np.abs(steps - np.round(steps)).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", [*EXACT, *TOLERANT])
+@pytest.mark.parametrize("name", ["zvd", "mzv", "ei", "negative-zv", "si"])
 def test_two_modes_on_any_times(name: str) -> None:
     for period_s in (None, 0.005):
         found = design(name, [SLOW, FAST], options(period_s))[0]
@@ -317,6 +320,8 @@ def test_a_grid_that_sees_no_vibration_is_refused_with_what_is_nearest() -> None
         design("zvd", [SLOW], options(max_duration_s=0.02))
     with pytest.raises(DesignError, match=r"negative-zv lasts .* with sum\|a\| 27: the limits are 250 ms and 10"):
         design("negative-zv", [SLOW, FAST, ModeBand(Mode(75.0, 0.02))])
+    with pytest.raises(DesignError, match=r"within 10 ms; one ZV after the other lasts 14\.689\d ms"):
+        simultaneous_zv([SLOW.mode, FAST.mode], 0.01)
     with pytest.raises(DesignError, match="the polynomial with its zeros lasts 4 ms with sum"):
         conditions = Conditions(zeros=(Zero(SLOW.mode),), limits=(ResidualLimit(SLOW.mode, 1.0, 46.0, 0.05),))
         shortest_on_grid(conditions, 0.002, 0.02, title="design that nothing meets")
@@ -380,7 +385,7 @@ def test_random_modes_on_random_grids() -> None:
     rng = np.random.default_rng(5)
     names = itertools.cycle(("zv", "zvd", "mzv", "ei", "negative-zv", "si"))
     designed = 0
-    for name, _ in zip(names, range(24), strict=False):
+    for name, _ in zip(names, range(18), strict=False):
         band = ModeBand(Mode(float(rng.uniform(15.0, 150.0)), float(rng.uniform(0.0, 0.08))), 0.05)
         try:
             found = design(name, [band], options(float(rng.choice(PERIODS_S))))[0]
@@ -391,4 +396,46 @@ def test_random_modes_on_random_grids() -> None:
         left = left_of(found.shaper, band.mode.frequency_hz, band.mode.damping_ratio)
         assert left <= (0.05 * (1.0 + 1e-9) if name in TOLERANT else 1e-10)
         assert found.worst_residual >= sampled_worst(found.shaper, band) * (1.0 - 2e-6) - 1e-11
-    assert designed > 20
+    assert designed > 15
+
+
+# --- figures of the documentation and of the specification ----------------------------------------------------
+
+
+def documented(columns: int) -> list[list[str]]:
+    """The rows of the section's table with that many columns: the family, then the others."""
+    text = (Path(__file__).resolve().parents[2] / "docs" / "shapers.md").read_text(encoding="utf-8")
+    section = text.split("## Families")[1].split("\n## ")[0]
+    rows = [
+        [cell.strip(" `") for cell in line.strip("|").split("|")] for line in re.findall(r"^\| `.*$", section, re.M)
+    ]
+    return [row for row in rows if len(row) == columns]
+
+
+def test_the_table_of_one_mode() -> None:
+    rows = documented(6)
+    assert len(rows) == 8
+    mode = Mode(46.0, 0.0)
+    for name, periods, taps, insensitive, abs_sum, _ in rows:
+        shaper = design(name, [ModeBand(mode)])[0].shaper
+        assert shaper.duration_s * 46.0 == pytest.approx(float(periods), abs=5e-4)
+        assert len(shaper.times_s) == int(taps)
+        assert insensitivity(shaper, mode, 0.05) == pytest.approx(float(insensitive), abs=5.1e-4)
+        assert shaper.abs_sum == pytest.approx(float(abs_sum))
+
+
+def test_the_table_of_two_modes() -> None:
+    rows = documented(5)
+    assert len(rows) == 6
+    for name, continuous, fine, coarse, worst in rows:
+        for period_s, lasts in ((None, continuous), (0.001, fine), (0.005, coarse)):
+            found = design(name, [SLOW, FAST], options(period_s))[0]
+            assert found.duration_s * 1e3 == pytest.approx(float(lasts), abs=0.051)
+        assert found.worst_residual * 100.0 == pytest.approx(float(worst), abs=0.051)
+
+
+def test_convolved_zv_at_a_ratio_of_two() -> None:
+    """The specification: 6.8 % at zeta .03 and a frequency error of 5 %, 7.75 % undamped."""
+    for zeta, expected in ((0.03, 0.068), (0.0, 0.0775)):
+        bands = [ModeBand(Mode(f, zeta), 0.05) for f in (50.0, 100.0)]
+        assert design("zv", bands)[0].worst_residual == pytest.approx(expected, abs=5e-4)

@@ -6,7 +6,7 @@
 namespace shapegcode {
 namespace {
 
-constexpr double largest_radius_mm = 99999.999;
+constexpr double largest_radius_increments = 99999999.0;  // a word has eight digits
 // Ticks by which a block ends before its last tick: far over the rounding of any controller, far under what matters.
 constexpr double tick_margin = 1e-4;
 
@@ -95,7 +95,7 @@ std::optional<ChordArc> BlockShape::chord_arc(const BlockPosition& from, const B
   }
   const double radius = (0.25 * arc.chord * arc.chord + height * height) / (2.0 * std::abs(height));
   arc.radius = std::round(radius / options_.increment_mm) * options_.increment_mm;
-  if (arc.radius > largest_radius_mm || 0.5 * arc.chord >= arc.radius) {
+  if (radius / options_.increment_mm > largest_radius_increments || 0.5 * arc.chord >= arc.radius) {
     return std::nullopt;
   }
   arc.sweep = 2.0 * std::asin(0.5 * arc.chord / arc.radius);

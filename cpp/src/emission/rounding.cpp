@@ -17,6 +17,7 @@ constexpr std::size_t width_before_rest = 128;
 constexpr std::size_t free_nodes_before_rest = 8;
 // How much what is left now counts against one period of what was left on the way.
 constexpr double weight_now = 4.0;
+constexpr double most_decay = 2.0;  // natural logarithm
 // So few choices are ranked by comparing each with each.
 constexpr std::size_t small_field = 2 * width_on_the_way;
 constexpr double never = std::numeric_limits<double>::infinity();
@@ -47,6 +48,7 @@ ModalRounder::ModalRounder(std::span<const Mode> modes, double block_period_s, i
       before = height;
     }
     step.bulge_gain *= step.scale * ticks_per_period;
+    decay_ = std::max(decay_, -step.pole_period.real());
     modes_.push_back(step);
   }
   state_.resize(modes_.size());
@@ -190,9 +192,9 @@ void ModalRounder::keep_best(std::size_t width) {
 }
 
 // Gives every choice so far the state that becomes an excitation some periods later.
-void ModalRounder::add_late(std::span<const std::complex<double>> excitation, std::uint32_t periods) {
+void ModalRounder::add_late(std::span<const std::complex<double>> excitation, double periods) {
   for (std::size_t m = 0; m < modes_.size(); ++m) {
-    const std::complex<double> now = excitation[m] * std::exp(-modes_[m].pole_period * static_cast<double>(periods));
+    const std::complex<double> now = excitation[m] * std::exp(-modes_[m].pole_period * periods);
     for (std::size_t i = 0; i < kept_.count; ++i) {
       kept_.real[m * room + i] += now.real();
       kept_.imag[m * room + i] += now.imag();
@@ -240,19 +242,21 @@ void ModalRounder::choose(std::span<const RoundingNode> nodes, std::span<const s
   }
   trace_.clear();
   trace_begin_.clear();
-  std::uint32_t late_periods = 0;
-  for (std::size_t n = last_ones; n < nodes.size(); ++n) {
-    late_periods += nodes[n].periods;
+  // What comes late is met from the last free nodes on, but not so early that most of it would have decayed again.
+  std::size_t late = nodes.size();
+  double late_periods = 0.0;
+  while (late > last_ones && decay_ * (late_periods + nodes[late - 1].periods) < most_decay) {
+    late_periods += nodes[--late].periods;
   }
   for (std::size_t n = 0; n < nodes.size(); ++n) {
-    if (n == last_ones && !end.late_excitation.empty()) {
+    if (n == late && !end.late_excitation.empty()) {
       add_late(end.late_excitation, late_periods);
     }
     expand(nodes[n], &excitation[n * modes_.size()]);
     keep_best(n < last_ones ? width_on_the_way : width_before_rest);
   }
-  if (last_ones == nodes.size() && !end.late_excitation.empty()) {
-    add_late(end.late_excitation, 0);
+  if (late == nodes.size() && !end.late_excitation.empty()) {
+    add_late(end.late_excitation, 0.0);
   }
   std::size_t choice = best_end(end);
   for (std::size_t m = 0; m < modes_.size(); ++m) {

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 #include <utility>
 
-#include "shapegcode/error.hpp"
 #include "shapegcode/motion/limits.hpp"
 
 namespace shapegcode {
@@ -29,14 +27,6 @@ Fir on_half_grid(const Fir& shaper) {
   return Fir(std::move(delays), shaper.taps());
 }
 
-RunFilter::Node node_of(Fir half_shaper, const AxisModes& modes, double half_period_s, ContourTarget target) {
-  RunFilter::Node node{std::move(half_shaper), {}};
-  for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    node.kernels[axis] = contour_kernel(node.half_shaper, modes[axis], half_period_s, target);
-  }
-  return node;
-}
-
 double smooth_step(double x) noexcept { return x * x * (3.0 - 2.0 * x); }
 
 bool is_corner(const Path& path, std::size_t before, std::size_t after) noexcept {
@@ -51,37 +41,28 @@ bool is_corner(const Path& path, std::size_t before, std::size_t after) noexcept
 }  // namespace
 
 RunFilter::RunFilter(const Fir& shaper, ContourTarget contour_target, const AxisModes& modes, double block_period_s,
-                     double weight)
-    : target(contour_target),
-      half_period_s(0.5 * block_period_s),
-      mean_delay_s(shaper.mean_samples() * block_period_s),
-      smoothness(weight) {
-  nodes.push_back(node_of(on_half_grid(shaper), modes, half_period_s, target));
-}
-
-RunFilter::RunFilter(const FollowingFir& shapers, ContourTarget contour_target, std::span<const AxisModes> modes,
-                     double block_period_s, double weight)
-    : following(shapers.on_finer_grid(2)),
+                     double weight, const std::optional<FollowingFir>& followed, const AxisModeTables& tables)
+    : half_shaper(on_half_grid(shaper)),
       target(contour_target),
       half_period_s(0.5 * block_period_s),
-      mean_delay_s(shapers.fir().mean_samples() * block_period_s),
+      mean_delay_s((followed ? followed->fir().mean_samples() : shaper.mean_samples()) * block_period_s),
       smoothness(weight) {
-  const std::vector<Fir>& set = following->fir().set();
-  if (modes.size() != set.size()) {
-    throw Error(ErrorKind::argument, "modes at " + std::to_string(modes.size()) + " positions for " +
-                                         std::to_string(set.size()) + " shapers");
+  if (followed) following = followed->on_finer_grid(2);
+  const std::size_t nodes = following ? following->position_mm().size() : 1;
+  for (std::size_t node = 0; node < nodes; ++node) {
+    std::array<std::vector<double>, axis_count>& kernel = kernels.emplace_back();
+    for (std::size_t axis = 0; axis < axis_count; ++axis) {
+      std::vector<Mode> here = modes[axis];
+      for (std::size_t m = 0; following && m < std::min(here.size(), tables[axis].size()); ++m) {
+        const ModeTable& table = tables[axis][m];
+        if (!table.empty() && table.axis == following->axis()) {
+          here[m] = mode_at(here[m], table, following->position_mm()[node]);
+        }
+      }
+      kernel[axis] =
+          contour_kernel(following ? following->fir().set()[node] : half_shaper, here, half_period_s, target);
+    }
   }
-  for (std::size_t k = 0; k < set.size(); ++k) {
-    nodes.push_back(node_of(set[k], modes[k], half_period_s, target));
-  }
-}
-
-std::size_t RunFilter::periods() const noexcept {
-  int longest = 0;
-  for (const Node& node : nodes) {
-    longest = std::max(longest, node.half_shaper.duration_samples());
-  }
-  return static_cast<std::size_t>(longest) / 2;
 }
 
 RunShaper::RunShaper(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
@@ -96,20 +77,17 @@ RunShaper::RunShaper(std::shared_ptr<const Path> path, std::shared_ptr<const Spe
   const std::size_t steps_per_period = 2 * steps_per_half_;
   const std::size_t periods_in = (ahead_.sample_count() - 1 + steps_per_period - 1) / steps_per_period;
   rows_in_ = 2 * periods_in + 1;
-  periods_ = static_cast<std::uint32_t>(periods_in + filter_.periods());
-  reach_ = 2 * filter_.periods();
+  const auto shaper_rows = static_cast<std::size_t>(filter_.shaper_rows());
+  periods_ = static_cast<std::uint32_t>(periods_in + shaper_rows / 2);
+  reach_ = shaper_rows;
   if (filter_.target != ContourTarget::none) {
     target_ = std::make_unique<Interpolator>(path_, std::move(profile), ahead_.period_s(), filter_.mean_delay_s);
-    for (const RunFilter::Node& node : filter_.nodes) {
-      for (const std::vector<double>& kernel : node.kernels) {
-        solvers_.emplace_back(kernel, filter_.smoothness);
-        reach_ = std::max(reach_, kernel.size() - 1);
-      }
+    for (const auto& kernel : filter_.kernels) {
+      solvers_.push_back({ContourSolver(kernel[0], filter_.smoothness), ContourSolver(kernel[1], filter_.smoothness),
+                          ContourSolver(kernel[2], filter_.smoothness)});
+      for (const std::vector<double>& of_axis : kernel) reach_ = std::max(reach_, of_axis.size() - 1);
     }
     margin_ = std::max<std::size_t>(reach_, 8);
-  }
-  if (filter_.following) {
-    stream_.emplace(filter_.following->fir(), axis_count);
   }
   rows_error_ = rows_in_ + reach_;
   history_ = static_cast<std::ptrdiff_t>(2 * reach_ + 8);
@@ -130,6 +108,12 @@ void RunShaper::read_row() {
     }
     command_[axis].push_back(position[static_cast<Eigen::Index>(axis)]);
     correction_[axis].push_back(0.0);
+  }
+  if (filter_.following) {
+    const double here = position[filter_.following->axis()];
+    if (read_ == 0) place_.assign(static_cast<std::size_t>(history_), filter_.following->place(here));
+    const Column& along = command_[static_cast<std::size_t>(filter_.following->axis())];
+    place_.push_back(filter_.following->place(0.5 * (here + along[along.size() - 2])));
   }
   const Segment& on = (*path_)[segment];
   if (on.kind == SegmentKind::arc && read_ < rows_in_) {
@@ -156,15 +140,10 @@ void RunShaper::read_row() {
   const std::size_t at = target_->segment();
   const Vector3 tangent = tangent_at((*path_)[at], target_->distance_mm() - path_->distance_mm(at));
   Vector3 error;
-  const auto row = static_cast<std::ptrdiff_t>(read_ - 1);
+  const std::size_t row = index(read_ - 1);
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    const std::vector<double>& kernel = node(row).kernels[axis];
-    const double* now = command_[axis].data() + (row - base_);
-    double sum = 0.0;
-    for (std::size_t j = 0; j < kernel.size(); ++j) {
-      sum += kernel[j] * *(now - j);
-    }
-    error[static_cast<Eigen::Index>(axis)] = sum - wanted[static_cast<Eigen::Index>(axis)];
+    const auto a = static_cast<Eigen::Index>(axis);
+    error[a] = behind_kernel(axis, command_[axis], row) - wanted[a];
   }
   error -= (1.0 - smooth_step(along_)) * tangent.dot(error) * tangent;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
@@ -239,11 +218,10 @@ void RunShaper::decide_to(std::size_t row) {
 
 void RunShaper::correct(std::size_t begin, std::size_t end, std::size_t accepted) {
   const std::size_t m = end - begin;
-  // Shapers that follow an axis change slowly over a window: that of its middle stands for all.
-  const auto first_node =
-      static_cast<std::size_t>(&node(static_cast<std::ptrdiff_t>(begin + m / 2)) - filter_.nodes.data());
+  // Windows are short against the way between two shapers that are followed: the nearest one serves.
+  const double place = place_.empty() ? 0.0 : place_[index(begin + m / 2)];
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    ContourSolver& solver = solvers_[axis_count * first_node + axis];
+    ContourSolver& solver = solvers_[static_cast<std::size_t>(std::lround(place))][axis];
     const std::size_t past = solver.reach() + 2;
     const double* error = error_[axis].data() + index(begin);
     double* correction = correction_[axis].data() + index(begin);
@@ -269,7 +247,7 @@ void RunShaper::correct(std::size_t begin, std::size_t end, std::size_t accepted
 
 // Whether the corrected command leaves a limit that the plain one keeps; where it does, `stiffness_` is raised.
 bool RunShaper::asks_too_much(std::size_t begin, std::size_t end, std::size_t axis) {
-  const std::size_t shaper_rows = 2 * filter_.periods();
+  const auto shaper_rows = static_cast<std::size_t>(filter_.shaper_rows());
   const double period = 2.0 * filter_.half_period_s;
   const std::size_t from = begin + begin % 2;
   const std::size_t to = end + shaper_rows + 4;
@@ -315,30 +293,33 @@ bool RunShaper::asks_too_much(std::size_t begin, std::size_t end, std::size_t ax
   return found;
 }
 
-const RunFilter::Node& RunShaper::node(std::ptrdiff_t row) const noexcept {
-  if (!filter_.following) {
-    return filter_.nodes.front();
+double RunShaper::behind_kernel(std::size_t axis, const Column& column, std::size_t i) const noexcept {
+  const auto at = [&](std::size_t node) {
+    const std::vector<double>& kernel = filter_.kernels[node][axis];
+    double sum = 0.0;
+    for (std::size_t j = 0; j < kernel.size(); ++j) {
+      sum += kernel[j] * column[i - j];
+    }
+    return sum;
+  };
+  if (place_.empty()) {
+    return at(0);
   }
-  const FollowingFir& following = *filter_.following;
-  const Column& along = command_[static_cast<std::size_t>(following.axis())];
-  const double place = following.place(along[static_cast<std::size_t>(row - base_)]);
-  return filter_.nodes[static_cast<std::size_t>(std::lround(place))];
-}
-
-// The command before shaping with its correction.
-Vector3 RunShaper::corrected(std::ptrdiff_t row) const noexcept {
-  Vector3 position;
-  for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    const auto i = static_cast<std::size_t>(row - base_);
-    position[static_cast<Eigen::Index>(axis)] = command_[axis][i] + correction_[axis][i];
-  }
-  return position;
+  const auto lower = static_cast<std::size_t>(place_[i]);
+  const double upper_share = place_[i] - static_cast<double>(lower);
+  const double below = at(lower);
+  return upper_share > 0.0 ? below + upper_share * (at(lower + 1) - below) : below;
 }
 
 double RunShaper::shaped(std::size_t axis, std::ptrdiff_t row, bool corrected) const noexcept {
-  const Fir& shaper = node(row).half_shaper;
-  const std::vector<int>& delays = shaper.delays();
-  const std::vector<double>& taps = shaper.taps();
+  if (filter_.following) {
+    const auto i = row - base_;
+    const VaryingFir& fir = filter_.following->fir();
+    const double plain = fir.value(command_[axis].data() + i, place_.data() + i);
+    return corrected ? plain + fir.value(correction_[axis].data() + i, place_.data() + i) : plain;
+  }
+  const std::vector<int>& delays = filter_.half_shaper.delays();
+  const std::vector<double>& taps = filter_.half_shaper.taps();
   const double* command = command_[axis].data() + (row - base_);
   double sum = 0.0;
   for (std::size_t k = 0; k < taps.size(); ++k) {
@@ -358,18 +339,13 @@ Vector3 RunShaper::deviation(std::size_t row) const noexcept {
   const std::size_t i = index(row);
   Vector3 result;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    const std::vector<double>& kernel = node(static_cast<std::ptrdiff_t>(row)).kernels[axis];
-    double sum = error_[axis][i];
-    for (std::size_t j = 0; j < kernel.size(); ++j) {
-      sum += kernel[j] * correction_[axis][i - j];
-    }
-    result[static_cast<Eigen::Index>(axis)] = sum;
+    result[static_cast<Eigen::Index>(axis)] = error_[axis][i] + behind_kernel(axis, correction_[axis], i);
   }
   return result;
 }
 
 void RunShaper::measure(std::size_t row) {
-  const std::size_t half = filter_.periods() + 1;
+  const std::size_t half = static_cast<std::size_t>(filter_.shaper_rows()) / 2 + 1;
   read_to(row + half + 1);
   const std::size_t i = index(row);
   const Vector3 left = deviation(row);
@@ -411,6 +387,9 @@ void RunShaper::forget() {
       drop(error_[axis]);
     }
   }
+  if (filter_.following) {
+    drop(place_);
+  }
   if (measured_ != nullptr) {
     drop(tangent_);
     drop(wanted_);
@@ -421,19 +400,8 @@ void RunShaper::forget() {
 
 void RunShaper::next(Vector3& position) {
   decide_to(out_ + 1);
-  const auto row = static_cast<std::ptrdiff_t>(out_);
-  if (stream_) {
-    position = corrected(row);
-    if (out_ == 0) {
-      stream_->reset({position.data(), axis_count});
-    }
-    const int along = filter_.following->axis();
-    const double middle = 0.5 * (position[along] + corrected(row - 1)[along]);
-    stream_->step({position.data(), axis_count}, filter_.following->place(middle));
-  } else {
-    for (std::size_t axis = 0; axis < axis_count; ++axis) {
-      position[static_cast<Eigen::Index>(axis)] = shaped(axis, row, target_ != nullptr);
-    }
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    position[static_cast<Eigen::Index>(axis)] = shaped(axis, static_cast<std::ptrdiff_t>(out_), target_ != nullptr);
   }
   if (measured_ != nullptr) {
     measure(out_);
@@ -447,7 +415,7 @@ std::int8_t RunShaper::arc_normal() {
   const std::size_t lead = target_ ? reach_ + margin_ : 0;
   const std::size_t row = out_ - 1;
   read_to(std::min(row + 3 + lead, rows_in_));
-  const std::size_t behind = 2 * filter_.periods() + lead;
+  const auto behind = static_cast<std::size_t>(filter_.shaper_rows()) + lead;
   while (!arcs_.empty() && arcs_.front().row <= row + 2 + lead) {
     seen_ = arcs_.front();
     arcs_.pop_front();

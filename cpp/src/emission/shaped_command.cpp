@@ -32,23 +32,11 @@ MotionLimits without_tolerance(MotionLimits limits) {
 }  // namespace
 
 RegionShaper::RegionShaper(std::shared_ptr<const Path> path, const Fir& shaper,
-                           std::span<const std::uint32_t> marked_segments, const ShapingOptions& options)
-    : RegionShaper(std::move(path),
-                   RunFilter(shaper, options.target, options.modes, options.block_period_s, options.contour_smoothness),
-                   marked_segments, options) {}
-
-RegionShaper::RegionShaper(std::shared_ptr<const Path> path, const FollowingFir& shapers,
-                           std::span<const AxisModes> modes, std::span<const std::uint32_t> marked_segments,
-                           const ShapingOptions& options)
-    : RegionShaper(std::move(path),
-                   RunFilter(shapers, options.target, modes, options.block_period_s, options.contour_smoothness),
-                   marked_segments, options) {}
-
-RegionShaper::RegionShaper(std::shared_ptr<const Path> path, RunFilter filter,
-                           std::span<const std::uint32_t> marked_segments, const ShapingOptions& options)
+                           std::span<const std::uint32_t> marked_segments, ShapingOptions options)
     : path_(std::move(path)),
-      options_(options),
-      filter_(std::move(filter)),
+      options_(std::move(options)),
+      filter_(shaper, options_.target, options_.modes, options_.block_period_s, options_.contour_smoothness,
+              options_.following, options_.mode_tables),
       marks_(marked_segments.begin(), marked_segments.end()) {
   const double ticks = options_.block_period_s / options_.interpolation_period_s;
   if (!(ticks >= 1.0 - 1e-9) || !(std::abs(ticks - std::round(ticks)) <= 1e-6)) {

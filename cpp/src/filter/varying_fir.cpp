@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <string>
 #include <utility>
 
@@ -16,8 +17,48 @@ namespace shapegcode {
 
 using Eigen::Index;
 
+namespace {
+
+/// A place as the filter below it and the share of the one above.
+struct Shares {
+  std::size_t lower;
+  double upper_share;
+};
+
+Shares shares_at(double place, std::size_t filters) noexcept {
+  const double within = place > 0.0 ? std::min(place, static_cast<double>(filters - 1)) : 0.0;  // not a number: 0
+  const auto lower = static_cast<std::size_t>(within);
+  return {lower, within - static_cast<double>(lower)};
+}
+
+}  // namespace
+
 VaryingFir::VaryingFir(std::vector<Fir> set) : set_(std::move(set)) {
   if (set_.empty()) throw Error(ErrorKind::argument, "set of filters without a filter");
+  const auto delays = static_cast<std::size_t>(duration_samples());
+  to_come_.resize(set_.size() * delays);
+  for (std::size_t k = 0; k < set_.size(); ++k) {
+    // Summed from the end, so that nothing is left behind the last tap.
+    double rest = 0.0;
+    std::size_t tap = set_[k].taps().size();
+    for (std::size_t delay = delays; delay-- > 0;) {
+      while (tap > 0 && static_cast<std::size_t>(set_[k].delays()[tap - 1]) > delay) rest += set_[k].taps()[--tap];
+      to_come_[k * delays + delay] = rest;
+    }
+  }
+}
+
+double VaryingFir::value(const double* newest, const double* place) const noexcept {
+  const auto delays = static_cast<std::ptrdiff_t>(duration_samples());
+  double lag = 0.0;
+  for (std::ptrdiff_t delay = 0; delay < delays; ++delay) {
+    const double increment = newest[-delay] - newest[-delay - 1];
+    if (increment == 0.0) continue;
+    const auto [lower, upper_share] = shares_at(place[-delay], set_.size());
+    const double* const share = &to_come_[lower * static_cast<std::size_t>(delays) + static_cast<std::size_t>(delay)];
+    lag += increment * (upper_share > 0.0 ? share[0] + upper_share * (share[delays] - share[0]) : share[0]);
+  }
+  return newest[0] - lag;
 }
 
 int VaryingFir::duration_samples() const noexcept {
@@ -91,7 +132,7 @@ void VaryingFirStream::Lag::add(double value) noexcept {
   sum = total;
 }
 
-VaryingFirStream::VaryingFirStream(VaryingFir fir, int n_axes) : fir_(std::move(fir)), n_axes_(n_axes) {
+VaryingFirStream::VaryingFirStream(VaryingFir fir, int n_axes) : fir_(std::move(fir)) {
   if (n_axes < 1) {
     throw Error(ErrorKind::argument, "filter stream of " + std::to_string(n_axes) + " axes, at least 1 needed");
   }
@@ -139,15 +180,12 @@ void VaryingFirStream::step(std::span<double> position, double place) noexcept {
   at_rest_ = moves ? 0 : at_rest_ + 1;
   if (moves) {
     const std::vector<Fir>& set = fir_.set();
-    const auto last = static_cast<double>(set.size() - 1);
-    const double within = place > 0.0 ? std::min(place, last) : 0.0;  // not a number: 0
-    const auto lower = static_cast<std::size_t>(within);
-    const double upper_share = within - static_cast<double>(lower);
+    const auto [lower, upper_share] = shares_at(place, set.size());
     begin_train(set[lower], 1.0 - upper_share);
     if (upper_share > 0.0) begin_train(set[lower + 1], upper_share);
   }
   double* const arriving = &pending_[(row_ & row_mask_) * axes];
-  const bool all_arrived = at_rest_ >= static_cast<std::size_t>(row_mask_ + 1);
+  const bool all_arrived = at_rest_ >= row_mask_ + 1;
   for (std::size_t axis = 0; axis < axes; ++axis) {
     Lag& lag = lag_[axis];
     if (all_arrived) {

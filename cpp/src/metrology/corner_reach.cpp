@@ -50,6 +50,8 @@ void CornerReach::step(const Vector3& p, double foot_mm) noexcept {
   last_ = p;
 }
 
+double CornerReach::largest_passed_mm() const noexcept { return std::sqrt(largest2_); }
+
 double CornerReach::largest_mm() const noexcept {
   double largest2 = largest2_;
   for (std::size_t i = first_; i < next_; ++i) {

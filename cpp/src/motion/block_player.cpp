@@ -44,7 +44,31 @@ double BlockPlayer::block_duration_s(const Segment& segment) const noexcept {
   return block_periods(segment.length_mm, segment.feed_mm_per_s * ratio_, period_s_, block_end_) * period_s_;
 }
 
-void BlockPlayer::open_block() noexcept { duration_s_ = block_duration_s(blocks_[block_]); }
+void BlockPlayer::open_block() noexcept {
+  duration_s_ = block_duration_s(blocks_[block_]);
+  if (block_ == paused_block_) {
+    duration_s_ += pause_s_;
+  }
+}
+
+void BlockPlayer::pause_after(std::size_t block, double seconds) {
+  if (!(seconds >= 0.0) || !std::isfinite(seconds)) {
+    throw Error(ErrorKind::argument, "pause of " + std::to_string(seconds) + " s: must be finite and >= 0");
+  }
+  if (block < block_ || block >= blocks_.size()) {
+    throw Error(ErrorKind::argument, "pause behind block " + std::to_string(block) + ": block " +
+                                         std::to_string(block_) + " of " + std::to_string(blocks_.size()) + " is open");
+  }
+  paused_block_ = block;
+  pause_s_ = block_end_ == BlockEnd::ceil ? whole_periods(seconds / period_s_) * period_s_ : seconds;
+  open_block();
+}
+
+bool BlockPlayer::pausing() const noexcept {
+  const double slack = tick_tolerance * period_s_;
+  return started_ && !finished_ && pause_s_ > 0.0 && block_ == paused_block_ &&
+         elapsed_s_ >= duration_s_ - pause_s_ - slack;
+}
 
 bool BlockPlayer::step(Vector3& position) noexcept {
   if (blocks_.empty() || finished_) {

@@ -23,8 +23,10 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double damping_step = 0.02;
+constexpr double largest_damping_step = 0.02;
+constexpr double smallest_damping_step = 1e-6;
 constexpr int newton_steps = 25;
+constexpr double rounding = 1e-14;   // of the residual at a hump, whose height is one of the conditions
 constexpr double converged = 1e-12;  // of the conditions, which are all of unit size
 
 struct Unknowns {
@@ -139,13 +141,14 @@ double newton_step(Unknowns& x, double zeta, double limit) {
 
 /// Newton to rounding; false if it does not get there or ends at something that is no such shaper.
 bool solve(Unknowns& x, double zeta, double limit) {
+  const double enough = converged + rounding / limit;
   double last = std::numeric_limits<double>::infinity();
   for (int step = 0; step < newton_steps; ++step) {
     const double size = newton_step(x, zeta, limit);
     if (!(size < 1e6)) {
       return false;
     }
-    if (size < converged && size >= 0.5 * last) {
+    if (size < enough && size >= 0.5 * last) {
       break;
     }
     last = size;
@@ -153,7 +156,7 @@ bool solve(Unknowns& x, double zeta, double limit) {
   const auto ascending = [](const Eigen::VectorXd& values) {
     return std::ranges::is_sorted(values.begin(), values.end(), std::ranges::less_equal{});
   };
-  return last < converged && ascending(x.times) && ascending(x.frequencies) && x.frequencies(0) > 0.0 &&
+  return last < enough && ascending(x.times) && ascending(x.frequencies) && x.frequencies(0) > 0.0 &&
          x.amplitudes.minCoeff() >= 0.0;
 }
 
@@ -180,10 +183,19 @@ ExtraInsensitive extra_insensitive(const Mode& mode, double vibration_limit, int
     throw Error(ErrorKind::argument, message.str());
   }
   Unknowns x = chebyshev(vibration_limit, humps);
-  const int steps = static_cast<int>(std::ceil(mode.damping_ratio / damping_step));
-  for (int step = 1; step <= steps; ++step) {
-    const double zeta = mode.damping_ratio * step / steps;
-    if (!solve(x, zeta, vibration_limit)) {
+  double zeta = 0.0;
+  double step = largest_damping_step;
+  while (zeta < mode.damping_ratio) {
+    Unknowns next = x;
+    const double to = std::min(zeta + step, mode.damping_ratio);
+    if (solve(next, to, vibration_limit)) {
+      x = std::move(next);
+      zeta = to;
+      step = std::min(2.0 * step, largest_damping_step);
+      continue;
+    }
+    step *= 0.5;
+    if (step < smallest_damping_step) {
       message << "no extra-insensitive shaper with " << humps << " humps of " << vibration_limit
               << " was found for the mode at " << mode.frequency_hz << " Hz, damping ratio " << mode.damping_ratio
               << ": its solution ends near damping ratio " << zeta;

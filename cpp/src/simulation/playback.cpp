@@ -1,9 +1,12 @@
 #include "shapegcode/simulation/playback.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string>
 #include <utility>
 
+#include "shapegcode/error.hpp"
 #include "shapegcode/metrology/corner_reach.hpp"
 #include "shapegcode/metrology/orbit.hpp"
 #include "shapegcode/motion/interpolator.hpp"
@@ -27,11 +30,11 @@ class Recorder {
       : options_(options),
         plant_(options.modes, options.period_s, options.mode_tables),
         tracks_contour_(options.measure_contour && path.length_mm() > 0.0),
-        tracks_command_(tracks_contour_ && !command_on_path),
+        tracks_command_(tracks_contour_ && options.measure_command && !command_on_path),
         command_tracker_(tracks_contour_ ? path : a_point()),
         response_tracker_(tracks_contour_ ? path : a_point()),
-        orbit_(path),
-        command_reach_(path),
+        orbit_(tracks_contour_ ? path : a_point()),
+        command_reach_(tracks_contour_ ? path : a_point()),
         response_reach_(command_reach_) {
     for (const Fir& fir : options.axis_filters) {
       filters_.emplace_back(fir, axis_count);
@@ -39,7 +42,8 @@ class Recorder {
     }
   }
 
-  void add(Vector3 setpoint) {
+  // `waiting`: the set-point is one of a wait for the next block.
+  void add(Vector3 setpoint, bool waiting = false) {
     if (count_ == 0) {
       for (FirStream& filter : filters_) {
         filter.reset({setpoint.data(), axis_count});
@@ -55,8 +59,18 @@ class Recorder {
     const bool moves = (command - last_).cwiseAbs().maxCoeff() > 0.0;
     if (moves) {
       last_moving_ = count_;
+      if (rests_in_wait_) {
+        rests_in_wait_ = false;
+        wait_residual_ = wait_residual_.cwiseMax(plant_.peak());
+        peak_ = peak_.cwiseMax(wait_residual_);
+      }
     } else if (last_moving_ + 1 == count_) {
       at_rest_plant_ = plant_;  // as it stood when the set-points came to rest; overwritten if they move on
+      if (waiting) {
+        rests_in_wait_ = true;
+        peak_ = peak_.cwiseMax(plant_.peak());
+        plant_.reset_peak();
+      }
     }
     const Vector3 response = plant_.step(command);
     acceleration_ = acceleration_.cwiseMax((command - 2.0 * last_ + before_last_).cwiseAbs());
@@ -83,12 +97,14 @@ class Recorder {
       at_rest_plant_ = plant_;
     }
     figures_.duration_s = static_cast<double>(last_moving_) * options_.period_s;
-    figures_.peak_mm = at_rest_plant_.peak();
+    figures_.peak_mm = peak_.cwiseMax(at_rest_plant_.peak());
     figures_.residual_mm = at_rest_plant_.residual_peak();
     figures_.peak_acceleration_mm_per_s2 = acceleration_ / (options_.period_s * options_.period_s);
     figures_.end_mm = last_;
     if (tracks_contour_) {
-      figures_.orbit_error_percent = orbit_.percent();
+      if (options_.measure_command) {
+        figures_.orbit_error_percent = orbit_.percent();
+      }
       figures_.command.count = figures_.response.count;
       figures_.command.include_missed(command_reach_.largest_mm());
       figures_.response.include_missed(response_reach_.largest_mm());
@@ -101,6 +117,22 @@ class Recorder {
     figures_.recorded_command = pack(commands_);
     figures_.recorded_response = pack(responses_);
     return std::move(figures_);
+  }
+
+  // The wait is over and what it excited has decayed: the rest of the run is that without a wait.
+  StarvedFigures finish_wait() {
+    if (tracks_contour_) {
+      figures_.command.count = figures_.response.count;
+      figures_.command.include_missed(command_reach_.largest_passed_mm());
+      figures_.response.include_missed(response_reach_.largest_passed_mm());
+    }
+    return {0, wait_residual_, figures_.command, figures_.response};
+  }
+
+  // The run was played to its end after a wait.
+  StarvedFigures finish_wait(const Vector3& end) {
+    const PlaybackFigures whole = finish(end);
+    return {0, wait_residual_.cwiseMax(whole.residual_mm), whole.command, whole.response};
   }
 
  private:
@@ -136,6 +168,9 @@ class Recorder {
   Vector3 last_ = Vector3::Zero();
   Vector3 before_last_ = Vector3::Zero();
   Vector3 acceleration_ = Vector3::Zero();
+  Vector3 peak_ = Vector3::Zero();           // before the set-points rested in a wait, and in it
+  Vector3 wait_residual_ = Vector3::Zero();  // largest |response - command| at rest in a wait
+  bool rests_in_wait_ = false;
   std::vector<Vector3> commands_;
   std::vector<Vector3> responses_;
   std::size_t count_ = 0;
@@ -151,6 +186,43 @@ PlaybackFigures play(const Path& path, const PlaybackOptions& options, bool comm
     recorder.add(position);
   }
   return recorder.finish(position);
+}
+
+// The run goes on from here in a copy of everything, with a wait behind the block on which it stands.
+StarvedFigures starve(Recorder recorder, BlockPlayer player, const PlaybackOptions& options) {
+  const std::size_t block = player.block();
+  player.pause_after(block, options.starved_s);
+  const auto memory = static_cast<std::size_t>(whole_periods(options.starved_memory_s / options.period_s));
+  std::size_t behind = 0;  // samples since the wait was over
+  Vector3 position = Vector3::Zero();
+  while ((memory == 0 || behind < memory) && player.step(position)) {
+    recorder.add(position, player.pausing());
+    behind += player.block() > block ? 1U : 0U;
+  }
+  const bool ended = memory == 0 || behind < memory;
+  StarvedFigures figures = ended ? recorder.finish_wait(position) : recorder.finish_wait();
+  figures.block = block;
+  return figures;
+}
+
+void check_starved(std::span<const Segment> blocks, const PlaybackOptions& options) {
+  const std::vector<std::size_t>& starved = options.starved_blocks;
+  if (starved.empty()) {
+    return;
+  }
+  if (options.last_seconds > 0.0) {
+    throw Error(ErrorKind::argument, "starved blocks need the whole run: last_seconds must be 0");
+  }
+  const bool usable = options.starved_s >= 0.0 && options.starved_memory_s >= 0.0 && std::isfinite(options.starved_s) &&
+                      std::isfinite(options.starved_memory_s);
+  if (!usable) {
+    throw Error(ErrorKind::argument, "wait of " + std::to_string(options.starved_s) + " s and memory of " +
+                                         std::to_string(options.starved_memory_s) + " s must be finite and >= 0");
+  }
+  if (starved.back() >= blocks.size() || !std::is_sorted(starved.begin(), starved.end())) {
+    throw Error(ErrorKind::argument,
+                "starved blocks must ascend and lie below the " + std::to_string(blocks.size()) + " blocks given");
+  }
 }
 
 std::span<const Segment> last_blocks(std::span<const Segment> blocks, double seconds) {
@@ -171,13 +243,31 @@ PlaybackFigures play_path(const std::shared_ptr<const Path>& path, std::shared_p
               [&](Vector3& position) { return interpolator.step(position); });
 }
 
+PlaybackFigures play_path(const std::shared_ptr<const Path>& path, std::shared_ptr<const SpeedProfile> profile,
+                          const Path& programmed, const PlaybackOptions& options) {
+  Interpolator interpolator(path, std::move(profile), options.period_s);
+  return play(programmed, options, false, [&](Vector3& position) { return interpolator.step(position); });
+}
+
 PlaybackFigures play_blocks(std::span<const Segment> blocks, const Path& path, BlockEnd block_end,
                             double override_ratio, const PlaybackOptions& options) {
+  check_starved(blocks, options);
   if (options.last_seconds > 0.0) {
     blocks = last_blocks(blocks, options.last_seconds * override_ratio);
   }
   BlockPlayer player(blocks, options.period_s, block_end, override_ratio);
-  return play(path, options, false, [&](Vector3& position) { return player.step(position); });
+  Recorder recorder(path, options, false);
+  std::vector<StarvedFigures> starved;
+  Vector3 position = Vector3::Zero();
+  while (player.step(position)) {
+    recorder.add(position);
+    while (starved.size() < options.starved_blocks.size() && player.block() >= options.starved_blocks[starved.size()]) {
+      starved.push_back(starve(recorder, player, options));
+    }
+  }
+  PlaybackFigures figures = recorder.finish(position);
+  figures.starved = std::move(starved);
+  return figures;
 }
 
 PlaybackFigures play_samples(const Samples& samples, const Path& path, const PlaybackOptions& options) {
@@ -188,6 +278,36 @@ PlaybackFigures play_samples(const Samples& samples, const Path& path, const Pla
     }
     return row++ < samples.positions_mm.rows();
   });
+}
+
+std::vector<std::size_t> fastest_block_ends(std::span<const Segment> blocks) {
+  std::vector<std::size_t> ends;
+  Vector3 fastest = Vector3::Zero();
+  std::array<std::size_t, axis_count> where{};
+  std::size_t last = blocks.size();
+  while (last > 0 && blocks[last - 1].length_mm <= 0.0) {
+    --last;
+  }
+  for (std::size_t i = 0; i + 1 < last; ++i) {
+    if (blocks[i].length_mm <= 0.0) {
+      continue;
+    }
+    const Vector3 speed = (tangent_at(blocks[i], blocks[i].length_mm) * blocks[i].feed_mm_per_s).cwiseAbs();
+    for (Eigen::Index axis = 0; axis < axis_count; ++axis) {
+      if (speed[axis] > fastest[axis]) {
+        fastest[axis] = speed[axis];
+        where[static_cast<std::size_t>(axis)] = i;
+      }
+    }
+  }
+  for (Eigen::Index axis = 0; axis < axis_count; ++axis) {
+    if (fastest[axis] > 0.0) {
+      ends.push_back(where[static_cast<std::size_t>(axis)]);
+    }
+  }
+  std::sort(ends.begin(), ends.end());
+  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+  return ends;
 }
 
 std::size_t count_slowed_blocks(std::span<const Segment> blocks, const LookAheadLimits& limits) {

@@ -55,11 +55,16 @@ def output_console(json_target: str | None = None, *, file: TextIO | None = None
 
 
 def print_before_after(report: Mapping[str, Any], json_target: str | None = None) -> None:
-    """Print the table original / emitted of a conversion's report, its warnings and the one next step."""
+    """Print the table original / emitted of a conversion's report, its cases, warnings and the one next step."""
+    from shapegcode.case_table import case_table
     from shapegcode.report import before_after_table, next_step, warning_table
 
     console = output_console(json_target)
     console.print(before_after_table(report))
+    cases = case_table(report)
+    if cases is not None:
+        console.print()
+        console.print(cases)
     if report.get("warnings"):
         console.print(warning_table(report["warnings"]))
     console.print(f"next: {next_step(report)}", markup=False)

@@ -19,6 +19,7 @@ from shapegcode.cli.options import (
     refuse_same_file,
     seconds,
     size,
+    with_values,
 )
 
 __all__ = ["add_arguments", "run"]
@@ -54,6 +55,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("response", "command", "off"),
         default=None,
         help="what is brought back to the programmed path: see shaping.contour (default: the machine file's)",
+    )
+    parser.add_argument(
+        "--shaper",
+        metavar="FAMILY",
+        default=None,
+        help="family of the shaper, for example zvd: see shaping.family, and `shapegcode shaper` to compare them",
+    )
+    parser.add_argument(
+        "--part-mass",
+        metavar="KG",
+        type=positive,
+        default=None,
+        help="mass of the part, for modes with a table over it: see shaping.part_mass_kg",
     )
     parser.add_argument(
         "--block-period",
@@ -125,14 +139,15 @@ def run(args: argparse.Namespace) -> int:
     limits = (args.max_bytes, args.baud, args.max_blocks_per_second)
     budget = None if limits == (None, None, None) else Budget(*limits)
     machine = load_machine(args)
-    for table, key, value in (
-        ("input", "compensation", args.compensation),
-        ("tolerance", "contour_um", args.contour_tolerance),
-        ("shaping", "contour", args.contour),
-        ("shaping", "rapids", args.shape_rapids),
-    ):
-        if value is not None:
-            machine = machine.model_copy(update={table: getattr(machine, table).model_copy(update={key: value})})
+    machine = with_values(
+        machine,
+        ("input.compensation", args.compensation),
+        ("tolerance.contour_um", args.contour_tolerance),
+        ("shaping.contour", args.contour),
+        ("shaping.rapids", args.shape_rapids),
+        ("shaping.family", args.shaper),
+        ("shaping.part_mass_kg", args.part_mass),
+    )
     failed = output.with_name(output.name + machine.emission.failed_suffix)
     read = [Path(args.input), Path(args.machine)]
     refuse_same_file([output, failed], read)

@@ -105,6 +105,27 @@ def load_machine(args: argparse.Namespace) -> Machine:
     return Machine.from_data(data, f"{args.machine} with --set")
 
 
+def with_values(machine: Machine, *values: tuple[str, object]) -> Machine:
+    """The machine with values of options, checked as those of a file; None leaves the machine's own.
+
+    Args:
+        machine: what `load_machine` gave.
+        values: pairs of a key of the machine file, "table.key", and its value.
+
+    Raises:
+        MachineError: a value that a machine file could not have.
+    """
+    from shapegcode.machine import Machine
+
+    stated = [(key.split("."), value) for key, value in values if value is not None]
+    if not stated:
+        return machine
+    data = machine.model_dump(exclude_none=True)
+    for (table, key), value in stated:
+        data[table][key] = value
+    return Machine.from_data(data, "options")
+
+
 def _inside(place: Any, name: str) -> Any:
     """A table of the file by its name; the entries of a list count from 1, as `machine show` prints them."""
     if isinstance(place, dict):

@@ -14,7 +14,15 @@ from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.shaping.band import ModeBand
 from shapegcode.shaping.grid_designs import check_modes_and_times, ms, shortest_non_negative
 from shapegcode.shaping.robust import VIBRATION_LIMIT
-from shapegcode.shaping.robust_search import RobustDesign, Task, best_within, names, shortest_below, unreachable
+from shapegcode.shaping.robust_search import (
+    RobustDesign,
+    Task,
+    best_within,
+    names,
+    refusal,
+    shortest_below,
+    unreachable,
+)
 
 __all__ = [
     "BlockPeriodCandidate",
@@ -260,12 +268,7 @@ def _below_candidate(
     found = shortest_below(task, limit, max_duration_s, least_cost=least_cost)
     if found is not None:
         return _candidate(found)
-    reason = unreachable(task)
-    return BlockPeriodCandidate(
-        period_s, None,
-        f"no design within {ms(max_duration_s)} on a {ms(period_s)} grid leaves at most {100.0 * limit:.3g} % of "
-        f"{names(bands)}" + (f"; {reason}" if reason else ""),
-    )  # fmt: skip
+    return BlockPeriodCandidate(period_s, None, refusal(task, limit, max_duration_s))
 
 
 def _fallback(

@@ -21,7 +21,7 @@ from scipy.optimize import linprog
 from shapegcode._core import DesignError, Shaper
 from shapegcode.shaping.band import ModeBand
 
-__all__ = ["SAME_RESIDUAL", "Bounds", "CutPool", "TapProblem", "proven_worst"]
+__all__ = ["NO_RESIDUAL", "SAME_RESIDUAL", "Bounds", "CutPool", "TapProblem", "proven_worst"]
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -29,15 +29,20 @@ ComplexArray = NDArray[np.complex128]
 SAME_RESIDUAL = 1e-3
 """Relative gap between the lower bound and the design at which the design counts as optimal."""
 
-NO_RESIDUAL = 1e-7
+NO_RESIDUAL = 1e-6
 """Residual ratio that counts as none: no gap is pursued below it."""
 
 _STEP_RAD = 0.1  # of the sweep, seen from the middle of the shaper; the peaks are refined
 _FEWEST_STEPS = 8
 _MOST_ROUNDS = 60
+_STARTS = 5  # frequencies of a band at which every search begins
+_BOUNDS_SHARE = 0.5  # of the worst residual: a plane that the taps come less close to did not bound them
 _PROOF_SHARE = 1e-4  # of the residual: what a proven sweep may add for what lies between its samples
 _PROOF_SAMPLES = 200_000
-_TOLERANCES = (1e-10, 1e-9, 1e-8, 1e-7)  # the solver gives up now and then where the optimum is zero
+# Tolerance and presolve: now and then the solver gives up, or goes round in circles, at the first of them.
+_WAYS = ((1e-9, True), (1e-9, False), (1e-8, True), (1e-7, True), (1e-7, False))
+_MOST_PIVOTS = 20  # per unknown and condition; some 1 is usual
+_SAME_VALUE = 1e-6  # relative
 _INFEASIBLE = 2
 _QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * math.pi
 
@@ -63,16 +68,17 @@ class CutPool:
 
     omegas: list[list[float]]
     directions: list[list[float]]
+    starts: int = 0
+    """Planes of each band that are never taken out."""
 
     @classmethod
     def around(cls, bands: Sequence[ModeBand]) -> CutPool:
         """Four directions at a few frequencies of every band, for a start."""
-        pool = cls([], [])
+        pool = cls([], [], _STARTS * len(_QUARTERS))
         for band in bands:
             low, high = _ends(band)
-            starts = np.repeat(np.linspace(low, high, 5 if high > low else 1), len(_QUARTERS))
-            pool.omegas.append(starts.tolist())
-            pool.directions.append(np.resize(_QUARTERS, len(starts)).tolist())
+            pool.omegas.append(np.repeat(np.linspace(low, high, _STARTS), len(_QUARTERS)).tolist())
+            pool.directions.append(np.tile(_QUARTERS, _STARTS).tolist())
         return pool
 
 
@@ -124,6 +130,7 @@ class TapProblem:
         equalities: matrix and right-hand side of the linear conditions, the sum among them.
         max_abs_sum: largest sum of the taps' magnitudes; None: no tap is negative.
         pool: planes, shared between problems of different duration.
+        last_tap: the tap at `last` periods is at least that.
     """
 
     bands: Sequence[ModeBand]
@@ -132,6 +139,7 @@ class TapProblem:
     equalities: tuple[FloatArray, FloatArray]
     max_abs_sum: float | None
     pool: CutPool
+    last_tap: float = 0.0
     _bands: list[_Band] = field(init=False)
     _rows: list[list[FloatArray]] = field(init=False)
 
@@ -151,17 +159,21 @@ class TapProblem:
         """
         best = np.zeros(self.last + 1)
         lower, upper = 0.0, math.inf
+        # far below what is asked for the program would be degenerate, and the solver may go round in circles
+        floor = 0.5 * NO_RESIDUAL if limit is None else 0.5 * limit
         for _ in range(_MOST_ROUNDS):
-            found = self._solve(None, None)
+            found = self._solve(None, floor)
             if found is None:
                 return None
             taps, value = found
-            lower = max(lower, value)
+            if value > (1.0 + _SAME_VALUE) * floor:
+                lower = max(lower, value)
             reached = self._add_cuts(taps, value)
             if reached < upper:
                 best, upper = taps, reached
             decided = limit is not None and (lower > limit or upper <= limit)
-            if decided or upper <= max((1.0 + SAME_RESIDUAL) * lower, lower + NO_RESIDUAL):
+            if decided or upper <= max((1.0 + SAME_RESIDUAL) * lower, NO_RESIDUAL):
+                self._forget(best, upper)
                 return Bounds(best, min(lower, upper), upper)
         raise DesignError(
             f"after {_MOST_ROUNDS} linear programs the worst residual lies between {lower:.4g} and {upper:.4g}: "
@@ -193,6 +205,16 @@ class TapProblem:
             directions.extend(np.angle(values[over]).tolist())
         return worst
 
+    def _forget(self, taps: FloatArray, worst: float) -> None:
+        """Take out of the pool what was found on the way and does not bound the result."""
+        for rows, omegas, directions in zip(self._rows, self.pool.omegas, self.pool.directions, strict=True):
+            keep = [
+                k for k in range(len(rows)) if k < self.pool.starts or float(rows[k] @ taps) >= _BOUNDS_SHARE * worst
+            ]
+            rows[:] = [rows[k] for k in keep]
+            omegas[:] = [omegas[k] for k in keep]
+            directions[:] = [directions[k] for k in keep]
+
     def _planes(self) -> FloatArray:
         """One row per plane of the pool; those of earlier rounds are kept."""
         for band, rows, omegas, directions in zip(
@@ -204,45 +226,53 @@ class TapProblem:
                 rows.extend(turned.real)
         return np.array([row for rows in self._rows for row in rows]).reshape(-1, self.last + 1)
 
-    def _solve(self, cost: FloatArray | None, limit: float | None) -> tuple[FloatArray, float] | None:
-        """The linear program with the planes so far: least bound without a cost, else least cost at the limit."""
+    def _solve(self, cost: FloatArray | None, limit: float) -> tuple[FloatArray, float] | None:
+        """The linear program with the planes so far: least cost below the limit, or the least bound above it."""
         planes = self._planes()
         matrix, right = self.equalities
         signed = self.max_abs_sum is not None
         if signed:
             planes, matrix = np.hstack([planes, -planes]), np.hstack([matrix, -matrix])
         count = planes.shape[1]
-        above = np.zeros(len(planes)) if limit is None else np.full(len(planes), limit)
-        if limit is None:
+        above = np.full(len(planes), limit)
+        if cost is None:  # one more unknown: how far above the limit the bound lies
             planes = np.hstack([planes, np.full((len(planes), 1), -1.0)])
             matrix = np.hstack([matrix, np.zeros((len(matrix), 1))])
             objective = np.eye(count + 1)[count]
         else:
-            assert cost is not None
             objective = np.tile(cost, 2) if signed else cost
         if self.max_abs_sum is not None:
             planes = np.vstack([planes, np.r_[np.ones(count), np.zeros(planes.shape[1] - count)]])
             above = np.append(above, self.max_abs_sum)
-        x = _linear_program(objective, (planes, above), (matrix, right))
+        least = np.zeros(len(objective))
+        least[self.last] = self.last_tap
+        x = _linear_program(objective, (planes, above), (matrix, right), least)
         if x is None:
             return None
         taps = x[: self.last + 1] - x[self.last + 1 : count] if signed else x[:count]
-        return taps, float(objective @ x)
+        return taps, float(objective @ x) + (limit if cost is None else 0.0)
 
 
 def _linear_program(
-    objective: FloatArray, above: tuple[FloatArray, FloatArray], equal: tuple[FloatArray, FloatArray]
+    objective: FloatArray,
+    above: tuple[FloatArray, FloatArray],
+    equal: tuple[FloatArray, FloatArray],
+    least: FloatArray,
 ) -> FloatArray | None:
-    """Least objective over what is at least 0, ``above[0] @ x <= above[1]`` and ``equal[0] @ x == equal[1]``, or None.
+    """Least objective over ``x >= least``, ``above[0] @ x <= above[1]`` and ``equal[0] @ x == equal[1]``, or None.
 
     Raises:
-        DesignError: the solver does not know, at any of its tolerances.
+        DesignError: the solver does not know, whichever way it is asked.
     """
-    for tolerance in _TOLERANCES:
+    for tolerance, presolve in _WAYS:
         result = linprog(
-            objective, A_ub=above[0], b_ub=above[1], A_eq=equal[0], b_eq=equal[1], bounds=(0.0, None),
+            objective, A_ub=above[0], b_ub=above[1], A_eq=equal[0], b_eq=equal[1],
+            bounds=[(low, None) for low in least.tolist()],
             method="highs-ds",
-            options={"primal_feasibility_tolerance": tolerance, "dual_feasibility_tolerance": tolerance},
+            options={
+                "primal_feasibility_tolerance": tolerance, "dual_feasibility_tolerance": tolerance,
+                "presolve": presolve, "maxiter": _MOST_PIVOTS * (len(objective) + len(above[1])),
+            },
         )  # fmt: skip
         if result.status == 0:
             return np.asarray(result.x, dtype=np.float64)

@@ -51,6 +51,7 @@ _MOST_ROUNDS = 60
 _CENTRES = (0.0, 0.5, 1.0)  # of the duration: starts on the way to the least second central moment
 _CENTRINGS = 4  # steps of that way
 _LONGER = 4  # times the longest duration: how far a refusal looks for what would do
+_HINT_PERIODS = 400  # longest grid that a refusal searches, periods
 
 
 @dataclass(frozen=True)
@@ -116,17 +117,18 @@ def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: fl
         if not (math.isfinite(value) and value > 0.0):
             raise ArgumentError(f"{name} is {value} s: it must be finite and above 0")
     search = _Search(conditions, period_s)
-    shaper = search.shortest(_periods(max_duration_s, period_s))
+    most = _periods(max_duration_s, period_s)
+    shaper = search.shortest(most)
     if shaper is not None:
         return shaper
     text = f"no {title} within {max_duration_s * 1e3:.6g} ms on a {period_s * 1e3:.6g} ms grid"
-    longer = search.shortest(_periods(_LONGER * max_duration_s, period_s))
-    if longer is not None:
-        raise DesignError(f"{text}; the shortest lasts {longer.duration_s * 1e3:.6g} ms")
-    raise DesignError(
-        f"{text}, nor within {_LONGER * max_duration_s * 1e3:.6g} ms; {_polynomial(conditions, period_s)}; "
-        "try another period"
-    )
+    further = min(_LONGER * most, _HINT_PERIODS)
+    if further > most:
+        longer = search.shortest(further)
+        if longer is not None:
+            raise DesignError(f"{text}; the shortest lasts {longer.duration_s * 1e3:.6g} ms")
+        text += f", nor within {further * period_s * 1e3:.6g} ms"
+    raise DesignError(f"{text}; {_polynomial(conditions, period_s)}; try another period")
 
 
 def _periods(duration_s: float, period_s: float) -> int:

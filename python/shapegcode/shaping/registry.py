@@ -12,6 +12,7 @@ from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.minimal_family import solve_minimal
 from shapegcode.shaping.options import DesignOptions
+from shapegcode.shaping.robust import minimax_robust
 
 __all__ = ["FAMILIES", "DesignOptions", "Family", "design", "distinct", "family_named"]
 
@@ -51,6 +52,16 @@ def _shortest_non_negative(bands: Sequence[ModeBand], options: DesignOptions) ->
     return [shortest_non_negative([band.mode for band in bands], options.grid_period_s, options.max_duration_s)]
 
 
+def _robust(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+    if not any(band.uncertainty for band in bands):
+        raise DesignError("no mode states a band: a robust design is the non-negative one")
+    found = minimax_robust(
+        bands, options.grid_period_s, vibration_limit=options.vibration_limit, max_duration_s=options.max_duration_s,
+        hints=False,
+    )  # fmt: skip
+    return [found.shaper]
+
+
 FAMILIES: tuple[Family, ...] = (
     Family(
         "zv", "zero vibration, one mode after the other", "paper 002, eq. 1-3; Smith 1958",
@@ -73,17 +84,17 @@ FAMILIES: tuple[Family, ...] = (
     ),
     Family(
         "ei", "extra-insensitive, one hump", "Singhose, Seering and Singer 1994; damped: this project",
-        "modes damped up to some .5; leaves the vibration limit at the nominal frequency", True, True,
+        "modes damped up to some .7; leaves the vibration limit at the nominal frequency", True, True,
         solvers.hump_ei("EI", 1),
     ),
     Family(
         "ei2", "extra-insensitive, two humps", "Singhose et al. 1997; damped: this project",
-        "modes damped up to some .35; zero at the nominal frequency, the vibration limit on both sides", True, True,
+        "modes damped up to some .45; zero at the nominal frequency, the vibration limit on both sides", True, True,
         solvers.hump_ei("two-hump EI", 2),
     ),
     Family(
         "ei3", "extra-insensitive, three humps", "Singhose et al. 1997; damped: this project",
-        "modes damped up to some .25; leaves the vibration limit at the nominal frequency", True, True,
+        "modes damped up to some .3; leaves the vibration limit at the nominal frequency", True, True,
         solvers.hump_ei("three-hump EI", 3),
     ),
     Family(
@@ -111,6 +122,10 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "non-negative", "shortest shaper of a grid without negative taps", "this project",
         "any modes on a grid on which one exists within the longest duration", False, True, _shortest_non_negative,
+    ),
+    Family(
+        "robust", "shortest shaper of a grid below a residual over the bands", "this project",
+        "modes with a band; one without is cancelled exactly; no tap is negative", False, True, _robust,
     ),
     Family(
         "taps", "taps as given", "the user",

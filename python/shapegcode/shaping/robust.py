@@ -10,6 +10,7 @@ A mode without a band (uncertainty 0) is cancelled exactly at its frequency, as 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from shapegcode._core import ArgumentError, DesignError
@@ -22,6 +23,7 @@ from shapegcode.shaping.robust_search import (
     check_time,
     names,
     no_exact,
+    refusal,
     shortest_below,
     smallest_below,
     unreachable,
@@ -34,6 +36,7 @@ VIBRATION_LIMIT = 0.05
 
 _LONGER = 4  # times the longest duration: how far a refusal looks for what would do
 _OTHER_PERIODS = (0.5, 0.75, 1.25, 1.5, 2.0)  # of the refused one: what a refusal looks at
+_HINT_PRECISION = 0.05  # relative, of the duration that would do
 _HINT_PERIODS = 500  # longest grid that a refusal searches, periods
 
 
@@ -49,8 +52,8 @@ def least_worst(
     """Taps on a grid whose worst residual over the bands is least, for a given duration.
 
     The optimum is proven to 0.1 %: `worst_residual` is at most that much above `least_possible` (a residual below
-    1e-7 counts as none). The exception is a damped mode on a grid where the best use of the last periods is to wait:
-    the shaper is then shorter, and its residual counts from its own last tap.
+    1e-6 counts as none). The exception is a damped mode on a grid where the best use of the last periods is to wait:
+    the residual counts from the last tap, so the shaper is then shorter, or a last tap of 0.001 marks the end.
 
     Args:
         bands: modes with their bands, at least one. One without a band is cancelled exactly.
@@ -90,6 +93,7 @@ def minimax_robust(
     non_negative: bool = True,
     max_abs_sum: float = 10.0,
     zeros_at_nominal: bool = False,
+    hints: bool = True,
 ) -> RobustDesign:
     """Shortest taps on a grid that leave at most a given share of the vibration anywhere in the bands.
 
@@ -106,10 +110,11 @@ def minimax_robust(
         non_negative: no tap is negative.
         max_abs_sum: largest sum of the taps' magnitudes where taps may be negative, at least 1.
         zeros_at_nominal: every mode is cancelled exactly at its nominal frequency besides.
+        hints: a refusal looks for what would do, which may take seconds.
 
     Raises:
         ArgumentError: no mode, or a value outside its range.
-        DesignError: no such design within `max_duration_s`. The message says what the longest allowed duration
+        DesignError: no such design within `max_duration_s`. With hints the message says what the longest allowed one
             reaches, which duration would do (up to four times the longest), and which period would do better.
 
     Source: this project (spec 2, grid-exact shapers).
@@ -120,48 +125,47 @@ def minimax_robust(
         raise ArgumentError(f"vibration_limit is {vibration_limit}: it must be above 0 and below 1")
     found = shortest_below(task, vibration_limit, max_duration_s)
     if found is None:
-        raise DesignError(_refusal(task, vibration_limit, max_duration_s))
+        text = refusal(task, vibration_limit, max_duration_s)
+        raise DesignError(f"{text}{_hints(task, vibration_limit, max_duration_s)}" if hints else text)
     return found
 
 
-def _refusal(task: Task, limit: float, max_duration_s: float) -> str:
-    """Why there is no design, what the longest allowed one reaches, and what would do."""
-    text = (
-        f"no design within {ms(max_duration_s)} on a {ms(task.period_s)} grid leaves at most {_percent(limit)} "
-        f"of {names(task.bands)}; "
-    )
-    most = task.periods(max_duration_s)
-    reason = unreachable(task)
-    if reason:
-        text += reason
-    else:
+def _hints(task: Task, limit: float, max_duration_s: float) -> str:
+    """What the longest allowed duration reaches, which one would do, and which other period."""
+    text = ""
+    if not unreachable(task):
+        most = task.periods(max_duration_s)
         reached = best_within(task, most) if task.wide and most else None
         if reached is not None:
-            text += f"the longest allowed reaches {_percent(reached.worst_residual)}"
+            text += f"; the longest allowed reaches {_percent(reached.worst_residual)}"
         else:
-            text += no_exact(task, most * task.period_s)
+            text += f"; {no_exact(task, most * task.period_s)}"
         longest = min(_LONGER * most, max(_HINT_PERIODS, most))
-        enough = smallest_below(task, limit, longest)
+        enough = smallest_below(task, limit, longest, too_few=most, precision=_HINT_PRECISION)
         text += f"; {ms(enough * task.period_s)} would do" if enough else f"; nor does {ms(longest * task.period_s)} do"
     return f"{text}; {_other_period(task, limit, max_duration_s)}"
 
 
 def _other_period(task: Task, limit: float, max_duration_s: float) -> str:
     """Which of some other periods does best within the duration."""
-    best: tuple[float, Task] | None = None
+    shortest_s, least = math.inf, math.inf
+    shortest_text, least_text = "", "no other period from half to twice as long has a design within that duration"
     for share in _OTHER_PERIODS:
         other = task.at_period(share * task.period_s)
         most = min(other.periods(max_duration_s), _HINT_PERIODS)
-        found = best_within(other, most) if most and not unreachable(other) else None
-        if found is not None and (best is None or found.worst_residual < best[0]):
-            best = found.worst_residual, other
-    if best is None:
-        return "no other period from half to twice as long has a design within that duration"
-    worst, other = best
-    enough = smallest_below(other, limit, other.periods(max_duration_s)) if worst <= limit else None
-    if enough is None:
-        return f"a period of {ms(other.period_s)} reaches {_percent(worst)} within that duration"
-    return f"on a period of {ms(other.period_s)} a design of {ms(enough * other.period_s)} would do"
+        if not most or unreachable(other):
+            continue
+        enough = smallest_below(other, limit, most)
+        if enough is not None:
+            if enough * other.period_s < shortest_s:
+                shortest_s = enough * other.period_s
+                shortest_text = f"on a period of {ms(other.period_s)} a design of {ms(shortest_s)} would do"
+            continue
+        found = best_within(other, most)
+        if found is not None and found.worst_residual < least:
+            least = found.worst_residual
+            least_text = f"a period of {ms(other.period_s)} reaches {_percent(least)} within that duration"
+    return shortest_text or least_text
 
 
 def _percent(ratio: float) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.shaping.band import ModeBand
-from shapegcode.shaping.cutting_planes import SAME_RESIDUAL, Bounds, CutPool, TapProblem, proven_worst
+from shapegcode.shaping.cutting_planes import NO_RESIDUAL, SAME_RESIDUAL, Bounds, CutPool, TapProblem, proven_worst
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, exact_conditions, lower_hull, ms, shortest_non_negative
 
 __all__ = [
@@ -23,7 +23,10 @@ FloatArray = NDArray[np.float64]
 
 _ON_GRID = 1e-9  # periods; forgives the rounding of a quotient
 _NO_TAP = 1e-9  # smaller amplitudes are the solver's dust
+_GROWTH = 1.4  # of the number of periods while it is searched
 _WHOLE = 1e-3  # swings per period from a whole number
+_LAST_TAP = 1e-3
+"""Where the best use of the last periods of a damped mode is to wait, a tap this large marks their end."""
 _SAME_VARIANCE = 5e-3  # relative
 
 
@@ -94,10 +97,10 @@ class Task:
         """Whole periods within a duration."""
         return math.floor(duration_s / self.period_s + _ON_GRID)
 
-    def problem(self, last: int) -> TapProblem:
-        """The taps at 0 ... `last` periods."""
+    def problem(self, last: int, last_tap: float = 0.0) -> TapProblem:
+        """The taps at 0 ... `last` periods, the last one at least `last_tap`."""
         conditions = exact_conditions(self.exact, self.period_s, last)
-        return TapProblem(self.wide, self.period_s, last, conditions, self.max_abs_sum, self.pool)
+        return TapProblem(self.wide, self.period_s, last, conditions, self.max_abs_sum, self.pool, last_tap)
 
     def at_period(self, period_s: float) -> Task:
         """The same on another grid."""
@@ -135,7 +138,7 @@ def shortest_below(task: Task, limit: float, max_duration_s: float, *, least_cos
         found = _within(task, last, limit, least_cost)
         if found is not None:
             return found
-        last += 1  # waiting was part of the optimum, or the taps did not survive full precision
+        last += 1  # the taps did not survive full precision
     return None
 
 
@@ -159,11 +162,15 @@ def best_within(task: Task, last: int) -> RobustDesign | None:
             f"the design of {ms(last * task.period_s)} on a {ms(task.period_s)} grid does not survive being "
             f"solved in full precision for modes {names(task.bands)}; try another period"
         )
-    used = round(found.shaper.duration_s / task.period_s)
-    if used < last and found.worst_residual > (1.0 + SAME_RESIDUAL) * bounds.upper:
-        shorter = best_within(task, used)
-        if shorter is not None and shorter.worst_residual < found.worst_residual:
-            found = RobustDesign(shorter.shaper, task.period_s, shorter.worst_residual, found.least_possible)
+    reached = max((1.0 + SAME_RESIDUAL) * bounds.upper, NO_RESIDUAL)
+    if found.worst_residual > reached:
+        # The best use of the last periods was to wait, and the residual counts from the last tap.
+        last = smallest_below(task, reached, last) or last
+        for last_tap in (0.0, _LAST_TAP):
+            ended = task.problem(last, last_tap).least_worst()
+            other = None if ended is None else task.finished(ended.taps, bounds.lower)
+            if other is not None and other.worst_residual < found.worst_residual:
+                found = other
     return found
 
 
@@ -173,20 +180,21 @@ def _below(task: Task, last: int, limit: float) -> Bounds | None:
     return bounds if bounds is not None and bounds.upper <= limit else None
 
 
-def smallest_below(task: Task, limit: float, most: int) -> int | None:
+def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, precision: float = 0.0) -> int | None:
     """Smallest number of periods that stays below the limit, or None if it exceeds `most`.
 
     A design stays one with further taps at zero, so growing and then halving finds it. The start is half a period of
-    each mode, what zero vibration takes.
+    each mode, what zero vibration takes, or `too_few`, if that is known not to suffice. With a relative `precision`
+    the answer suffices, but may exceed the smallest by that much.
     """
-    too_few = 0
-    enough = max(1, min(most, math.ceil(sum(0.5 / band.mode.frequency_hz for band in task.bands) / task.period_s)))
+    start = max(1.0, sum(0.5 / band.mode.frequency_hz for band in task.bands) / task.period_s, _GROWTH * too_few)
+    enough = min(most, math.ceil(start))
     while enough < most and _below(task, enough, limit) is None:
-        too_few, enough = enough, max(enough + 1, math.ceil(1.4 * enough))
+        too_few, enough = enough, max(enough + 1, math.ceil(_GROWTH * enough))
     enough = min(enough, most)
     if enough <= too_few or _below(task, enough, limit) is None:
         return None
-    while enough - too_few > 1:
+    while enough - too_few > max(1, math.floor(precision * enough)):
         middle = (too_few + enough) // 2
         if _below(task, middle, limit) is None:
             too_few = middle
@@ -197,9 +205,13 @@ def smallest_below(task: Task, limit: float, most: int) -> int | None:
 
 def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesign | None:
     """A design of `last` periods below the limit, that of least contour cost if asked for; None if none survives."""
-    problem = task.problem(last)
-    bounds = problem.least_worst(limit)
-    if bounds is None:
+    for last_tap in (0.0, _LAST_TAP):
+        problem = task.problem(last, last_tap)
+        bounds = problem.least_worst(limit)
+        plain = None if bounds is None else task.finished(bounds.taps, bounds.lower)
+        if plain is not None and plain.worst_residual <= limit:
+            break
+    else:
         return None
     inner = (1.0 - 2.0 * SAME_RESIDUAL) * limit  # room for the gap of the planes and for the proof
     candidates = []
@@ -208,11 +220,11 @@ def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesi
     elif least_cost:
         least = problem.cheapest(np.ones(last + 1), inner)
         candidates = [] if least is None else [least]
-    for taps in [*candidates, bounds.taps]:
-        found = task.finished(taps, bounds.lower)
+    for taps in candidates:
+        found = task.finished(taps, plain.least_possible)
         if found is not None and found.worst_residual <= limit:
             return found
-    return None
+    return plain
 
 
 def check_time(name: str, value_s: float) -> None:
@@ -235,6 +247,15 @@ def no_exact(task: Task, duration_s: float) -> str:
     modes = ", ".join(f"{mode.frequency_hz:g} Hz (zeta {mode.damping_ratio:g})" for mode in task.exact)
     taps = "non-negative taps" if task.max_abs_sum is None else f"taps with sum|a| up to {task.max_abs_sum:g}"
     return f"{taps} up to {ms(duration_s)} on a {ms(task.period_s)} grid do not cancel {modes} exactly"
+
+
+def refusal(task: Task, limit: float, max_duration_s: float) -> str:
+    """That there is no design below the limit, and the reason if it is known, for a message."""
+    reason = unreachable(task)
+    return (
+        f"no design within {ms(max_duration_s)} on a {ms(task.period_s)} grid leaves at most {100.0 * limit:.3g} % of "
+        f"{names(task.bands)}" + (f"; {reason}" if reason else "")
+    )
 
 
 def unreachable(task: Task) -> str:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from shapegcode._core import DesignError, Mode, Shaper
+from shapegcode._core import DesignError, Mode, Shaper, convolved_zv
 from shapegcode.shaping.grid_families import Conditions, Zero, joint_title, shortest_on_grid
 
 __all__ = ["simultaneous_zv"]
@@ -49,7 +49,14 @@ def simultaneous_zv(modes: Sequence[Mode], max_duration_s: float) -> Shaper:
     for per_period in _PER_PERIOD:
         step_s = 1.0 / (per_period * fastest_hz)
         # the exact solution may be shorter than that of the grid by a step or two
-        start = shortest_on_grid(conditions, step_s, max_duration_s + 2.0 * step_s, title=title)
+        try:
+            start = shortest_on_grid(conditions, step_s, max_duration_s + 2.0 * step_s, title=title)
+        except DesignError as error:
+            one_by_one_s = convolved_zv(modes).duration_s
+            raise DesignError(
+                f"no {title} within {max_duration_s * 1e3:.6g} ms; one ZV after the other lasts "
+                f"{one_by_one_s * 1e3:.6g} ms"
+            ) from error
         shaper = _polished(*_merged(start, _NEIGHBOURS * step_s), modes)
         if shaper is not None and shaper.duration_s <= max_duration_s * (1.0 + 1e-9):
             return shaper

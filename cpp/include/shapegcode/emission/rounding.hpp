@@ -83,12 +83,13 @@ class ModalRounder {
 
   void expand(const RoundingNode& node, const std::complex<double>* excitation);
   void grow(const RoundingNode& node, unsigned side, const std::complex<double>* excitation);
-  void add_late(std::span<const std::complex<double>> excitation, std::uint32_t periods);
+  void add_late(std::span<const std::complex<double>> excitation, double periods);
   void keep_best(std::size_t width);
   [[nodiscard]] std::size_t best_end(const RoundingEnd& end) const;
   [[nodiscard]] std::complex<double> state_of(std::size_t choice, std::size_t mode) const;
 
   std::vector<ModeStep> modes_;
+  double decay_ = 0.0;  // of the most damped mode over a period
   std::vector<std::complex<double>> state_;         // per mode, at the begin of the next stretch
   std::vector<std::complex<double>> chosen_state_;  // at the end of the stretch last chosen
   Choices kept_;

@@ -6,7 +6,6 @@
 #include <deque>
 #include <memory>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "shapegcode/filter/fir.hpp"
@@ -21,28 +20,23 @@ namespace shapegcode {
 
 /// What follows the look-ahead of a run, on half the block grid, and how the contour is kept.
 struct RunFilter {
-  /// A shaper and what it makes of a command before shaping, per axis (see contour_kernel).
-  struct Node {
-    Fir half_shaper;  ///< taps in half block periods
-    std::array<std::vector<double>, axis_count> kernels;
-  };
+  /// `shaper`: taps in whole block periods, common to all axes. `followed`: a set of shapers along an axis, which is
+  /// used instead of it; the contour is then kept with the modes at each of its positions, by `tables`. Throws as
+  /// `contour_kernel` and ContourSolver do.
+  RunFilter(const Fir& shaper, ContourTarget target, const AxisModes& modes, double block_period_s, double smoothness,
+            const std::optional<FollowingFir>& followed = {}, const AxisModeTables& tables = {});
 
-  /// One shaper everywhere. `shaper`: taps in whole block periods, common to all axes. Throws as `contour_kernel` and
-  /// ContourSolver do.
-  RunFilter(const Fir& shaper, ContourTarget target, const AxisModes& modes, double block_period_s, double smoothness);
-  /// Shapers that follow an axis; `modes` as they are at each of its positions. Throws Error(argument) on another
-  /// number of them.
-  RunFilter(const FollowingFir& shapers, ContourTarget target, std::span<const AxisModes> modes, double block_period_s,
-            double smoothness);
+  /// Half block periods by which the shaped command moves longer.
+  [[nodiscard]] int shaper_rows() const noexcept {
+    return following ? following->fir().duration_samples() : half_shaper.duration_samples();
+  }
 
-  /// Whole block periods by which the shaped run is longer.
-  [[nodiscard]] std::size_t periods() const noexcept;
-
-  std::vector<Node> nodes;
-  std::optional<FollowingFir> following;  ///< on half the block grid
+  Fir half_shaper;                        ///< taps in half block periods
+  std::optional<FollowingFir> following;  ///< likewise, instead of it
   ContourTarget target;
   double half_period_s;
-  double mean_delay_s;  ///< of the shapers
+  double mean_delay_s;                                               ///< of the shaper
+  std::vector<std::array<std::vector<double>, axis_count>> kernels;  ///< one per shaper that is followed
   double smoothness;
 };
 
@@ -98,8 +92,8 @@ class RunShaper {
   void measure(std::size_t row);
   void forget();
   [[nodiscard]] double shaped(std::size_t axis, std::ptrdiff_t row, bool corrected) const noexcept;
-  [[nodiscard]] const RunFilter::Node& node(std::ptrdiff_t row) const noexcept;
-  [[nodiscard]] Vector3 corrected(std::ptrdiff_t row) const noexcept;
+  /// What a column comes to behind the kernel that is valid at its entry `i`.
+  [[nodiscard]] double behind_kernel(std::size_t axis, const Column& column, std::size_t i) const noexcept;
   [[nodiscard]] std::size_t index(std::size_t row) const noexcept {
     return static_cast<std::size_t>(static_cast<std::ptrdiff_t>(row) - base_);
   }
@@ -111,9 +105,8 @@ class RunShaper {
   std::size_t steps_per_half_;
   Interpolator ahead_;                    // the command before shaping
   std::unique_ptr<Interpolator> target_;  // where the path should be: later by the shaper's mean delay
-  std::vector<ContourSolver> solvers_;    // axes of every node
-  std::optional<VaryingFirStream> stream_;
-  std::size_t reach_ = 0;   // samples by which any kernel acts ahead
+  std::vector<std::array<ContourSolver, axis_count>> solvers_;  // one per shaper that is followed
+  std::size_t reach_ = 0;                                       // samples by which any kernel acts ahead
   std::size_t margin_ = 0;  // samples by which a window is longer than what it corrects
 
   std::size_t rows_in_ = 0;     // of the command before shaping, until it rests
@@ -126,6 +119,7 @@ class RunShaper {
   std::size_t decided_ = 0;                 // rows whose correction is final
   std::size_t out_ = 0;                     // rows given out
   std::array<Column, axis_count> command_;  // before shaping
+  Column place_;                            // in the set of shapers that are followed, else empty
   std::array<Column, axis_count> error_;    // to be corrected
   std::array<Column, axis_count> correction_;
   std::vector<Vector3> tangent_;        // of the target, only where deviations are measured

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,7 +28,11 @@ struct ShapingOptions {
   /// What is brought back to the path behind the shaper (spec 5). With a target, `limits.contour_tolerance_mm` is its
   /// tolerance, kept by the highest feed that does; without one, `limits` holds the bounds that plain shaping needs.
   ContourTarget target = ContourTarget::none;
-  AxisModes modes;                  ///< of the response; nothing else is done with them
+  AxisModes modes;  ///< of the response; nothing else is done with them
+  /// Shapers along an axis (taps in whole block periods, positions as in the path) in place of the one shaper, for
+  /// modes that vary with position by `mode_tables`.
+  std::optional<FollowingFir> following;
+  AxisModeTables mode_tables;
   double contour_smoothness = 1.0;  ///< weight of the correction's second differences on half the block grid
 };
 
@@ -50,10 +55,7 @@ class RegionShaper {
   /// `marked_segments`: ascending indices (up to path->size()) whose begin in time is wanted. Throws Error(argument) if
   /// the block period is not a whole multiple of the interpolation period, and as the planner and the filter do.
   RegionShaper(std::shared_ptr<const Path> path, const Fir& shaper, std::span<const std::uint32_t> marked_segments,
-               const ShapingOptions& options);
-  /// The same with shapers that follow an axis; `modes` as they are at each of its positions.
-  RegionShaper(std::shared_ptr<const Path> path, const FollowingFir& shapers, std::span<const AxisModes> modes,
-               std::span<const std::uint32_t> marked_segments, const ShapingOptions& options);
+               ShapingOptions options);
 
   /// Next piece of at most `periods` periods; false once the region was given out, and `piece` is then left alone.
   /// `piece.segment_periods` then holds all marks of the runs that were begun.
@@ -68,8 +70,6 @@ class RegionShaper {
     std::size_t first, last;  // segments
   };
 
-  RegionShaper(std::shared_ptr<const Path> path, RunFilter filter, std::span<const std::uint32_t> marked_segments,
-               const ShapingOptions& options);
   [[nodiscard]] bool begin_run();
   void note_marks(const PlannedRun& run);
 

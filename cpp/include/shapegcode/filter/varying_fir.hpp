@@ -37,9 +37,13 @@ class VaryingFir {
   /// rows. Bit-identical to VaryingFirStream. Throws Error(argument) on an input without rows, another number of
   /// places, or a place that is not finite.
   [[nodiscard]] Samples apply(const Samples& in, std::span<const double> place) const;
+  /// Any one output of one axis, for who keeps the input: `newest` points at the input of that row and `place` at its
+  /// place; the duration_samples() rows before it must lie in front of both. A place that is not a number counts as 0.
+  [[nodiscard]] double value(const double* newest, const double* place) const noexcept;
 
  private:
   std::vector<Fir> set_;
+  std::vector<double> to_come_;  // filter, delay: share of an increment that is still to come so long after it
 };
 
 /// Real-time form: one sample of every axis per step; no allocation, no exception, bounded work. At rest for longer
@@ -66,7 +70,6 @@ class VaryingFirStream {
   void begin_train(const Fir& fir, double share) noexcept;
 
   VaryingFir fir_;
-  int n_axes_ = 0;
   std::vector<double> pending_;  // increments to come, one row of n_axes values per sample; a power of two of rows
   std::size_t row_mask_ = 0;
   std::size_t row_ = 0;

@@ -17,6 +17,8 @@ class CornerReach {
   void step(const Vector3& p, double foot_mm) noexcept;
   /// Largest distance of a corner from the track so far, mm.
   [[nodiscard]] double largest_mm() const noexcept;
+  /// The same of the corners that lie well behind the point: for a track that ends before the path does.
+  [[nodiscard]] double largest_passed_mm() const noexcept;
 
  private:
   struct Corner {

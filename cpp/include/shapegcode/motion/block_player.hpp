@@ -29,10 +29,17 @@ class BlockPlayer {
   /// `override_ratio` scales every feed. Throws Error(argument) on period or ratio <= 0, or a segment without feed.
   BlockPlayer(std::span<const Segment> blocks, double period_s, BlockEnd block_end, double override_ratio = 1.0);
 
+  /// Stop for so long behind a block, as where the block buffer runs empty: the set-points stay at its end, then the
+  /// next block follows. One pause per player, a later call takes the place of an earlier one. Under `ceil` whole
+  /// periods, rounded up. Throws Error(argument) on a time that is negative or not finite, or a block that is
+  /// over already or does not exist.
+  void pause_after(std::size_t block, double seconds);
   /// Next set-point, the start first; false once the end was given.
   bool step(Vector3& position) noexcept;
   /// Block on which the set-point last given lies.
   [[nodiscard]] std::size_t block() const noexcept { return block_; }
+  /// Whether the set-point last given is one of a pause.
+  [[nodiscard]] bool pausing() const noexcept;
   /// Duration of one block: a whole number of periods under `ceil`.
   [[nodiscard]] double block_duration_s(const Segment& segment) const noexcept;
 
@@ -45,7 +52,9 @@ class BlockPlayer {
   BlockEnd block_end_;
   std::size_t block_ = 0;
   double elapsed_s_ = 0.0;   // since the open block began
-  double duration_s_ = 0.0;  // of the open block
+  double duration_s_ = 0.0;  // of the open block and a pause behind it
+  std::size_t paused_block_ = 0;
+  double pause_s_ = 0.0;
   bool started_ = false;
   bool finished_ = false;
 };

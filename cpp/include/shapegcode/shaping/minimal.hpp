@@ -56,9 +56,9 @@ struct MinimalShapers {
 /// One mode is closed form, two are `minimal_two_mode`: both complete. Three and more are searched twice: by Newton
 /// from many low-discrepancy starts and from mirror images, and by halving boxes of times, each of which a bound on
 /// derivatives proves empty, or shrinks onto one solution. The boxes go in ascending duration, so that
-/// `complete_up_to_s` grows with `max_boxes`; as a rule they settle three modes within twice the duration of the
-/// convolved ZV, four within about half of it. Bounds are evaluated in floating point, rounding aside. Where solutions
-/// are not isolated (undamped modes at odd ratios, which one ZV serves) boxes stay unresolved.
+/// `complete_up_to_s` grows with `max_boxes`; as a rule they settle three modes up to the duration of the convolved ZV,
+/// four up to half of it and more. Bounds are evaluated in floating point, rounding aside. Where solutions are not
+/// isolated (undamped modes at odd ratios, which one ZV serves) boxes stay unresolved.
 ///
 /// Throws Error(argument) as `pole` does, on no mode or more than 6, if two poles lie within 1e-6 of one another
 /// (relative), if `max_duration_s` is not finite and positive or exceeds 100 periods of the fastest mode, if

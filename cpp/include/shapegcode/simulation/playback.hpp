@@ -21,11 +21,28 @@ struct PlaybackOptions {
   AxisModes modes;
   AxisModeTables mode_tables;   ///< how the modes vary with position; none: constant modes
   bool measure_contour = true;  ///< deviation of command and response and orbit errors
+  bool measure_command = true;  ///< false: the response alone; no figures of the command, no orbit errors
   /// Blocks only: play no more than the last so many seconds (0: all). Enough for the residual where older vibration
   /// has decayed; peak and contour figures then speak of that part alone.
   double last_seconds = 0.0;
+  /// Blocks only: what if the block buffer ran empty behind one of these blocks (ascending)? Each is tried by itself,
+  /// beside the run without a stop.
+  std::vector<std::size_t> starved_blocks;
+  double starved_s = 0.0;  ///< how long the set-points then wait
+  /// So much of the run behind such a wait is looked at (0: all): enough where older vibration has decayed.
+  double starved_memory_s = 0.0;
   /// Keep at most so many samples of command and response for pictures (0: none); longer runs keep their beginning.
   std::size_t record_samples = 0;
+};
+
+/// What a wait for the next block does to a run.
+struct StarvedFigures {
+  std::size_t block = 0;  ///< the set-points wait behind it
+  /// Largest |response - command| while the set-points rest: in the wait, and at the end of the run where that was
+  /// played. Zero in the wait if the filters are longer than it, so that the set-points never rest.
+  Vector3 residual_mm = Vector3::Zero();
+  DeviationStats command;  ///< of the run up to the end of what was looked at
+  DeviationStats response;
 };
 
 /// Figures of one run from rest to rest. Deviations in mm against the programmed path.
@@ -38,6 +55,7 @@ struct PlaybackFigures {
   DeviationStats response;
   std::vector<double> orbit_error_percent;  ///< per arc of the path, of the command
   Vector3 end_mm = Vector3::Zero();
+  std::vector<StarvedFigures> starved;  ///< one per PlaybackOptions::starved_blocks
   Samples recorded_command;
   Samples recorded_response;
 };
@@ -46,13 +64,22 @@ struct PlaybackFigures {
 /// not grow with the length of the run.
 [[nodiscard]] PlaybackFigures play_path(const std::shared_ptr<const Path>& path,
                                         std::shared_ptr<const SpeedProfile> profile, const PlaybackOptions& options);
+/// The same, measured against another path: that of `programmed`, of which `path` is made.
+[[nodiscard]] PlaybackFigures play_path(const std::shared_ptr<const Path>& path,
+                                        std::shared_ptr<const SpeedProfile> profile, const Path& programmed,
+                                        const PlaybackOptions& options);
 
-/// Plays blocks at their feed (a controller without look-ahead), measured against the programmed `path`.
+/// Plays blocks at their feed (a controller without look-ahead), measured against the programmed `path`. Throws
+/// Error(argument) on starved blocks that do not ascend or do not exist, and together with `last_seconds`.
 [[nodiscard]] PlaybackFigures play_blocks(std::span<const Segment> blocks, const Path& path, BlockEnd block_end,
                                           double override_ratio, const PlaybackOptions& options);
 
 /// Any set-points, (n, 3), measured against the programmed `path` (empty: no contour figures).
 [[nodiscard]] PlaybackFigures play_samples(const Samples& samples, const Path& path, const PlaybackOptions& options);
+
+/// Where a stop between two blocks excites most: for each axis the block at whose end its speed is largest, the last
+/// block (which ends in a stop) left out. Ascending, each once; an axis that never moves there has none.
+[[nodiscard]] std::vector<std::size_t> fastest_block_ends(std::span<const Segment> blocks);
 
 /// Blocks that a controller with look-ahead would run slower than programmed: per-axis speed step at a border over the
 /// corner limit, feed over an axis limit.

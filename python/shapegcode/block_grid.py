@@ -1,0 +1,149 @@
+"""On what a conversion is written: the block period and the shaper on it, chosen for a machine."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.moving_modes import moving_axis, shaper_track
+
+if TYPE_CHECKING:
+    from shapegcode.shaping import BlockPeriodCandidate, ModeBand
+    from shapegcode.shaping.track import ShaperTrack
+
+__all__ = ["Grid", "choose_grid", "make_grid"]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """On what a conversion is written: block period and the shaper on it.
+
+    Attributes:
+        block_period_s: T_B.
+        shaper: the design, times on the block grid.
+        fir: the same in whole block periods.
+        track: shapers along an axis, used instead where its position is known; None: no mode varies with position.
+        family: name of the design's row in the registry of families.
+        note: what a user should know of the choice; empty: nothing.
+    """
+
+    block_period_s: float
+    shaper: _core.Shaper
+    fir: _core.Fir
+    track: ShaperTrack | None = None
+    family: str = ""
+    note: str = ""
+
+    @property
+    def shapers(self) -> tuple[_core.Shaper, ...]:
+        """All shapers that may act."""
+        return (self.shaper, *(node.shaper for node in (self.track.nodes if self.track else ())))
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last tap of the longest shaper, s."""
+        return max(shaper.duration_s for shaper in self.shapers)
+
+
+def make_grid(
+    block_period_s: float, shaper: _core.Shaper, track: ShaperTrack | None = None, *, family: str = "", note: str = ""
+) -> Grid:
+    """Grid of a shaper whose times are whole block periods, and of shapers that follow an axis."""
+    delays = [round(t / block_period_s) for t in shaper.times_s]
+    return Grid(block_period_s, shaper, _core.Fir(delays, list(shaper.amplitudes)), track, family, note)
+
+
+def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
+    """Block period and shaper for all modes of a machine, and shapers that follow moving modes.
+
+    With `shaping.family` = "auto" the shortest shaper without negative taps that leaves at most
+    `shaping.vibration_limit` of the vibration anywhere in the modes' stated bands; exact where no band is stated. With
+    a named family its shortest one.
+
+    Args:
+        machine: modes and controller.
+        block_period_s: a period to use; None: `emission.block_period_s`, or the best one.
+
+    Raises:
+        DesignError: no shaper exists within `shaping.max_duration_s`.
+        ArgumentError: the machine has no mode, its modes vary over several axes, or the period does not fit the
+            controller.
+    """
+    # SciPy's solvers take a quarter of a second to load: not before they are needed.
+    from shapegcode.shaping import choose_robust_grid, machine_bands, robust_candidate
+
+    if not any(axis.modes for axis in machine.axes.as_tuple()):
+        raise _core.ArgumentError("the machine file gives no vibration mode (axes.x.modes): nothing to shape for")
+    bands = machine_bands(machine)
+    shaping, controller = machine.shaping, machine.controller
+    period = block_period_s if block_period_s is not None else machine.emission.block_period_s
+    if period is not None:
+        _check_period(period, machine)
+    if shaping.family != "auto":
+        return _of_family(shaping.family, bands, machine, period)
+    family = "robust" if any(band.uncertainty for band in bands) else "non-negative"
+    best: BlockPeriodCandidate
+    if period is None:
+        choice = choose_robust_grid(
+            bands, controller.interpolation_period_s, controller.block_time_s,
+            max_duration_s=shaping.max_duration_s, vibration_limit=shaping.vibration_limit,
+        )  # fmt: skip
+        best = next(each for each in choice.candidates if each.period_s == choice.period_s)
+    else:
+        best = robust_candidate(bands, period, shaping.max_duration_s, shaping.vibration_limit)
+    assert best.shaper is not None  # what is chosen exists
+    return make_grid(best.period_s, best.shaper, _track(machine, best.period_s), family=family, note=best.note)
+
+
+def _of_family(name: str, bands: list[ModeBand], machine: Machine, period_s: float | None) -> Grid:
+    """The shortest shaper of a family, on one grid or on the one on which it is shortest."""
+    from shapegcode.shaping import DesignOptions, candidate_periods, design
+
+    shaping = machine.shaping
+    periods_s = (
+        [period_s]
+        if period_s is not None
+        else candidate_periods(bands, machine, shaping.max_duration_s, shaping.vibration_limit)
+    )
+    found = []
+    refusals = []
+    for each in periods_s:
+        options = DesignOptions(each, shaping.max_duration_s, vibration_limit=shaping.vibration_limit)
+        try:
+            found.append((design(name, bands, options)[0], each))
+        except _core.DesignError as error:
+            refusals.append(str(error))
+    if not found:
+        raise _core.DesignError(f"shaping.family = {name!r}: {refusals[0]}")
+    best, period = min(found, key=lambda pair: (pair[0].duration_s, -pair[1]))
+    note = ""
+    if best.worst_residual > shaping.vibration_limit:
+        note = (
+            f"the {name} shaper leaves up to {best.worst_residual:.1%} of the vibration within the modes' bands, "
+            f"shaping.vibration_limit is {shaping.vibration_limit:.1%}"
+        )
+    return make_grid(period, best.shaper, _track(machine, period), family=name, note=note)
+
+
+def _check_period(period_s: float, machine: Machine) -> None:
+    controller = machine.controller
+    if not (math.isfinite(period_s) and period_s > 0.0):
+        raise _core.ArgumentError(f"block period is {period_s} s, must be finite and above 0")
+    ticks = period_s / controller.interpolation_period_s
+    if round(ticks) < 1 or not math.isclose(ticks, round(ticks), abs_tol=1e-6):
+        raise _core.ArgumentError(
+            f"block period {period_s * 1e3:g} ms is no whole multiple of the interpolation period "
+            f"{controller.interpolation_period_s * 1e3:g} ms"
+        )
+    if period_s < controller.block_time_s * (1 - 1e-9):
+        raise _core.ArgumentError(
+            f"block period {period_s * 1e3:g} ms is below the block time {controller.block_time_s * 1e3:g} ms "
+            "(controller.block_time_s)"
+        )
+
+
+def _track(machine: Machine, period_s: float) -> ShaperTrack | None:
+    return None if moving_axis(machine) is None else shaper_track(machine, period_s)

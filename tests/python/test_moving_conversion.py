@@ -1,0 +1,111 @@
+"""Programs of a machine whose mode moves: shaped by shapers that follow, judged with the mode where it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import shapegcode as sg
+from shapegcode import _core
+from shapegcode.block_grid import choose_grid, make_grid
+from shapegcode.emit import motion_limits, shaping_options
+from shapegcode.moving_modes import region_offset
+from shapegcode.program import Program
+from shapegcode.simulator import simulate
+from shapegcode.verify import play_emitted
+from test_moving_modes import OVER_MASS, OVER_Z, machine_with
+
+HEAD = "%\nO0001\nG21 G90 G94 G17 G54\n"
+
+
+def zig_zag(strokes: int, depth_mm: float, head: str = "G00 X0 Y0 Z0") -> bytes:
+    """X to and fro by 30 mm with a stop at every turn, while Z travels `depth_mm`."""
+    lines = [f"G01 X{30.0 * (k % 2):.3f} Z{depth_mm * k / strokes:.3f} F6000" for k in range(1, strokes + 1)]
+    return (HEAD + "\n".join([head, *lines, "M30", "%"]) + "\n").encode()
+
+
+def fine_machine(contour: str = "off") -> sg.Machine:
+    """The machine with words so fine that their rounding leaves nothing, and no forced stops."""
+    text = machine_with(OVER_Z).to_toml()
+    for old, new in (
+        ("least_increment_mm = 0.001", "least_increment_mm = 0.00001"),
+        ("feed_decimals_mm = 1", "feed_decimals_mm = 4"),
+        ('contour = "response"', f'contour = "{contour}"'),
+        ("plunge_angle_deg = 15.0", "plunge_angle_deg = 0.0"),
+    ):
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return sg.Machine.from_toml(text)
+
+
+def command(path: _core.Path, grid: object, machine: sg.Machine, offset: tuple[float | None, ...]) -> np.ndarray:
+    """The shaped command of a region, borders and middles in turn."""
+    options = shaping_options(machine, grid, motion_limits(machine, grid=grid, contour_tolerance_um=1e6), offset)  # type: ignore[arg-type]
+    piece = _core.RegionShaper(path, grid.fir, [], options).next(1 << 30)  # type: ignore[attr-defined]
+    assert piece is not None
+    rows = np.empty((len(piece.grid_mm) + len(piece.middle_mm), 3))
+    rows[::2], rows[1::2] = piece.grid_mm, piece.middle_mm
+    return rows
+
+
+def test_the_shaped_command_is_the_followed_one() -> None:
+    """The command before shaping, shaped by the filter on half the block grid, is what the region's shaper gives."""
+    machine = fine_machine()
+    region = Program.from_text(zig_zag(4, 400.0), machine).regions[0]
+    grid = choose_grid(machine)
+    assert grid.track is not None
+    alone = make_grid(grid.block_period_s, _core.Shaper([0.0], [1.0]))
+    offset = region_offset(region, machine)
+    limits = motion_limits(machine, grid=grid, contour_tolerance_um=1e6)
+    options = shaping_options(machine, alone, limits, offset)
+    bare = _core.RegionShaper(region.path, alone.fir, [], options).next(1 << 30)
+    assert bare is not None
+    before = np.empty((len(bare.grid_mm) + len(bare.middle_mm), 3))
+    before[::2], before[1::2] = bare.grid_mm, bare.middle_mm
+    expected = grid.track.following().on_finer_grid(2).apply(before)
+    shaped = command(region.path, grid, machine, offset)
+    assert len(bare.run_ends) == 1
+    assert shaped.shape == expected.shape
+    assert np.abs(shaped - expected).max() < 1e-11
+
+
+@pytest.mark.parametrize("contour", ["off", "command", "response"])
+def test_following_leaves_a_fraction_of_what_one_shaper_leaves(contour: str) -> None:
+    machine = fine_machine(contour)
+    program = Program.from_text(zig_zag(21, 40.0), machine)  # all of it near 52 Hz
+    followed = sg.convert(program, machine)
+    assert followed.report["shaper"]["following"]["axis"] == "z"
+    was = followed.report["residual_vibration_um"]["original"]["x"]
+    left = followed.report["residual_vibration_um"]["emitted"]["x"]
+    # The same program with one shaper for the nominal frequency, played by the same plant.
+    fixed_machine = sg.Machine.from_toml(machine.to_toml().replace("frequency_over = ", "# frequency_over = ", 1))
+    fixed = sg.convert(Program.from_text(zig_zag(21, 40.0), fixed_machine), fixed_machine)
+    blocks = fixed.emitted.core.cutting_path(fixed.placed[0].first_line, fixed.placed[0].last_line)
+    one_left = play_emitted(blocks, program.regions[0].path, machine).residual_mm[0] * 1e3
+    assert was > 20.0
+    assert left < 0.01 * was
+    assert left < 0.2 * one_left
+    assert followed.report["within_tolerance"]
+
+
+def test_an_unknown_position_is_shaped_for_the_nominal_frequency() -> None:
+    machine = fine_machine()
+    program = Program.from_text(HEAD.encode() + b"G00 X0 Y0\nG01 X30. F6000\nX0\nX30.\nM30\n%\n", machine)
+    grid = choose_grid(machine)
+    options = shaping_options(machine, grid, motion_limits(machine), region_offset(program.regions[0], machine))
+    assert options.following is None
+    report = sg.convert(program, machine).report
+    assert any("position of Z is not known" in warning for warning in report["warnings"])
+    assert report["residual_vibration_um"]["emitted"]["x"] < 0.1
+
+
+def test_warnings_and_modes_reach_the_report_and_the_header() -> None:
+    machine = machine_with(OVER_MASS, more="part_mass_kg = 100")
+    conversion = sg.convert(Program.from_text(zig_zag(4, 4.0), machine), machine)
+    assert b"(MODE X 46 HZ 0.03)" in conversion.text
+    heavy = machine_with(OVER_MASS, more="part_mass_kg = 400")
+    program = Program.from_text(zig_zag(4, 4.0), heavy)
+    for report in (sg.convert(program, heavy).report, simulate(program, heavy).report):
+        assert any("lies outside the table" in warning for warning in report["warnings"])
+    moving = machine_with(OVER_Z)
+    assert b"SHAPERS FOLLOW Z)" in sg.convert(Program.from_text(zig_zag(4, 4.0), moving), moving).text
