@@ -130,6 +130,11 @@ class Shaping(Table):
         '"off": neither, the feed alone keeps the command within the tolerance',
         default="response",
     )
+    rapids: Bool = key(
+        "write rapids (G00) as shaped cutting moves where the table is settled for the next cut sooner; rapid override "
+        "does not act on them",
+        default=False,
+    )
     plunge_angle_deg: Annotated[NonNegative, Field(le=90)] = key(
         "a corner is a forced stop of the shaped command if a side of it leans from the Z axis by no more than "
         "this and the direction changes by 45 degrees or more: a shaper must not mix plunges with other cuts",

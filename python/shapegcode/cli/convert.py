@@ -83,6 +83,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="duration of the shortest block, for example 5ms (default: chosen for the modes)",
     )
     parser.add_argument(
+        "--shape-rapids",
+        action="store_const",
+        const=True,
+        default=None,
+        help="write rapids as shaped cutting moves where the table is settled for the next cut sooner (default: "
+        "shaping.rapids of the machine file); rapid override does not act on them",
+    )
+    parser.add_argument(
         "--compensation",
         choices=("refuse", "expand", "keep"),
         default=None,
@@ -142,6 +150,7 @@ def run(args: argparse.Namespace) -> int:
         ("input.compensation", args.compensation),
         ("tolerance.contour_um", args.contour_tolerance),
         ("shaping.contour", args.contour),
+        ("shaping.rapids", args.shape_rapids),
         ("shaping.family", args.shaper),
         ("shaping.per_axis", args.per_axis),
         ("shaping.part_mass_kg", args.part_mass),
