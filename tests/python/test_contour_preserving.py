@@ -93,7 +93,7 @@ def test_a_wider_tolerance_is_not_slower() -> None:
 
 
 def test_the_feed_on_a_binding_arc_is_the_highest() -> None:
-    """A tenth more speed on the arc that binds would leave the tolerance; with 1.3 times of it the program is faster."""
+    """A tenth more speed on the arc that binds would leave the tolerance; more tolerance is not slower."""
     text = "%\nO1\nG21G17G90G94G40G64G00X0Y0Z0\nG01X50.F9000.\nG03X54.Y4.R4.\nG01Y60.\nM30\n%\n"
     for target in ("command", "response"):
         times = []
