@@ -1802,7 +1802,7 @@ class ContourSolver:
         """
         See the class.
         """
-    def solve(self, error: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], carried: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], stiffness: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> numpy.typing.NDArray[numpy.float64]:
+    def solve(self, error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], carried: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64] = ...) -> numpy.typing.NDArray[numpy.float64]:
         """
         Corrections (m,) for errors (m + len(kernel) - 1,); `carried`: the len(kernel) + 1 corrections before.
         """

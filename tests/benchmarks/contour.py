@@ -104,9 +104,7 @@ def _region_rows(repetitions: int) -> list[list[str]]:
             limits = motion_limits(machine, grid=grid, contour_tolerance_um=machine.tolerance.contour_um)
             options = shaping_options(machine, grid, limits)
 
-            def shape(
-                path: Any = path, grid: Grid = grid, options: Any = options
-            ) -> int:
+            def shape(path: Any = path, grid: Grid = grid, options: Any = options) -> int:
                 piece = _core.RegionShaper(path, grid.fir, [], options).next(10**7)
                 assert piece is not None
                 return len(piece.middle_mm)
