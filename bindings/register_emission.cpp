@@ -17,6 +17,7 @@ namespace {
 
 struct FittedBlocks {
   std::vector<FittedBlock> blocks;
+  std::uint32_t left_periods = 0;
 };
 
 }  // namespace
@@ -31,6 +32,7 @@ void register_emission(py::module_& module) {
       .def_readwrite("minimum_feed", &FitOptions::minimum_feed, "In feed units.")
       .def_readwrite("merge_tolerance_increments", &FitOptions::merge_tolerance_increments,
                      "Deviation of merged blocks per axis, least increments.")
+      .def_readwrite("lent_periods", &FitOptions::lent_periods, "Periods that the blocks before did not last.")
       .def_readwrite("modes", &FitOptions::modes,
                      "Modes of X, Y, Z, which the rounding of block ends leaves at rest; none: ends are rounded to the "
                      "nearest increment.")
@@ -47,6 +49,8 @@ void register_emission(py::module_& module) {
 
   py::class_<FittedBlocks, std::shared_ptr<FittedBlocks>>(module, "FittedBlocks", "Blocks ready to be written.")
       .def("__len__", [](const FittedBlocks& self) { return self.blocks.size(); })
+      .def_readonly("left_periods", &FittedBlocks::left_periods,
+                    "Time that the blocks do not last: `FitOptions.lent_periods` of the next piece.")
       .def_property_readonly(
           "periods",
           [](const FittedBlocks& self) {
@@ -86,8 +90,8 @@ void register_emission(py::module_& module) {
       [](const ShapedCommand& command, const std::vector<std::uint32_t>& breaks, const FitOptions& options) {
         const py::gil_scoped_release release;
         auto fitted = std::make_shared<FittedBlocks>();
-        fitted->blocks =
-            fit_blocks(command.grid_mm, command.middle_mm, command.arc_normal, breaks, options, command.run_ends);
+        fitted->blocks = fit_blocks(command.grid_mm, command.middle_mm, command.arc_normal, breaks, options,
+                                    command.run_ends, &fitted->left_periods);
         return fitted;
       },
       py::arg("command"), py::arg("breaks"), py::arg("options"),
@@ -105,6 +109,7 @@ void register_emission(py::module_& module) {
       .def_readwrite("position_decimals", &WriterOptions::position_decimals, "Digits behind the point.")
       .def_readwrite("feed_decimals", &WriterOptions::feed_decimals, "Digits behind the point.")
       .def_readwrite("incremental", &WriterOptions::incremental, "G91 words.")
+      .def_readwrite("motion", &WriterOptions::motion, "Motion code active before the first block.")
       .def_readwrite("plane", &WriterOptions::plane, "Plane active before the first block.")
       .def_readwrite("exact_stop_at_end", &WriterOptions::exact_stop_at_end, "G09 on the last block.")
       .def_readwrite("line_end", &WriterOptions::line_end, "Line end.");

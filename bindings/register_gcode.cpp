@@ -43,6 +43,21 @@ std::shared_ptr<const Path> cutting_path(const Program& program, std::uint32_t f
   return std::make_shared<const Path>(std::move(segments));
 }
 
+std::shared_ptr<Region> one_line_region(const std::shared_ptr<Path>& path, const ModalState& entry,
+                                        const ModalState& exit, std::uint32_t line, std::size_t text_begin,
+                                        std::size_t text_end) {
+  auto region = std::make_shared<Region>();
+  region->first_line = region->last_line = line;
+  region->text_begin = text_begin;
+  region->text_end = text_end;
+  region->path = path;
+  region->entry = entry;
+  region->exit = exit;
+  region->exact_stop_at_end = true;
+  region->blocks = 1;
+  return region;
+}
+
 char one_letter(const std::string& text, const char* allowed) {
   if (text.size() != 1 || std::string(allowed).find(text) == std::string::npos) {
     throw Error(ErrorKind::argument, "'" + text + "' must be one of the letters " + allowed);
@@ -125,7 +140,10 @@ void register_gcode(py::module_& module) {
       .def_readwrite("feed", &ModalState::feed, "F as programmed; 0 before the first.")
       .def_readwrite("spindle_rev_per_min", &ModalState::spindle_rev_per_min, "S; 0 before the first.")
       .def_readonly("position_mm", &ModalState::position_mm, "Position in the active work coordinates, shape (3,), mm.")
-      .def_readonly("known", &ModalState::known, "Whether each axis' position is known.");
+      .def_readonly("known", &ModalState::known, "Whether each axis' position is known.")
+      .def_property_readonly(
+          "uncertain", [](const ModalState& self) { return self.uncertain_groups != 0; },
+          "Whether a modal code depends on the block-skip switch.");
 
   py::enum_<StepKind>(module, "StepKind", "What a step of a program is.")
       .value("region", StepKind::region)
@@ -198,6 +216,10 @@ void register_gcode(py::module_& module) {
       .def_readonly("comment_length", &RegionNote::comment_length, "Bytes; 0: no comment.");
 
   py::class_<Region, std::shared_ptr<Region>>(module, "Region", "A run of cutting moves between two stops.")
+      .def(py::init(&one_line_region), py::kw_only(), py::arg("path"), py::arg("entry"), py::arg("exit"),
+           py::arg("line"), py::arg("text_begin"), py::arg("text_end"),
+           "One line of a text as a region that ends with an exact stop: what takes the place of a rapid. `path`: its "
+           "move; `entry`, `exit`: modal state before and behind it; `text_begin`, `text_end`: its bytes.")
       .def_readonly("first_line", &Region::first_line, "From 1.")
       .def_readonly("last_line", &Region::last_line, "From 1, inclusive.")
       .def_readonly("text_begin", &Region::text_begin, "Byte offset of its first line.")

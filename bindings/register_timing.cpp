@@ -1,5 +1,6 @@
 #include <pybind11/stl.h>
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -132,6 +133,15 @@ void define_model(py::module_& module) {
       },
       py::arg("travel_mm"), py::arg("model"),
       "Wait for in-position behind a rapid, s. Raises ArgumentError on a model that no controller can have.");
+  module.def(
+      "in_position_wait_behind_s",
+      [](const Vector3& error_mm, const std::array<bool, axis_count>& moved, const ControllerModel& model) {
+        check(model);
+        return in_position_wait_s(error_mm, moved, model);
+      },
+      py::arg("error_mm"), py::arg("moved"), py::arg("model"),
+      "The same behind any command, s. `error_mm`: what the servo loop lags at its end, (3,); `moved`: the axes that "
+      "moved, (3,). Raises ArgumentError on a model that no controller can have.");
   module.def(
       "rapid_samples",
       [](const Vector3& start_mm, const Vector3& end_mm, const ControllerModel& model) {

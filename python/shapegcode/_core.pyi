@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'grid_polynomial', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -963,6 +963,11 @@ class ModalState:
     def spindle_rev_per_min(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def uncertain(self) -> bool:
+        """
+        Whether a modal code depends on the block-skip switch.
+        """
+    @property
     def units(self) -> int:
         """
         Group 06: 20, 21.
@@ -1338,6 +1343,10 @@ class Region:
     """
     A run of cutting moves between two stops.
     """
+    def __init__(self, *, path: Path, entry: ModalState, exit: ModalState, line: typing.SupportsInt | typing.SupportsIndex, text_begin: typing.SupportsInt | typing.SupportsIndex, text_end: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        One line of a text as a region that ends with an exact stop: what takes the place of a rapid. `path`: its move; `entry`, `exit`: modal state before and behind it; `text_begin`, `text_end`: its bytes.
+        """
     @property
     def blocks(self) -> int:
         """
@@ -1614,6 +1623,14 @@ class ShapingOptions:
     def __init__(self) -> None:
         ...
     @property
+    def axis_shapers(self) -> list[Fir]:
+        """
+        A shaper for each of X, Y and Z, of one mean delay, in place of the common one; empty: none.
+        """
+    @axis_shapers.setter
+    def axis_shapers(self, arg0: collections.abc.Sequence[Fir]) -> None:
+        ...
+    @property
     def block_period_s(self) -> float:
         """
         s.
@@ -1840,6 +1857,14 @@ class FitOptions:
     def interpolation_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def lent_periods(self) -> int:
+        """
+        Periods that the blocks before did not last.
+        """
+    @lent_periods.setter
+    def lent_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
     def merge_tolerance_increments(self) -> float:
         """
         Deviation of merged blocks per axis, least increments.
@@ -1878,6 +1903,11 @@ class FittedBlocks:
     def first_periods(self) -> numpy.typing.NDArray[numpy.uint32]:
         """
         Block period of the command in which each begins, (n,).
+        """
+    @property
+    def left_periods(self) -> int:
+        """
+        Time that the blocks do not last: `FitOptions.lent_periods` of the next piece.
         """
     @property
     def periods(self) -> numpy.typing.NDArray[numpy.uint32]:
@@ -1927,6 +1957,14 @@ class WriterOptions:
         """
     @line_end.setter
     def line_end(self, arg0: str) -> None:
+        ...
+    @property
+    def motion(self) -> int:
+        """
+        Motion code active before the first block.
+        """
+    @motion.setter
+    def motion(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def plane(self) -> int:
@@ -2932,6 +2970,10 @@ def grid_polynomial(modes: collections.abc.Sequence[Mode], period_s: typing.Supp
         DesignError: A z closer to +1 than 0.01, or so large an abs_sum that rounding leaves more than 1e-10.
     
     Source: this project (spec 2, grid-exact shapers).
+    """
+def in_position_wait_behind_s(error_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], moved: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(3)"], model: ControllerModel) -> float:
+    """
+    The same behind any command, s. `error_mm`: what the servo loop lags at its end, (3,); `moved`: the axes that moved, (3,). Raises ArgumentError on a model that no controller can have.
     """
 def in_position_wait_s(travel_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: ControllerModel) -> float:
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from shapegcode.moving_modes import (
     region_range_warnings,
 )
 from shapegcode.program import Program
+from shapegcode.rapids import ShapedRapids, rapid_warnings, shape_rapids
 from shapegcode.verdict import RegionFigures, contour_target, contour_um, measure, summarise
 from shapegcode.verify import Placed, axis_modes, other_time_s, play_original, read_back
 
@@ -141,10 +142,18 @@ def convert(
         while spending is not None and spending.give_up(grid, written, summarise(figures, written.placed, machine)):
             reasons = [spending.given_up.get(index, reason) for index, reason in enumerate(reasons)]
             written, emitted, figures = settle(grid, reasons)
+        rapids: ShapedRapids | None = None
+        if machine.shaping.rapids:
+            rapids = shape_rapids(emitted, written.placed, machine, grid, pool, budget)
+            written, emitted = replace(written, text=rapids.text, placed=rapids.placed), rapids.emitted
         kept_s = sum(play.result().duration_s for play, reason in zip(playbacks, reasons, strict=True) if reason)
     finally:
         pool.shutdown(cancel_futures=True)
     report = _report(program, machine, grid, written, kept_s, summarise(figures, written.placed, machine), spending)
+    if rapids is not None:
+        report["rapids"] = _tidy(rapids.report)
+        report["cycle_time_s"]["emitted"] += rapids.extra_s
+        report["warnings"] += rapid_warnings(rapids.report, machine)
     verdict = _VERDICT_GOOD if report["within_tolerance"] else _VERDICT_BAD
     text = written.text.replace(_VERDICT_PENDING, verdict, 1)
     return Conversion(text, report, emitted, tuple(written.placed))
@@ -342,6 +351,9 @@ def _report(
             "times_s": [float(t) for t in grid.shaper.times_s],
             "amplitudes": [float(a) for a in grid.shaper.amplitudes],
             "family": grid.family,
+            "duration_s": grid.duration_s,
+            "per_axis": [{"delays": list(fir.delays), "taps": list(fir.taps)} for fir in grid.axis_firs],
+            "per_axis_duration_s": grid.per_axis_duration_s,
         },
         "blocks": {"read": program.core.block_count, "emitted": written.blocks},
         "expanded": program.core.expanded,

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shapegcode._core import Fir, Mode, Shaper, convolved_zv, minimal_two_mode
+from shapegcode._core import Fir, MinimalBranches, Mode, Shaper, convolved_zv, minimal_branches, minimal_two_mode
 from shapegcode.modal_response import ModalRun, respond, shaped_step
 from shapegcode.shaping.band import ModeBand
-from shapegcode.shaping.choice import NO_RESIDUAL
 from shapegcode.shaping.design import evaluate
+from shapegcode.shaping.ranking import NO_RESIDUAL
 
-__all__ = ["BranchPoint", "ShaperDemo", "branches", "shaper_demo"]
+__all__ = ["MODES", "ShaperDemo", "shaper_demo"]
 
 FloatArray = NDArray[np.float64]
 
@@ -42,21 +42,8 @@ _RAMP_S = 0.1
 _DAMPING_RATIO = 0.005
 _FREQUENCY_ERROR = 0.02
 
-_BRANCH_RATIOS = np.linspace(1.05, 8.0, 140)
+_BRANCH_RATIOS = np.linspace(1.05, 8.01, 349)
 _BRANCH_LONGEST_S = 1.0
-
-
-@dataclass(frozen=True)
-class BranchPoint:
-    """A minimal shaper for a pair of frequencies (figures 2 and 3).
-
-    Attributes:
-        second_hz: second natural frequency.
-        shaper: one of the shapers for it.
-    """
-
-    second_hz: float
-    shaper: Shaper
 
 
 @dataclass(frozen=True)
@@ -65,47 +52,28 @@ class ShaperDemo:
 
     Attributes:
         shapers: short, medium, long and convolved ZV.
-        branches: minimal shapers over the second frequency.
+        branches: minimal shapers over the second frequency, the first one at 1 Hz.
         runs: of the stage, by the shaper's name, "unshaped" among them.
         report: figures as plain values: `rows` (figure, what, paper, here, agrees), `shapers`, `stage`, `remark`.
     """
 
     shapers: dict[str, Shaper]
-    branches: tuple[BranchPoint, ...]
+    branches: MinimalBranches
     runs: dict[str, ModalRun]
     report: dict[str, Any]
-
-
-def branches(first_hz: float, ratios: Sequence[float] | FloatArray, max_duration_s: float) -> tuple[BranchPoint, ...]:
-    """All minimal shapers of undamped pairs, the second frequency varied (figure 2).
-
-    Args:
-        first_hz: first natural frequency.
-        ratios: second frequencies relative to it.
-        max_duration_s: longest shaper.
-
-    Raises:
-        ArgumentError: a frequency or a duration that is not above 0.
-    """
-    pairs = ((first_hz * float(ratio), Mode(first_hz, 0.0)) for ratio in ratios)
-    return tuple(
-        BranchPoint(second_hz, shaper)
-        for second_hz, first in pairs
-        for shaper in minimal_two_mode(first, Mode(second_hz, 0.0), max_duration_s)
-    )
 
 
 def shaper_demo() -> ShaperDemo:
     """The paper's shapers, branches, step responses, sensitivities and stage test."""
     found = minimal_two_mode(*MODES, _LONGEST_S)
     shapers = {name: _named(found, name) for name in _PAPER_NEGATIVE} | {"convolved ZV": convolved_zv(list(MODES))}
-    points = branches(MODES[0].frequency_hz, _BRANCH_RATIOS, _BRANCH_LONGEST_S)
+    branches = minimal_branches(MODES[0], 0.0, _BRANCH_RATIOS.tolist(), _BRANCH_LONGEST_S)
     runs = _stage_runs(shapers)
     stage = {name: _stage_figures(run) for name, run in runs.items()}
     bands = [ModeBand(mode, _BAND) for mode in MODES]
     worst = {name: 100.0 * evaluate(name, shaper, bands).worst_residual for name, shaper in shapers.items()}
     rows = [
-        *_branch_rows(points),
+        *_branch_rows(branches),
         *_shaper_rows(shapers),
         *_sensitivity_rows(shapers, worst),
         *_response_rows(shapers),
@@ -144,7 +112,7 @@ def shaper_demo() -> ShaperDemo:
             "three minimal shapers; there are seven up to 0.8 s."
         ),
     }  # fmt: skip
-    return ShaperDemo(shapers, points, runs, report)
+    return ShaperDemo(shapers, branches, runs, report)
 
 
 def _named(found: Sequence[Shaper], name: str) -> Shaper:
@@ -168,28 +136,25 @@ def _row(figure: str, what: str, paper: str, here: str, agrees: bool | None) -> 
     return {"figure": figure, "what": what, "paper": paper, "here": here, "agrees": agrees}
 
 
-def _branch_rows(points: Sequence[BranchPoint]) -> list[dict[str, Any]]:
+def _branch_rows(branches: MinimalBranches) -> list[dict[str, Any]]:
     """Several shapers per frequency; the shortest branch is the closed form 2/(f1+f2)."""
-    counts = [sum(point.second_hz == second_hz for point in points) for second_hz in {p.second_hz for p in points}]
-    first_hz = MODES[0].frequency_hz
-    shortest = {
-        second_hz: min((p.shaper for p in points if p.second_hz == second_hz), key=lambda each: each.duration_s)
-        for second_hz in {p.second_hz for p in points}
-    }
-    misses = [abs(shaper.duration_s - 2.0 / (first_hz + second_hz)) for second_hz, shaper in shortest.items()]
-    third = [second_hz for second_hz, shaper in shortest.items() if shaper.has_negative]
+    durations_s = branches.times_s[..., 2]
+    counts = np.isfinite(durations_s).sum(axis=0)
+    shortest = np.nanargmin(durations_s, axis=0)
+    every = np.arange(len(shortest))
+    seconds_hz = branches.ratios * MODES[0].frequency_hz
+    miss_s = np.abs(durations_s[shortest, every] - 2.0 / (MODES[0].frequency_hz + seconds_hz)).max()
+    middle = branches.amplitudes[shortest, every, 1]
+    turning = float(branches.ratios[middle < 0.0].min())
     return [
         _row(
-            "2", "durations for one pair of frequencies, up to 1 s", "several", f"{min(counts)} to {max(counts)}",
-            max(counts) > 1,
+            "2", "shapers for one pair of frequencies, up to 1 s", "several", f"{counts.min()} to {counts.max()}",
+            bool(counts.max() > 1),
         ),
         _row(
-            "2", "shortest branch against 2/(f1+f2)", "(curve)", f"within {max(misses) * 1e3:.1g} ms",
-            max(misses) < 1e-6,
+            "2", "shortest branch against 2/(f1+f2)", "(curve)", f"within {miss_s * 1e3:.1g} ms", bool(miss_s < 1e-9)
         ),
-        _row(
-            "3", "middle tap of the shortest branch is negative", "(curve)", f"from f2/f1 = {min(third):.3g} on", None
-        ),
+        _row("3", "middle tap of the shortest branch is negative", "(curve)", f"from f2/f1 = {turning:.3g} on", None),
     ]  # fmt: skip
 
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from shapegcode import canvas
-from shapegcode.demo_shaper import MODES, BranchPoint, ShaperDemo
+from shapegcode._core import MinimalBranches
+from shapegcode.demo_shaper import MODES, ShaperDemo
 from shapegcode.modal_response import ModalRun
-from shapegcode.shaper_picture import plot_impulses, plot_sensitivity, plot_steps
+from shapegcode.shaper_picture import plot_branches, plot_impulses, plot_sensitivity, plot_steps
 from shapegcode.shaping.band import ModeBand
 
-__all__ = ["plot_branch_amplitudes", "plot_branches", "plot_stage", "write_demo_pictures"]
+__all__ = ["plot_branch_amplitudes", "plot_stage", "write_demo_pictures"]
 
 
 def write_demo_pictures(demo: ShaperDemo, folder: str | Path) -> list[str]:
@@ -32,7 +33,7 @@ def write_demo_pictures(demo: ShaperDemo, folder: str | Path) -> list[str]:
     compared = {label: shaper for label, shaper in labelled.items() if not label.startswith("medium")}
     bands = [ModeBand(mode, 0.05) for mode in MODES]
     pictures: dict[str, Callable[[Path], None]] = {
-        "figure2-durations": lambda file: plot_branches(file, demo.branches),
+        "figure2-durations": lambda file: plot_branches(file, demo.branches, MODES),
         "figure3-amplitudes": lambda file: plot_branch_amplitudes(file, demo.branches),
         "figure4-impulses": lambda file: plot_impulses(file, minimal),
         "figure5-sensitivity": lambda file: plot_sensitivity(file, compared, bands),
@@ -48,50 +49,22 @@ def write_demo_pictures(demo: ShaperDemo, folder: str | Path) -> list[str]:
     return [str(file) for file in files]
 
 
-def plot_branches(file: str | Path, points: Sequence[BranchPoint]) -> None:
-    """Durations of all minimal shapers over the second frequency; filled: no negative tap.
-
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
-    """
-    figure = canvas.figure(9.0, 5.0)
-    panel = canvas.panels(figure, 1, 1)[0][0]
-    for negative, colour, label in ((True, canvas.COLOURS[0], "a negative tap"), (False, canvas.COLOURS[1], "none")):
-        chosen = [point for point in points if point.shaper.has_negative == negative]
-        panel.plot(
-            [point.second_hz for point in chosen], [point.shaper.duration_s for point in chosen], ".", color=colour,
-            markersize=4, label=label,
-        )  # fmt: skip
-    panel.set_ylim(bottom=0.0)
-    panel.set_xlabel("second natural frequency in Hz")
-    panel.set_ylabel("duration in s")
-    canvas.legend_above(panel)
-    canvas.heading(figure, "Minimal shapers of two undamped modes, the first at 1 Hz (figure 2)", "")
-    canvas.save(figure, file)
-
-
-def plot_branch_amplitudes(file: str | Path, points: Sequence[BranchPoint]) -> None:
+def plot_branch_amplitudes(file: str | Path, branches: MinimalBranches) -> None:
     """Amplitudes of the shortest minimal shaper over the second frequency.
 
     Raises:
         ValueError: a wrong ending.
         OSError: the file cannot be written.
     """
-    shortest: dict[float, BranchPoint] = {}
-    for point in points:
-        known = shortest.get(point.second_hz)
-        if known is None or point.shaper.duration_s < known.shaper.duration_s:
-            shortest[point.second_hz] = point
-    kept = [point for point in shortest.values() if len(point.shaper.times_s) == 3]
+    shortest = np.nanargmin(branches.times_s[..., 2], axis=0)
+    amplitudes = branches.amplitudes[shortest, np.arange(len(shortest))]
     figure = canvas.figure(9.0, 4.5)
     panel = canvas.panels(figure, 1, 1)[0][0]
-    frequencies = [point.second_hz for point in kept]
     for tap, label in enumerate(("first tap", "second tap", "third tap")):
-        style = "--" if tap == 2 else "-"
         panel.plot(
-            frequencies, [point.shaper.amplitudes[tap] for point in kept], style, color=canvas.COLOURS[tap], label=label
-        )
+            branches.ratios * MODES[0].frequency_hz, amplitudes[:, tap], "--" if tap == 2 else "-",
+            color=canvas.COLOURS[tap], label=label,
+        )  # fmt: skip
     panel.axhline(0.0, color="black", linewidth=0.8)
     panel.set_xlabel("second natural frequency in Hz")
     panel.set_ylabel("amplitude")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 _DEGREE = math.pi / 180.0
 _PLUNGE_CORNER_DEG = 45.0
-_ALL_PERIODS = (1 << 32) - 1
+_PIECE_PERIODS = 1 << 17  # of a region in one go: what bounds the memory
 _CORNER_SHARE = 0.75  # several corners of a polyline may fall into one shaper, and then their deviations add up
 
 
@@ -111,10 +112,41 @@ def shaping_options(
     options.rest_at_stop_s = machine.controller.shaped_time_constant_s
     options.target = _TARGETS[machine.shaping.contour]
     options.modes = axis_modes(machine)
+    options.axis_shapers = list(grid.axis_firs)
     if grid.track is not None and (start := offset[grid.track.axis]) is not None:
         options.following = grid.track.following(start)
         options.mode_tables = mode_tables(machine, offset=offset)
     return options
+
+
+class _Marks:
+    """N words and comments of a region, in the pieces in which it is written."""
+
+    def __init__(self, program: Program, notes: Sequence[_core.RegionNote]) -> None:
+        self._program = program
+        self._notes = notes
+        self._next = 0
+        self.first_number = -1
+        """N word at the region's begin, which belongs before its prologue; -1: none."""
+
+    def within(self, piece: _core.ShapedCommand, *, last: bool) -> tuple[list[_core.BlockMark], list[int]]:
+        """Marks of a piece and the periods at which its blocks must end for them, both counted from its begin."""
+        first = piece.first_period
+        end = first + len(piece.middle_mm)
+        reached = piece.segment_periods
+        marks: list[_core.BlockMark] = []
+        breaks: list[int] = []
+        while self._next < len(reached) and (last or reached[self._next] < end):
+            note, period = self._notes[self._next], reached[self._next] - first
+            self._next += 1
+            number = note.n_number
+            if note.segment == 0 and self.first_number < 0 <= number:
+                self.first_number, number = number, -1
+            comment = self._program.core.slice(note.comment_offset, note.comment_offset + note.comment_length)
+            if number >= 0 or comment:
+                marks.append(_core.BlockMark(period, number, comment))
+                breaks.append(period)
+        return marks, breaks
 
 
 def emit_region(
@@ -143,33 +175,38 @@ def emit_region(
     if machine.emission.rounding == "vibration":
         fit.modes = options.modes
     last = region.path[-1]
-    if region.exit.motion in (2, 3) and last.kind == _core.SegmentKind.arc:
-        fit.end_with_arc(region.exit.motion == 2, last.normal, last.radius_mm)
-
-    command = shaper.next(_ALL_PERIODS)
-    assert command is not None  # the first piece always exists
-    line_end = program.core.line_end
-    marks: list[_core.BlockMark] = []
-    breaks = set(command.run_ends)
-    first_number = -1
-    for note, period in zip(notes, command.segment_periods, strict=True):
-        number = note.n_number
-        if note.segment == 0 and first_number < 0 <= number:
-            first_number, number = number, -1
-        comment = program.core.slice(note.comment_offset, note.comment_offset + note.comment_length)
-        if number >= 0 or comment:
-            marks.append(_core.BlockMark(period, number, comment))
-            breaks.add(period)
-    fitted = _core.fit_blocks(command, sorted(breaks), fit)
     writer = _core.WriterOptions()
     writer.position_decimals = -round(math.log10(increment / unit))
     writer.feed_decimals = feed_decimals
     writer.incremental = region.incremental
     writer.plane = region.entry.plane
-    writer.exact_stop_at_end = region.exact_stop_at_end
-    writer.line_end = line_end
-    start = [round(float(x) / increment) for x in command.grid_mm[0]]
-    text, motion, plane = _core.write_blocks(fitted, start, marks, writer)
+    writer.line_end = program.core.line_end
+    marks = _Marks(program, notes)
+    texts: list[bytes] = []
+    periods: list[npt.NDArray[np.uint32]] = []
+    piece = shaper.next(_PIECE_PERIODS)
+    assert piece is not None  # the first one always exists
+    start = [round(float(x) / increment) for x in piece.grid_mm[0]]
+    motion, plane = 1, region.entry.plane
+    while piece is not None:
+        following = shaper.next(_PIECE_PERIODS)
+        if following is None:
+            writer.exact_stop_at_end = region.exact_stop_at_end
+            if region.exit.motion in (2, 3) and last.kind == _core.SegmentKind.arc:
+                fit.end_with_arc(region.exit.motion == 2, last.normal, last.radius_mm)
+        here, breaks = marks.within(piece, last=following is None)
+        fitted = _core.fit_blocks(piece, sorted({*piece.run_ends, *breaks}), fit)
+        fit.lent_periods = fitted.left_periods
+        text, motion, plane = _core.write_blocks(
+            fitted, [round(float(x) / increment) for x in piece.grid_mm[0]], here, writer
+        )
+        writer.motion, writer.plane = motion, plane
+        texts.append(text)
+        periods.append(fitted.periods)
+        piece = following
+    text = b"".join(texts)
+    all_periods = np.concatenate(periods)
+    first_number, line_end = marks.first_number, program.core.line_end
 
     # A search for the region's N word must not skip the prologue.
     head = [*machine.emission.prologue, _safe_line(region, start, writer.position_decimals, machine)]
@@ -181,7 +218,7 @@ def emit_region(
     end = line_end.encode()
     before = b"".join(line.encode("latin-1") + end for line in head)
     after = b"".join(line.encode("latin-1") + end for line in tail)
-    return EmittedRegion(before + text + after, len(fitted), fitted.periods, len(before), len(before) + len(text))
+    return EmittedRegion(before + text + after, len(all_periods), all_periods, len(before), len(before) + len(text))
 
 
 def decimal(value: float, decimals: int) -> str:

@@ -109,6 +109,11 @@ class Shaping(Table):
         "at the modes, or below vibration_limit over their bands where frequency_uncertainty_percent states them",
         default="auto",
     )
+    per_axis: Bool = key(
+        "a shaper for each axis, which cancels only that axis' modes: shorter than one for all, usable because the "
+        'contour is brought back (not with contour = "off", stated bands, or modes that move with an axis)',
+        default=False,
+    )
     vibration_limit: Annotated[Positive, Field(lt=1)] = key(
         "largest residual vibration over the modes' bands as a share of the unshaped one, for families that leave some",
         unit="1",
@@ -124,6 +129,11 @@ class Shaping(Table):
         'tolerance.contour_um: "response" is the table with its modes, and so the part; "command" the set-points; '
         '"off": neither, the feed alone keeps the command within the tolerance',
         default="response",
+    )
+    rapids: Bool = key(
+        "write rapids (G00) as shaped cutting moves where the table is settled for the next cut sooner; rapid override "
+        "does not act on them",
+        default=False,
     )
     plunge_angle_deg: Annotated[NonNegative, Field(le=90)] = key(
         "a corner is a forced stop of the shaped command if a side of it leans from the Z axis by no more than "

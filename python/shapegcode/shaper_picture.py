@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapegcode import canvas
-from shapegcode._core import Mode, Shaper
+from shapegcode._core import MinimalBranches, Mode, Shaper, minimal_branches
 from shapegcode.modal_response import respond, shaped_step
 from shapegcode.shaper_table import shown, times_name
 from shapegcode.shaping.band import ModeBand
@@ -21,18 +21,23 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
-    "plot_impulses", "plot_pareto", "plot_sensitivity", "plot_steps", "residual_curve", "selected",
+    "plot_branches", "plot_impulses", "plot_pareto", "plot_sensitivity", "plot_steps", "residual_curve", "selected",
     "write_shaper_pictures",
 ]  # fmt: skip
 
 _CURVES = 6
 _FREQUENCIES = 601
 _SAMPLES_OF_A_STEP = 3000
+_LEAST_RATIO = 1.02
+_RATIO_STEP = 0.02
+_BRANCH_SWINGS = 1.0  # of the slower mode: minimal shapers of interest are shorter
 _SWINGS_SHOWN = 3.0  # of the slowest mode, behind the longest shaper
 
 
 def write_shaper_pictures(result: Recommendation, folder: str | Path) -> list[str]:
-    """Write ``shaper-pareto``, ``-sensitivity``, ``-impulses`` and ``-steps`` (PNG and SVG) into a folder.
+    """Write ``shaper-pareto``, ``-sensitivity``, ``-impulses``, ``-steps`` and, for two modes, ``-branches``.
+
+    Each as PNG and SVG, into a folder, which is made where it is missing.
 
     Returns:
         The files written.
@@ -50,6 +55,9 @@ def write_shaper_pictures(result: Recommendation, folder: str | Path) -> list[st
         "impulses": lambda file: plot_impulses(file, designs),
         "steps": lambda file: plot_steps(file, designs, modes),
     }
+    branches = _branches(result)
+    if branches is not None:
+        pictures["branches"] = lambda file: plot_branches(file, branches, modes)
     files = []
     for kind, plot in pictures.items():
         for suffix in canvas.FORMATS:
@@ -66,15 +74,31 @@ def name(each: Design) -> str:
 
 
 def selected(result: Recommendation, count: int = _CURVES) -> list[Design]:
-    """The designs worth a curve: what is recommended, then the shortest of the Pareto front, one of each family."""
-    places = [result.index, *([] if result.grid_index is None else [result.grid_index])]
-    families = {result.designs[place].family for place in places}
+    """The designs worth a curve: what is recommended, then one of each family on the Pareto front, from short to long.
+
+    Designs with negative taps are left out where they may not be recommended and there are others.
+    """
+    places = list(dict.fromkeys([result.index, *([] if result.grid_index is None else [result.grid_index])]))
+    negative = result.allow_negative or result.design.negative
     front = [place for place in shown(result) if result.pareto[place]]
-    for place in [*front, *shown(result)]:
-        if result.designs[place].family not in families:
-            families.add(result.designs[place].family)
-            places.append(place)
-    return [result.designs[place] for place in dict.fromkeys(places)][:count]
+    front = [place for place in front if negative or not result.designs[place].negative]
+    families = {result.designs[place].family for place in places}
+    drawn = {_taps(result.designs[place]) for place in places}
+    others = []
+    for place in front:
+        each = result.designs[place]
+        if each.family not in families and _taps(each) not in drawn:
+            families.add(each.family)
+            drawn.add(_taps(each))
+            others.append(place)
+    room = min(count - len(places), len(others))
+    places += [others[round(step)] for step in np.linspace(0, len(others) - 1, room)] if room > 0 else []
+    return [result.designs[place] for place in places]
+
+
+def _taps(each: Design) -> tuple[float, ...]:
+    """Times and amplitudes, to nine digits."""
+    return tuple(float(f"{value:.9g}") for value in (*each.shaper.times_s, *each.shaper.amplitudes))
 
 
 def residual_curve(shaper: Shaper, frequencies_hz: NDArray[np.float64], modes: Sequence[Mode]) -> NDArray[np.float64]:
@@ -210,12 +234,59 @@ def plot_steps(file: str | Path, shapers: dict[str, Shaper], modes: Sequence[Mod
     canvas.save(figure, file)
 
 
+def plot_branches(file: str | Path, branches: MinimalBranches, modes: Sequence[Mode]) -> None:
+    """Durations of all minimal shapers of two modes over the frequency of the faster one, which a line marks.
+
+    Args:
+        file: ``.png`` or ``.svg``.
+        branches: over the ratio to the slower mode.
+        modes: the two.
+
+    Raises:
+        ValueError: a wrong ending.
+        OSError: the file cannot be written.
+    """
+    slow, fast = sorted(mode.frequency_hz for mode in modes)
+    figure = canvas.figure(9.0, 5.0)
+    panel = canvas.panels(figure, 1, 1)[0][0]
+    negative = (branches.amplitudes < 0.0).any(axis=2)
+    durations_s = branches.times_s[..., 2]
+    unit, scale = _time_unit(float(np.nanmax(durations_s)))
+    for has, colour, label in ((True, canvas.COLOURS[0], "a negative tap"), (False, canvas.COLOURS[1], "none")):
+        curves = np.where(negative == has, durations_s, np.nan)
+        panel.plot(branches.ratios * slow, curves.T * scale, color=colour, linewidth=1.4)
+        panel.plot([], [], color=colour, label=label)
+    panel.axvline(fast, color=canvas.GREY, linewidth=0.8, linestyle="--")
+    panel.set_ylim(bottom=0.0)
+    panel.set_xlabel("frequency of the faster mode in Hz")
+    panel.set_ylabel(f"duration in {unit}")
+    _legend(panel)
+    canvas.heading(figure, f"Minimal shapers of two modes, the slower one at {slow:g} Hz", "")
+    canvas.save(figure, file)
+
+
 def _legend(panel: Axes) -> None:
     panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False, borderaxespad=0.2, fontsize=8)
 
 
 def _time_unit(longest_s: float) -> tuple[str, float]:
     return ("s", 1.0) if longest_s >= 1.0 else ("ms", 1e3)
+
+
+def _branches(result: Recommendation) -> MinimalBranches | None:
+    """All minimal shapers of two modes around their ratio, the slower one held; None for another number of modes."""
+    if len(result.bands) != 2:
+        return None
+    slow, fast = sorted((band.mode for band in result.bands), key=lambda mode: mode.frequency_hz)
+    ratio = fast.frequency_hz / slow.frequency_hz
+    lowest = max(_LEAST_RATIO, 0.6 * ratio)
+    ratios = np.arange(lowest, max(1.4 * ratio, lowest + 0.2), _RATIO_STEP)
+    # No more than the search takes at the largest ratio, and not more curves than one can tell apart.
+    longest_s = min(
+        result.options.max_duration_s, _BRANCH_SWINGS / slow.frequency_hz, 99.0 / (ratios[-1] * slow.frequency_hz)
+    )
+    branches = minimal_branches(slow, fast.damping_ratio, ratios.tolist(), longest_s)
+    return branches if np.isfinite(branches.times_s).any() else None
 
 
 def _modes(result: Recommendation) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import groupby
 from typing import TYPE_CHECKING
 
-from shapegcode.shaping.choice import NO_RESIDUAL, Recommendation, Refusal
+from shapegcode.shaping.choice import Recommendation, Refusal
 from shapegcode.shaping.design import Design
+from shapegcode.shaping.ranking import NO_RESIDUAL
 from shapegcode.shaping.registry import FAMILIES
 
 if TYPE_CHECKING:
@@ -38,37 +38,43 @@ def times_name(period_s: float | None) -> str:
     return "continuous" if period_s is None else f"{period_s * 1e3:.4g} ms grid"
 
 
-def shown(result: Recommendation) -> list[int]:
+def shown(result: Recommendation, *, everything: bool = False) -> list[int]:
     """Indices of the designs for a table, shortest first.
 
-    Of each family on each kind of times the preferred design and the shortest ones of the Pareto front; and what is
-    recommended.
+    What is recommended, at all and for each grid; of each family at continuous times the preferred design and the
+    shortest ones of the Pareto front, and on grids the shortest one of all.
     """
-    kept = {result.index, *([] if result.grid_index is None else [result.grid_index])}
+    if everything:
+        return sorted(range(len(result.designs)), key=lambda index: (result.designs[index].duration_s, index))
+    kept = {result.index, *result.best_by_period.values()}
+    families: dict[tuple[str, bool], list[int]] = {}
+    for index, each in enumerate(result.designs):
+        families.setdefault((each.family, each.period_s is None), []).append(index)
 
-    def kind(index: int) -> tuple[str, float]:
-        return result.designs[index].family, result.designs[index].period_s or 0.0
+    def length(index: int) -> tuple[float, float]:
+        # Of equally long ones the longest period: it writes the fewest blocks.
+        return round(result.designs[index].duration_s, 9), -(result.designs[index].period_s or 0.0)
 
-    for _, group in groupby(sorted(range(len(result.designs)), key=lambda index: (*kind(index), index)), key=kind):
-        members = list(group)
-        front = sorted(
-            (index for index in members if result.pareto[index]), key=lambda index: result.designs[index].duration_s
-        )
-        kept |= {members[0], *front[:_PARETO_OF_A_FAMILY]}
+    for (_, continuous), members in families.items():
+        by_duration = sorted(members, key=length)
+        front = [index for index in by_duration if result.pareto[index]]
+        kept |= {members[0], *front[:_PARETO_OF_A_FAMILY]} if continuous else set(by_duration[:1])
     return sorted(kept, key=lambda index: (result.designs[index].duration_s, index))
 
 
-def designs_table(result: Recommendation, speed_mm_per_s: float, radius_mm: float) -> Table:
+def designs_table(
+    result: Recommendation, speed_mm_per_s: float, radius_mm: float, *, everything: bool = False
+) -> Table:
     """One row per design that is shown, with what it costs and what it leaves."""
     from rich.table import Table
     from rich.text import Text
 
-    rows = shown(result)
+    rows = shown(result, everything=everything)
     left_out = len(result.designs) - len(rows)
-    meaning = f"µm: by how much an arc R{radius_mm:g} comes out too small at {speed_mm_per_s:g} mm/s (contour cost)"
+    meaning = f"µm: by how much an arc R{radius_mm:g} comes out too small at {speed_mm_per_s:g} mm/s"
     table = Table(
         title=f"shapers for {', '.join(map(str, result.bands))}",
-        caption=meaning + (f"; {left_out} more designs: --json lists them" if left_out else ""),
+        caption=meaning + (f"; {left_out} more designs: --all shows them" if left_out else ""),
         show_edge=False,
         pad_edge=False,
     )
@@ -98,16 +104,19 @@ def designs_table(result: Recommendation, speed_mm_per_s: float, radius_mm: floa
 
 
 def refusals_table(refusals: Sequence[Refusal]) -> Table:
-    """The families without a design on some kind of times, and why."""
+    """The families without a design on some kind of times, and why; the same reason on several is one row."""
     from rich.table import Table
     from rich.text import Text
 
     table = Table(title="no design", show_edge=False, pad_edge=False)
     table.add_column("family", no_wrap=True)
-    table.add_column("times", no_wrap=True)
+    table.add_column("times", overflow="fold", max_width=24)
     table.add_column("why", overflow="fold")
+    times: dict[tuple[str, str], list[float | None]] = {}
     for refusal in refusals:
-        table.add_row(Text(refusal.family), times_name(refusal.period_s), Text(refusal.reason))
+        times.setdefault((refusal.family, refusal.reason), []).append(refusal.period_s)
+    for (family, reason), periods_s in times.items():
+        table.add_row(Text(family), ", ".join(map(times_name, periods_s)), Text(reason))
     return table
 
 
@@ -120,6 +129,12 @@ def verdict(result: Recommendation) -> list[str]:
         other = result.designs[result.grid_index]
         left = f"{_percent(other.worst_residual)} % left at worst"
         lines.append(f"{_GRID_MARK} for the blocks of a program: {other.family}, {_spoken(other)} ({left})")
+    if len(result.best_by_period) > 1:
+        best = (result.designs[index] for index in result.best_by_period.values())
+        compared = ", ".join(
+            f"{times_name(each.period_s)}: {each.family} {each.duration_s * 1e3:.4g} ms" for each in best
+        )
+        lines.append(f"best of each grid: {compared}")
     return lines
 
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "block_rounding.hpp"
 #include "block_shape.hpp"
@@ -57,6 +58,7 @@ class Fitter {
       position_ = best->block.end;
       blocks.push_back(best->block);
     }
+    left_ = lent_ + (periods_ - k);
     const auto has_modes = [](const std::vector<Mode>& modes) { return !modes.empty(); };
     if (std::any_of(options_.modes.begin(), options_.modes.end(), has_modes)) {
       round_for_vibration(blocks, grid_, shape_, k, rests, options_);
@@ -64,6 +66,8 @@ class Fitter {
     end_with_arc(blocks);
     return blocks;
   }
+
+  [[nodiscard]] std::uint32_t left_periods() const noexcept { return left_; }
 
  private:
   // Makes the last line an arc where the original ends with one. A line that does not move in the arc's plane (the end
@@ -234,15 +238,45 @@ class Fitter {
   std::uint32_t periods_;
   Position position_{};
   std::uint32_t lent_ = 0;  // periods that the blocks so far did not last
+  std::uint32_t left_ = 0;  // likewise, at the end
   std::size_t break_ = 0;
 };
+
+// Time that was lent from before is rest in front of the command.
+std::vector<FittedBlock> fit_behind_rest(const Eigen::Ref<const Eigen::MatrixXd>& grid,
+                                         const Eigen::Ref<const Eigen::MatrixXd>& middle,
+                                         std::span<const std::int8_t> arc_normal, std::span<const std::uint32_t> breaks,
+                                         FitOptions options, std::span<const std::uint32_t> rests,
+                                         std::uint32_t* left_periods) {
+  const std::uint32_t lent = std::exchange(options.lent_periods, 0U);
+  Eigen::MatrixXd longer(grid.rows() + lent, axis_count);
+  longer.topRows(lent).rowwise() = Vector3(grid.row(0)).transpose();
+  longer.bottomRows(grid.rows()) = grid;
+  Eigen::MatrixXd longer_middle(middle.rows() + lent, axis_count);
+  longer_middle.topRows(lent).rowwise() = Vector3(grid.row(0)).transpose();
+  longer_middle.bottomRows(middle.rows()) = middle;
+  std::vector<std::int8_t> normals(lent, std::int8_t{-1});
+  normals.insert(normals.end(), arc_normal.begin(), arc_normal.end());
+  const auto later = [lent](std::span<const std::uint32_t> periods) {
+    std::vector<std::uint32_t> result(periods.begin(), periods.end());
+    std::ranges::for_each(result, [lent](std::uint32_t& period) { period += lent; });
+    return result;
+  };
+  std::vector<FittedBlock> blocks =
+      fit_blocks(longer, longer_middle, normals, later(breaks), options, later(rests), left_periods);
+  for (FittedBlock& block : blocks) {
+    block.first_period -= std::min(block.first_period, lent);
+  }
+  return blocks;
+}
 
 }  // namespace
 
 std::vector<FittedBlock> fit_blocks(const Eigen::Ref<const Eigen::MatrixXd>& grid_mm,
                                     const Eigen::Ref<const Eigen::MatrixXd>& middle_mm,
                                     std::span<const std::int8_t> arc_normal, std::span<const std::uint32_t> breaks,
-                                    const FitOptions& options, std::span<const std::uint32_t> rests) {
+                                    const FitOptions& options, std::span<const std::uint32_t> rests,
+                                    std::uint32_t* left_periods) {
   if (grid_mm.cols() != axis_count || middle_mm.cols() != axis_count || grid_mm.rows() != middle_mm.rows() + 1 ||
       static_cast<Eigen::Index>(arc_normal.size()) != middle_mm.rows()) {
     throw Error(ErrorKind::argument, "fit_blocks needs n+1 grid rows, n middle rows and n plane entries of 3 axes");
@@ -250,7 +284,15 @@ std::vector<FittedBlock> fit_blocks(const Eigen::Ref<const Eigen::MatrixXd>& gri
   if (!grid_mm.allFinite() || grid_mm.cwiseAbs().maxCoeff() > largest_position_mm) {
     throw Error(ErrorKind::argument, "a position is not finite or outside +-99999.999 mm");
   }
-  return Fitter(grid_mm, middle_mm, arc_normal, breaks, options).run(rests);
+  if (options.lent_periods > 0) {
+    return fit_behind_rest(grid_mm, middle_mm, arc_normal, breaks, options, rests, left_periods);
+  }
+  Fitter fitter(grid_mm, middle_mm, arc_normal, breaks, options);
+  std::vector<FittedBlock> blocks = fitter.run(rests);
+  if (left_periods != nullptr) {
+    *left_periods = fitter.left_periods();
+  }
+  return blocks;
 }
 
 }  // namespace shapegcode

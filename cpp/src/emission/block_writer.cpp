@@ -18,7 +18,7 @@ WrittenBlocks write_blocks(std::span<const FittedBlock> blocks, std::array<std::
   std::string text;
   text.reserve(blocks.size() * 26 + 64);
   auto position = start;
-  int motion = 1;
+  int motion = options.motion;
   int plane = options.plane;
   std::int64_t feed = -1;
   std::size_t mark = 0;

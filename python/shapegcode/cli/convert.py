@@ -63,6 +63,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="family of the shaper, for example zvd: see shaping.family, and `shapegcode shaper` to compare them",
     )
     parser.add_argument(
+        "--per-axis",
+        action="store_true",
+        default=None,
+        help="a shaper for each axis, shorter than one for all: see shaping.per_axis",
+    )
+    parser.add_argument(
         "--part-mass",
         metavar="KG",
         type=positive,
@@ -75,6 +81,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=None,
         help="duration of the shortest block, for example 5ms (default: chosen for the modes)",
+    )
+    parser.add_argument(
+        "--shape-rapids",
+        action="store_const",
+        const=True,
+        default=None,
+        help="write rapids as shaped cutting moves where the table is settled for the next cut sooner (default: "
+        "shaping.rapids of the machine file); rapid override does not act on them",
     )
     parser.add_argument(
         "--compensation",
@@ -136,7 +150,9 @@ def run(args: argparse.Namespace) -> int:
         ("input.compensation", args.compensation),
         ("tolerance.contour_um", args.contour_tolerance),
         ("shaping.contour", args.contour),
+        ("shaping.rapids", args.shape_rapids),
         ("shaping.family", args.shaper),
+        ("shaping.per_axis", args.per_axis),
         ("shaping.part_mass_kg", args.part_mass),
     )
     failed = output.with_name(output.name + machine.emission.failed_suffix)

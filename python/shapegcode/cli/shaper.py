@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.options import (
@@ -17,9 +16,6 @@ from shapegcode.cli.options import (
     refuse_same_file,
     seconds,
 )
-
-if TYPE_CHECKING:
-    from shapegcode._core import Shaper
 
 __all__ = ["add_arguments", "run"]
 
@@ -67,7 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="TIME",
         type=seconds,
         default=None,
-        help="longest shaper, for example 50ms (default: the machine's, else three periods of the slowest mode)",
+        help="longest shaper, for example 50ms (default: three periods of the slowest mode; the machine's limit if "
+        "that is not enough)",
     )
     parser.add_argument(
         "--max-abs-sum",
@@ -80,8 +77,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--vibration-limit",
         metavar="RATIO",
         type=ratio,
-        default=0.05,
-        help="largest share of the vibration that may be left anywhere in the bands (default: 5%%)",
+        default=None,
+        help="largest share of the vibration that may be left anywhere in the bands (default: the machine's "
+        "shaping.vibration_limit, else 5%%)",
     )
     parser.add_argument(
         "--objective",
@@ -108,6 +106,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=20.0,
         help="radius of the arc on which it is shown (default: %(default)g)",
     )
+    parser.add_argument("--all", action="store_true", help="show every design in the table")
     add_plots_argument(parser, "write pictures of the comparison (PNG and SVG) into this folder")
     add_json_argument(parser)
 
@@ -150,15 +149,15 @@ def run(args: argparse.Namespace) -> int:
             vibration_limit=args.vibration_limit,
             objective=args.objective,
             allow_negative=args.negative,
-            taps=None if args.taps is None else _taps(args.taps),
+            taps=args.taps,
         )
-    if args.plots is not None:
-        from shapegcode.shaper_picture import write_shaper_pictures
+        if args.plots is not None:
+            from shapegcode.shaper_picture import write_shaper_pictures
 
-        write_shaper_pictures(result, args.plots)
+            write_shaper_pictures(result, args.plots)
     if args.json is not None:
         write_json(result.report(), args.json)
-    console.print(designs_table(result, args.speed, args.radius))
+    console.print(designs_table(result, args.speed, args.radius, everything=args.all))
     if result.refusals:
         console.print(refusals_table(result.refusals))
     for line in verdict(result):
@@ -181,32 +180,3 @@ def _band(text: str) -> float:
     if not 0.0 <= value < 1.0:
         raise argparse.ArgumentTypeError(f"{text!r}: must be at least 0 and below 100%, for example 5%")
     return value
-
-
-def _taps(text: str) -> Shaper:
-    """A shaper written as ``0:.5,10.9ms:.5``.
-
-    Raises:
-        ArgumentError: not of that form, or taps that are no shaper.
-    """
-    from shapegcode._core import ArgumentError, Shaper
-
-    times_s, amplitudes = [], []
-    for part in text.split(","):
-        time, sign, amplitude = part.strip().partition(":")
-        try:
-            times_s.append(0.0 if _float_or_none(time) == 0.0 else seconds(time.strip()))
-            amplitudes.append(float(amplitude))
-        except (ValueError, argparse.ArgumentTypeError):
-            sign = ""
-        if not sign:
-            raise ArgumentError(f"--taps: {part.strip()!r} is no tap: TIME:AMPLITUDE, for example 10.9ms:.5")
-    return Shaper(times_s, amplitudes)
-
-
-def _float_or_none(text: str) -> float | None:
-    """The number, or None."""
-    try:
-        return float(text)
-    except ValueError:
-        return None

@@ -1,9 +1,9 @@
 """Designs of shapers, and the choice among them.
 
 `band` says what is to be cancelled, `design` what a design is worth, `registry` which families there are,
-`choice` which to take, `comparison` what a user may ask of it; `grid_designs` holds the exact designs on a sample grid
-that need an optimiser, `robust` those that hold over bands (`robust_search` and `cutting_planes` find them), and
-`block_period` chooses the grid.
+`choice` which to take by the rules of `ranking`, `comparison` what a user may ask of it; `grid_designs` holds the exact
+designs on a sample grid that need an optimiser, `robust` those that hold over bands (`robust_search` and
+`cutting_planes` find them), and `block_period` chooses the grid.
 """
 
 from shapegcode.shaping.band import ModeBand, parse_mode_band
@@ -14,10 +14,11 @@ from shapegcode.shaping.block_period import (
     choose_robust_grid,
     robust_candidate,
 )
-from shapegcode.shaping.choice import Recommendation, Refusal, choose, pareto_front, recommend
+from shapegcode.shaping.choice import Recommendation, Refusal, choose
 from shapegcode.shaping.comparison import candidate_periods, choose_shaper, machine_bands
 from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
+from shapegcode.shaping.ranking import pareto_front, recommend
 from shapegcode.shaping.registry import FAMILIES, DesignOptions, Family, design, family_named
 from shapegcode.shaping.robust import VIBRATION_LIMIT, RobustDesign, least_worst, minimax_robust
 

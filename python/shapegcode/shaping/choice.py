@@ -1,68 +1,31 @@
 """The choice among shapers: every family that can be designed, which designs are worth a look, and which to take.
 
-A design is worth a look (it is on the Pareto front) if no other one is at least as good in duration, worst residual
-over the bands, contour cost and sum of the taps' magnitudes, and better in one of them. Which of those to take is the
-user's objective; :func:`recommend` is the whole rule.
+How designs rank is said in :mod:`shapegcode.shaping.ranking`.
 """
 
 from __future__ import annotations
 
 import cmath
+import contextlib
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
-from shapegcode._core import ArgumentError, DesignError, ShapegcodeError, Shaper
+from shapegcode._core import ArgumentError, DesignError, ShapegcodeError
 from shapegcode.shaping.band import ModeBand
 from shapegcode.shaping.design import Design, evaluate
+from shapegcode.shaping.ranking import OBJECTIVES, is_within, pareto_front, reason_for, recommend, spoken
 from shapegcode.shaping.registry import FAMILIES, DesignOptions, Family, design, family_named
+from shapegcode.shaping.robust import least_worst
 
-__all__ = ["OBJECTIVES", "OWN_TAPS", "Recommendation", "Refusal", "choose", "pareto_front", "recommend"]
+__all__ = ["Recommendation", "Refusal", "choose"]
 
-OWN_TAPS = "taps"
-"""Family name of taps that the user gives."""
-NO_RESIDUAL = 1e-9
-"""A residual ratio below this is none: what is left is the rounding of the solver."""
-
-_DIGITS = 9  # designs that agree in so many digits are equally good
-_ROUNDING = 1e-6  # a design made for a limit may miss it by so much, relative
+_ROBUST = "robust"  # the family of which a design is shown even if it leaves more than the limit
+_OWN_TAPS = "taps"  # the family of taps that the user gives
+_MOST_PERIODS = 5000  # of the longest shaper: finer grids are as good as continuous times
 _NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of swings per period
-_ON_GRID = 1e-6  # periods
-
-
-def _merits(each: Design) -> tuple[float, float, float, float]:
-    """What is better small: duration, worst residual, contour cost (either sign), sum of magnitudes."""
-    values = (each.duration_s, max(each.worst_residual, NO_RESIDUAL), abs(each.variance_s2), each.abs_sum)
-    duration, residual, contour, magnitudes = (float(f"{value:.{_DIGITS}g}") for value in values)
-    return duration, residual, contour, magnitudes
-
-
-def _shortest(each: Design) -> tuple[float, ...]:
-    duration, residual, contour, _ = _merits(each)
-    # Of equal durations the longest period writes the fewest blocks.
-    return duration, -(each.period_s or 0.0), residual, contour
-
-
-def _flattest(each: Design) -> tuple[float, ...]:
-    duration, residual, contour, _ = _merits(each)
-    return residual, duration, -(each.period_s or 0.0), contour
-
-
-def _truest(each: Design) -> tuple[float, ...]:
-    duration, residual, contour, _ = _merits(each)
-    return contour, duration, -(each.period_s or 0.0), residual
-
-
-OBJECTIVES: dict[str, tuple[str, Callable[[Design], tuple[float, ...]]]] = {
-    "shortest": ("the shortest", _shortest),
-    "contour": ("the one with the least contour cost", _truest),
-    "robust": ("the one with the least worst residual", _flattest),
-}
-"""Objectives by name: how the reason calls the winner, and what is least in it."""
 
 
 @dataclass(frozen=True)
@@ -114,16 +77,28 @@ class Recommendation:
     @property
     def within_limit(self) -> bool:
         """Whether its worst residual stays within the vibration limit."""
-        return _within(self.design, self.options.vibration_limit)
+        return is_within(self.design, self.options.vibration_limit)
 
     @property
     def grid_index(self) -> int | None:
         """Index of the design to take of those on a grid, which alone can be written as blocks; None: there is none."""
-        places = [place for place, each in enumerate(self.designs) if each.period_s is not None]
+        return self._best_of([place for place, each in enumerate(self.designs) if each.period_s is not None])
+
+    @property
+    def best_by_period(self) -> dict[float, int]:
+        """Index of the design to take on each grid, by its period in s, ascending."""
+        places: dict[float, list[int]] = {}
+        for place, each in enumerate(self.designs):
+            if each.period_s is not None:
+                places.setdefault(each.period_s, []).append(place)
+        best = {period_s: self._best_of(places[period_s]) for period_s in sorted(places)}
+        return {period_s: place for period_s, place in best.items() if place is not None}
+
+    def _best_of(self, places: Sequence[int]) -> int | None:
         if not places:
             return None
-        on_grid = [self.designs[place] for place in places]
-        return places[recommend(on_grid, self.options.vibration_limit, self.objective, self.allow_negative)]
+        designs = [self.designs[place] for place in places]
+        return places[recommend(designs, self.options.vibration_limit, self.objective, self.allow_negative)]
 
     def report(self) -> dict[str, Any]:
         """Everything as plain values: `modes`, `designs`, `recommended` (index), `reason`, `refused`, limits."""
@@ -171,7 +146,6 @@ def choose(
     families: Sequence[str] | None = None,
     objective: str = "shortest",
     allow_negative: bool = False,
-    taps: Shaper | None = None,
     on_progress: Callable[[float], None] = lambda _: None,
 ) -> Recommendation:
     """Design every family on every kind of times, compare, and recommend.
@@ -179,11 +153,10 @@ def choose(
     Args:
         bands: at least one mode with its band, no two modes equal.
         periods_s: grids on which the taps may lie, s; None among them: continuous times too.
-        options: limits; `period_s` plays no part; None: the defaults.
+        options: limits, and taps to compare with the rest; `period_s` plays no part; None: the defaults.
         families: names of the families to compare; None: all.
         objective: a name of `OBJECTIVES`: what is least in the design to take.
         allow_negative: whether a design with negative taps may be taken.
-        taps: a shaper of the user's own, compared with the others and exempt from the limits.
         on_progress: called with the share of the work done, 0 to 1.
 
     Returns:
@@ -197,7 +170,7 @@ def choose(
     """
     options = options or DesignOptions()
     _check(bands, periods_s, options, objective)
-    rows = FAMILIES if families is None else tuple(family_named(name) for name in dict.fromkeys(families))
+    rows = _rows(families, options)
     usable = _usable(bands, periods_s)
     found: list[Design] = []
     refusals: list[Refusal] = []
@@ -205,24 +178,22 @@ def choose(
     for done, (row, period_s) in enumerate(work):
         on_progress(done / len(work))
         if row.continuous if period_s is None else row.on_grid:
-            designs, reason = _designs(row, bands, replace(options, period_s=period_s))
+            designs, refusal = _designs(row, bands, replace(options, period_s=period_s))
             found += designs
-            refusals += [Refusal(row.name, period_s, reason)] if reason else []
+            refusals += [Refusal(row.name, period_s, refusal)] if refusal else []
     refusals += _never_tried(rows, usable)
     refusals += [
         Refusal(row.name, period_s, _aliases(bands, period_s))
         for row, period_s in itertools.product(rows, periods_s)
         if period_s is not None and period_s not in usable and row.on_grid
     ]
-    if taps is not None:
-        designs, reason = _own(taps, bands, usable)
-        found += designs
-        refusals += [Refusal(OWN_TAPS, usable[0], reason)] if reason else []
+    least = _least_worst(rows, usable, bands, options, found)
+    found += least
+    shown_anyway = {(each.family, each.period_s) for each in least}
+    refusals = [each for each in refusals if (each.family, each.period_s) not in shown_anyway]
     if not found:
         reasons = "; ".join(dict.fromkeys(f"{refusal.family}: {refusal.reason}" for refusal in refusals))
-        raise DesignError(
-            f"no family has a shaper for {_spoken(bands)} within {_ms(options.max_duration_s)}: {reasons}"
-        )
+        raise DesignError(f"no family has a shaper for {spoken(bands)} within {_ms(options.max_duration_s)}: {reasons}")
     index = recommend(found, options.vibration_limit, objective, allow_negative)
     return Recommendation(
         bands=tuple(bands),
@@ -232,63 +203,17 @@ def choose(
         designs=tuple(found),
         pareto=tuple(pareto_front(found)),
         index=index,
-        reason=_reason(found, index, bands, options.vibration_limit, objective, allow_negative),
+        reason=reason_for(found, index, bands, options.vibration_limit, objective, allow_negative),
         refusals=tuple(refusals),
     )
 
 
-def pareto_front(designs: Sequence[Design]) -> list[bool]:
-    """For each design whether no other one is at least as good in everything and better in something.
-
-    Compared are duration, worst residual, magnitude of the contour cost and sum of the taps' magnitudes, each to nine
-    digits, a residual below 1e-9 as none. A design on a grid serves where continuous times are asked for, not the
-    other way round: so designs on grids are compared with each other only.
-    """
-    if not designs:
-        return []
-    merits = np.array([_merits(each) for each in designs])
-    on_grid = np.array([each.period_s is not None for each in designs])
-    front = []
-    for own, grid in zip(merits, on_grid, strict=True):
-        better = (merits <= own).all(axis=1) & (merits < own).any(axis=1)
-        front.append(not bool((better & (on_grid | ~grid)).any()))
-    return front
-
-
-def recommend(
-    designs: Sequence[Design], vibration_limit: float, objective: str = "shortest", allow_negative: bool = False
-) -> int:
-    """Index of the design to take.
-
-    Of the designs without negative taps (of all with `allow_negative`, or where every design has some) those whose
-    worst residual is at most the limit compete for the objective; if there is none, the one that leaves least is
-    taken. Of equally short ones the one with the longest period is taken, because it writes the fewest blocks. A
-    tighter limit never makes the shortest one shorter.
-
-    Args:
-        designs: at least one.
-        vibration_limit: largest worst residual ratio.
-        objective: a name of `OBJECTIVES`.
-        allow_negative: whether a design with negative taps may be taken.
-
-    Raises:
-        ArgumentError: no design.
-    """
-    if not designs:
-        raise ArgumentError("there is no design to choose from: 0 given")
-    places = _eligible(designs, allow_negative)
-    good = [place for place in places if _within(designs[place], vibration_limit)]
-    least = OBJECTIVES[objective][1] if good else _flattest
-    return min(good or places, key=lambda place: least(designs[place]))
-
-
-def _eligible(designs: Sequence[Design], allow_negative: bool) -> list[int]:
-    places = range(len(designs))
-    return [place for place in places if allow_negative or not designs[place].negative] or list(places)
-
-
-def _within(each: Design, vibration_limit: float) -> bool:
-    return each.worst_residual <= vibration_limit * (1.0 + _ROUNDING)
+def _rows(families: Sequence[str] | None, options: DesignOptions) -> tuple[Family, ...]:
+    """The families to compare: the user's taps only where there are some."""
+    if families is None:
+        return tuple(row for row in FAMILIES if row.name != _OWN_TAPS or options.taps is not None)
+    names = [*families, *([] if options.taps is None else [_OWN_TAPS])]
+    return tuple(family_named(name) for name in dict.fromkeys(names))
 
 
 def _check(
@@ -306,6 +231,13 @@ def _check(
     for name, value in positive:
         if not (math.isfinite(value) and value > 0.0):
             raise ArgumentError(f"{name} is {value:g}: it must be finite and above 0")
+    finest_s = min((period_s for period_s in periods_s if period_s is not None), default=math.inf)
+    if options.max_duration_s > _MOST_PERIODS * finest_s:
+        raise ArgumentError(
+            f"a shaper of {_ms(options.max_duration_s)} on a grid of {_ms(finest_s)} has up to "
+            f"{options.max_duration_s / finest_s:.3g} taps, at most {_MOST_PERIODS} can be searched: take a longer "
+            "period or a shorter duration"
+        )
     if objective not in OBJECTIVES:
         raise ArgumentError(f"{objective!r} is no objective: {', '.join(OBJECTIVES)}")
 
@@ -338,20 +270,29 @@ def _aliases(bands: Sequence[ModeBand], period_s: float) -> str:
 def _designs(row: Family, bands: Sequence[ModeBand], options: DesignOptions) -> tuple[list[Design], str]:
     """The family's designs within the limits, or why there is none."""
     try:
-        found = design(row.name, bands, options)
+        return design(row.name, bands, options), ""
     except ShapegcodeError as error:
         return [], str(error)
-    short = [each for each in found if each.duration_s <= options.max_duration_s * (1.0 + _ROUNDING)]
-    tame = [each for each in short if each.abs_sum <= options.max_abs_sum * (1.0 + _ROUNDING)]
-    if tame:
-        return tame, ""
-    if short:
-        least = min(each.abs_sum for each in short)
-        return [], f"sum of the taps' magnitudes is {least:.4g}, the limit is {options.max_abs_sum:g}"
-    if found:
-        least = min(each.duration_s for each in found)
-        return [], f"lasts {_ms(least)}, the longest shaper allowed lasts {_ms(options.max_duration_s)}"
-    return [], "the family has none for these modes"
+
+
+def _least_worst(
+    rows: Sequence[Family],
+    usable: Sequence[float | None],
+    bands: Sequence[ModeBand],
+    options: DesignOptions,
+    found: Sequence[Design],
+) -> list[Design]:
+    """What leaves least within the longest duration, on each grid; none if a design without negative taps is good."""
+    wanted = any(row.name == _ROBUST for row in rows) and any(band.uncertainty for band in bands)
+    if not wanted or any(not each.negative and is_within(each, options.vibration_limit) for each in found):
+        return []
+    designs = []
+    for period_s in usable:
+        if period_s is not None:
+            with contextlib.suppress(DesignError):
+                shaper = least_worst(bands, period_s, options.max_duration_s).shaper
+                designs.append(evaluate(_ROBUST, shaper, bands, period_s))
+    return designs
 
 
 def _never_tried(rows: Sequence[Family], usable: Sequence[float | None]) -> Iterator[Refusal]:
@@ -360,57 +301,6 @@ def _never_tried(rows: Sequence[Family], usable: Sequence[float | None]) -> Iter
             yield Refusal(row.name, usable[0], "is designed at continuous times only")
         if not row.continuous and usable == [None]:
             yield Refusal(row.name, None, "is designed on a grid: give a period")
-
-
-def _own(taps: Shaper, bands: Sequence[ModeBand], usable: Sequence[float | None]) -> tuple[list[Design], str]:
-    """The user's taps, on the longest of the grids that holds them all; or why they cannot be compared."""
-    periods_s = [period_s for period_s in usable if period_s is not None and _lies_on(taps, period_s)]
-    own = evaluate(OWN_TAPS, taps, bands, max(periods_s, default=None))
-    if own.period_s is not None or None in usable:
-        return [own], ""
-    return [], f"not on a grid that was asked for; at continuous times they leave {_percent(own.worst_residual)}"
-
-
-def _lies_on(taps: Shaper, period_s: float) -> bool:
-    steps = taps.times_s / period_s
-    return bool(np.all(np.abs(steps - np.round(steps)) < _ON_GRID))
-
-
-def _reason(
-    designs: Sequence[Design], index: int, bands: Sequence[ModeBand], limit: float, objective: str, allow_negative: bool
-) -> str:
-    taken = designs[index]
-    places = _eligible(designs, allow_negative)
-    good = sum(_within(designs[place], limit) for place in places)
-    only_negative = not allow_negative and taken.negative
-    kind = "" if allow_negative or only_negative else "non-negative "
-    if good:
-        text = (
-            f"{OBJECTIVES[objective][0]} of {good} {kind}design{'' if good == 1 else 's'} whose worst residual over "
-            f"{_spoken(bands)} stays within {_percent(limit)} (it leaves {_percent(taken.worst_residual)})"
-        )
-    else:
-        text = (
-            f"none of {len(places)} {kind}design{'' if len(places) == 1 else 's'} stays within {_percent(limit)} over "
-            f"{_spoken(bands)}; this one leaves least, {_percent(taken.worst_residual)}"
-        )
-        others = [each for each in designs if each.negative and _within(each, limit)]
-        if others and not allow_negative:
-            other = min(others, key=_shortest)
-            text += f"; with negative taps {other.family} ({_ms(other.duration_s)}) would leave less"
-    return text + ("; every design has negative taps" if only_negative else "")
-
-
-def _spoken(bands: Sequence[ModeBand]) -> str:
-    def spoken(band: ModeBand) -> str:
-        text = f"{band.mode.frequency_hz:g} Hz"
-        return f"{text} ±{100.0 * band.uncertainty:g} %" if band.uncertainty else text
-
-    return " and ".join(map(spoken, bands))
-
-
-def _percent(ratio: float) -> str:
-    return "nothing" if ratio < NO_RESIDUAL else f"{100.0 * ratio:.3g} %"
 
 
 def _ms(time_s: float) -> str:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from shapegcode._core import ArgumentError, Mode, Shaper
+from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.shaping.band import ModeBand, parse_mode_band
 from shapegcode.shaping.choice import Recommendation, choose
+from shapegcode.shaping.ranking import SAME
 from shapegcode.shaping.registry import DesignOptions
 from shapegcode.shaping.robust_search import Task, shortest_below
+from shapegcode.shaping.taps import parse_taps
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -20,7 +23,7 @@ __all__ = ["candidate_periods", "choose_shaper", "machine_bands"]
 
 _ASSUMED_TICK_S = 0.001  # interpolation period where no machine states one
 _LONGEST_BLOCK_PERIOD_S = 0.02
-_PERIODS_COMPARED = 4
+_PERIODS_COMPARED = 3
 _SLOWEST_PERIODS = 3.0  # longest shaper where none is stated: three-hump EI of the slowest mode and of a faster one
 _FINEST_SHARE = 1.0 / 32.0  # of the fastest mode's period: a finer grid is as good as continuous times
 _WHOLE = 1e-6  # interpolation periods
@@ -36,10 +39,10 @@ def choose_shaper(
     families: Sequence[str] | None = None,
     max_duration_s: float | None = None,
     max_abs_sum: float = 10.0,
-    vibration_limit: float = 0.05,
+    vibration_limit: float | None = None,
     objective: str = "shortest",
     allow_negative: bool = False,
-    taps: Shaper | None = None,
+    taps: str | Shaper | None = None,
     on_progress: Callable[[float], None] = lambda _: None,
 ) -> Recommendation:
     """Compare every family of shapers for some modes, and recommend one.
@@ -54,12 +57,14 @@ def choose_shaper(
         periods_s: grids on which the taps may lie, s; None among them: continuous times too. None: with a machine its
             block period or the best few, without one continuous times and the best few multiples of 1 ms.
         families: names of the families to compare; None: all.
-        max_duration_s: longest shaper in s; None: the machine's, without one three periods of the slowest mode.
+        max_duration_s: longest shaper in s; None: three periods of the slowest mode, and the machine's limit if that
+            is not enough.
         max_abs_sum: largest sum of the taps' magnitudes.
-        vibration_limit: largest worst residual ratio of the design to take.
+        vibration_limit: largest worst residual ratio of the design to take; None: the machine's
+            `shaping.vibration_limit`, without a machine 0.05.
         objective: "shortest", "contour" (least contour cost) or "robust" (least worst residual).
         allow_negative: whether a design with negative taps may be taken.
-        taps: a shaper of the user's own, compared with the others.
+        taps: a shaper of the user's own, compared with the others: as text ("0:.5,10.9ms:.5") or as it is.
         on_progress: called with the share of the work done, 0 to 1.
 
     Raises:
@@ -72,20 +77,38 @@ def choose_shaper(
         bands = machine_bands(machine, uncertainty)
     else:
         raise ArgumentError("a comparison of shapers needs modes or a machine: neither is given")
-    if max_duration_s is None:
-        slowest = min(band.mode.frequency_hz for band in bands)
-        max_duration_s = machine.shaping.max_duration_s if machine is not None else _SLOWEST_PERIODS / slowest
-    if periods_s is None:
-        best = candidate_periods(bands, machine, max_duration_s, vibration_limit)
-        periods_s = [*([None] if machine is None else []), *best]
-    elif machine is not None:
+    if periods_s is not None and machine is not None:
         for period_s in periods_s:
             _check_period(period_s, machine)
-    options = DesignOptions(max_duration_s=max_duration_s, max_abs_sum=max_abs_sum, vibration_limit=vibration_limit)
-    return choose(
-        bands, periods_s, options, families=families, objective=objective, allow_negative=allow_negative, taps=taps,
-        on_progress=on_progress,
-    )  # fmt: skip
+    own = parse_taps(taps) if isinstance(taps, str) else taps
+    if vibration_limit is None:
+        vibration_limit = DesignOptions.vibration_limit if machine is None else machine.shaping.vibration_limit
+    limit = vibration_limit
+
+    def compared(longest_s: float) -> Recommendation:
+        options = DesignOptions(None, longest_s, max_abs_sum, limit, own)
+        kinds = periods_s
+        if kinds is None:
+            best = candidate_periods(bands, machine, longest_s, limit)
+            kinds = best if machine is not None else [None, *best]
+        return choose(
+            bands, kinds, options, families=families, objective=objective, allow_negative=allow_negative,
+            on_progress=on_progress,
+        )  # fmt: skip
+
+    if max_duration_s is not None:
+        return compared(max_duration_s)
+    usual_s = math.ceil(1e3 * _SLOWEST_PERIODS / min(band.mode.frequency_hz for band in bands)) / 1e3
+    if machine is None:
+        return compared(usual_s)
+    longest_s = machine.shaping.max_duration_s
+    if usual_s < longest_s:
+        # Long shapers take long to find, and are wanted only where there is no short one.
+        with contextlib.suppress(DesignError):
+            result = compared(usual_s)
+            if result.within_limit and result.design.exact:
+                return result
+    return compared(longest_s)
 
 
 def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
@@ -126,7 +149,8 @@ def candidate_periods(
         vibration_limit: largest worst residual ratio of the shapers that are compared.
 
     Returns:
-        The best four of those up to 20 ms; the shortest four if none has such a shaper.
+        The best three of those up to 20 ms, among them the longest whose shaper lasts at most 2 % longer than the
+        shortest one, which is what a conversion takes; the shortest three if none has such a shaper.
 
     Raises:
         ArgumentError: a value outside its range.
@@ -140,18 +164,22 @@ def candidate_periods(
         tick_s = _ASSUMED_TICK_S * max(1, math.ceil(least_s / _ASSUMED_TICK_S))
     first = max(1, math.ceil(least_s / tick_s - _WHOLE))
     last = max(first + _PERIODS_COMPARED - 1, math.floor(_LONGEST_BLOCK_PERIOD_S / tick_s + _WHOLE))
-    best: list[tuple[float, float]] = []  # duration, and the period with a minus: of equal durations the longer one
+    every: list[tuple[float, float]] = []  # duration, and the period with a minus: of equal durations the longer one
     for multiple in range(first, last + 1):
         period_s = multiple * tick_s
         # What is longer than the worst of the best so far need not be found.
-        longest_s = best[-1][0] if len(best) == _PERIODS_COMPARED else max_duration_s
+        longest_s = max_duration_s
+        if len(every) >= _PERIODS_COMPARED:
+            longest_s = min(longest_s, max(every[_PERIODS_COMPARED - 1][0], (1.0 + SAME) * every[0][0]))
         task = Task.checked(bands, period_s, non_negative=True, max_abs_sum=1.0, zeros_at_nominal=False)
         found = shortest_below(task, vibration_limit, longest_s, least_cost=False)
         if found is not None:
-            best = sorted([*best, (round(found.shaper.duration_s, 9), -period_s)])[:_PERIODS_COMPARED]
-    return sorted(-period_s for _, period_s in best) or [
-        multiple * tick_s for multiple in range(first, first + _PERIODS_COMPARED)
-    ]
+            every = sorted([*every, (round(found.shaper.duration_s, 9), -period_s)])
+    if not every:
+        return [multiple * tick_s for multiple in range(first, first + _PERIODS_COMPARED)]
+    taken = max(-period for duration, period in every if duration <= (1.0 + SAME) * every[0][0])
+    others = [-period for _, period in every if -period != taken]
+    return sorted([taken, *others[: _PERIODS_COMPARED - 1]])
 
 
 def _band(given: str | Mode | ModeBand, uncertainty: float) -> ModeBand:

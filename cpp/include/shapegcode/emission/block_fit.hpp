@@ -43,6 +43,7 @@ struct FitOptions {
   /// rounded to that of the two neighbouring increments that leaves them at rest (see ModalRounder); else to the
   /// nearest.
   std::array<std::vector<Mode>, axis_count> modes;
+  std::uint32_t lent_periods = 0;  ///< time that the blocks before did not last (see fit_blocks)
 };
 
 /// Turns a shaped command into blocks that each last a whole number of block periods.
@@ -54,12 +55,14 @@ struct FitOptions {
 /// blocks stay within an increment of the command, and where it rests they are on the nearest increment. `rests`:
 /// ascending periods at which the command is at rest, besides its end. F is rounded up, so that a controller that
 /// starts blocks on its interpolation ticks takes exactly the intended number of ticks. A block that rounds to nothing
-/// lends its time to its successor; at the very end it is rest and left out. Throws Error(argument) on mismatched sizes
+/// lends its time to its successor; at the very end it is rest and left out. A long command may be fitted in pieces:
+/// `left_periods` receives what the next one must be lent. Throws Error(argument) on mismatched sizes
 /// or a position outside +-99999.999 mm.
 [[nodiscard]] std::vector<FittedBlock> fit_blocks(const Eigen::Ref<const Eigen::MatrixXd>& grid_mm,
                                                   const Eigen::Ref<const Eigen::MatrixXd>& middle_mm,
                                                   std::span<const std::int8_t> arc_normal,
                                                   std::span<const std::uint32_t> breaks, const FitOptions& options,
-                                                  std::span<const std::uint32_t> rests = {});
+                                                  std::span<const std::uint32_t> rests = {},
+                                                  std::uint32_t* left_periods = nullptr);
 
 }  // namespace shapegcode

@@ -21,6 +21,7 @@ struct WriterOptions {
   int position_decimals = 3;
   int feed_decimals = 1;
   bool incremental = false;        ///< G91 words: differences of the rounded absolute positions
+  int motion = 1;                  ///< modal motion code before the first block
   int plane = 17;                  ///< plane active before the first block; G01 is active too
   bool exact_stop_at_end = false;  ///< G09 on the last block
   std::string line_end = "\n";

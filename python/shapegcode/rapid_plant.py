@@ -1,0 +1,155 @@
+"""Rapids in time, as a machine makes them: motion, wait for in-position, and the settling of the modes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.controller import controller_model
+from shapegcode.machine import Machine
+from shapegcode.moving_modes import region_offset, slowest_mode
+from shapegcode.rapid_candidates import Rapid
+from shapegcode.verify import play_emitted, playback_options
+
+__all__ = ["RapidPlant", "Timing", "settling_time_s"]
+
+_LONGEST_WAIT_S = 30.0  # a vibration that takes longer counts as settled then: nobody waits so long
+_LAG_MEMORY = 20.0  # time constants of the servo loop beyond which the past does not count
+
+Vector = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Timing:
+    """One rapid in time, seconds.
+
+    Attributes:
+        motion_s: until the set-points rest.
+        arrival_s: wait for in-position behind them.
+        settling_s: from the end of the set-points until the table stays within the band.
+    """
+
+    motion_s: float
+    arrival_s: float
+    settling_s: float
+
+    @property
+    def clock_s(self) -> float:
+        """What the control takes: motion and wait for in-position."""
+        return self.motion_s + self.arrival_s
+
+
+def settling_time_s(command_mm: Vector, options: _core.PlaybackOptions, slowest_per_s: float, band_mm: float) -> float:
+    """Time from the end of a command until the table stays within a band around it, s; at most 30 s.
+
+    Args:
+        command_mm: set-points from rest to rest, one per period, (n, 3).
+        options: the plant.
+        slowest_per_s: decay rate of the slowest mode (damping ratio times angular frequency), 1/s.
+        band_mm: half the width of the band, above 0.
+    """
+    still = _core.Path([_core.Segment.line(command_mm[0], command_mm[0], 1.0)])
+    options.measure_contour = False
+    options.record_samples = 0
+    figures = _core.play_samples(np.asfortranarray(command_mm), still, options)
+    largest = float(figures.residual_mm.max())
+    if largest <= band_mm:
+        return 0.0
+    # Several modes of an axis may cancel for a while.
+    needed = math.log(4.0 * largest / band_mm) / slowest_per_s if slowest_per_s > 0.0 else math.inf
+    hold = math.ceil(min(needed, _LONGEST_WAIT_S) / options.period_s)
+    held = np.concatenate([command_mm, np.repeat(command_mm[-1:], hold, axis=0)])
+    options.record_samples = len(held)
+    played = _core.play_samples(np.asfortranarray(held), still, options)
+    apart = np.abs(played.recorded_response - played.recorded_command).max(axis=1)
+    outside = np.flatnonzero(apart > band_mm)
+    rest = round(played.duration_s / options.period_s)
+    return max(0.0, float(outside[-1] + 1 - rest) * options.period_s) if len(outside) else 0.0
+
+
+class RapidPlant:
+    """Rapids as the controller and the modes of a machine make them."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.model = controller_model(machine)
+        self.band_mm = machine.tolerance.residual_floor_um * 1e-3
+        rates = [
+            damping * 2.0 * math.pi * frequency
+            for axis in machine.axes.as_tuple()
+            for mode in axis.modes
+            for frequency, damping in (slowest_mode(mode),)
+        ]
+        self._slowest_per_s = min(rates, default=math.inf)
+        self._moving = any(mode.frequency_over is not None for axis in machine.axes.as_tuple() for mode in axis.modes)
+        self._known: dict[tuple[float, ...], Timing] = {}
+
+    def rapid(self, rapid: Rapid) -> Timing:
+        """A rapid as the original makes it. Where its region is not known, its modes are the nominal ones."""
+        travel = rapid.travel_mm
+        key = tuple(np.round(travel, 9))
+        if not self._moving and key in self._known:
+            return self._known[key]
+        samples = _core.rapid_samples(rapid.start_mm, rapid.end_mm, self.model)
+        timing = Timing(
+            _core.rapid_time_s(travel, self.model),
+            _core.in_position_wait_s(travel, self.model),
+            settling_time_s(samples, self._options(rapid.region), self._slowest_per_s, self.band_mm),
+        )
+        self._known[key] = timing
+        return timing
+
+    def play_original(self, rapid: Rapid) -> _core.PlaybackFigures:
+        """The rapid's figures beside which those of the replacement stand."""
+        options = self._options(rapid.region)
+        options.measure_contour = False
+        samples = _core.rapid_samples(rapid.start_mm, rapid.end_mm, self.model)
+        still = _core.Path([_core.Segment.line(rapid.start_mm, rapid.start_mm, 1.0)])
+        return _core.play_samples(np.asfortranarray(samples), still, options)
+
+    def blocks(self, blocks: _core.Path, region: _core.Region, stops_s: float) -> Timing:
+        """The replacement as the text has it: the slower of both rules of block end."""
+        period = self.model.period_s
+        offset = region_offset(region, self.machine)
+        worst = Timing(0.0, 0.0, 0.0)
+        for rule in (_core.BlockEnd.ceil, _core.BlockEnd.carry):
+            least = 2 + math.ceil(2.0 * blocks.programmed_time_s / period) + self._filter_periods()
+            figures = play_emitted(
+                blocks, region.path, self.machine, rule, contour=False, record_samples=least, offset=offset
+            )
+            count = round(figures.duration_s / period) + 1
+            command = np.array(figures.recorded_command[:count])
+            settling = settling_time_s(command, self._options(region), self._slowest_per_s, self.band_mm)
+            timing = Timing(stops_s + figures.duration_s, self._arrival_s(command), settling)
+            if timing.clock_s + max(0.0, settling - timing.arrival_s) >= worst.clock_s + max(
+                0.0, worst.settling_s - worst.arrival_s
+            ):
+                worst = timing
+        return worst
+
+    def _filter_periods(self) -> int:
+        return math.ceil(self.machine.controller.shaped_time_constant_s / self.model.period_s) + 1
+
+    def _options(self, region: _core.Region | None) -> _core.PlaybackOptions:
+        if region is None:
+            return playback_options(self.machine)
+        return playback_options(self.machine, offset=region_offset(region, self.machine))
+
+    def _arrival_s(self, command: Vector) -> float:
+        """Wait for in-position behind a command."""
+        model = self.model
+        moved = [bool(way) for way in np.ptp(command, axis=0) > 0.0]
+        error = np.zeros(3)
+        if model.in_position == _core.InPosition.servo_lag:
+            lag = _core.ServoLag(model.position_gain_per_s, model.feed_forward_ratio, model.period_s)
+            memory = math.ceil(_LAG_MEMORY / float(np.min(model.position_gain_per_s)) / model.period_s)
+            tail = command[-memory:]
+            lag.reset(tail[0])
+            for point in tail[1:]:
+                lag.step(point)
+            error = np.array(lag.error_mm)
+        return _core.in_position_wait_behind_s(error, moved, model)

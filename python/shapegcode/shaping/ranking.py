@@ -1,0 +1,184 @@
+"""How designs of shapers rank: Pareto front, objectives, the rule of the recommendation, and its reason in words.
+
+A design is worth a look (it is on the Pareto front) if no other one is at least as good in duration, worst residual
+over the bands, contour cost and sum of the taps' magnitudes, and better in one of them. Which of those to take is the
+user's objective; :func:`recommend` is the whole rule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from shapegcode._core import ArgumentError
+from shapegcode.shaping.band import ModeBand
+from shapegcode.shaping.design import Design
+from shapegcode.shaping.registry import FAMILIES
+
+__all__ = ["NO_RESIDUAL", "OBJECTIVES", "SAME", "is_within", "pareto_front", "reason_for", "recommend", "spoken"]
+
+NO_RESIDUAL = 1e-9
+"""A residual ratio below this is none: what is left is the rounding of the solver."""
+SAME = 0.02
+"""Durations (or, where none is good, worst residuals) that differ by less, relative, give way to a longer period."""
+
+_CONVERTED = {"non-negative", "robust"}  # what a conversion takes by itself
+_FOR_GRIDS = {row.name for row in FAMILIES if not row.continuous}
+_DIGITS = 9  # designs that agree in so many digits are equally good
+_ROUNDING = 1e-6  # a design made for a limit may miss it by so much, relative
+
+
+def _merits(each: Design) -> tuple[float, float, float, float]:
+    """What is better small: duration, worst residual, contour cost (either sign), sum of magnitudes."""
+    values = (each.duration_s, max(each.worst_residual, NO_RESIDUAL), abs(each.variance_s2), each.abs_sum)
+    duration, residual, contour, magnitudes = (float(f"{value:.{_DIGITS}g}") for value in values)
+    return duration, residual, contour, magnitudes
+
+
+def _shortest(each: Design) -> tuple[float, ...]:
+    duration, residual, contour, _ = _merits(each)
+    # Of equal durations the longest period writes the fewest blocks; what is left is within the limit.
+    return duration, -(each.period_s or 0.0), _rank(each), contour, residual
+
+
+def _rank(each: Design) -> float:
+    """Of which family an equally good design is taken."""
+    return 0.0 if each.family in _CONVERTED else 1.0 if each.family in _FOR_GRIDS else 2.0
+
+
+def _flattest(each: Design) -> tuple[float, ...]:
+    duration, residual, contour, _ = _merits(each)
+    return residual, duration, -(each.period_s or 0.0), contour
+
+
+def _truest(each: Design) -> tuple[float, ...]:
+    duration, residual, contour, _ = _merits(each)
+    return contour, duration, -(each.period_s or 0.0), residual
+
+
+OBJECTIVES: dict[str, tuple[str, Callable[[Design], tuple[float, ...]]]] = {
+    "shortest": ("the shortest", _shortest),
+    "contour": ("the one with the least contour cost", _truest),
+    "robust": ("the one with the least worst residual", _flattest),
+}
+"""Objectives by name: how the reason calls the winner, and what is least in it."""
+
+
+def pareto_front(designs: Sequence[Design]) -> list[bool]:
+    """For each design whether no other one is at least as good in everything and better in something.
+
+    Compared are duration, worst residual, magnitude of the contour cost and sum of the taps' magnitudes, each to nine
+    digits, a residual below 1e-9 as none. A design on a grid serves where continuous times are asked for, not the
+    other way round: so designs on grids are compared with each other only.
+    """
+    if not designs:
+        return []
+    merits = np.array([_merits(each) for each in designs])
+    on_grid = np.array([each.period_s is not None for each in designs])
+    front = []
+    for own, grid in zip(merits, on_grid, strict=True):
+        better = (merits <= own).all(axis=1) & (merits < own).any(axis=1)
+        front.append(not bool((better & (on_grid | ~grid)).any()))
+    return front
+
+
+def recommend(
+    designs: Sequence[Design], vibration_limit: float, objective: str = "shortest", allow_negative: bool = False
+) -> int:
+    """Index of the design to take.
+
+    Of the designs without negative taps (of all with `allow_negative`, or where every design has some) those whose
+    worst residual is at most the limit compete for the objective, and of these, if there are any, those that cancel the
+    modes that state no band; if there is none within the limit, the one that leaves least is taken. Of equally short
+    ones on grids, to 2 %, the one with the longest period is taken, because it writes the fewest blocks; of equal ones
+    the family that a conversion takes by itself, then one that is made for grids.
+
+    Args:
+        designs: at least one.
+        vibration_limit: largest worst residual ratio.
+        objective: a name of `OBJECTIVES`.
+        allow_negative: whether a design with negative taps may be taken.
+
+    Raises:
+        ArgumentError: no design.
+    """
+    if not designs:
+        raise ArgumentError("there is no design to choose from: 0 given")
+    places = _eligible(designs, allow_negative)
+    good = _good(designs, places, vibration_limit)
+    least = OBJECTIVES[objective][1] if good else _flattest
+
+    def order(place: int) -> tuple[float, ...]:
+        return (*least(designs[place]), _rank(designs[place]))
+
+    best = min(good or places, key=order)
+    if designs[best].period_s is None or (good and objective != "shortest"):
+        return best
+    most = (1.0 + SAME) * least(designs[best])[0]
+    near = [place for place in good or places if designs[place].period_s and least(designs[place])[0] <= most]
+    longest_s = max(designs[place].period_s or 0.0 for place in near)
+    return min((place for place in near if designs[place].period_s == longest_s), key=order)
+
+
+def _good(designs: Sequence[Design], places: Sequence[int], vibration_limit: float) -> list[int]:
+    """Those within the limit; of them those that cancel the modes without a band, if there are any."""
+    good = [place for place in places if is_within(designs[place], vibration_limit)]
+    return [place for place in good if designs[place].exact] or good
+
+
+def _eligible(designs: Sequence[Design], allow_negative: bool) -> list[int]:
+    places = range(len(designs))
+    return [place for place in places if allow_negative or not designs[place].negative] or list(places)
+
+
+def is_within(each: Design, vibration_limit: float) -> bool:
+    """Whether the worst residual is at most the limit, but for rounding."""
+    return each.worst_residual <= vibration_limit * (1.0 + _ROUNDING)
+
+
+def reason_for(
+    designs: Sequence[Design], index: int, bands: Sequence[ModeBand], limit: float, objective: str, allow_negative: bool
+) -> str:
+    """Why `recommend` takes the design of that index, in a sentence."""
+    taken = designs[index]
+    places = _eligible(designs, allow_negative)
+    among = _good(designs, places, limit)
+    good = len(among)
+    only_negative = not allow_negative and taken.negative
+    kind = "" if allow_negative or only_negative else "non-negative "
+    if good:
+        unstated = [band for band in bands if not band.uncertainty]
+        exactly = f" and which cancel{'' if good > 1 else 's'} {spoken(unstated)}" if unstated and taken.exact else ""
+        text = (
+            f"{OBJECTIVES[objective][0]} of {good} {kind}design{'' if good == 1 else 's'} whose worst residual over "
+            f"{spoken(bands)} stays within {_percent(limit)}{exactly} (it leaves {_percent(taken.worst_residual)})"
+        )
+    else:
+        text = (
+            f"none of {len(places)} {kind}design{'' if len(places) == 1 else 's'} stays within {_percent(limit)} over "
+            f"{spoken(bands)}; this one leaves least, {_percent(taken.worst_residual)}"
+        )
+        others = [each for each in designs if each.negative and is_within(each, limit)]
+        if others and not allow_negative:
+            other = min(others, key=_shortest)
+            text += f"; with negative taps {other.family} ({_ms(other.duration_s)}) would leave less"
+    return text + ("; every design has negative taps" if only_negative else "")
+
+
+def spoken(bands: Sequence[ModeBand]) -> str:
+    """Modes with their bands in a sentence."""
+
+    def one(band: ModeBand) -> str:
+        text = f"{band.mode.frequency_hz:g} Hz"
+        return f"{text} ±{100.0 * band.uncertainty:g} %" if band.uncertainty else text
+
+    return " and ".join(map(one, bands))
+
+
+def _percent(ratio: float) -> str:
+    return "nothing" if ratio < NO_RESIDUAL else f"{100.0 * ratio:.3g} %"
+
+
+def _ms(time_s: float) -> str:
+    return f"{time_s * 1e3:.6g} ms"
