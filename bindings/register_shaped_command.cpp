@@ -40,6 +40,8 @@ void register_shaped_command(py::module_& module) {
                      "Shapers along an axis in place of the one shaper, taps in whole block periods; None: none.")
       .def_readwrite("mode_tables", &ShapingOptions::mode_tables,
                      "How the modes vary with the position of the axis that is followed, for the response as target.")
+      .def_readwrite("axis_shapers", &ShapingOptions::axis_shapers,
+                     "A shaper for each of X, Y and Z, of one mean delay, in place of the common one; empty: none.")
       .def_readwrite("contour_smoothness", &ShapingOptions::contour_smoothness,
                      "Weight of the correction's second differences.");
 

@@ -1623,6 +1623,14 @@ class ShapingOptions:
     def __init__(self) -> None:
         ...
     @property
+    def axis_shapers(self) -> list[Fir]:
+        """
+        A shaper for each of X, Y and Z, of one mean delay, in place of the common one; empty: none.
+        """
+    @axis_shapers.setter
+    def axis_shapers(self, arg0: collections.abc.Sequence[Fir]) -> None:
+        ...
+    @property
     def block_period_s(self) -> float:
         """
         s.

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.moving_modes import moving_axis, shaper_track
+from shapegcode.moving_modes import moving_axis, shaper_track, still_mode
 
 if TYPE_CHECKING:
     from shapegcode.shaping import BlockPeriodCandidate, ModeBand
@@ -28,6 +28,8 @@ class Grid:
         track: shapers along an axis, used instead where its position is known; None: no mode varies with position.
         family: name of the design's row in the registry of families.
         note: what a user should know of the choice; empty: nothing.
+        axis_firs: a shaper for each of X, Y, Z in whole block periods, used instead; empty: the one for all.
+        per_axis_duration_s: how long such shapers would be, s; None: not looked for, or not shorter.
     """
 
     block_period_s: float
@@ -36,6 +38,8 @@ class Grid:
     track: ShaperTrack | None = None
     family: str = ""
     note: str = ""
+    axis_firs: tuple[_core.Fir, ...] = ()
+    per_axis_duration_s: float | None = None
 
     @property
     def shapers(self) -> tuple[_core.Shaper, ...]:
@@ -45,6 +49,8 @@ class Grid:
     @property
     def duration_s(self) -> float:
         """Time of the last tap of the longest shaper, s."""
+        if self.axis_firs:
+            return max(fir.duration_samples for fir in self.axis_firs) * self.block_period_s
         return max(shaper.duration_s for shaper in self.shapers)
 
 
@@ -95,7 +101,44 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
     else:
         best = robust_candidate(bands, period, shaping.max_duration_s, shaping.vibration_limit)
     assert best.shaper is not None  # what is chosen exists
-    return make_grid(best.period_s, best.shaper, _track(machine, best.period_s), family=family, note=best.note)
+    grid = make_grid(best.period_s, best.shaper, _track(machine, best.period_s), family=family, note=best.note)
+    return _per_axis(grid, machine, exact=family == "non-negative")
+
+
+def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
+    """The grid with a shaper for each axis where the machine file asks for it, or with a word of how long it would be.
+
+    Raises:
+        ArgumentError: they are asked for where the contour is not brought back or modes vary.
+        DesignError: they are asked for, and there are none.
+    """
+    from shapegcode.shaping.per_axis import design_per_axis
+
+    wanted = machine.shaping.per_axis
+    possible = exact and grid.track is None and machine.shaping.contour != "off"
+    if not possible:
+        if wanted:
+            raise _core.ArgumentError(
+                "shaping.per_axis needs shaping.contour (different shapers distort the path), shaping.family = "
+                '"auto", and modes without frequency_uncertainty_percent and frequency_over axis'
+            )
+        return grid
+    longest = machine.shaping.max_duration_s if wanted else grid.shaper.duration_s - 0.5 * grid.block_period_s
+    modes = [
+        [still_mode(mode, machine.shaping.part_mass_kg) for mode in axis.modes] for axis in machine.axes.as_tuple()
+    ]
+    firs = design_per_axis(modes, grid.block_period_s, longest)
+    if firs is None:
+        if wanted:
+            raise _core.DesignError(
+                f"no shapers of equal mean delay for each axis within {longest * 1e3:g} ms on a "
+                f"{grid.block_period_s * 1e3:g} ms grid; the one for all axes lasts {grid.shaper.duration_s * 1e3:g} ms"
+            )
+        return grid
+    if wanted:
+        return replace(grid, axis_firs=tuple(firs))
+    duration_s = max(fir.duration_samples for fir in firs) * grid.block_period_s
+    return replace(grid, per_axis_duration_s=duration_s)
 
 
 def _of_family(name: str, bands: list[ModeBand], machine: Machine, period_s: float | None) -> Grid:

@@ -112,6 +112,7 @@ def shaping_options(
     options.rest_at_stop_s = machine.controller.shaped_time_constant_s
     options.target = _TARGETS[machine.shaping.contour]
     options.modes = axis_modes(machine)
+    options.axis_shapers = list(grid.axis_firs)
     if grid.track is not None and (start := offset[grid.track.axis]) is not None:
         options.following = grid.track.following(start)
         options.mode_tables = mode_tables(machine, offset=offset)

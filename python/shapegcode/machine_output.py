@@ -109,6 +109,11 @@ class Shaping(Table):
         "at the modes, or below vibration_limit over their bands where frequency_uncertainty_percent states them",
         default="auto",
     )
+    per_axis: Bool = key(
+        "a shaper for each axis, which cancels only that axis' modes: shorter than one for all, usable because the "
+        'contour is brought back (not with contour = "off", stated bands, or modes that move with an axis)',
+        default=False,
+    )
     vibration_limit: Annotated[Positive, Field(lt=1)] = key(
         "largest residual vibration over the modes' bands as a share of the unshaped one, for families that leave some",
         unit="1",

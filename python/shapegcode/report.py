@@ -248,9 +248,12 @@ def _program_rows(report: Mapping[str, Any]) -> Iterator[Row]:
     budget = report.get("budget")
     if budget:
         rows.append(("regions given up for the budget", "", None, float(len(budget["given_up"])), 0))
-    times = (report.get("shaper") or {}).get("times_s")
+    shaper = report.get("shaper") or {}
+    times = shaper.get("times_s")
     if times:
-        rows.append(("duration of the shaper", "ms", None, (times[-1] - times[0]) * 1e3, 3))
+        rows.append(("duration of the shaper", "ms", None, shaper.get("duration_s", times[-1]) * 1e3, 3))
+    if shaper.get("per_axis_duration_s"):
+        rows.append(("with one for each axis (--per-axis)", "ms", None, shaper["per_axis_duration_s"] * 1e3, 3))
     for number, (name, unit, original, emitted, decimals) in enumerate(rows):
         yield Row(name, unit, original, emitted, decimals, section=number == 0)
 

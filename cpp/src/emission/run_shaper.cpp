@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
+#include "shapegcode/error.hpp"
 #include "shapegcode/motion/limits.hpp"
 
 namespace shapegcode {
@@ -17,6 +19,7 @@ constexpr std::size_t read_ahead = 1024;
 constexpr std::size_t forget_after = 32768;
 constexpr int attempts = 6;
 constexpr double stiffer = 20.0;  // factor of the smoothness where a limit would be left
+constexpr double same_delay_s = 1e-9;
 constexpr double stiffest = 1e12;
 
 Fir on_half_grid(const Fir& shaper) {
@@ -40,13 +43,26 @@ bool is_corner(const Path& path, std::size_t before, std::size_t after) noexcept
 
 }  // namespace
 
-RunFilter::RunFilter(const Fir& shaper, ContourTarget contour_target, const AxisModes& modes, double block_period_s,
-                     double weight, const std::optional<FollowingFir>& followed, const AxisModeTables& tables)
-    : half_shaper(on_half_grid(shaper)),
-      target(contour_target),
+RunFilter::RunFilter(std::span<const Fir> shapers, ContourTarget contour_target, const AxisModes& modes,
+                     double block_period_s, double weight, const std::optional<FollowingFir>& followed,
+                     const AxisModeTables& tables)
+    : target(contour_target),
       half_period_s(0.5 * block_period_s),
-      mean_delay_s((followed ? followed->fir().mean_samples() : shaper.mean_samples()) * block_period_s),
+      mean_delay_s((followed ? followed->fir().mean_samples() : shapers.front().mean_samples()) * block_period_s),
       smoothness(weight) {
+  if (shapers.size() != 1 && shapers.size() != axis_count) {
+    throw Error(ErrorKind::argument, std::to_string(shapers.size()) + " shapers: one for all axes, or one for each");
+  }
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    const Fir& shaper = shapers[shapers.size() == 1 ? 0 : axis];
+    const double other_s = shaper.mean_samples() * block_period_s;
+    if (!(std::abs(other_s - shapers.front().mean_samples() * block_period_s) <= same_delay_s)) {
+      throw Error(ErrorKind::argument, "shapers of several axes have mean delays of " + std::to_string(other_s) +
+                                           " s and " + std::to_string(mean_delay_s) + " s, must be equal");
+    }
+    half_shapers.push_back(on_half_grid(shaper));
+    longest_ = std::max(longest_, half_shapers.back().duration_samples());
+  }
   if (followed) following = followed->on_finer_grid(2);
   const std::size_t nodes = following ? following->position_mm().size() : 1;
   for (std::size_t node = 0; node < nodes; ++node) {
@@ -60,7 +76,7 @@ RunFilter::RunFilter(const Fir& shaper, ContourTarget contour_target, const Axis
         }
       }
       kernel[axis] =
-          contour_kernel(following ? following->fir().set()[node] : half_shaper, here, half_period_s, target);
+          contour_kernel(following ? following->fir().set()[node] : half_shapers[axis], here, half_period_s, target);
     }
   }
 }
@@ -318,8 +334,8 @@ double RunShaper::shaped(std::size_t axis, std::ptrdiff_t row, bool corrected) c
     const double plain = fir.value(command_[axis].data() + i, place_.data() + i);
     return corrected ? plain + fir.value(correction_[axis].data() + i, place_.data() + i) : plain;
   }
-  const std::vector<int>& delays = filter_.half_shaper.delays();
-  const std::vector<double>& taps = filter_.half_shaper.taps();
+  const std::vector<int>& delays = filter_.half_shapers[axis].delays();
+  const std::vector<double>& taps = filter_.half_shapers[axis].taps();
   const double* command = command_[axis].data() + (row - base_);
   double sum = 0.0;
   for (std::size_t k = 0; k < taps.size(); ++k) {

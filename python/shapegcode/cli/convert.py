@@ -63,6 +63,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="family of the shaper, for example zvd: see shaping.family, and `shapegcode shaper` to compare them",
     )
     parser.add_argument(
+        "--per-axis",
+        action="store_true",
+        default=None,
+        help="a shaper for each axis, shorter than one for all: see shaping.per_axis",
+    )
+    parser.add_argument(
         "--part-mass",
         metavar="KG",
         type=positive,
@@ -146,6 +152,7 @@ def run(args: argparse.Namespace) -> int:
         ("shaping.contour", args.contour),
         ("shaping.rapids", args.shape_rapids),
         ("shaping.family", args.shaper),
+        ("shaping.per_axis", args.per_axis),
         ("shaping.part_mass_kg", args.part_mass),
     )
     failed = output.with_name(output.name + machine.emission.failed_suffix)

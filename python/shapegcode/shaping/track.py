@@ -21,7 +21,15 @@ from scipy.optimize import linprog
 from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode, ModeTable, Shaper, VaryingFir
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, shortest_non_negative
 
-__all__ = ["MovingMode", "ShaperTrack", "TrackNode", "design_track", "shaper_of_mean"]
+__all__ = [
+    "MovingMode",
+    "ShaperTrack",
+    "TrackNode",
+    "design_track",
+    "mean_range",
+    "shaper_of_mean",
+    "taps_of_mean",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -195,6 +203,17 @@ def shaper_of_mean(modes: Sequence[Mode], period_s: float, periods: int, mean_s:
     Returns:
         The shaper, residual ratio of every mode at most 1e-10, or None if there is none.
     """
+    found = taps_of_mean(modes, period_s, periods, mean_s)
+    if found is None or found[0][0] != 0:
+        return None
+    shaper = Shaper((found[0] * period_s).tolist(), found[1].tolist())
+    return shaper if max(shaper.residual_ratio(mode) for mode in modes) <= RESIDUAL_LIMIT else None
+
+
+def taps_of_mean(
+    modes: Sequence[Mode], period_s: float, periods: int, mean_s: float | None = None
+) -> tuple[NDArray[np.intp], FloatArray] | None:
+    """Delays in periods and taps of `shaper_of_mean`, whose first delay need not be zero; its arguments."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)
     cost = steps
@@ -208,10 +227,9 @@ def shaper_of_mean(modes: Sequence[Mode], period_s: float, periods: int, mean_s:
     taps = taps[support]
     for _ in range(3):  # the optimiser's tolerance, then rounding
         taps = taps + np.linalg.lstsq(matrix[:, support], right - matrix[:, support] @ taps, rcond=1e-14)[0]
-    if not (np.all(taps > 0.0) and abs(taps.sum() - 1.0) <= RESIDUAL_LIMIT and support[0] == 0):
+    if not (np.all(taps > 0.0) and abs(taps.sum() - 1.0) <= RESIDUAL_LIMIT):
         return None
-    shaper = Shaper((support * period_s).tolist(), (taps / taps.sum()).tolist())
-    return shaper if max(shaper.residual_ratio(mode) for mode in modes) <= RESIDUAL_LIMIT else None
+    return support, taps / taps.sum()
 
 
 def _conditions(modes: Sequence[Mode], period_s: float, steps: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -240,7 +258,7 @@ def _equal_means(found: Sequence[Sequence[Mode]], period_s: float, max_duration_
     fewest = max(round(shaper.duration_s / period_s) for shaper in shortest)
     most = min(math.floor(max_duration_s / period_s + _ON_GRID), math.ceil(_LONGER * fewest))
     for periods in range(fewest, most + 1):
-        ranges = [_mean_range(modes, period_s, periods) for modes in found]
+        ranges = [mean_range(modes, period_s, periods) for modes in found]
         least = max(low for low, _ in ranges)
         largest = min(high for _, high in ranges)
         if least <= largest:
@@ -253,7 +271,7 @@ def _equal_means(found: Sequence[Sequence[Mode]], period_s: float, max_duration_
     return shortest
 
 
-def _mean_range(modes: Sequence[Mode], period_s: float, periods: int) -> tuple[float, float]:
+def mean_range(modes: Sequence[Mode], period_s: float, periods: int) -> tuple[float, float]:
     """Least and largest mean delay of non-negative taps, in periods."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)

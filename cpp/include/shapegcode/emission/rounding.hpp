@@ -89,7 +89,7 @@ class ModalRounder {
   [[nodiscard]] std::complex<double> state_of(std::size_t choice, std::size_t mode) const;
 
   std::vector<ModeStep> modes_;
-  double decay_ = 0.0;  // of the most damped mode over a period
+  double decay_ = 0.0;                              // of the most damped mode over a period
   std::vector<std::complex<double>> state_;         // per mode, at the begin of the next stretch
   std::vector<std::complex<double>> chosen_state_;  // at the end of the stretch last chosen
   Choices kept_;

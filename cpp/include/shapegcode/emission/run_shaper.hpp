@@ -6,6 +6,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "shapegcode/filter/fir.hpp"
@@ -20,24 +21,25 @@ namespace shapegcode {
 
 /// What follows the look-ahead of a run, on half the block grid, and how the contour is kept.
 struct RunFilter {
-  /// `shaper`: taps in whole block periods, common to all axes. `followed`: a set of shapers along an axis, which is
-  /// used instead of it; the contour is then kept with the modes at each of its positions, by `tables`. Throws as
-  /// `contour_kernel` and ContourSolver do.
-  RunFilter(const Fir& shaper, ContourTarget target, const AxisModes& modes, double block_period_s, double smoothness,
-            const std::optional<FollowingFir>& followed = {}, const AxisModeTables& tables = {});
+  /// `shapers`: taps in whole block periods, one common to all axes or one for each, of one mean delay. `followed`: a
+  /// set of shapers along an axis, which is used instead of it; the contour is then kept with the modes at each of its
+  /// positions, by `tables`. Throws as `contour_kernel` and ContourSolver do.
+  RunFilter(std::span<const Fir> shapers, ContourTarget target, const AxisModes& modes, double block_period_s,
+            double smoothness, const std::optional<FollowingFir>& followed = {}, const AxisModeTables& tables = {});
 
   /// Half block periods by which the shaped command moves longer.
-  [[nodiscard]] int shaper_rows() const noexcept {
-    return following ? following->fir().duration_samples() : half_shaper.duration_samples();
-  }
+  [[nodiscard]] int shaper_rows() const noexcept { return following ? following->fir().duration_samples() : longest_; }
 
-  Fir half_shaper;                        ///< taps in half block periods
+  std::vector<Fir> half_shapers;          ///< one per axis, taps in half block periods
   std::optional<FollowingFir> following;  ///< likewise, instead of it
   ContourTarget target;
   double half_period_s;
   double mean_delay_s;                                               ///< of the shaper
   std::vector<std::array<std::vector<double>, axis_count>> kernels;  ///< one per shaper that is followed
   double smoothness;
+
+ private:
+  int longest_ = 0;
 };
 
 /// What the axes may do while the contour is corrected. A stretch whose plain shaping asks for more keeps what it asks.

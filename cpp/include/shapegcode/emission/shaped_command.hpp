@@ -29,6 +29,9 @@ struct ShapingOptions {
   /// tolerance, kept by the highest feed that does; without one, `limits` holds the bounds that plain shaping needs.
   ContourTarget target = ContourTarget::none;
   AxisModes modes;  ///< of the response; nothing else is done with them
+  /// One shaper for each of X, Y and Z (taps in whole block periods, of one mean delay) in place of the common one;
+  /// empty: none. Without a target they distort the path.
+  std::vector<Fir> axis_shapers;
   /// Shapers along an axis (taps in whole block periods, positions as in the path) in place of the one shaper, for
   /// modes that vary with position by `mode_tables`.
   std::optional<FollowingFir> following;
