@@ -12,7 +12,7 @@ from bisect import bisect
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -112,6 +112,7 @@ def shape_rapids(
             "tolerance.residual_floor_um is 0: shaped rapids need the band in which vibration counts as settled"
         )
     machine = _without_contour(machine)
+    grid = replace(grid, axis_firs=())  # one shaper for all axes keeps a straight move straight
     plant = RapidPlant(machine)
     kept: Counter[str] = Counter()
     gaps = find_gaps(emitted, machine)

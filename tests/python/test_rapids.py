@@ -396,12 +396,20 @@ def test_the_warnings_say_what_is_different() -> None:
     conversion = converted(text, dogleg)
     assert conversion.report["rapids"]["shaped"] == 1
     assert "check that the straight way is free" in " ".join(conversion.report["warnings"])
+    check_straight(conversion)
+    per_axis = converted(text, with_tables(Machine.load("vx500"), shaping={"per_axis": True}))
+    assert per_axis.report["rapids"]["shaped"] == 1
+    check_straight(per_axis)
+
+
+def check_straight(conversion: Conversion) -> None:
+    """The replacement of X20 Y0 to X80 Y30 is on the straight line, within rounding."""
     (move,) = conversion.report["rapids"]["moves"]
     first, last = move["emitted_lines"]
-    records = interpret(conversion.text.decode()).lines[first - 1 : last]
-    for block in (m for r in records for m in r.moves):
-        x, y = block.end[0] - 20.0, block.end[1]
-        assert abs(x * 30.0 - y * 60.0) / math.hypot(30.0, 60.0) < 1.5e-3  # on the straight line, within rounding
+    for record in interpret(conversion.text.decode()).lines[first - 1 : last]:
+        for block in record.moves:
+            x, y = block.end[0] - 20.0, block.end[1]
+            assert abs(x * 30.0 - y * 60.0) / math.hypot(30.0, 60.0) < 1.5e-3
 
 
 def test_the_wait_behind_a_command_is_the_one_of_the_servo_lag() -> None:
