@@ -352,8 +352,8 @@ def rapid_warnings(report: Mapping[str, Any], machine: Machine) -> list[str]:
         f"{letter} {axis.max_feed_mm_per_min:g}" for letter, axis in zip("XYZ", machine.axes.as_tuple(), strict=True)
     )
     warnings = [
-        f"rapids written as shaped cutting moves: {report['shaped']}: rapid override no longer acts on them, feed "
-        "override does",
+        f"{report['shaped']} of {report['found']} rapids are shaped cutting moves (the table is ready "
+        f"{report['time_saved_s']:.2f} s sooner in all): rapid override no longer acts on them, feed override does",
         "shaped rapids run at the cutting feeds of the axes (axes.*.max_feed_mm_per_min: "
         f"{fastest} mm/min): the control's clamp of cutting feeds (parameters 1422, 1430) must not lie below",
     ]
