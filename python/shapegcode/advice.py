@@ -41,8 +41,8 @@ def binding_warnings(figures: dict[str, Any], machine: Machine) -> list[str]:
         rounding = math.sqrt(2.0) * least_increment_mm(machine, 21) * 1e3
         alone = f"; rounding the words alone may take {rounding:.1f} um of it" if rounding > 0.2 * contour else ""
         warnings.append(
-            f"tolerance.contour_um = {tolerance.contour_um:g} binds: {contour:.1f} um were reached with the feed lowered "
-            f"as far as it helps{alone}; feasible: {_rounded_up(contour):g} um"
+            f"tolerance.contour_um = {tolerance.contour_um:g} binds: {contour:.1f} um were reached with the feed "
+            f"lowered as far as it helps{alone}; feasible: {_rounded_up(contour):g} um"
         )
     over = [
         (region["residual_vibration_um"]["emitted"][axis], limit)
@@ -54,7 +54,8 @@ def binding_warnings(figures: dict[str, Any], machine: Machine) -> list[str]:
         left, limit = max(over)
         warnings.append(
             f"the tolerance of residual vibration binds: {left:.2f} um are left, limit {limit:.2f} um "
-            f"(tolerance.residual_*); feasible: tolerance.residual_floor_um = {_rounded_up(left):g}, or a longer shaper (`shapegcode shaper`)"
+            f"(tolerance.residual_*); feasible: tolerance.residual_floor_um = {_rounded_up(left):g}, "
+            "or a longer shaper (`shapegcode shaper`)"
         )
     return warnings
 
