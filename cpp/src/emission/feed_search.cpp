@@ -48,29 +48,43 @@ class FeedSearch {
       if (within && (!best.profile || last.profile->duration_s() < best.profile->duration_s())) {
         best = last;
       }
-      const bool changed = adjust(round < raising_rounds);
+      bool changed = adjust(round < raising_rounds);
       if (!stops_.empty()) {
         last.stops = std::move(stops_);
         return last;
+      }
+      if (!changed && !within && limits_.law == AccelerationLaw::constant_time) {
+        changed = slow_lines();
       }
       if (!changed || (within && round >= raising_rounds)) {
         break;
       }
     }
-    return best.profile ? best : last;
+    if (best.profile) {
+      return best;
+    }
+    // Corners that do not answer to a lower speed: what bends them is the change of speed around them.
+    for (std::size_t i = 1; i < path_->size(); ++i) {
+      if (caps_.at_junction[i] < none && deviation_.at_junction[i] > tolerance_ && junction_change(i) >= curve_change) {
+        last.stops.push_back(i);
+      }
+    }
+    return last;
   }
 
  private:
   PlannedRun measured() {
     PlannedRun plan{path_, std::make_shared<const SpeedProfile>(plan_speed(*path_, limits_, &caps_)), 0.0, {}};
     deviation_.at_junction.assign(path_->size(), 0.0F);
-    deviation_.on_segment.assign(path_->size(), 0.0F);
+    deviation_.on_segment.assign(path_->size(), -1.0F);
+    deviation_.near_corner.assign(path_->size(), 0.0F);
     RunShaper shaper(path_, plan.profile, filter_, run_limits(limits_), steps_per_half_, &deviation_);
     Vector3 position;
     for (std::size_t row = 0; row < 2 * static_cast<std::size_t>(shaper.periods()) + 1; ++row) {
       shaper.next(position);
     }
-    plan.largest_deviation_mm = *std::ranges::max_element(deviation_.on_segment);
+    plan.largest_deviation_mm = std::max(
+        {0.0F, *std::ranges::max_element(deviation_.on_segment), *std::ranges::max_element(deviation_.near_corner)});
     return plan;
   }
 
@@ -93,13 +107,14 @@ class FeedSearch {
       const Segment& segment = (*path_)[i];
       const double speed = std::min(static_cast<double>(caps_.on_segment[i]), segment_speed_limit(segment, limits_));
       if (segment.kind == SegmentKind::arc) {
-        adjust_one(caps_.on_segment[i], speed, deviation_.on_segment[i], true);
+        const float clear = deviation_.on_segment[i];
+        adjust_one(caps_.on_segment[i], speed, clear >= 0.0F ? clear : deviation_.near_corner[i], true);
       }
       if (i == 0) {
         continue;
       }
       const Segment& before = (*path_)[i - 1];
-      const double change = (tangent_at(segment, 0.0) - tangent_at(before, before.length_mm)).norm();
+      const double change = junction_change(i);
       if (change < 1e-6) {
         continue;  // an arc that begins or ends tangentially is slowed as a whole
       }
@@ -110,6 +125,29 @@ class FeedSearch {
       if (caps_.at_junction[i] < std::max(creep_mm_per_s, creep_share * first)) {
         stops_.push_back(i);
       }
+    }
+    return changed;
+  }
+
+  // Change of the direction as segment i is entered: the length of the difference of the unit tangents.
+  [[nodiscard]] double junction_change(std::size_t i) const {
+    const Segment& before = (*path_)[i - 1];
+    return (tangent_at((*path_)[i], 0.0) - tangent_at(before, before.length_mm)).norm();
+  }
+
+  // Where neither arcs nor corners are to blame it is a ramp on a line across the axes, which bends the response of
+  // axes with different modes; a ramp of constant time is as steep as the feed is high.
+  bool slow_lines() {
+    bool changed = false;
+    for (std::size_t i = 0; i < path_->size(); ++i) {
+      const Segment& segment = (*path_)[i];
+      const auto deviation = static_cast<double>(deviation_.on_segment[i]);
+      if (segment.kind == SegmentKind::arc || deviation <= tolerance_) {
+        continue;
+      }
+      const double speed = std::min(static_cast<double>(caps_.on_segment[i]), segment_speed_limit(segment, limits_));
+      caps_.on_segment[i] = static_cast<float>(next_speed(speed, deviation, tolerance_, false));
+      changed = true;
     }
     return changed;
   }

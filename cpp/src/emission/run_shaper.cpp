@@ -382,8 +382,11 @@ void RunShaper::measure(std::size_t row) {
     size = std::max(size, nearest);
   }
   const auto found = static_cast<float>(size);
+  // A corner's deviation is no reason to slow the whole arc beside it.
+  std::vector<float>& on =
+      is_corner(*path_, segment_[i - half], segment_[i + half]) ? measured_->near_corner : measured_->on_segment;
   for (std::uint32_t k = segment_[i - half]; k <= segment_[i + half]; ++k) {
-    measured_->on_segment[k] = std::max(measured_->on_segment[k], found);
+    on[k] = std::max(on[k], found);
     if (k > segment_[i - half]) {
       measured_->at_junction[k] = std::max(measured_->at_junction[k], found);
     }

@@ -51,7 +51,8 @@ struct RunLimits {
 /// Largest deviation of what follows the path, near each junction and segment of a run, in mm.
 struct RunDeviation {
   std::vector<float> at_junction;  ///< [i]: while segment i is entered, within half the shaper
-  std::vector<float> on_segment;
+  std::vector<float> on_segment;   ///< further than that from every corner; negative: nowhere
+  std::vector<float> near_corner;  ///< [i]: on segment i, within half the shaper of a corner
 };
 
 /// One run from rest to rest as a shaped command on half the block grid: row 2k is the border k of block periods, row
