@@ -19,6 +19,8 @@ constexpr double curve_change = 0.0872;  // |change of direction| up to which a 
 // A corner that would have to be passed more slowly than this, or than this share of its first speed, is a stop.
 constexpr double creep_mm_per_s = 0.5;
 constexpr double creep_share = 0.02;
+// Curves and lines are never slowed below this share of their speed: what then still deviates is not the feed's doing.
+constexpr double slowest_share = 0.05;
 constexpr float none = std::numeric_limits<float>::infinity();
 
 // Speed at which the next round may pass a place that was passed at `speed` with `deviation`. Deviation grows with the
@@ -91,7 +93,7 @@ class FeedSearch {
   // New caps; false if none changed.
   bool adjust(bool raise) {
     bool changed = false;
-    const auto adjust_one = [&](float& cap, double speed, double deviation, bool curve) {
+    const auto adjust_one = [&](float& cap, double speed, double deviation, bool curve, double least) {
       const bool capped = cap < none;
       if (deviation <= tolerance_ && !(capped && raise && deviation < enough * tolerance_)) {
         return;
@@ -99,6 +101,11 @@ class FeedSearch {
       double next = next_speed(speed, deviation, tolerance_, curve);
       if (deviation <= tolerance_) {
         next = std::min(next, largest_raise * speed);
+      } else if (next < least) {
+        next = least;
+        if (speed <= least) {
+          return;
+        }
       }
       cap = static_cast<float>(next);
       changed = true;
@@ -108,7 +115,8 @@ class FeedSearch {
       const double speed = std::min(static_cast<double>(caps_.on_segment[i]), segment_speed_limit(segment, limits_));
       if (segment.kind == SegmentKind::arc) {
         const float clear = deviation_.on_segment[i];
-        adjust_one(caps_.on_segment[i], speed, clear >= 0.0F ? clear : deviation_.near_corner[i], true);
+        adjust_one(caps_.on_segment[i], speed, clear >= 0.0F ? clear : deviation_.near_corner[i], true,
+                   slowest_share * segment_speed_limit(segment, limits_));
       }
       if (i == 0) {
         continue;
@@ -121,7 +129,8 @@ class FeedSearch {
       const double first = std::min({corner_speed_limit(before, segment, limits_),
                                      segment_speed_limit(segment, limits_), segment_speed_limit(before, limits_)});
       const double passed = std::min(first, static_cast<double>(caps_.at_junction[i]));
-      adjust_one(caps_.at_junction[i], passed, deviation_.at_junction[i], change < curve_change);
+      adjust_one(caps_.at_junction[i], passed, deviation_.at_junction[i], change < curve_change,
+                 change < curve_change ? slowest_share * first : 0.0);
       if (caps_.at_junction[i] < std::max(creep_mm_per_s, creep_share * first)) {
         stops_.push_back(i);
       }
@@ -145,9 +154,13 @@ class FeedSearch {
       if (segment.kind == SegmentKind::arc || deviation <= tolerance_) {
         continue;
       }
-      const double speed = std::min(static_cast<double>(caps_.on_segment[i]), segment_speed_limit(segment, limits_));
-      caps_.on_segment[i] = static_cast<float>(next_speed(speed, deviation, tolerance_, false));
-      changed = true;
+      const double first = segment_speed_limit(segment, limits_);
+      const double speed = std::min(static_cast<double>(caps_.on_segment[i]), first);
+      const double least = slowest_share * first;
+      if (speed > least) {
+        caps_.on_segment[i] = static_cast<float>(std::max(least, next_speed(speed, deviation, tolerance_, false)));
+        changed = true;
+      }
     }
     return changed;
   }
