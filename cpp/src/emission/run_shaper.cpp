@@ -300,8 +300,7 @@ bool RunShaper::asks_too_much(std::size_t begin, std::size_t end, std::size_t ax
     }
   });
   std::ranges::sort(raised_);
-  const auto repeated = std::ranges::unique(raised_);
-  raised_.erase(repeated.begin(), repeated.end());
+  raised_.erase(std::unique(raised_.begin(), raised_.end()), raised_.end());
   for (const std::size_t k : raised_) {
     stiffness_[k] *= stiffer;
   }
