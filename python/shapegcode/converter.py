@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shapegcode import _core
-from shapegcode.advice import controller_warnings, region_warnings, worse_warnings
+from shapegcode.advice import binding_warnings, controller_warnings, region_warnings, worse_warnings
 from shapegcode.block_grid import Grid, choose_grid
 from shapegcode.budget import Budget, Load, Spending, measure_load
 from shapegcode.compensation import guard_lines, header_lines, read_for_conversion, require_decision
@@ -347,6 +347,7 @@ def _report(
         first, last = region["lines"]
         where = f"{program.place(first)}: lines {first} to {last}" + (" expanded" if program.core.expanded else "")
         warnings += [f"{where}: {miss}" for miss in region["misses"]]
+    warnings += binding_warnings(figures, machine)
     warnings += worse_warnings(figures)
     warnings += region_warnings(program, placed, machine)
     warnings += controller_warnings(machine, written.text, cutting["emitted"], written.blocks, figures["slowed_blocks"])

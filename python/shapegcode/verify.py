@@ -147,7 +147,8 @@ def play_emitted(
     own = controller.shaped_time_constant_s
     options = playback_options(machine, time_constant_s=own, shift=shift, offset=offset)
     options.measure_contour = contour
-    options.tracker = tracker
+    if tracker is not None:
+        options.tracker = tracker
     options.measure_command = command_contour
     options.last_seconds = last_seconds
     options.record_samples = record_samples

@@ -92,9 +92,18 @@ class Outcome:
     within_tolerance: bool = True
 
 
-def machine_of(way: Way, contour_um: float, base: str = "vx500") -> sg.Machine:
-    """The machine file of a row. That a mode is off costs no feed and no verdict: the tables show what it does."""
-    data = sg.Machine.load(base).model_dump(exclude_none=True)
+def machine_of(way: Way, contour_um: float, finer: int = 0) -> sg.Machine:
+    """The machine file of a row. That a mode is off costs no feed and no verdict: the tables show what it does.
+
+    Args:
+        way: the row.
+        contour_um: contour tolerance.
+        finer: more decimals of every word, to see what rounding does.
+    """
+    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
+    for unit in ("mm", "inch"):
+        data["controller"][f"least_increment_{unit}"] *= 10.0**-finer
+        data["controller"][f"feed_decimals_{unit}"] += finer
     data["shaping"]["contour"] = way.contour
     if way.family != "minimal":
         data["shaping"]["family"] = way.family
@@ -103,7 +112,7 @@ def machine_of(way: Way, contour_um: float, base: str = "vx500") -> sg.Machine:
     for axis in data["axes"].values():
         for mode in axis["modes"] if way.band else ():
             mode["frequency_uncertainty_percent"] = 100.0 * way.band
-    return sg.Machine.from_data(data, f"{base} for {way.name}")
+    return sg.Machine.from_data(data, f"vx500 for {way.name}")
 
 
 def shifted(machine: sg.Machine, share: float) -> sg.Machine:
@@ -131,9 +140,9 @@ def _with_grid(way: Way, machine: sg.Machine) -> AbstractContextManager[Any]:
     return mock.patch.object(converter, "choose_grid", lambda *_: grid)
 
 
-def convert(program: Path, way: Way, contour_um: float) -> Outcome:
+def convert(program: Path, way: Way, contour_um: float, finer: int = 0) -> Outcome:
     """Convert a program one way, and measure the emitted text."""
-    machine = machine_of(way, contour_um)
+    machine = machine_of(way, contour_um, finer)
     try:
         with _with_grid(way, machine):
             conversion = sg.convert(program, machine)
@@ -264,6 +273,9 @@ def _ideal_note() -> str:
 def main() -> int:
     """Print the tables as Markdown."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "--finer", type=int, default=0, metavar="N", help="words with N more decimals than the machine's"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure to FILE")
     arguments = parser.parse_args()
 
@@ -282,9 +294,9 @@ def main() -> int:
             wide[name], tight[name] = [as_programmed(path)], []
             advance()
             for way in WAYS:
-                wide[name].append(convert(path, way, WIDE_UM))
+                wide[name].append(convert(path, way, WIDE_UM, arguments.finer))
                 advance()
-                tight[name].append(convert(path, way, TIGHT_UM))
+                tight[name].append(convert(path, way, TIGHT_UM, arguments.finer))
                 advance()
     for name, outcomes in wide.items():
         print(f"**{name}**, contour tolerance {WIDE_UM:g} µm\n\n{full_table(outcomes)}\n")
