@@ -175,7 +175,8 @@ TEST_CASE("feed search: only what leaves the tolerance is slowed") {
        make_line({62, 2, 0}, {62, 60, 0}, feed), make_arc({62, 60, 0}, {2, 120, 0}, {2, 60, 0}, quarter, 2, feed),
        make_line({2, 120, 0}, {-60, 120, 0}, feed)});
   const ShapingOptions options = options_for(ContourTarget::command, 0.003);
-  const RunFilter filter(grid_shaper(), options.target, options.modes, block_s, 1.0);
+  const std::vector<Fir> shaper{grid_shaper()};
+  const RunFilter filter(shaper, options.target, options.modes, block_s, 1.0);
   MotionLimits limits = options.limits;
   limits.contour_tolerance_mm = MotionLimits::none;
   const PlannedRun plan = plan_within_tolerance(path, limits, filter, 5, 0.003);

@@ -76,7 +76,10 @@ std::shared_ptr<const SpeedProfile> planned(const PathPointer& path, const Motio
   return std::make_shared<const SpeedProfile>(plan_speed(*path, limits));
 }
 
-RunFilter filter_for(ContourTarget target) { return {grid_shaper(), target, modes(), block_s, 1.0}; }
+RunFilter filter_for(ContourTarget target) {
+  const std::vector<Fir> shaper{grid_shaper()};
+  return RunFilter(shaper, target, modes(), block_s, 1.0);
+}
 
 Rows rows_of(RunShaper& shaper) {
   Rows rows(2 * static_cast<std::size_t>(shaper.periods()) + 1);

@@ -55,8 +55,8 @@ class FeedSearch {
         last.stops = std::move(stops_);
         return last;
       }
-      if (!changed && !within && limits_.law == AccelerationLaw::constant_time) {
-        changed = slow_lines();
+      if (!within && (!changed || round >= raising_rounds) && limits_.law == AccelerationLaw::constant_time) {
+        changed = slow_lines() || changed;
       }
       if (!changed || (within && round >= raising_rounds)) {
         break;
