@@ -234,7 +234,8 @@ def decimal(value: float, decimals: int) -> str:
 
 def feed_word(feed: float) -> str:
     """F with a point, and with a digit behind it below 10, so that it is never a one-digit feed code."""
-    text = decimal(feed, 8)  # as many digits as a word can have
+    whole = len(str(int(feed))) if feed >= 1.0 else 0
+    text = decimal(feed, max(0, 8 - whole))  # a word has eight digits
     return f"F{text}0" if feed < 10.0 and text.endswith(".") else f"F{text}"
 
 

@@ -56,7 +56,7 @@ class Emission(Table):
         "blocks are merged into one where the path and the feed stay within this many least increments; "
         "0: only where they agree exactly",
         unit="increments",
-        default=0.5,
+        default=0.35,
     )
     rounding: Literal["vibration", "nearest"] = key(
         'how the ends of blocks are rounded. "vibration": to that of the two neighbouring increments that leaves the '

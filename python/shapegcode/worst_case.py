@@ -177,7 +177,7 @@ class Judged:
     @property
     def is_missed(self) -> bool:
         """Whether the figure is over its limit."""
-        return self.value_um > self.limit_um
+        return self.value_um > self.limit_um * (1.0 + 1e-9)
 
     def __str__(self) -> str:
         """For people, with both values."""
