@@ -225,7 +225,7 @@ def test_full_standard_output(folder: Path) -> None:
         ("frequency_hz = 46.0", "frequency_hz = -46.0", ("frequency_hz = -46.0", "greater than 0")),
         ("damping_ratio = 0.02", "damping_ratio = 1.5", ("damping_ratio = 1.5", "1")),
         ("interpolation_period_s = 0.001", "interpolation_period_s = nan", ("interpolation_period_s = nan", "finite")),
-        ("contour_um = 50.0", "contour_um = nan", ("contour_um = nan", "finite")),
+        ("contour_um = 20.0", "contour_um = nan", ("contour_um = nan", "finite")),
         ('name = "VX500"', "name = ", ("machine.toml:",)),
         ('name = "VX500"', 'nmae = "VX500"', ("nmae",)),
     ],
