@@ -29,6 +29,8 @@ FEEDS = (9000, 60, 3000, 600, 12000, 1500, 6000)
 PART = HEAD + "".join(f"G0X0Y0\nG1X{20 + k}.F{f}\nY{10 + k}.\nG0Z5.\n" for k, f in enumerate(FEEDS)) + TAIL
 MACHINE = machine_with()
 PERIOD = {"emission.block_period_s": 0.005}
+#: On the period used without a budget no region is written again, slower: the first text is the last one.
+WIDE = {"tolerance.contour_um": 50.0}
 
 
 def budgeted(text: str = PART, keys: dict[str, Any] | None = None, **limits: Any) -> Judged:
@@ -188,11 +190,11 @@ def test_arcs_with_absolute_centres_cannot_be_given_up() -> None:
 def test_the_shortest_shaper_whose_blocks_are_slow_enough(limits: dict[str, Any], which: int) -> None:
     (limit,) = limits.values()
     key = ("baud", "blocks_per_second")[which]
-    judged = budgeted(**limits)
+    judged = budgeted(keys=WIDE, **limits)
     report = judged.conversion.report
     assert rates(judged)[which] <= limit * (1 + 1e-9)
     assert rates(judged) == pytest.approx([report["budget"]["after"][k] for k in ("baud", "blocks_per_second")])
-    assert report["budget"]["before"][key] == pytest.approx(rates(FREE)[which])
+    assert report["budget"]["before"][key] == pytest.approx(rates(convert(PART, machine_with(WIDE)))[which])
     assert judged.conversion.within_tolerance
     assert not given_up(judged)
     chosen = round(report["block_period_s"] * 1e3)
@@ -205,7 +207,7 @@ def test_the_shortest_shaper_whose_blocks_are_slow_enough(limits: dict[str, Any]
             continue
         shorter = grid.shaper.duration_s - duration
         if shorter < -1e-9 or (shorter < 1e-9 and ms < chosen):
-            other = convert(PART, MACHINE, block_period_s=ms * 1e-3)
+            other = convert(PART, machine_with(WIDE), block_period_s=ms * 1e-3)
             assert rates(other)[which] > limit, f"{ms} ms would do"
 
 
@@ -233,17 +235,17 @@ def test_an_argument_fixes_the_block_period_too() -> None:
 
 
 def test_what_misses_its_tolerance_only_for_the_longer_period_is_kept() -> None:
-    """Circles within 1.2 um: 40 ms of them are no line."""
+    """Circles within 2 um: 40 ms of them are no line."""
     circles = "G1X5.F3000\n" + "G2X5.Y0I5.\n" * 6 + "G1X0\n"
     text = HEAD + "G1X10.F600\nG0Z5.\nG0X0Y0\n" + circles + TAIL
-    keys = {"tolerance.contour_um": 1.2}
+    keys = {"tolerance.contour_um": 2.0}
     assert convert(text, machine_with(keys)).conversion.within_tolerance
     judged = budgeted(text, keys, max_blocks_per_second=25)
     assert judged.conversion.within_tolerance
     (entry,) = judged.conversion.report["budget"]["given_up"]
     assert entry["lines"] == [8, 15]
     period_ms = judged.conversion.report["block_period_s"] * 1e3
-    assert entry["reason"].endswith(f"limit 1.2 um, at a block period of {period_ms:g} ms")
+    assert entry["reason"].endswith(f"limit 2.0 um, at a block period of {period_ms:g} ms")
 
 
 @pytest.mark.parametrize("name", ["TEST_G90.NC", "TEST_G91.NC", "PROGRAM2.NC"])
