@@ -369,12 +369,12 @@ def fuzz(seed: int, count: int) -> None:
 
 
 def test_changed_bytes_never_crash() -> None:
-    fuzz(seed=1, count=100)
+    fuzz(seed=1, count=50)
 
 
 @pytest.mark.slow
 def test_many_changed_bytes_never_crash() -> None:
-    fuzz(seed=2, count=400)
+    fuzz(seed=2, count=200)
 
 
 @settings(max_examples=200, suppress_health_check=list(HealthCheck))
