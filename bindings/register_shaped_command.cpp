@@ -1,8 +1,10 @@
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -15,6 +17,11 @@
 namespace py = pybind11;
 
 namespace shapegcode::bindings {
+namespace {
+
+using Column = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+}  // namespace
 
 void register_shaped_command(py::module_& module) {
   py::enum_<ContourTarget>(module, "ContourTarget", "What shall follow the programmed path.")
@@ -119,18 +126,21 @@ Source: spec 5.)")
       .def(py::init<std::vector<double>, double>(), py::arg("kernel"), py::arg("smoothness"), "See the class.")
       .def(
           "solve",
-          [](ContourSolver& self, const std::vector<double>& error, const std::vector<double>& carried,
-             const std::vector<double>& stiffness) {
-            std::vector<double> correction(carried);
-            correction.resize(carried.size() + error.size() - std::min(error.size(), self.reach()));
+          [](ContourSolver& self, const Column& error, const Column& carried, const Column& stiffness) {
+            const auto values = [](const Column& column) {
+              return std::span<const double>(column.data(), static_cast<std::size_t>(column.size()));
+            };
+            const std::size_t past = values(carried).size();
+            const std::size_t m = values(error).size() - std::min(values(error).size(), self.reach());
+            std::vector<double> correction(past + m);
+            std::ranges::copy(values(carried), correction.begin());
             {
               const py::gil_scoped_release release;
-              self.solve(error, correction, stiffness);
+              self.solve(values(error), correction, values(stiffness));
             }
-            return py::array_t<double>(static_cast<py::ssize_t>(correction.size() - carried.size()),
-                                       correction.data() + carried.size());
+            return py::array_t<double>(static_cast<py::ssize_t>(m), correction.data() + past);
           },
-          py::arg("error"), py::arg("carried"), py::arg("stiffness") = std::vector<double>{},
+          py::arg("error"), py::arg("carried"), py::arg("stiffness") = Column(0),
           "Corrections (m,) for errors (m + len(kernel) - 1,); `carried`: the len(kernel) + 1 corrections before.");
   module.def(
       "contour_kernel",

@@ -30,10 +30,19 @@ void register_simulation(py::module_& module) {
       .def_readonly("count", &DeviationStats::count, "Samples.")
       .def_property_readonly("rms_mm", &DeviationStats::rms_mm, "mm.");
 
+  py::class_<ContourTracker, std::shared_ptr<ContourTracker>>(
+      module, "ContourTracker", "Geometry of a path for the distance of a moving point to it.")
+      .def(py::init([](const std::shared_ptr<Path>& path) { return ContourTracker(*path); }), py::arg("path"),
+           "Raises ArgumentError on a path without segments.");
+
   py::class_<PlaybackOptions>(module, "PlaybackOptions", "What a run of set-points is measured with.")
       .def(py::init<>())
       .def_readwrite("period_s", &PlaybackOptions::period_s, "Interpolation period, s.")
       .def_readwrite("axis_filters", &PlaybackOptions::axis_filters, "Filters after the set-points, in order.")
+      .def_property(
+          "tracker", [](const PlaybackOptions& self) { return std::const_pointer_cast<ContourTracker>(self.tracker); },
+          [](PlaybackOptions& self, std::shared_ptr<ContourTracker> tracker) { self.tracker = std::move(tracker); },
+          "Tracker of the path, whose geometry several runs share; None: each run makes its own.")
       .def_readwrite("modes", &PlaybackOptions::modes, "Modes of X, Y and Z.")
       .def_readwrite("mode_tables", &PlaybackOptions::mode_tables,
                      "How the modes of X, Y and Z vary with position, one table per mode; none: constant modes.")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from shapegcode.machine import Machine
-from shapegcode.program import Program
+from shapegcode.program import Program, least_increment_mm
 from shapegcode.verify import Placed
 
-__all__ = ["controller_warnings", "region_warnings", "worse_warnings"]
+__all__ = ["binding_warnings", "controller_warnings", "region_warnings", "worse_warnings"]
 
 # How much worse than the original's a figure must be to be worth a warning: ratio, and size in um.
 _WORSE_RATIO, _WORSE_UM = 1.2, 5.0
@@ -28,6 +29,42 @@ def worse_warnings(figures: dict[str, Any]) -> list[str]:
         for name, before, after in pairs
         if after > _WORSE_RATIO * before and after - before > _WORSE_UM
     ]
+
+
+def binding_warnings(figures: dict[str, Any], machine: Machine) -> list[str]:
+    """Which tolerance a conversion left, by how much, and what would be feasible; empty where all were kept."""
+    tolerance = machine.tolerance
+    regions = figures["regions"]
+    warnings = []
+    contour = max((region["contour_error_um"] for region in regions), default=0.0)
+    if contour > tolerance.contour_um:
+        rounding = math.sqrt(2.0) * least_increment_mm(machine, 21) * 1e3
+        alone = f"; rounding the words alone may take {rounding:.1f} um of it" if rounding > 0.2 * contour else ""
+        warnings.append(
+            f"tolerance.contour_um = {tolerance.contour_um:g} binds: {contour:.1f} um were reached with the feed "
+            f"lowered as far as it helps{alone}; feasible: {_rounded_up(contour):g} um"
+        )
+    over = [
+        (region["residual_vibration_um"]["emitted"][axis], limit)
+        for region in regions
+        for axis, limit in region["residual_limit_um"].items()
+        if region["residual_vibration_um"]["emitted"][axis] > limit
+    ]
+    if over:
+        left, limit = max(over)
+        warnings.append(
+            f"the tolerance of residual vibration binds: {left:.2f} um are left, limit {limit:.2f} um "
+            f"(tolerance.residual_*); feasible: tolerance.residual_floor_um = {_rounded_up(left):g}, "
+            "or a longer shaper (`shapegcode shaper`)"
+        )
+    return warnings
+
+
+def _rounded_up(value: float) -> float:
+    """Two digits, with a margin of 5 %."""
+    value *= 1.05
+    step = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.ceil(value / step) * step
 
 
 def region_warnings(program: Program, placed: list[Placed], machine: Machine) -> list[str]:

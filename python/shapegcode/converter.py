@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shapegcode import _core
-from shapegcode.advice import controller_warnings, region_warnings, worse_warnings
+from shapegcode.advice import binding_warnings, controller_warnings, region_warnings, worse_warnings
 from shapegcode.block_grid import Grid, choose_grid
 from shapegcode.budget import Budget, Load, Spending, measure_load
 from shapegcode.compensation import guard_lines, header_lines, read_for_conversion, require_decision
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
 _MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin
-_ATTEMPTS = 4  # each with less room for the regions that left the contour tolerance
+_ATTEMPTS = 8  # each with less room for the regions that left the contour tolerance; few need more than two
 _COMMENT_WIDTH = 60
 _HEADER_MARK = b"(SHAPEGCODE "
 _HEADER_REACH = 4096
@@ -161,12 +162,17 @@ def convert(
 
 @dataclass(frozen=True)
 class _Written:
-    """The emitted text before it is judged; loads per index of a shaped region, only under a budget."""
+    """The emitted text before it is judged.
+
+    Per index of a shaped region: `planned_um`, the deviation that its feed was planned for, µm, where the contour is
+    kept by a target; and, only under a budget, `loads`.
+    """
 
     text: bytes
     placed: list[Placed]
     blocks: int
     kept_warnings: list[str]
+    planned_um: dict[int, float]
     loads: dict[int, Load]
 
 
@@ -190,25 +196,28 @@ def _settle(
         written = _write(program, machine, grid, arc_feed_ratio, reasons, room_um, spending, stage)
         emitted = read_back(written.text, written.placed, machine)
         figures = measure(emitted, written.placed, originals, machine, pool, partial(on_progress, "round trip"))
-        if attempt + 1 == _ATTEMPTS or not _tighten(room_um, program, written.placed, figures, machine):
+        if attempt + 1 == _ATTEMPTS or not _tighten(room_um, program, written, figures, machine):
             break
     return written, emitted, figures
 
 
 def _tighten(
-    room_um: list[float], program: Program, placed: list[Placed], figures: list[RegionFigures], machine: Machine
+    room_um: list[float], program: Program, written: _Written, figures: list[RegionFigures], machine: Machine
 ) -> bool:
     """Give regions that left the contour tolerance less room, so that they run slower. False if there is none.
 
-    The bound on feed counts corners and arcs one by one; where several fall into one shaper they add up.
+    The bound on feed counts corners and arcs one by one; where several fall into one shaper they add up. Where the feed
+    was searched for a target, what it was planned for counts: more room than that would change nothing.
     """
     limit = machine.tolerance.contour_um
     places = {id(region): index for index, region in enumerate(program.regions)}
     tightened = False
-    for place, region in zip(placed, figures, strict=True):
+    for place, region in zip(written.placed, figures, strict=True):
         reached = contour_um(region, machine)
         if reached > limit:
-            room_um[places[id(place.region)]] *= _CONTOUR_MARGIN * limit / reached
+            index = places[id(place.region)]
+            room_um[index] = min(room_um[index], written.planned_um.get(index, math.inf))
+            room_um[index] *= _CONTOUR_MARGIN * limit / reached
             tightened = True
     return tightened
 
@@ -242,6 +251,7 @@ def _write(
     position = core.header_offset
     placed: list[Placed] = []
     kept: list[str] = []
+    planned_um: dict[int, float] = {}
     loads: dict[int, Load] = {}
     blocks = 0
     for done, (region, reason, room) in enumerate(zip(regions, reasons, room_um, strict=True), start=1):
@@ -261,11 +271,13 @@ def _write(
         put(shaped.text)
         placed.append(Placed(region, first, line - 1))
         blocks += shaped.blocks
+        if shaped.planned_um > 0.0:
+            planned_um[done - 1] = shaped.planned_um
         if spending is not None:
             loads[done - 1] = measure_load(region, shaped, grid, machine)
         on_progress(done, len(regions))
     put(core.slice(position, core.size))
-    return _Written(b"".join(parts), placed, blocks, kept, loads)
+    return _Written(b"".join(parts), placed, blocks, kept, planned_um, loads)
 
 
 def _why_kept(region: _core.Region, machine: Machine) -> str:
@@ -335,6 +347,7 @@ def _report(
         first, last = region["lines"]
         where = f"{program.place(first)}: lines {first} to {last}" + (" expanded" if program.core.expanded else "")
         warnings += [f"{where}: {miss}" for miss in region["misses"]]
+    warnings += binding_warnings(figures, machine)
     warnings += worse_warnings(figures)
     warnings += region_warnings(program, placed, machine)
     warnings += controller_warnings(machine, written.text, cutting["emitted"], written.blocks, figures["slowed_blocks"])

@@ -42,6 +42,7 @@ class EmittedRegion:
         periods: whole block periods that each of them lasts.
         blocks_begin: byte of the text at which they begin.
         blocks_end: byte behind them.
+        planned_um: deviation of what shall follow the path for which the feed was planned, µm; 0 without a target.
     """
 
     text: bytes
@@ -49,6 +50,7 @@ class EmittedRegion:
     periods: npt.NDArray[np.uint32]
     blocks_begin: int
     blocks_end: int
+    planned_um: float
 
 
 def motion_limits(
@@ -218,7 +220,10 @@ def emit_region(
     end = line_end.encode()
     before = b"".join(line.encode("latin-1") + end for line in head)
     after = b"".join(line.encode("latin-1") + end for line in tail)
-    return EmittedRegion(before + text + after, len(all_periods), all_periods, len(before), len(before) + len(text))
+    return EmittedRegion(
+        before + text + after, len(all_periods), all_periods, len(before), len(before) + len(text),
+        shaper.largest_deviation_mm * 1e3,
+    )  # fmt: skip
 
 
 def decimal(value: float, decimals: int) -> str:

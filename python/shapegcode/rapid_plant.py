@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from shapegcode.controller import controller_model
 from shapegcode.machine import Machine
 from shapegcode.moving_modes import region_offset, slowest_mode
 from shapegcode.rapid_candidates import Rapid
-from shapegcode.verify import play_emitted, playback_options
+from shapegcode.verify import play_emitted, playback_options, vibration_memory_s
 
 __all__ = ["RapidPlant", "Timing", "settling_time_s"]
 
@@ -23,24 +24,31 @@ _LAG_MEMORY = 20.0  # time constants of the servo loop beyond which the past doe
 Vector = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Timing:
-    """One rapid in time, seconds.
+    """One step between two cuts, in time.
 
     Attributes:
-        motion_s: until the set-points rest.
-        arrival_s: wait for in-position behind them.
-        settling_s: from the end of the set-points until the table stays within the band.
+        motion_s: until the set-points rest, s.
+        arrival_s: wait for in-position behind them, s.
+        settling_s: from the end of the set-points until the table stays within the band, s.
+        command_mm: set-points, one per period, (n, 3); a pause has one.
     """
 
     motion_s: float
     arrival_s: float
     settling_s: float
+    command_mm: Vector
 
     @property
     def clock_s(self) -> float:
         """What the control takes: motion and wait for in-position."""
         return self.motion_s + self.arrival_s
+
+    @property
+    def settled_s(self) -> float:
+        """Until the axes have arrived and the table has settled."""
+        return self.motion_s + max(self.arrival_s, self.settling_s)
 
 
 def settling_time_s(command_mm: Vector, options: _core.PlaybackOptions, slowest_per_s: float, band_mm: float) -> float:
@@ -86,6 +94,8 @@ class RapidPlant:
         ]
         self._slowest_per_s = min(rates, default=math.inf)
         self._moving = any(mode.frequency_over is not None for axis in machine.axes.as_tuple() for mode in axis.modes)
+        self.longest_memory_s = vibration_memory_s(machine) or math.inf
+        """What moved longer ago no longer counts, s."""
         self._known: dict[tuple[float, ...], Timing] = {}
 
     def rapid(self, rapid: Rapid) -> Timing:
@@ -99,6 +109,7 @@ class RapidPlant:
             _core.rapid_time_s(travel, self.model),
             _core.in_position_wait_s(travel, self.model),
             settling_time_s(samples, self._options(rapid.region), self._slowest_per_s, self.band_mm),
+            samples,
         )
         self._known[key] = timing
         return timing
@@ -112,10 +123,10 @@ class RapidPlant:
         return _core.play_samples(np.asfortranarray(samples), still, options)
 
     def blocks(self, blocks: _core.Path, region: _core.Region, stops_s: float) -> Timing:
-        """The replacement as the text has it: the slower of both rules of block end."""
+        """The replacement as the text has it: the slower of both rules of block end; `stops_s`: dwells before it."""
         period = self.model.period_s
         offset = region_offset(region, self.machine)
-        worst = Timing(0.0, 0.0, 0.0)
+        runs = []
         for rule in (_core.BlockEnd.ceil, _core.BlockEnd.carry):
             least = 2 + math.ceil(2.0 * blocks.programmed_time_s / period) + self._filter_periods()
             figures = play_emitted(
@@ -124,12 +135,47 @@ class RapidPlant:
             count = round(figures.duration_s / period) + 1
             command = np.array(figures.recorded_command[:count])
             settling = settling_time_s(command, self._options(region), self._slowest_per_s, self.band_mm)
-            timing = Timing(stops_s + figures.duration_s, self._arrival_s(command), settling)
-            if timing.clock_s + max(0.0, settling - timing.arrival_s) >= worst.clock_s + max(
-                0.0, worst.settling_s - worst.arrival_s
-            ):
-                worst = timing
-        return worst
+            still = np.repeat(command[:1], round(stops_s / period), axis=0)
+            runs.append(
+                Timing(
+                    len(still) * period + figures.duration_s,
+                    self._arrival_s(command),
+                    settling,
+                    np.concatenate([still, command]),
+                )
+            )
+        return max(runs, key=lambda run: run.settled_s)
+
+    def pause(self, seconds: float) -> Timing:
+        """What moves no axis: a dwell, an M function."""
+        return Timing(seconds, 0.0, 0.0, np.zeros((1, 3)))
+
+    def ready_s(self, steps: Sequence[Timing], region: _core.Region) -> float:
+        """Time of steps one after the other until the table has settled behind all of them together, s.
+
+        Args:
+            steps: in order.
+            region: whose modes hold, where modes vary with position.
+        """
+        period = self.model.period_s
+        clock_s = math.fsum(step.clock_s for step in steps)
+        parts: list[Vector] = []
+        end = next((step.command_mm[-1] for step in reversed(steps) if len(step.command_mm) > 1), np.zeros(3))
+        after_s = 0.0
+        for step in reversed(steps):
+            if after_s > self.longest_memory_s:
+                break
+            wait = round(step.clock_s / period) + 1 - len(step.command_mm)
+            way = np.concatenate([step.command_mm, np.repeat(step.command_mm[-1:], wait, axis=0)])
+            way = way + (end - way[-1])  # where positions are not known, pieces do not join by themselves
+            parts.append(way[:-1] if parts else way)
+            end = way[0]
+            after_s += step.clock_s
+        command = np.concatenate(parts[::-1])
+        settling_s = settling_time_s(command, self._options(region), self._slowest_per_s, self.band_mm)
+        moves = np.flatnonzero(np.abs(np.diff(command, axis=0)).max(axis=1))
+        still_s = (len(command) - 1 - (moves[-1] + 1 if len(moves) else 0)) * period
+        return clock_s + max(0.0, settling_s - still_s)
 
     def _filter_periods(self) -> int:
         return math.ceil(self.machine.controller.shaped_time_constant_s / self.model.period_s) + 1

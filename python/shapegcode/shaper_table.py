@@ -163,13 +163,16 @@ def next_step(result: Recommendation, machine: str | None) -> str:
     place = result.grid_index
     if place is None:
         return "blocks of a program need taps on a grid: compare some with --period 5ms, or name the machine with -m"
-    period_ms = f"{(result.designs[place].period_s or 0.0) * 1e3:.6g}ms"
+    best = result.designs[place]
+    options = f"--shaper {best.family} --block-period {(best.period_s or 0.0) * 1e3:.6g}ms -o shaped.nc"
+    if best.family == "taps":
+        return "taps of your own cannot be written by convert: take a family, or use the Python interface"
     if machine is None:
         return (
             f"put the modes into a machine file (shapegcode machine init -o mine.toml), then "
-            f"shapegcode convert part.nc -m mine.toml --block-period {period_ms} -o shaped.nc"
+            f"shapegcode convert part.nc -m mine.toml {options}"
         )
-    return f"shapegcode convert part.nc -m {machine} --block-period {period_ms} -o shaped.nc"
+    return f"shapegcode convert part.nc -m {machine} {options}"
 
 
 def _mark(result: Recommendation, index: int) -> str:

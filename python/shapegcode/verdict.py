@@ -87,7 +87,7 @@ def measure(
     for place in placed:
         player = _CasePlayer(
             emitted.core.cutting_path(place.first_line, place.last_line), place.region.path, machine, cases,
-            region_offset(place.region, machine),
+            region_offset(place.region, machine), _core.ContourTracker(place.region.path),
         )  # fmt: skip
         runs = [pool.submit(player.nominal, rule) for rule in _BLOCK_ENDS]
         planned = pool.submit(player.planned)
@@ -116,6 +116,7 @@ class _CasePlayer:
     machine: Machine
     cases: Sequence[Case]
     offset: Offset
+    tracker: _core.ContourTracker
 
     def nominal(self, rule: _core.BlockEnd) -> _core.PlaybackFigures:
         """Blocks at 100 %; under the controller's own rule also with an empty buffer where a stop excites most."""
@@ -123,7 +124,7 @@ class _CasePlayer:
         return play_emitted(
             self.blocks, self.path, self.machine, rule, offset=self.offset,
             starved_blocks=_core.fastest_block_ends(self.blocks) if own else (),
-            memory_s=vibration_memory_s(self.machine),
+            memory_s=vibration_memory_s(self.machine), tracker=self.tracker,
         )  # fmt: skip
 
     def planned(self) -> _core.PlaybackFigures | None:
@@ -148,6 +149,7 @@ class _CasePlayer:
             played[case.name] = play_emitted(
                 self.blocks, self.path, machine, override=case.override, shift=case.shift, offset=self.offset,
                 contour=whole, command_contour=case.override != 1.0, last_seconds=0.0 if whole else memory_s,
+                tracker=self.tracker,
             )  # fmt: skip
         return played
 

@@ -123,6 +123,7 @@ def play_emitted(
     offset: Offset = NO_OFFSET,
     starved_blocks: Sequence[int] = (),
     memory_s: float = 0.0,
+    tracker: _core.ContourTracker | None = None,
 ) -> _core.PlaybackFigures:
     """Emitted blocks as the controller plays them, measured against the programmed path.
 
@@ -139,12 +140,15 @@ def play_emitted(
         record_samples: samples kept for pictures.
         offset: see `playback_options`.
         starved_blocks: behind each of these, tried one by one, the buffer is empty for `verdict.starved_s`.
+        tracker: of the programmed path, shared by several runs; None: one of its own.
         memory_s: how long after that its vibration is looked at; 0: to the end.
     """
     controller = machine.controller
     own = controller.shaped_time_constant_s
     options = playback_options(machine, time_constant_s=own, shift=shift, offset=offset)
     options.measure_contour = contour
+    if tracker is not None:
+        options.tracker = tracker
     options.measure_command = command_contour
     options.last_seconds = last_seconds
     options.record_samples = record_samples

@@ -179,3 +179,24 @@ TEST_CASE("interpolator: refuses a period that is not positive; nothing to do is
   REQUIRE(samples.positions_mm.rows() == 1);
   CHECK(samples.positions_mm.row(0) == Vector3(1, 2, 3).transpose());
 }
+
+TEST_CASE("interpolator: a delay is rest at the start, also of part of a period") {
+  const double length = 30.0;
+  const double speed = 100.0;
+  const auto profile = trapezoid(length, speed, 0.05);
+  for (const double delay : {0.0, 0.004, 0.0123, 0.2}) {
+    Interpolator interpolator(straight(length), profile, 0.001, delay);
+    CHECK(interpolator.sample_count() ==
+          static_cast<std::size_t>(std::ceil((profile->duration_s() + delay) / 0.001 - 1e-9)) + 1);
+    double worst = 0.0;
+    Vector3 position;
+    for (std::size_t k = 0; k < interpolator.sample_count(); ++k) {
+      REQUIRE(interpolator.step(position));
+      const double time = static_cast<double>(k) * 0.001 - delay;
+      worst = std::max(worst, std::abs(position.x() - 1.0 - trapezoid_distance(time, length, speed, 0.05)));
+    }
+    CHECK(worst < 1e-12);
+    CHECK(!interpolator.step(position));
+    CHECK(position == Vector3(1.0 + length, 2.0, 3.0));
+  }
+}

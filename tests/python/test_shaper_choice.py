@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -124,6 +125,26 @@ def test_objectives_and_ties() -> None:
     assert recommend(found, 0.02) == 3
     with pytest.raises(ArgumentError, match="0 given"):
         recommend([], 0.05)
+
+
+def test_a_mode_without_a_band_is_cancelled_where_any_design_does_so() -> None:
+    found = [replace(made(0.01, 0.04), exact=False), made(0.02, 0.0), made(0.03, 0.0)]
+    assert recommend(found, 0.05) == 1
+    assert recommend(found[:1], 0.05) == 0
+    assert recommend([found[0], made(0.02, 0.2)], 0.05) == 0
+    exact = evaluate("zv", Shaper([0.0, 0.01], [0.5, 0.5]), [ModeBand(Mode(50.0, 0.0)), ModeBand(Mode(20.0, 0.0), 0.1)])
+    assert exact.exact
+    assert exact.worst_residual > 0.5
+    assert not evaluate("zv", exact.shaper, [ModeBand(Mode(20.0, 0.0))]).exact
+
+
+def test_a_longer_period_wins_within_two_percent() -> None:
+    found = [made(0.05, 0.0, period_s=0.002), made(0.051, 0.0, period_s=0.003), made(0.054, 0.0, period_s=0.009)]
+    assert recommend(found, 0.05) == 1
+    assert recommend(found, 0.05, "robust") == 0
+    least = [made(0.05, 0.2, period_s=0.002), made(0.05, 0.203, period_s=0.003), made(0.05, 0.21, period_s=0.009)]
+    assert recommend(least, 0.05) == 1
+    assert recommend([*found, made(0.0499, 0.0)], 0.05) == 3  # at continuous times there is no period
 
 
 def test_equal_taps_are_named_after_the_family_for_grids() -> None:

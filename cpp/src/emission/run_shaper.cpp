@@ -43,10 +43,11 @@ bool is_corner(const Path& path, std::size_t before, std::size_t after) noexcept
 
 }  // namespace
 
-RunFilter::RunFilter(std::span<const Fir> shapers, ContourTarget contour_target, const AxisModes& modes,
+RunFilter::RunFilter(std::span<const Fir> shapers, ContourTarget contour_target, const AxisModes& axis_modes,
                      double block_period_s, double weight, const std::optional<FollowingFir>& followed,
                      const AxisModeTables& tables)
     : target(contour_target),
+      modes(axis_modes),
       half_period_s(0.5 * block_period_s),
       mean_delay_s((followed ? followed->fir().mean_samples() : shapers.front().mean_samples()) * block_period_s),
       smoothness(weight) {
@@ -68,7 +69,7 @@ RunFilter::RunFilter(std::span<const Fir> shapers, ContourTarget contour_target,
   for (std::size_t node = 0; node < nodes; ++node) {
     std::array<std::vector<double>, axis_count>& kernel = kernels.emplace_back();
     for (std::size_t axis = 0; axis < axis_count; ++axis) {
-      std::vector<Mode> here = modes[axis];
+      std::vector<Mode> here = axis_modes[axis];
       for (std::size_t m = 0; following && m < std::min(here.size(), tables[axis].size()); ++m) {
         const ModeTable& table = tables[axis][m];
         if (!table.empty() && table.axis == following->axis()) {
@@ -170,10 +171,16 @@ void RunShaper::read_row() {
       tangent_.assign(static_cast<std::size_t>(history_), tangent);
       wanted_.assign(static_cast<std::size_t>(history_), wanted);
       segment_.assign(static_cast<std::size_t>(history_), 0);
+      left_.assign(static_cast<std::size_t>(history_), Vector3::Zero());
+      if (filter_.target == ContourTarget::response && !filter_.following) {
+        plant_ = std::make_unique<ModalPlant>(filter_.modes, filter_.half_period_s);
+        plant_->reset(wanted);
+      }
     }
     tangent_.push_back(tangent);
     wanted_.push_back(wanted);
     segment_.push_back(static_cast<std::uint32_t>(at));
+    left_.push_back(Vector3::Zero());
   }
 }
 
@@ -300,8 +307,7 @@ bool RunShaper::asks_too_much(std::size_t begin, std::size_t end, std::size_t ax
     }
   });
   std::ranges::sort(raised_);
-  const auto repeated = std::ranges::unique(raised_);
-  raised_.erase(repeated.begin(), repeated.end());
+  raised_.erase(std::unique(raised_.begin(), raised_.end()), raised_.end());
   for (const std::size_t k : raised_) {
     stiffness_[k] *= stiffer;
   }
@@ -350,9 +356,32 @@ double RunShaper::shaped(std::size_t axis, std::ptrdiff_t row, bool corrected) c
   return sum;
 }
 
-// What is left of the error behind the correction.
-Vector3 RunShaper::deviation(std::size_t row) const noexcept {
+// A row as the emitted blocks pass it: a block is straight, or an arc where the path is one.
+Vector3 RunShaper::as_block(std::size_t row) const noexcept {
+  const std::size_t half = static_cast<std::size_t>(filter_.shaper_rows()) / 2 + 1;
   const std::size_t i = index(row);
+  bool bends = row % 2 == 0;
+  for (std::size_t k = segment_[i - half]; k <= segment_[i + half]; ++k) {
+    bends = bends || (*path_)[k].kind == SegmentKind::arc;
+  }
+  const auto at = static_cast<std::ptrdiff_t>(row);
+  Vector3 position;
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    position[static_cast<Eigen::Index>(axis)] =
+        bends ? shaped(axis, at, true) : 0.5 * (shaped(axis, at - 1, true) + shaped(axis, at + 1, true));
+  }
+  return position;
+}
+
+// What the emitted blocks leave of the error; call once for each row in turn.
+Vector3 RunShaper::deviation(std::size_t row) {
+  const std::size_t i = index(row);
+  if (filter_.target == ContourTarget::command) {
+    return as_block(row) - wanted_[i];
+  }
+  if (plant_) {
+    return plant_->step(as_block(row)) - wanted_[i];
+  }
   Vector3 result;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     result[static_cast<Eigen::Index>(axis)] = error_[axis][i] + behind_kernel(axis, correction_[axis], i);
@@ -364,7 +393,8 @@ void RunShaper::measure(std::size_t row) {
   const std::size_t half = static_cast<std::size_t>(filter_.shaper_rows()) / 2 + 1;
   read_to(row + half + 1);
   const std::size_t i = index(row);
-  const Vector3 left = deviation(row);
+  left_[i] = deviation(row);
+  const Vector3& left = left_[i];
   double size = (left - tangent_[i].dot(left) * tangent_[i]).norm();
   // At a corner the way by which the corner itself is missed counts.
   constexpr std::size_t around = 4;  // rows, within which the place along the path counts fully
@@ -373,8 +403,8 @@ void RunShaper::measure(std::size_t row) {
     const Vector3& corner = (*path_)[segment_[i - around]].start_mm;
     double nearest = MotionLimits::none;
     for (std::size_t k = row - std::min(row, 2 * around); k < row; ++k) {
-      const Vector3 from = wanted_[index(k)] + deviation(k);
-      const Vector3 step = wanted_[index(k + 1)] + deviation(k + 1) - from;
+      const Vector3 from = wanted_[index(k)] + left_[index(k)];
+      const Vector3 step = wanted_[index(k + 1)] + left_[index(k + 1)] - from;
       const double length2 = step.squaredNorm();
       const double share = length2 > 0.0 ? std::clamp((corner - from).dot(step) / length2, 0.0, 1.0) : 0.0;
       nearest = std::min(nearest, (from + share * step - corner).norm());
@@ -382,8 +412,11 @@ void RunShaper::measure(std::size_t row) {
     size = std::max(size, nearest);
   }
   const auto found = static_cast<float>(size);
+  // A corner's deviation is no reason to slow the whole arc beside it.
+  std::vector<float>& on =
+      is_corner(*path_, segment_[i - half], segment_[i + half]) ? measured_->near_corner : measured_->on_segment;
   for (std::uint32_t k = segment_[i - half]; k <= segment_[i + half]; ++k) {
-    measured_->on_segment[k] = std::max(measured_->on_segment[k], found);
+    on[k] = std::max(on[k], found);
     if (k > segment_[i - half]) {
       measured_->at_junction[k] = std::max(measured_->at_junction[k], found);
     }
@@ -410,12 +443,13 @@ void RunShaper::forget() {
     drop(tangent_);
     drop(wanted_);
     drop(segment_);
+    drop(left_);
   }
   base_ = keep;
 }
 
 void RunShaper::next(Vector3& position) {
-  decide_to(out_ + 1);
+  decide_to(out_ + (measured_ != nullptr ? 2 : 1));
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     position[static_cast<Eigen::Index>(axis)] = shaped(axis, static_cast<std::ptrdiff_t>(out_), target_ != nullptr);
   }

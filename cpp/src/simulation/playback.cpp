@@ -22,6 +22,10 @@ const Path& a_point() {
   return point;
 }
 
+ContourTracker tracker_of(const Path& path, const PlaybackOptions& options) {
+  return options.tracker ? *options.tracker : ContourTracker(path);
+}
+
 // Everything that hangs on one stream of set-points.
 class Recorder {
  public:
@@ -31,8 +35,8 @@ class Recorder {
         plant_(options.modes, options.period_s, options.mode_tables),
         tracks_contour_(options.measure_contour && path.length_mm() > 0.0),
         tracks_command_(tracks_contour_ && options.measure_command && !command_on_path),
-        command_tracker_(tracks_contour_ ? path : a_point()),
-        response_tracker_(tracks_contour_ ? path : a_point()),
+        command_tracker_(tracks_contour_ ? tracker_of(path, options) : ContourTracker(a_point())),
+        response_tracker_(command_tracker_),
         orbit_(tracks_contour_ ? path : a_point()),
         command_reach_(tracks_contour_ ? path : a_point()),
         response_reach_(command_reach_) {

@@ -77,8 +77,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--vibration-limit",
         metavar="RATIO",
         type=ratio,
-        default=0.05,
-        help="largest share of the vibration that may be left anywhere in the bands (default: 5%%)",
+        default=None,
+        help="largest share of the vibration that may be left anywhere in the bands (default: the machine's "
+        "shaping.vibration_limit, else 5%%)",
     )
     parser.add_argument(
         "--objective",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.shaping.band import ModeBand, parse_mode_band
 from shapegcode.shaping.choice import Recommendation, choose
+from shapegcode.shaping.ranking import SAME
 from shapegcode.shaping.registry import DesignOptions
 from shapegcode.shaping.robust_search import Task, shortest_below
 from shapegcode.shaping.taps import parse_taps
@@ -38,7 +39,7 @@ def choose_shaper(
     families: Sequence[str] | None = None,
     max_duration_s: float | None = None,
     max_abs_sum: float = 10.0,
-    vibration_limit: float = 0.05,
+    vibration_limit: float | None = None,
     objective: str = "shortest",
     allow_negative: bool = False,
     taps: str | Shaper | None = None,
@@ -59,7 +60,8 @@ def choose_shaper(
         max_duration_s: longest shaper in s; None: three periods of the slowest mode, and the machine's limit if that
             is not enough.
         max_abs_sum: largest sum of the taps' magnitudes.
-        vibration_limit: largest worst residual ratio of the design to take.
+        vibration_limit: largest worst residual ratio of the design to take; None: the machine's
+            `shaping.vibration_limit`, without a machine 0.05.
         objective: "shortest", "contour" (least contour cost) or "robust" (least worst residual).
         allow_negative: whether a design with negative taps may be taken.
         taps: a shaper of the user's own, compared with the others: as text ("0:.5,10.9ms:.5") or as it is.
@@ -79,12 +81,15 @@ def choose_shaper(
         for period_s in periods_s:
             _check_period(period_s, machine)
     own = parse_taps(taps) if isinstance(taps, str) else taps
+    if vibration_limit is None:
+        vibration_limit = DesignOptions.vibration_limit if machine is None else machine.shaping.vibration_limit
+    limit = vibration_limit
 
     def compared(longest_s: float) -> Recommendation:
-        options = DesignOptions(None, longest_s, max_abs_sum, vibration_limit, own)
+        options = DesignOptions(None, longest_s, max_abs_sum, limit, own)
         kinds = periods_s
         if kinds is None:
-            best = candidate_periods(bands, machine, longest_s, vibration_limit)
+            best = candidate_periods(bands, machine, longest_s, limit)
             kinds = best if machine is not None else [None, *best]
         return choose(
             bands, kinds, options, families=families, objective=objective, allow_negative=allow_negative,
@@ -101,7 +106,7 @@ def choose_shaper(
         # Long shapers take long to find, and are wanted only where there is no short one.
         with contextlib.suppress(DesignError):
             result = compared(usual_s)
-            if result.within_limit:
+            if result.within_limit and result.design.exact:
                 return result
     return compared(longest_s)
 
@@ -144,7 +149,8 @@ def candidate_periods(
         vibration_limit: largest worst residual ratio of the shapers that are compared.
 
     Returns:
-        The best three of those up to 20 ms; the shortest three if none has such a shaper.
+        The best three of those up to 20 ms, among them the longest whose shaper lasts at most 2 % longer than the
+        shortest one, which is what a conversion takes; the shortest three if none has such a shaper.
 
     Raises:
         ArgumentError: a value outside its range.
@@ -158,18 +164,22 @@ def candidate_periods(
         tick_s = _ASSUMED_TICK_S * max(1, math.ceil(least_s / _ASSUMED_TICK_S))
     first = max(1, math.ceil(least_s / tick_s - _WHOLE))
     last = max(first + _PERIODS_COMPARED - 1, math.floor(_LONGEST_BLOCK_PERIOD_S / tick_s + _WHOLE))
-    best: list[tuple[float, float]] = []  # duration, and the period with a minus: of equal durations the longer one
+    every: list[tuple[float, float]] = []  # duration, and the period with a minus: of equal durations the longer one
     for multiple in range(first, last + 1):
         period_s = multiple * tick_s
         # What is longer than the worst of the best so far need not be found.
-        longest_s = best[-1][0] if len(best) == _PERIODS_COMPARED else max_duration_s
+        longest_s = max_duration_s
+        if len(every) >= _PERIODS_COMPARED:
+            longest_s = min(longest_s, max(every[_PERIODS_COMPARED - 1][0], (1.0 + SAME) * every[0][0]))
         task = Task.checked(bands, period_s, non_negative=True, max_abs_sum=1.0, zeros_at_nominal=False)
         found = shortest_below(task, vibration_limit, longest_s, least_cost=False)
         if found is not None:
-            best = sorted([*best, (round(found.shaper.duration_s, 9), -period_s)])[:_PERIODS_COMPARED]
-    return sorted(-period_s for _, period_s in best) or [
-        multiple * tick_s for multiple in range(first, first + _PERIODS_COMPARED)
-    ]
+            every = sorted([*every, (round(found.shaper.duration_s, 9), -period_s)])
+    if not every:
+        return [multiple * tick_s for multiple in range(first, first + _PERIODS_COMPARED)]
+    taken = max(-period for duration, period in every if duration <= (1.0 + SAME) * every[0][0])
+    others = [-period for _, period in every if -period != taken]
+    return sorted([taken, *others[: _PERIODS_COMPARED - 1]])
 
 
 def _band(given: str | Mode | ModeBand, uncertainty: float) -> ModeBand:

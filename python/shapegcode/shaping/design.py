@@ -10,6 +10,8 @@ from shapegcode.shaping.band import ModeBand
 
 __all__ = ["Design", "evaluate"]
 
+_EXACT = 1e-3  # of the vibration; taps that someone typed have four digits
+
 
 @dataclass(frozen=True)
 class Design:
@@ -21,6 +23,7 @@ class Design:
         period_s: grid on which its times lie and its zeros are exact, s; None: times are continuous.
         residual: largest residual ratio of the modes at their nominal frequencies.
         worst_residual: the same over the modes' bands.
+        exact: whether the modes without a band are cancelled, to a thousandth.
     """
 
     family: str
@@ -28,6 +31,7 @@ class Design:
     period_s: float | None
     residual: float
     worst_residual: float
+    exact: bool = True
 
     @property
     def duration_s(self) -> float:
@@ -54,7 +58,8 @@ def evaluate(family: str, shaper: Shaper, bands: Sequence[ModeBand], period_s: f
     """The figures of a shaper for modes and their bands; the worst residual is proven to 1e-6 of it."""
     residual = max(shaper.residual_ratio(band.mode) for band in bands)
     worst = max(_worst(shaper, band) for band in bands)
-    return Design(family, shaper, period_s, residual, worst)
+    exact = all(shaper.residual_ratio(band.mode) <= _EXACT for band in bands if not band.uncertainty)
+    return Design(family, shaper, period_s, residual, worst, exact)
 
 
 def _worst(shaper: Shaper, band: ModeBand) -> float:

@@ -16,11 +16,14 @@ from shapegcode.shaping.band import ModeBand
 from shapegcode.shaping.design import Design
 from shapegcode.shaping.registry import FAMILIES
 
-__all__ = ["NO_RESIDUAL", "OBJECTIVES", "is_within", "pareto_front", "reason_for", "recommend", "spoken"]
+__all__ = ["NO_RESIDUAL", "OBJECTIVES", "SAME", "is_within", "pareto_front", "reason_for", "recommend", "spoken"]
 
 NO_RESIDUAL = 1e-9
 """A residual ratio below this is none: what is left is the rounding of the solver."""
+SAME = 0.02
+"""Durations (or, where none is good, worst residuals) that differ by less, relative, give way to a longer period."""
 
+_CONVERTED = {"non-negative", "robust"}  # what a conversion takes by itself
 _FOR_GRIDS = {row.name for row in FAMILIES if not row.continuous}
 _DIGITS = 9  # designs that agree in so many digits are equally good
 _ROUNDING = 1e-6  # a design made for a limit may miss it by so much, relative
@@ -35,8 +38,13 @@ def _merits(each: Design) -> tuple[float, float, float, float]:
 
 def _shortest(each: Design) -> tuple[float, ...]:
     duration, residual, contour, _ = _merits(each)
-    # Of equal durations the longest period writes the fewest blocks.
-    return duration, -(each.period_s or 0.0), residual, contour
+    # Of equal durations the longest period writes the fewest blocks; what is left is within the limit.
+    return duration, -(each.period_s or 0.0), _rank(each), contour, residual
+
+
+def _rank(each: Design) -> float:
+    """Of which family an equally good design is taken."""
+    return 0.0 if each.family in _CONVERTED else 1.0 if each.family in _FOR_GRIDS else 2.0
 
 
 def _flattest(each: Design) -> tuple[float, ...]:
@@ -81,10 +89,10 @@ def recommend(
     """Index of the design to take.
 
     Of the designs without negative taps (of all with `allow_negative`, or where every design has some) those whose
-    worst residual is at most the limit compete for the objective; if there is none, the one that leaves least is
-    taken. Of equally short ones the one with the longest period is taken, because it writes the fewest blocks; of the
-    same taps found by two families the one of a family that is made for grids. A tighter limit never makes the
-    shortest one shorter.
+    worst residual is at most the limit compete for the objective, and of these, if there are any, those that cancel the
+    modes that state no band; if there is none within the limit, the one that leaves least is taken. Of equally short
+    ones on grids, to 2 %, the one with the longest period is taken, because it writes the fewest blocks; of equal ones
+    the family that a conversion takes by itself, then one that is made for grids.
 
     Args:
         designs: at least one.
@@ -98,9 +106,25 @@ def recommend(
     if not designs:
         raise ArgumentError("there is no design to choose from: 0 given")
     places = _eligible(designs, allow_negative)
-    good = [place for place in places if is_within(designs[place], vibration_limit)]
+    good = _good(designs, places, vibration_limit)
     least = OBJECTIVES[objective][1] if good else _flattest
-    return min(good or places, key=lambda place: (*least(designs[place]), designs[place].family not in _FOR_GRIDS))
+
+    def order(place: int) -> tuple[float, ...]:
+        return (*least(designs[place]), _rank(designs[place]))
+
+    best = min(good or places, key=order)
+    if designs[best].period_s is None or (good and objective != "shortest"):
+        return best
+    most = (1.0 + SAME) * least(designs[best])[0]
+    near = [place for place in good or places if designs[place].period_s and least(designs[place])[0] <= most]
+    longest_s = max(designs[place].period_s or 0.0 for place in near)
+    return min((place for place in near if designs[place].period_s == longest_s), key=order)
+
+
+def _good(designs: Sequence[Design], places: Sequence[int], vibration_limit: float) -> list[int]:
+    """Those within the limit; of them those that cancel the modes without a band, if there are any."""
+    good = [place for place in places if is_within(designs[place], vibration_limit)]
+    return [place for place in good if designs[place].exact] or good
 
 
 def _eligible(designs: Sequence[Design], allow_negative: bool) -> list[int]:
@@ -119,13 +143,16 @@ def reason_for(
     """Why `recommend` takes the design of that index, in a sentence."""
     taken = designs[index]
     places = _eligible(designs, allow_negative)
-    good = sum(is_within(designs[place], limit) for place in places)
+    among = _good(designs, places, limit)
+    good = len(among)
     only_negative = not allow_negative and taken.negative
     kind = "" if allow_negative or only_negative else "non-negative "
     if good:
+        unstated = [band for band in bands if not band.uncertainty]
+        exactly = f" and which cancel{'' if good > 1 else 's'} {spoken(unstated)}" if unstated and taken.exact else ""
         text = (
             f"{OBJECTIVES[objective][0]} of {good} {kind}design{'' if good == 1 else 's'} whose worst residual over "
-            f"{spoken(bands)} stays within {_percent(limit)} (it leaves {_percent(taken.worst_residual)})"
+            f"{spoken(bands)} stays within {_percent(limit)}{exactly} (it leaves {_percent(taken.worst_residual)})"
         )
     else:
         text = (

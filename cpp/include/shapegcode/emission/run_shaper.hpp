@@ -33,6 +33,7 @@ struct RunFilter {
   std::vector<Fir> half_shapers;          ///< one per axis, taps in half block periods
   std::optional<FollowingFir> following;  ///< likewise, instead of it
   ContourTarget target;
+  AxisModes modes;
   double half_period_s;
   double mean_delay_s;                                               ///< of the shaper
   std::vector<std::array<std::vector<double>, axis_count>> kernels;  ///< one per shaper that is followed
@@ -51,7 +52,8 @@ struct RunLimits {
 /// Largest deviation of what follows the path, near each junction and segment of a run, in mm.
 struct RunDeviation {
   std::vector<float> at_junction;  ///< [i]: while segment i is entered, within half the shaper
-  std::vector<float> on_segment;
+  std::vector<float> on_segment;   ///< further than that from every corner; negative: nowhere
+  std::vector<float> near_corner;  ///< [i]: on segment i, within half the shaper of a corner
 };
 
 /// One run from rest to rest as a shaped command on half the block grid: row 2k is the border k of block periods, row
@@ -90,7 +92,8 @@ class RunShaper {
   void correct(std::size_t begin, std::size_t end, std::size_t accepted);
   [[nodiscard]] bool asks_too_much(std::size_t begin, std::size_t end, std::size_t axis);
   [[nodiscard]] bool active(std::size_t row) const noexcept;
-  [[nodiscard]] Vector3 deviation(std::size_t row) const noexcept;
+  [[nodiscard]] Vector3 deviation(std::size_t row);
+  [[nodiscard]] Vector3 as_block(std::size_t row) const noexcept;
   void measure(std::size_t row);
   void forget();
   [[nodiscard]] double shaped(std::size_t axis, std::ptrdiff_t row, bool corrected) const noexcept;
@@ -127,6 +130,8 @@ class RunShaper {
   std::vector<Vector3> tangent_;        // of the target, only where deviations are measured
   std::vector<Vector3> wanted_;         // likewise, its position
   std::vector<std::uint32_t> segment_;  // likewise
+  std::vector<Vector3> left_;           // likewise, the deviation
+  std::unique_ptr<ModalPlant> plant_;   // likewise, of the response; null where modes move
   std::deque<ArcRow> arcs_;             // rows on arcs that are still ahead
   ArcRow seen_;
   double since_corner_ = 1e300;  // rows

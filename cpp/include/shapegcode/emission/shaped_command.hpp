@@ -36,7 +36,9 @@ struct ShapingOptions {
   /// modes that vary with position by `mode_tables`.
   std::optional<FollowingFir> following;
   AxisModeTables mode_tables;
-  double contour_smoothness = 1.0;  ///< weight of the correction's second differences on half the block grid
+  /// Weight of the correction's second differences on half the block grid. Less of it follows the path more closely and
+  /// asks for more beside the modes' frequencies, which shows where these are off: docs/contour.md.
+  double contour_smoothness = 0.4;
 };
 
 /// A region's command, shaped and on the block grid, ready for fit_blocks.

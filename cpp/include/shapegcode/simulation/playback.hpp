@@ -19,7 +19,9 @@ struct PlaybackOptions {
   double period_s = 0.001;
   std::vector<Fir> axis_filters;  ///< after the set-points, in order (acceleration after interpolation)
   AxisModes modes;
-  AxisModeTables mode_tables;   ///< how the modes vary with position; none: constant modes
+  AxisModeTables mode_tables;  ///< how the modes vary with position; none: constant modes
+  /// A tracker of the path at its start, whose geometry several runs share; null: each run makes its own.
+  std::shared_ptr<const ContourTracker> tracker;
   bool measure_contour = true;  ///< deviation of command and response and orbit errors
   bool measure_command = true;  ///< false: the response alone; no figures of the command, no orbit errors
   /// Blocks only: play no more than the last so many seconds (0: all). Enough for the residual where older vibration

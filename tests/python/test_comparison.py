@@ -1,0 +1,99 @@
+"""Cells of docs/comparison.md by the judge, which reads, plays and measures the emitted text with code of its own."""
+
+from __future__ import annotations
+
+import functools
+import re
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import acceptance
+import shapegcode as sg
+from judge import residual_um, response
+from shapegcode.shaping import design, machine_bands
+
+TABLES = Path(__file__).parents[2] / "docs" / "comparison.md"
+PAPER_PATH = Path(sg.__file__).parent / "data" / "paper_path.nc"
+WIDE_UM = 1000.0  # contour tolerance that slows nothing
+
+
+@functools.cache
+def converted(family: str, contour: str = "off") -> acceptance.Judged:
+    """The path of paper 000 at 200 mm/s, as the script of the tables converts it."""
+    keys = {"shaping.family": family, "shaping.contour": contour, "tolerance.contour_um": WIDE_UM}
+    return acceptance.convert(PAPER_PATH.read_text(), acceptance.machine_with(keys))
+
+
+def judged(run: acceptance.Judged) -> acceptance.Figures:
+    """What the judge measures of the last region, which holds the arc."""
+    programmed, blocks, _ = list(run.regions())[-1]
+    return acceptance.figures(run, blocks, programmed, "ceil")
+
+
+def unshaped() -> npt.NDArray[np.float64]:
+    """Set-points of the path as programmed: 50 ms to 200 mm/s and back, line, quarter of a circle, line."""
+    speed, ramp, radius = 200.0, 0.05, 20.0
+    length = 40.0 + radius * np.pi / 2
+    stop = length / speed
+    t = np.arange(0.0, stop + ramp + 1e-3, 1e-3)
+
+    def ramped(t: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        inside = np.clip(t, 0.0, ramp)
+        return np.asarray(speed / ramp * inside**2 / 2 + speed * np.clip(t - ramp, 0.0, None))
+
+    s = ramped(t) - ramped(t - stop)
+    angle = np.clip((s - 20.0) / radius, 0.0, np.pi / 2)
+    x = np.minimum(s, 20.0) + radius * np.sin(angle)
+    y = radius * (1.0 - np.cos(angle)) + np.clip(s - 20.0 - radius * np.pi / 2, 0.0, None)
+    return np.stack([x, y, np.zeros_like(x)], axis=1)
+
+
+def row(name: str) -> list[list[float]]:
+    """The figures of a row of the first table, cell by cell."""
+    text = TABLES.read_text(encoding="utf-8").split("PARALLEL.NC**")[0]
+    (line,) = [line for line in text.splitlines() if line.startswith(f"| {name} ")]
+    return [[float(figure) for figure in re.findall(r"[+-]?\d+\.?\d*", cell)] for cell in line.split("|")[2:-1]]
+
+
+@pytest.mark.parametrize(("contour", "share"), [("off", 0.05), ("response", 0.1)])
+def test_exact_shapers_leave_next_to_nothing_of_the_vibration_of_the_path(contour: str, share: float) -> None:
+    run = converted("non-negative", contour)
+    before = residual_um(unshaped(), run.modes, 1e-3)
+    assert before[:2] == pytest.approx([row("as programmed")[2][0], row("as programmed")[3][0]], rel=0.02)
+    assert (judged(run).residual[:2] < share * before[:2]).all()
+
+
+def test_keeping_the_contour_makes_the_table_follow_the_path() -> None:
+    plain, kept = judged(converted("non-negative")), judged(converted("non-negative", "response"))
+    cells = row("`non-negative`: exact on the grid"), row("`non-negative`, contour kept ³")
+    assert kept.response[0] < 0.25 * plain.response[0]
+    for run, cell in zip((plain, kept), cells, strict=True):
+        assert run.command[0] == pytest.approx(cell[5][0], rel=0.05)
+        assert run.response[0] == pytest.approx(cell[6][0], rel=0.05)
+
+
+def test_a_less_sensitive_shaper_cuts_the_arc_deeper() -> None:
+    plain, robust = judged(converted("non-negative")), judged(converted("zvd"))
+    assert robust.command[0] > 2.0 * plain.command[0]
+    assert robust.command[0] == pytest.approx(row("`zvd`")[5][0], rel=0.05)
+
+
+def test_the_minimal_shaper_loses_its_zeros_on_the_block_grid() -> None:
+    note = next(line for line in TABLES.read_text(encoding="utf-8").splitlines() if line.startswith("¹"))
+    shares = [float(share) / 100 for share in re.findall(r"([\d.]+) %", note)]
+    ideal = design("minimal", machine_bands(sg.Machine.load("vx500")))[0].shaper
+    for times, expected in ((ideal.times_s, shares[:2]), (np.round(ideal.times_s / 0.005) * 0.005, shares[2:])):
+        for frequency_hz, share in zip((46.0, 131.0), expected, strict=True):
+            # Each tap starts a decaying oscillation; what is left is their sum at the last one.
+            pole = 2 * np.pi * frequency_hz * (-0.02 + 1j * np.sqrt(1 - 0.02**2))
+            left = abs(np.sum(ideal.amplitudes * np.exp(pole * (times[-1] - times))))
+            assert left == pytest.approx(share, abs=6e-4)
+
+
+def test_the_judge_finds_the_vibration_of_the_path_as_programmed() -> None:
+    _, command, table = response(unshaped(), [(46.0, 0.02), (131.0, 0.02), None], 1e-3)
+    peak = 1e3 * np.abs(table - command).max(axis=0)
+    assert peak[:2] == pytest.approx(row("as programmed")[4], rel=0.02)
