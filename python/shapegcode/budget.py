@@ -150,7 +150,8 @@ class Spending:
         program: what is converted.
         machine: controller and tolerances.
         longer: the block period is longer than it would be without the budget.
-        before: figures of the text with everything shaped.
+        before: figures of the text with everything shaped; where the block period is longer: of that on the shorter
+            one, before any region is slowed for the contour tolerance.
         given_up: reason per index of a region.
         entries: figures of the regions given up, per index.
     """
@@ -185,7 +186,6 @@ class Spending:
         ]
         written = write(grid)
         loads = written.loads
-        self._note_before(grid, written)
         if self.machine.emission.block_period_s is not None or not self._factors(loads):
             return grid
         tick = self.machine.controller.interpolation_period_s
@@ -209,6 +209,8 @@ class Spending:
             if self._worth(longer, loads, weights) > self._worth(best, best_loads, weights):
                 best, best_loads = longer, loads
         self.longer = best is not grid
+        if self.longer:  # else noted from the text as it is judged
+            self._note_before(grid, written)
         return best
 
     def give_up(self, grid: Grid, written: Written, figures: Mapping[str, Any]) -> bool:

@@ -405,7 +405,7 @@ def test_made_up_program(text: str) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
 @given(programs())
 def test_many_made_up_programs(text: str) -> None:
     check_made_up(text)
