@@ -152,7 +152,8 @@ void ModalRounder::keep_best(std::size_t width) {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < small_field; ++i) {
       order_[kept] = static_cast<std::uint16_t>(i);
-      kept += (beaten_by[i] < static_cast<std::int64_t>(width)) & (rank_[i] < never) ? 1U : 0U;
+      const auto few_beat_it = static_cast<unsigned>(beaten_by[i] < static_cast<std::int64_t>(width));
+      kept += few_beat_it & static_cast<unsigned>(rank_[i] < never);
     }
     order_.resize(kept);
   } else {
