@@ -212,7 +212,7 @@ def test_a_band_decides_what_counts() -> None:
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        ({"verdict.override_percent": [80, 100]}, "override"),
+        ({"verdict.override_percent": [80, 100], "tolerance.contour_um": 500.0}, "override"),
         ({"verdict.look_ahead": True}, "look-ahead on"),
         ({"verdict.starved_block": True}, "starved 20 ms"),
     ],
@@ -234,7 +234,7 @@ def test_the_worst_case_that_counts_decides(keys: dict[str, Any], words: str) ->
 def test_exit_code_and_table_follow_the_worst_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "part.nc").write_text(PART)
     for high, code in ((100.0, 0), (120.0, 1)):
-        machine = machine_with({"verdict.override_percent": [100.0, high]})
+        machine = machine_with({"verdict.override_percent": [100.0, high], "tolerance.contour_um": 500.0})
         (tmp_path / "machine.toml").write_text(machine.to_toml(), encoding="utf-8")
         args = ["part.nc", "-m", "machine.toml", "-o", f"out{high:g}.nc", "--json", "report.json"]
         with pytest.MonkeyPatch.context() as patch:
