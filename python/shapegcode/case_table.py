@@ -48,7 +48,7 @@ def case_table(report: Mapping[str, Any]) -> Table | None:
         table.add_row(*(Text(cell) for cell in cells), style=_style(case, case["name"] == worst))
     shown = sum(not case["counts"] for case in cases)
     brackets = "; those in brackets are only shown" if shown else ""
-    table.caption = Text(f"{len(cases) - shown} of {len(cases)} cases count{brackets} (machine file, [verdict])")
+    table.caption = Text(f"{len(cases) - shown} of {len(cases)} cases count{brackets} ([verdict])")
     table.caption_justify = "left"
     return table
 
