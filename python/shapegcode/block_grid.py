@@ -89,6 +89,13 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
     if period is not None:
         _check_period(period, machine)
     if shaping.family != "auto":
+        if shaping.per_axis:
+            raise _core.ArgumentError(f'shaping.per_axis needs shaping.family = "auto": it is {shaping.family!r}')
+        if moving_axis(machine) is not None:
+            raise _core.ArgumentError(
+                f"shaping.family = {shaping.family!r}: modes that move with an axis (frequency_over) are followed by "
+                'shapers without negative taps; use "auto"'
+            )
         return _of_family(shaping.family, bands, machine, period)
     family = "robust" if any(band.uncertainty for band in bands) else "non-negative"
     best: BlockPeriodCandidate

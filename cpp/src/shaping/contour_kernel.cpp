@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numeric>
 
 #include "shapegcode/plant/modal.hpp"
 
@@ -45,8 +44,16 @@ std::vector<double> contour_kernel(const Fir& shaper, std::span<const Mode> mode
     rest += std::abs(kernel[--size]);
   }
   kernel.resize(size);
-  const double sum = std::accumulate(kernel.begin(), kernel.end(), 0.0);
-  std::ranges::for_each(kernel, [sum](double& tap) { tap /= sum; });
+  // A base-excited mode follows a steady motion without delay, whatever was cut off: sum and mean are the shaper's.
+  double sum = 0.0;
+  double moment = 0.0;
+  for (std::size_t k = 0; k < kernel.size(); ++k) {
+    sum += kernel[k];
+    moment += kernel[k] * static_cast<double>(k);
+  }
+  const double behind = (shaper.mean_samples() - moment) / static_cast<double>(kernel.size() - 1);
+  kernel.back() += behind;
+  kernel.front() += 1.0 - sum - behind;
   return kernel;
 }
 

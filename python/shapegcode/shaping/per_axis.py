@@ -19,6 +19,7 @@ __all__ = ["design_per_axis"]
 _RESIDUAL_LIMIT = 1e-10
 _MEANS = 9  # mean delays that are compared
 _ON_GRID = 1e-9  # periods
+_POINT = 1e-8  # periods: means that differ by less are one
 
 
 def design_per_axis(axis_modes: Sequence[Sequence[Mode]], period_s: float, max_duration_s: float) -> list[Fir] | None:
@@ -48,8 +49,10 @@ def design_per_axis(axis_modes: Sequence[Sequence[Mode]], period_s: float, max_d
     for periods in range(1, math.floor(max_duration_s / period_s + _ON_GRID) + 1):
         ranges = [mean_range(modes, period_s, periods) for modes in shaken]
         least, largest = max(low for low, _ in ranges), min(high for _, high in ranges)
-        if least > largest:
+        if least > largest + _POINT:
             continue
+        if least > largest:  # a single mean, within the rounding of both ends
+            least = largest = 0.5 * (least + largest)
         found = [
             filters
             for mean in np.linspace(least, largest, _MEANS)
