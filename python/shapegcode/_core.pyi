@@ -1663,6 +1663,14 @@ class ShapingOptions:
     def interpolation_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def least_feed_mm_per_s(self) -> float:
+        """
+        What the controller can run: no run is slowed below it, mm/s.
+        """
+    @least_feed_mm_per_s.setter
+    def least_feed_mm_per_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def limits(self) -> MotionLimits:
         """
         Limits of the look-ahead.

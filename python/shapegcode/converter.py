@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
 _MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin
+_HELPED = 0.9  # of what was reached before: less room that brings no more is taken back
 _ATTEMPTS = 8  # each with less room for the regions that left the contour tolerance; few need more than two
 _COMMENT_WIDTH = 60
 _HEADER_MARK = b"(SHAPEGCODE "
@@ -191,34 +192,57 @@ def _settle(
 ) -> tuple[_Written, Program, list[RegionFigures]]:
     """Write, read back and play; again, slower, where a region left the contour tolerance."""
     originals = [playback for playback, reason in zip(playbacks, reasons, strict=True) if not reason]
+    tried: dict[int, _Tried] = {}
     for attempt in range(_ATTEMPTS):
         stage = partial(on_progress, "shaping" if attempt == 0 else "shaping again, slower")
         written = _write(program, machine, grid, arc_feed_ratio, reasons, room_um, spending, stage)
         emitted = read_back(written.text, written.placed, machine)
         figures = measure(emitted, written.placed, originals, machine, pool, partial(on_progress, "round trip"))
-        if attempt + 1 == _ATTEMPTS or not _tighten(room_um, program, written, figures, machine):
+        if attempt + 1 == _ATTEMPTS or not _tighten(room_um, tried, program, written, figures, machine):
             break
     return written, emitted, figures
 
 
+@dataclass
+class _Tried:
+    """The last room of a region that left the tolerance, what it then reached, µm, and whether less room helps."""
+
+    room_um: float
+    reached_um: float
+    helps: bool = True
+
+
 def _tighten(
-    room_um: list[float], program: Program, written: _Written, figures: list[RegionFigures], machine: Machine
+    room_um: list[float],
+    tried: dict[int, _Tried],
+    program: Program,
+    written: _Written,
+    figures: list[RegionFigures],
+    machine: Machine,
 ) -> bool:
     """Give regions that left the contour tolerance less room, so that they run slower. False if there is none.
 
     The bound on feed counts corners and arcs one by one; where several fall into one shaper they add up. Where the feed
-    was searched for a target, what it was planned for counts: more room than that would change nothing.
+    was searched for a target, what it was planned for counts: more room than that would change nothing. A region that
+    less room does not help gets its room back: slower would only be slower.
     """
     limit = machine.tolerance.contour_um
     places = {id(region): index for index, region in enumerate(program.regions)}
     tightened = False
     for place, region in zip(written.placed, figures, strict=True):
         reached = contour_um(region, machine)
-        if reached > limit:
-            index = places[id(place.region)]
+        index = places[id(place.region)]
+        before = tried.get(index)
+        if reached <= limit or (before is not None and not before.helps):
+            continue
+        tightened = True
+        if before is not None and reached > _HELPED * before.reached_um:
+            room_um[index] = before.room_um
+            before.helps = False
+        else:
+            tried[index] = _Tried(room_um[index], reached)
             room_um[index] = min(room_um[index], written.planned_um.get(index, math.inf))
             room_um[index] *= _CONTOUR_MARGIN * limit / reached
-            tightened = True
     return tightened
 
 

@@ -115,6 +115,7 @@ def shaping_options(
     options.target = _TARGETS[machine.shaping.contour]
     options.modes = axis_modes(machine)
     options.axis_shapers = list(grid.axis_firs)
+    options.least_feed_mm_per_s = machine.controller.minimum_feed_mm_per_min / 60.0
     if grid.track is not None and (start := offset[grid.track.axis]) is not None:
         options.following = grid.track.following(start)
         options.mode_tables = mode_tables(machine, offset=offset)

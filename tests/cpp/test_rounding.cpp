@@ -422,7 +422,7 @@ TEST_CASE("rounding: a slow axis alone makes no empty block and does not turn ba
 }
 
 TEST_CASE("rounding: blocks of minutes are nothing special") {
-  const Command command = sampled(60000, [](double k) { return Vector3(0.00000833 * k, 0.0, 0.0); });
+  const Command command = sampled(8000, [](double k) { return Vector3(0.00000833 * k, 0.0, 0.0); });
   for (const int normal : {-1, 2}) {
     Command with_plane = command;
     with_plane.normals.assign(with_plane.normals.size(), static_cast<std::int8_t>(normal));
@@ -436,7 +436,7 @@ TEST_CASE("rounding: blocks of minutes are nothing special") {
   }
   ModalRounder rounder(two_modes, 0.005, 5);
   Problem problem = random_problem(20, 1, rounder);
-  for (RoundingNode& node : problem.nodes) node.periods = 60000;
+  for (RoundingNode& node : problem.nodes) node.periods = 8000;
   const State late{{0.5, 0.1}, {-0.1, 0.3}};
   std::vector<std::int8_t> shift(20);
   rounder.choose(problem.nodes, problem.excitation, {true, late, 0, {}}, shift);

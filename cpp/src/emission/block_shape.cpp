@@ -68,6 +68,15 @@ std::int64_t BlockShape::nearest_feed(double length_mm, std::uint32_t periods) c
 
 void BlockShape::set_feed(FittedBlock& block, double length_mm) const {
   auto f = feed(length_mm, block.periods);
+  if (!f) {
+    // No F is slower than the least: at once to the periods that it takes.
+    const double least = static_cast<double>(options_.minimum_feed) * options_.feed_unit_mm_per_s;
+    const double longest = std::floor(length_mm / (least * options_.block_period_s)) + 2.0;
+    if (longest < block.periods) {
+      block.periods = static_cast<std::uint32_t>(longest);
+      f = feed(length_mm, block.periods);
+    }
+  }
   while (!f && block.periods > 1) {
     f = feed(length_mm, --block.periods);
   }

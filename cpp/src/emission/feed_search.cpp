@@ -33,12 +33,13 @@ double next_speed(double speed, double deviation, double tolerance, bool curve) 
 class FeedSearch {
  public:
   FeedSearch(std::shared_ptr<const Path> path, const MotionLimits& limits, const RunFilter& filter,
-             std::size_t steps_per_half, double tolerance_mm)
+             std::size_t steps_per_half, double tolerance_mm, double least_feed_mm_per_s)
       : path_(std::move(path)),
         limits_(limits),
         filter_(filter),
         steps_per_half_(steps_per_half),
         tolerance_(tolerance_mm),
+        least_feed_(least_feed_mm_per_s),
         caps_{std::vector<float>(path_->size(), none), std::vector<float>(path_->size(), none)} {}
 
   PlannedRun run() {
@@ -116,7 +117,7 @@ class FeedSearch {
       if (segment.kind == SegmentKind::arc) {
         const float clear = deviation_.on_segment[i];
         adjust_one(caps_.on_segment[i], speed, clear >= 0.0F ? clear : deviation_.near_corner[i], true,
-                   slowest_share * segment_speed_limit(segment, limits_));
+                   slowest(segment_speed_limit(segment, limits_)));
       }
       if (i == 0) {
         continue;
@@ -130,12 +131,16 @@ class FeedSearch {
                                      segment_speed_limit(segment, limits_), segment_speed_limit(before, limits_)});
       const double passed = std::min(first, static_cast<double>(caps_.at_junction[i]));
       adjust_one(caps_.at_junction[i], passed, deviation_.at_junction[i], change < curve_change,
-                 change < curve_change ? slowest_share * first : 0.0);
+                 change < curve_change ? slowest(first) : 0.0);
       if (caps_.at_junction[i] < std::max(creep_mm_per_s, creep_share * first)) {
         stops_.push_back(i);
       }
     }
     return changed;
+  }
+
+  [[nodiscard]] double slowest(double speed) const noexcept {
+    return std::min(speed, std::max(least_feed_, slowest_share * speed));
   }
 
   // Change of the direction as segment i is entered: the length of the difference of the unit tangents.
@@ -156,7 +161,7 @@ class FeedSearch {
       }
       const double first = segment_speed_limit(segment, limits_);
       const double speed = std::min(static_cast<double>(caps_.on_segment[i]), first);
-      const double least = slowest_share * first;
+      const double least = slowest(first);
       if (speed > least) {
         caps_.on_segment[i] = static_cast<float>(std::max(least, next_speed(speed, deviation, tolerance_, false)));
         changed = true;
@@ -170,6 +175,7 @@ class FeedSearch {
   const RunFilter& filter_;
   std::size_t steps_per_half_;
   double tolerance_;
+  double least_feed_;
   SpeedCaps caps_;
   RunDeviation deviation_;
   std::vector<std::size_t> stops_;
@@ -182,8 +188,8 @@ RunLimits run_limits(const MotionLimits& limits) {
 }
 
 PlannedRun plan_within_tolerance(std::shared_ptr<const Path> path, const MotionLimits& limits, const RunFilter& filter,
-                                 std::size_t steps_per_half, double tolerance_mm) {
-  return FeedSearch(std::move(path), limits, filter, steps_per_half, tolerance_mm).run();
+                                 std::size_t steps_per_half, double tolerance_mm, double least_feed_mm_per_s) {
+  return FeedSearch(std::move(path), limits, filter, steps_per_half, tolerance_mm, least_feed_mm_per_s).run();
 }
 
 }  // namespace shapegcode

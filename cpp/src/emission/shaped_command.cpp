@@ -77,7 +77,7 @@ bool RegionShaper::begin_run() {
       break;
     }
     plan = plan_within_tolerance(part, without_tolerance(options_.limits), filter_, steps_per_half_,
-                                 options_.limits.contour_tolerance_mm);
+                                 options_.limits.contour_tolerance_mm, options_.least_feed_mm_per_s);
     if (plan.stops.empty()) {
       break;
     }

@@ -9,6 +9,10 @@ namespace {
 
 // Along the path on both sides of a corner: further away its nearest track point does not lie.
 constexpr double window_mm = 1.0;
+// On a reversal, or where the path runs over itself, the foot may be on a later pass while the point is still before
+// the corner. One that seems missed by more than this waits for the point so much longer.
+constexpr double missed_mm = 0.02;
+constexpr double patience_mm = 20.0;
 
 double distance2(const Vector3& p, const Vector3& from, const Vector3& to) noexcept {
   const Vector3 along = to - from;
@@ -43,7 +47,11 @@ void CornerReach::step(const Vector3& p, double foot_mm) noexcept {
   for (std::size_t i = first_; i < next_; ++i) {
     corners_[i].best2 = std::min(corners_[i].best2, distance2(corners_[i].point, last_, p));
   }
-  while (first_ < next_ && corners_[first_].s < foot_mm - window_mm) {
+  const auto passed = [foot_mm](const Corner& corner) {
+    const bool met = corner.best2 <= missed_mm * missed_mm;
+    return corner.s < foot_mm - (met ? window_mm : patience_mm);
+  };
+  while (first_ < next_ && passed(corners_[first_])) {
     largest2_ = std::max(largest2_, corners_[first_].best2);
     ++first_;
   }

@@ -38,6 +38,7 @@ struct ShapingOptions {
   AxisModeTables mode_tables;
   /// Weight of the correction's second differences on half the block grid. Less of it follows the path more closely and
   /// asks for more beside the modes' frequencies, which shows where these are off: docs/contour.md.
+  double least_feed_mm_per_s = 0.0;  ///< what the controller can run: no run is slowed below it for the tolerance
   double contour_smoothness = 0.4;
 };
 
