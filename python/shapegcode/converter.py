@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
 _MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin
+_HASTE = 0.9  # of the original's time: a region that takes less cuts faster than programmed
 _HELPED = 0.9  # of what was reached before: less room that brings no more is taken back
 _ATTEMPTS = 8  # each with less room for the regions that left the contour tolerance; few need more than two
 _COMMENT_WIDTH = 60
@@ -369,6 +370,13 @@ def _report(
         warnings.append(f"{program.source}: no cutting moves that can be shaped: the text is unchanged")
     for region in figures["regions"]:
         first, last = region["lines"]
+        was_s, now_s = region["time_s"]["original"], region["time_s"]["emitted"]
+        if now_s < _HASTE * was_s:
+            # Feeds so slow that an increment lasts several blocks: F words of its resolution do not meet their ticks.
+            region["misses"].append(
+                f"runs in {now_s:.1f} s instead of {was_s:.1f} s: too slow a feed for blocks of "
+                f"{grid.block_period_s * 1e3:g} ms; raise controller.minimum_feed_mm_per_min above it to keep its text"
+            )
         where = f"{program.place(first)}: lines {first} to {last}" + (" expanded" if program.core.expanded else "")
         warnings += [f"{where}: {miss}" for miss in region["misses"]]
     warnings += binding_warnings(figures, machine)
