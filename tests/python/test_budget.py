@@ -243,17 +243,17 @@ def test_an_argument_fixes_the_block_period_too() -> None:
 
 
 def test_what_misses_its_tolerance_only_for_the_longer_period_is_kept() -> None:
-    """Circles within 2 um: 40 ms of them are no line."""
+    """Circles within 1.2 um: 40 ms of them are no line."""
     circles = "G1X5.F3000\n" + "G2X5.Y0I5.\n" * 6 + "G1X0\n"
     text = HEAD + "G1X10.F600\nG0Z5.\nG0X0Y0\n" + circles + TAIL
-    keys = {"tolerance.contour_um": 2.0}
+    keys = {"tolerance.contour_um": 1.2, "shaping.contour": "command", "emission.rounding": "nearest"}
     assert convert(text, machine_with(keys)).conversion.within_tolerance
     judged = budgeted(text, keys, max_blocks_per_second=25)
     assert judged.conversion.within_tolerance
     (entry,) = judged.conversion.report["budget"]["given_up"]
     assert entry["lines"] == [8, 15]
     period_ms = judged.conversion.report["block_period_s"] * 1e3
-    assert entry["reason"].endswith(f"limit 2.0 um, at a block period of {period_ms:g} ms")
+    assert entry["reason"].endswith(f"limit 1.2 um, at a block period of {period_ms:g} ms")
 
 
 @pytest.mark.parametrize("name", ["TEST_G90.NC", "TEST_G91.NC", "PROGRAM2.NC"])
