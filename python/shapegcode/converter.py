@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
 _MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin
 _HASTE = 0.9  # of the original's time: a region that takes less cuts faster than programmed
-_HELPED = 0.9  # of what was reached before: less room that brings no more is taken back
+_HELPED = 0.98  # of what was reached before: less room that brings no more is taken back
 _ATTEMPTS = 8  # each with less room for the regions that left the contour tolerance; few need more than two
 _COMMENT_WIDTH = 60
 _HEADER_MARK = b"(SHAPEGCODE "

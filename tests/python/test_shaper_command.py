@@ -72,7 +72,10 @@ def test_a_file_and_the_table(capsys: pytest.CaptureFixture[str], tmp_path: Path
     result = json.loads(file.read_text(encoding="utf-8"))
     assert result["designs"][result["recommended"]]["duration_s"] == pytest.approx(0.02)
     assert "=> recommended" in out
-    assert "next: shapegcode convert part.nc -m vx500 --block-period 5ms -o shaped.nc" in out
+    assert (
+        "next: shapegcode convert part.nc -m vx500 --shaper non-negative --block-period 5ms -o shaped.nc"
+        in " ".join(out.split())
+    )
     assert "no design" in out
     assert result["reason"] in out.replace("\n", "").replace("  ", " ") or "the shortest of" in out
 
