@@ -15,6 +15,9 @@ PYBIND11_MODULE(_core, module) {
   register_motion(module);
   register_gcode(module);
   register_plant(module);
+  register_feed_drive(module);
+  register_metrology(module);
+  register_identification(module);
   register_shaped_command(module);
   register_emission(module);
   register_simulation(module);

@@ -31,7 +31,7 @@ ALLOWED_FOLDERS: dict[str, set[str]] = {
     "plant": {"filter"},
     "metrology": {"path"},
     "milling": {"path"},
-    "identification": {"filter"},
+    "identification": {"filter", "plant"},
 }
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"]+)[>"]', re.MULTILINE)
 
