@@ -52,4 +52,4 @@ class Record:
     @property
     def time_s(self) -> FloatArray:
         """Instants of the samples, (n,)."""
-        return self.start_s + self.period_s * np.arange(len(self.response))
+        return np.asarray(self.start_s + self.period_s * np.arange(len(self.response)), dtype=np.float64)
