@@ -22,14 +22,6 @@ constexpr double stiffer = 20.0;  // factor of the smoothness where a limit woul
 constexpr double same_delay_s = 1e-9;
 constexpr double stiffest = 1e12;
 
-Fir on_half_grid(const Fir& shaper) {
-  std::vector<int> delays = shaper.delays();
-  for (int& delay : delays) {
-    delay *= 2;
-  }
-  return Fir(std::move(delays), shaper.taps());
-}
-
 double smooth_step(double x) noexcept { return x * x * (3.0 - 2.0 * x); }
 
 bool is_corner(const Path& path, std::size_t before, std::size_t after) noexcept {
@@ -61,7 +53,7 @@ RunFilter::RunFilter(std::span<const Fir> shapers, ContourTarget contour_target,
       throw Error(ErrorKind::argument, "shapers of several axes have mean delays of " + std::to_string(other_s) +
                                            " s and " + std::to_string(mean_delay_s) + " s, must be equal");
     }
-    half_shapers.push_back(on_half_grid(shaper));
+    half_shapers.push_back(shaper.on_finer_grid(2));
     longest_ = std::max(longest_, half_shapers.back().duration_samples());
   }
   if (followed) following = followed->on_finer_grid(2);
