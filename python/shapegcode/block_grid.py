@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.moving_modes import moving_axis, shaper_track, still_mode
+from shapegcode.moving_modes import axis_modes, moving_axis, shaper_track
 
 if TYPE_CHECKING:
     from shapegcode.shaping import BlockPeriodCandidate, ModeBand
@@ -131,10 +131,7 @@ def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
             )
         return grid
     longest = machine.shaping.max_duration_s if wanted else grid.shaper.duration_s - 0.5 * grid.block_period_s
-    modes = [
-        [still_mode(mode, machine.shaping.part_mass_kg) for mode in axis.modes] for axis in machine.axes.as_tuple()
-    ]
-    firs = design_per_axis(modes, grid.block_period_s, longest)
+    firs = design_per_axis(axis_modes(machine), grid.block_period_s, longest)
     if firs is None:
         if wanted:
             raise _core.DesignError(

@@ -9,7 +9,7 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from shapegcode import _core
 from shapegcode.advice import binding_warnings, controller_warnings, region_warnings, worse_warnings
@@ -19,6 +19,7 @@ from shapegcode.compensation import guard_lines, header_lines, read_for_conversi
 from shapegcode.emit import emit_region, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.moving_modes import (
+    axis_modes,
     machine_warnings,
     region_offset,
     region_range_warnings,
@@ -26,10 +27,7 @@ from shapegcode.moving_modes import (
 from shapegcode.program import Program
 from shapegcode.rapids import ShapedRapids, rapid_warnings, shape_rapids
 from shapegcode.verdict import RegionFigures, contour_target, contour_um, measure, summarise
-from shapegcode.verify import Placed, axis_modes, other_time_s, play_original, read_back
-
-if TYPE_CHECKING:
-    pass
+from shapegcode.verify import Placed, other_time_s, play_original, read_back
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
 _MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +12,8 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.block_grid import Grid
 from shapegcode.machine import Machine
-from shapegcode.moving_modes import NO_OFFSET, Offset, mode_tables, region_offset
+from shapegcode.moving_modes import NO_OFFSET, Offset, axis_modes, mode_tables, region_offset
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
-
-if TYPE_CHECKING:
-    pass
 
 _DEGREE = math.pi / 180.0
 _PLUNGE_CORNER_DEG = 45.0
@@ -103,8 +99,6 @@ def shaping_options(
         offset: from the region's positions to the machine's; where it is not known of the axis that the grid's track
             follows, the grid's one shaper is used.
     """
-    from shapegcode.verify import axis_modes  # which imports this module
-
     options = _core.ShapingOptions()
     options.limits = limits
     options.block_period_s = grid.block_period_s
