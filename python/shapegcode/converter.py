@@ -31,7 +31,6 @@ from shapegcode.verify import Placed, other_time_s, play_original, read_back
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
 _MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin
-_HASTE = 0.9  # of the original's time: a region that takes less cuts faster than programmed
 _HELPED = 0.98  # of what was reached before: less room that brings no more is taken back
 _ATTEMPTS = 8  # each with less room for the regions that left the contour tolerance; few need more than two
 _COMMENT_WIDTH = 60
@@ -140,7 +139,9 @@ def convert(
                 lambda other: _write(program, machine, other, ratio, reasons, room_um, spending),
             )  # fmt: skip
         written, emitted, figures = settle(grid, reasons)
-        while spending is not None and spending.give_up(grid, written, summarise(figures, written.placed, machine)):
+        while spending is not None and spending.give_up(
+            grid, written, summarise(figures, written.placed, machine, grid.block_period_s)
+        ):
             reasons = [spending.given_up.get(index, reason) for index, reason in enumerate(reasons)]
             written, emitted, figures = settle(grid, reasons)
         rapids: ShapedRapids | None = None
@@ -150,7 +151,8 @@ def convert(
         kept_s = sum(play.result().duration_s for play, reason in zip(playbacks, reasons, strict=True) if reason)
     finally:
         pool.shutdown(cancel_futures=True)
-    report = _report(program, machine, grid, written, kept_s, summarise(figures, written.placed, machine), spending)
+    summary = summarise(figures, written.placed, machine, grid.block_period_s)
+    report = _report(program, machine, grid, written, kept_s, summary, spending)
     if rapids is not None:
         report["rapids"] = _tidy(rapids.report)
         report["cycle_time_s"]["emitted"] += rapids.extra_s
@@ -368,13 +370,6 @@ def _report(
         warnings.append(f"{program.source}: no cutting moves that can be shaped: the text is unchanged")
     for region in figures["regions"]:
         first, last = region["lines"]
-        was_s, now_s = region["time_s"]["original"], region["time_s"]["emitted"]
-        if now_s < _HASTE * was_s:
-            # Feeds so slow that an increment lasts several blocks: F words of its resolution do not meet their ticks.
-            region["misses"].append(
-                f"runs in {now_s:.1f} s instead of {was_s:.1f} s: too slow a feed for blocks of "
-                f"{grid.block_period_s * 1e3:g} ms; raise controller.minimum_feed_mm_per_min above it to keep its text"
-            )
         where = f"{program.place(first)}: lines {first} to {last}" + (" expanded" if program.core.expanded else "")
         warnings += [f"{where}: {miss}" for miss in region["misses"]]
     warnings += binding_warnings(figures, machine)
