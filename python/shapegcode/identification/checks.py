@@ -12,17 +12,29 @@ from shapegcode.identification.hits import Hit, find_hits, split_hits
 from shapegcode.identification.quality import DECAYED, excited_hz, is_clipped, refuse_short
 from shapegcode.identification.record import UNITS, FloatArray, Record, RecordError
 
-__all__ = ["Prepared", "Refused", "excited_hz", "find_decay", "is_clipped", "prepare", "split_hits"]
+__all__ = [
+    "DOUBLE_HIT",
+    "LEAST_FORCE",
+    "LEAST_LEAD",
+    "LEAST_PULSE",
+    "Prepared",
+    "Refused",
+    "excited_hz",
+    "find_decay",
+    "is_clipped",
+    "prepare",
+    "split_hits",
+]
 
 #: A second pulse above this share of the first is refused: the momentum, and so the mass, would be off by as much.
 #: Below, it may be the ringing of an anti-aliasing filter, which reaches 9 %.
-_DOUBLE_HIT = 0.1
+DOUBLE_HIT = 0.1
 #: The force must stand out of its noise by this factor: the mass would be off by about the inverse.
-_LEAST_FORCE = 10.0
+LEAST_FORCE = 10.0
 #: A pulse of fewer samples does not tell its momentum: with three, a half sine is known to about 10 %.
-_LEAST_PULSE = 3
+LEAST_PULSE = 3
 #: Samples before the hit from which noise and offset are measured: a standard deviation to 25 %.
-_LEAST_LEAD = 8
+LEAST_LEAD = 8
 #: A record that begins inside the pulse at more than this share of its peak has lost too much of the momentum.
 _CUT_PULSE = 0.2
 #: The machine was at rest before the hit if it shook less than this share of what it did afterwards.
@@ -82,7 +94,7 @@ def _mean_to_remove(values: FloatArray) -> float:
 
 def _orient(record: Record, hit: Hit, response: FloatArray, force: FloatArray, warnings: list[str]) -> FloatArray:
     """The response with the sign that the push of the hammer gives it at the point of the tap."""
-    if hit.end - hit.first < _LEAST_PULSE:
+    if hit.end - hit.first < LEAST_PULSE:
         return response
     stretch = slice(hit.first, min(hit.end + (hit.end - hit.first), len(force)))
     push = force[stretch]
@@ -136,23 +148,23 @@ def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> _Usable:
     for each in hits:
         off_pulse[each.first : each.end] = False
     quiet = force[off_pulse]
-    sigma = float(np.std(quiet)) if quiet.size >= _LEAST_LEAD else 0.0
-    if not hits or abs(hits[0].peak_n) < _LEAST_FORCE * sigma:
+    sigma = float(np.std(quiet)) if quiet.size >= LEAST_LEAD else 0.0
+    if not hits or abs(hits[0].peak_n) < LEAST_FORCE * sigma:
         peak = float(np.max(np.abs(force - np.median(force))))
         raise RecordError(
-            f"no hit stands out: the largest force, {peak:.4g} N, is less than {_LEAST_FORCE:g} times its noise of "
+            f"no hit stands out: the largest force, {peak:.4g} N, is less than {LEAST_FORCE:g} times its noise of "
             f"{sigma:.3g} N; hit harder or choose a smaller range"
         )
     hit = hits[0]
-    if hit.second_share >= _DOUBLE_HIT:
+    if hit.second_share >= DOUBLE_HIT:
         raise RecordError(
             f"double hit: a second pulse of {100 * hit.second_share:.0f} % comes {1000 * hit.second_s:.3g} ms after "
-            f"the first; above {100 * _DOUBLE_HIT:g} % it is not one tap: hit again"
+            f"the first; above {100 * DOUBLE_HIT:g} % it is not one tap: hit again"
         )
     if hit.first == 0 and hit.peak > 0 and (force[0] - np.median(force)) / hit.peak_n > _CUT_PULSE:
         raise RecordError(
             "the record begins inside the pulse: part of the force is missing; needed is a pre-trigger of some "
-            f"{_LEAST_LEAD} samples or more"
+            f"{LEAST_LEAD} samples or more"
         )
     if hit.second_share > 0.0:
         warnings.append(
@@ -167,7 +179,7 @@ def _windowed(
 ) -> _Usable:
     assert record.force_n is not None
     where = record.source
-    offset = _mean_to_remove(quiet) if quiet.size >= _LEAST_LEAD else 0.0
+    offset = _mean_to_remove(quiet) if quiet.size >= LEAST_LEAD else 0.0
     if abs(offset) > _OFFSET_TOLD * abs(hit.peak_n):
         warnings.append(f"{where}: offset of the force, {offset:.4g} N, taken away")
     force = np.zeros(len(record.force_n))
@@ -177,9 +189,9 @@ def _windowed(
         force = -force
     response, noise = record.response, None
     lead = response[: max(hit.first - 1, 0)]
-    if len(lead) < _LEAST_LEAD:
+    if len(lead) < LEAST_LEAD:
         warnings.append(
-            f"{where}: {len(lead)} samples before the hit: noise and offset are measured from {_LEAST_LEAD} or more "
+            f"{where}: {len(lead)} samples before the hit: noise and offset are measured from {LEAST_LEAD} or more "
             "(pre-trigger)"
         )
     else:
@@ -192,9 +204,9 @@ def _windowed(
                 "noise, or the machine was not at rest"
             )
     width = int(np.count_nonzero(np.abs(force) > 0.1 * abs(hit.peak_n)))
-    if width < _LEAST_PULSE:
+    if width < LEAST_PULSE:
         warnings.append(
-            f"{where}: the pulse has {width} samples above a tenth of its peak: below {_LEAST_PULSE} its momentum, and "
+            f"{where}: the pulse has {width} samples above a tenth of its peak: below {LEAST_PULSE} its momentum, and "
             "so the mass, is uncertain; sample faster or take a softer tip"
         )
     strongest = refuse_short(record, response[hit.first :], noise or 0.0, band_hz, warnings)
@@ -223,7 +235,7 @@ def _decay(record: Record, band_hz: float | None, start_s: float | None, warning
             f"{UNITS[record.quantity]}; needed is a larger range of the input"
         )
     refuse_short(free, free.response, 0.0, band_hz, warnings)
-    tenth = free.response[-max(len(free.response) // 10, _LEAST_LEAD) :]
+    tenth = free.response[-max(len(free.response) // 10, LEAST_LEAD) :]
     offset = float(np.mean(tenth))
     still = float(np.std(tenth)) < DECAYED * float(np.std(free.response[: len(tenth)]))
     if still and _mean_to_remove(tenth):

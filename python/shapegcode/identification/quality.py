@@ -9,7 +9,7 @@ import numpy as np
 from shapegcode.identification.record import FloatArray, Record, RecordError
 from shapegcode.identification.spectra import decay_spectrum
 
-__all__ = ["DECAYED", "excited_hz", "is_clipped", "refuse_short"]
+__all__ = ["DECAYED", "EXCITED_HALF_SINE", "FOLDING", "LEAST_PERIODS", "excited_hz", "is_clipped", "refuse_short"]
 
 #: So many equal extreme samples on end may be an overload; two can lie on either side of a smooth peak.
 _CLIPPED_RUN = 3
@@ -19,8 +19,10 @@ _CLIPPED_STEP = 1e-4
 _SMOOTH_FALL = 6.0
 #: Where the force's spectrum has fallen to this share (-20 dB), noise counts tenfold.
 _EXCITED = 0.1
+#: A half sine falls to that share at this many over its duration: cos(pi x) / (1 - 4 x²) = 0.1 in size.
+EXCITED_HALF_SINE = 1.3033
 #: Periods that tell a damping ratio though the response has not decayed; fewer do not tell decay from beat.
-_LEAST_PERIODS = 8.0
+LEAST_PERIODS = 8.0
 #: ... of the lowest vibration whose peak in the spectrum has this share of the largest.
 _STRONG_PEAK = 0.3
 #: Decayed: the last tenth of the record is below this share of the beginning.
@@ -28,7 +30,7 @@ DECAYED = 0.1
 #: Samples after the hit below which no model has data enough.
 _LEAST_SAMPLES = 32
 #: The strongest frequency must lie below this share of half the sampling rate: above, filters cut and modes fold.
-_FOLDING = 0.8
+FOLDING = 0.8
 
 
 def is_clipped(values: FloatArray) -> bool:
@@ -93,12 +95,12 @@ def refuse_short(
     if len(response) < _LEAST_SAMPLES:
         raise RecordError(
             f"{len(response)} samples of response: too short; needed are {_LEAST_SAMPLES} at the very least, and "
-            f"{_LEAST_PERIODS:g} periods of the lowest mode"
+            f"{LEAST_PERIODS:g} periods of the lowest mode"
         )
-    if band_hz is not None and band_hz > _FOLDING * half_rate:
+    if band_hz is not None and band_hz > FOLDING * half_rate:
         raise RecordError(
             f"{1.0 / record.period_s:g} samples per second are too slow for {band_hz:g} Hz: needed are "
-            f"{2.0 * band_hz / _FOLDING:.4g} or more, better {5.0 * band_hz:.4g}"
+            f"{2.0 * band_hz / FOLDING:.4g} or more, better {5.0 * band_hz:.4g}"
         )
     if not np.ptp(response) > 0.0:
         raise RecordError(f"every sample of the response is {response[0]:g}: is the sensor connected?")
@@ -107,10 +109,10 @@ def refuse_short(
     if not peaks:
         raise RecordError(f"no vibration stands out of the spectrum of {duration:.4g} s: too short, or noise only")
     frequency = peaks[0].frequency_hz
-    if frequency > _FOLDING * half_rate:
+    if frequency > FOLDING * half_rate:
         text = (
-            f"the strongest vibration, {frequency:.4g} Hz, is above {_FOLDING * half_rate:.4g} Hz, "
-            f"{100 * _FOLDING:g} % of half the sampling rate: sampling may be too slow and the mode folded; needed are "
+            f"the strongest vibration, {frequency:.4g} Hz, is above {FOLDING * half_rate:.4g} Hz, "
+            f"{100 * FOLDING:g} % of half the sampling rate: sampling may be too slow and the mode folded; needed are "
             f"{5.0 * frequency:.4g} samples per second or more, with an anti-aliasing filter"
         )
         if band_hz is None:
@@ -123,11 +125,11 @@ def refuse_short(
     lowest = min(peak.frequency_hz for peak in peaks if peak.amplitude > _STRONG_PEAK * peaks[0].amplitude)
     periods = lowest * duration
     if last > DECAYED * first:
-        if periods < _LEAST_PERIODS:
+        if periods < LEAST_PERIODS:
             raise RecordError(
                 f"{duration:.4g} s hold {periods:.1f} periods of {lowest:.4g} Hz, and the response is still "
-                f"at {100 * last / first:.0f} %: too short; needed are {_LEAST_PERIODS / lowest:.4g} s "
-                f"({_LEAST_PERIODS:g} periods) or more"
+                f"at {100 * last / first:.0f} %: too short; needed are {LEAST_PERIODS / lowest:.4g} s "
+                f"({LEAST_PERIODS:g} periods) or more"
             )
         if record.force_n is not None:
             warnings.append(
