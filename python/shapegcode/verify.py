@@ -16,7 +16,7 @@ from shapegcode import _core
 from shapegcode.controller import controller_model
 from shapegcode.emit import motion_limits
 from shapegcode.machine import Machine
-from shapegcode.moving_modes import NO_OFFSET, Offset, mode_tables, slowest_mode, still_mode
+from shapegcode.moving_modes import NO_OFFSET, Offset, damping_scale, mode_tables, slowest_mode, still_mode
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.worst_case import Deviation
 
@@ -49,7 +49,7 @@ class Placed:
 
 
 def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
-    """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty.
+    """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty, its damping at its low end.
 
     A table over the part's mass is looked up; of one over a position the nominal frequency is taken.
     """
@@ -57,7 +57,7 @@ def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
         [
             _core.Mode(
                 still.frequency_hz * (1.0 + shift * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
-                still.damping_ratio,
+                still.damping_ratio * damping_scale(mode, shift),
                 still.participation,
             )
             for mode in axis.modes
