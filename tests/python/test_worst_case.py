@@ -373,7 +373,7 @@ def test_the_contour_limit_is_for_the_targeted_deviation() -> None:
 
 def test_what_has_to_be_measured_depends_on_the_target() -> None:
     cases = {case.name: case for case in stated_cases(machine_with(UNCERTAIN))}
-    shift, override = cases["X 46 Hz +5 %"], cases["override 90 %"]
+    shift, override = cases["X 46 Hz +5 %, damping -20 %"], cases["override 90 %"]
     assert (shift.needs_contour("command"), shift.needs_contour("response")) == (False, True)
     assert (override.needs_contour("command"), override.needs_contour("response")) == (False, False)
     counted = {case.name: case for case in stated_cases(machine_with({"verdict.override_percent": [90, 100]}))}
