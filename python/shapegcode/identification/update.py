@@ -19,7 +19,7 @@ from shapegcode.machine import Machine
 from shapegcode.machine_keys import toml
 from shapegcode.toml_lines import Chunk, chunks, commented_key, commented_table
 
-__all__ = ["MachineUpdate", "update_machine_file", "update_modes"]
+__all__ = ["MachineUpdate", "check_updatable", "update_machine_file", "update_modes"]
 
 SAME_MODE = 0.1
 """Two frequencies, relative to the old one, within which a mode is taken as the one that the file has."""
@@ -61,13 +61,24 @@ def update_machine_file(path: str | Path, axis: str, modes: Sequence[IdentifiedM
         MachineError: the file is bad, or would be.
         OSError: it cannot be read.
     """
+    check_updatable(path)
+    return update_modes(Path(path).read_bytes().decode("utf-8"), axis, modes, source=source, file=str(path))
+
+
+def check_updatable(path: str | Path) -> None:
+    """Tell before the work what would make `update_machine_file` fail whatever the modes.
+
+    Raises:
+        ArgumentError: a built-in machine.
+        MachineError: the file is bad.
+        OSError: it cannot be read.
+    """
     if isinstance(path, str) and path in Machine.builtin_names():
         raise ArgumentError(
             f"{path} is a built-in machine, which stays as it is: shapegcode machine init {path} -o mine.toml makes a "
             "file of it that can be updated"
         )
-    Machine.load(path)  # what is bad before is said of the file as it is
-    return update_modes(Path(path).read_bytes().decode("utf-8"), axis, modes, source=source, file=str(path))
+    Machine.load(path)
 
 
 def update_modes(
