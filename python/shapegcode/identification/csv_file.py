@@ -129,7 +129,7 @@ class _Reader:
                     return None
                 raise RecordError(
                     f"{self.where}: no column of time; {_listed(self.labels)}; needed is one called time (or t, Zeit), "
-                    "--time-column, or the period (--period-s)"
+                    "--time-column, or the period (--period)"
                 )
             index = found[0]
             if len(found) > 1:
