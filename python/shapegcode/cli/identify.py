@@ -44,7 +44,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_machine_argument(parser, required=False)
     parser.add_argument(
-        "--modes",
+        "--modes", metavar="N", type=_count, default=None, help="number of modes (default: chosen by evidence)"
+    )
+    parser.add_argument(
+        "--most-modes",
         metavar="N",
         type=_count,
         default=_MOST_MODES,
@@ -150,7 +153,8 @@ def _identify(args: argparse.Namespace) -> int:
         test = tap_test(
             args.files,
             _read_options(args),
-            most_modes=args.modes,
+            most_modes=args.most_modes,
+            modes=args.modes,
             band_hz=args.band,
             start_s=args.start,
         )

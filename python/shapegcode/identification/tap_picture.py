@@ -150,16 +150,17 @@ def plot_stabilisation(file: str | Path, test: TapTest) -> None:
     panel.set_zorder(background.get_zorder() + 1)
     panel.patch.set_visible(False)
     kinds = (
-        ("new", "x", canvas.GREY, "none", lambda pole: not pole.stable_frequency),
-        (
-            "frequency within 1 %", "o", canvas.COLOURS[1], "none",
-            lambda pole: pole.stable_frequency and not pole.stable_damping,
-        ),
-        ("and damping within 5 %", "o", canvas.COLOURS[2], canvas.COLOURS[2], lambda pole: pole.stable_damping),
-    )  # fmt: skip
+        ("new", "x", canvas.GREY, "none"),
+        ("frequency within 1 %", "o", canvas.COLOURS[1], "none"),
+        ("and damping within 5 %", "o", canvas.COLOURS[2], canvas.COLOURS[2]),
+    )
     highest = frequency[seen][-1]
-    for label, marker, edge, face, belongs in kinds:
-        poles = [pole for pole in found.chart if belongs(pole) and pole.frequency_hz <= highest]
+    for stable, (label, marker, edge, face) in enumerate(kinds):
+        poles = [
+            pole
+            for pole in found.chart
+            if pole.stable_frequency + pole.stable_damping == stable and pole.frequency_hz <= highest
+        ]
         panel.plot(
             [pole.frequency_hz for pole in poles], [pole.order for pole in poles], marker, linestyle="none",
             markeredgecolor=edge, markerfacecolor=face, label=label,

@@ -42,8 +42,6 @@ def print_tap_test(test: TapTest, console: Console) -> None:
         for record in test.records:
             lasts_s = len(record.response) * record.period_s
             say(f"  {record.source}: {len(record.response)} samples, {lasts_s:.4g} s, {record.quantity}")
-        for refused in test.prepared.refused:
-            say(f"not used: {refused.source}: {refused.reason}")
     found = test.found
     if found is not None:
         if found.modes:

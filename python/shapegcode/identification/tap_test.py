@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from shapegcode._core import NumericError
+from shapegcode.identification import fit
 from shapegcode.identification.checks import Prepared, prepare
-from shapegcode.identification.fit import identify
 from shapegcode.identification.read import ReadOptions, read_records
 from shapegcode.identification.record import Record, RecordError
 from shapegcode.identification.results import Identification, IdentifiedMode
 
-__all__ = ["MOST_MODES", "TapTest", "tap_test"]
+__all__ = ["MOST_MODES", "TapTest", "identify", "tap_test"]
 
 MOST_MODES = 8
 """Largest number of modes that is tried unless asked otherwise."""
@@ -44,8 +44,9 @@ class TapTest:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know of the records and of the result."""
-        told = () if self.prepared is None else self.prepared.warnings
-        return told if self.found is None else (*told, *self.found.warnings)
+        if self.found is not None:
+            return self.found.warnings
+        return () if self.prepared is None else self.prepared.warnings
 
     @property
     def modes(self) -> tuple[IdentifiedMode, ...]:
@@ -119,6 +120,7 @@ def tap_test(
     options: ReadOptions | None = None,
     *,
     most_modes: int = MOST_MODES,
+    modes: int | None = None,
     band_hz: tuple[float, float] | None = None,
     start_s: float | None = None,
 ) -> TapTest:
@@ -130,6 +132,7 @@ def tap_test(
         files: records of one point and axis.
         options: what the files do not say.
         most_modes: largest number of modes that is tried.
+        modes: number of modes; None: chosen by evidence.
         band_hz: lowest and highest frequency of interest; None: all.
         start_s: time at which a decay begins; None: it is looked for.
 
@@ -139,10 +142,63 @@ def tap_test(
     names = tuple(str(file) for file in files)
     prepared = None
     try:
-        records = [record for file in files for record in read_records(file, options)]
-        prepared = prepare(records, band_hz=None if band_hz is None else band_hz[1], start_s=start_s)
-        found = identify(prepared.records, most_modes=most_modes)
+        prepared = _prepared(files, options, band_hz, start_s)
+        found = fit.identify(prepared.records, band_hz=band_hz, most_modes=most_modes, modes=modes, prepared=prepared)
     except (RecordError, NumericError) as error:
         return TapTest(names, prepared, None, str(error))
-    reason = "" if found.modes else "the data support no mode"
-    return TapTest(names, prepared, found, reason)
+    return TapTest(names, prepared, found, "" if found.modes else _nothing(found))
+
+
+def identify(
+    source: str | Path | Sequence[str | Path] | Sequence[Record],
+    options: ReadOptions | None = None,
+    *,
+    most_modes: int = MOST_MODES,
+    modes: int | None = None,
+    band_hz: tuple[float, float] | None = None,
+    start_s: float | None = None,
+) -> Identification:
+    """Modes in one or several taps of a point (with force), or in free decays (without).
+
+    Args:
+        source: a file (CSV, UFF, WAV), several files, or records.
+        options: what the files do not say; see `tap_test` for the others.
+        most_modes: largest number of modes that is tried.
+        modes: number of modes; None: chosen by evidence.
+        band_hz: lowest and highest frequency of interest; None: all.
+        start_s: time at which a decay begins; None: it is looked for.
+
+    Raises:
+        RecordError: no record can be used; what was found and what is needed.
+        OSError: a file cannot be read.
+    """
+    files = [source] if isinstance(source, str | Path) else source
+    prepared = _prepared(files, options, band_hz, start_s)
+    return fit.identify(prepared.records, band_hz=band_hz, most_modes=most_modes, modes=modes, prepared=prepared)
+
+
+def _prepared(
+    sources: Sequence[str | Path] | Sequence[Record],
+    options: ReadOptions | None,
+    band_hz: tuple[float, float] | None,
+    start_s: float | None,
+) -> Prepared:
+    """Files read, records checked.
+
+    Raises:
+        RecordError: none can be used.
+        OSError: a file cannot be read.
+    """
+    records: list[Record] = []
+    for each in sources:
+        records += [each] if isinstance(each, Record) else read_records(each, options)
+    return prepare(records, band_hz=None if band_hz is None else band_hz[1], start_s=start_s)
+
+
+def _nothing(found: Identification) -> str:
+    """Why there is no mode."""
+    if not found.refused:
+        return "no mode stands out of the noise"
+    return "no mode is supported: " + "; ".join(
+        f"{mode.frequency_hz.value:.4g} Hz: {mode.refusal}" for mode in found.refused
+    )
