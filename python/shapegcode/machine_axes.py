@@ -70,7 +70,7 @@ class Mode(Table):
     )
     frequency_uncertainty_percent: Annotated[NonNegative, Field(lt=100)] | None = key(
         "the frequency may be off by this much either way (position of the table, weight of the workpiece); "
-        "left out: not known, and only the nominal frequency is designed for",
+        "left out: not known. Only the nominal frequency is designed for then, and up to 0.2 %",
         unit="%",
         default=None,
     )
