@@ -197,8 +197,8 @@ def _windowed(
     else:
         response = response - _mean_to_remove(lead)
         noise = float(np.std(lead))
-        after = float(np.sqrt(np.mean(response[hit.first :][: len(lead)] ** 2)))
-        if noise > _AT_REST * after:
+        after = float(np.sqrt(np.mean(response[hit.end :][: len(lead)] ** 2))) if hit.end < len(response) else 0.0
+        if noise > _AT_REST * after > 0.0:
             warnings.append(
                 f"{where}: before the hit the sensor shows {100 * noise / after:.0f} % of what it shows afterwards: "
                 "noise, or the machine was not at rest"

@@ -23,6 +23,8 @@ _EVENT_RISES = 1.3
 _STRONG = 0.5
 #: The tail of a decay, in which no command is left, begins after this share of it.
 _TAIL = 0.3
+#: Samples below which a tail tells no frequency.
+_LEAST_TAIL = 16
 #: Modes above this share of the tail's largest peak are vibration, whatever is slower is the axis's own motion.
 _MODE_SHARE = 0.2
 #: The axis moves where its mean over a period of the lowest mode is above this share of the envelope.
@@ -60,6 +62,11 @@ def _mean_over(values: FloatArray, samples: float) -> FloatArray:
     return np.asarray(uniform_filter1d(values, max(1, round(samples)), mode="nearest"), dtype=np.float64)
 
 
+def _envelope(quiet: FloatArray, period_samples: float) -> FloatArray:
+    shaking = quiet - _mean_over(quiet, period_samples)
+    return _forward_rms(shaking, max(2, round(_ENVELOPE_PERIODS * period_samples)))
+
+
 def _events(envelope: FloatArray) -> npt.NDArray[np.intp]:
     """Samples from which the envelope falls."""
     level = np.log(np.maximum(envelope, 1e-6 * np.max(envelope)))
@@ -74,18 +81,30 @@ def _until_next(envelope: FloatArray, starts: npt.NDArray[np.intp]) -> list[tupl
     return list(zip([int(each) for each in starts], [*ends, len(envelope)], strict=True))
 
 
-def _after_motion(record: Record, quiet: FloatArray, level: float, start: int, end: int) -> int:
-    """First sample from which the axis itself stays at rest for a period of the lowest mode."""
+def _longest(quiet: FloatArray, period_samples: float) -> tuple[int, int, float]:
+    """First and last + 1 sample of the longest of the strong decays, and the envelope at its beginning."""
+    envelope = _envelope(quiet, period_samples)
+    starts = _events(envelope)
+    strong = envelope[starts] >= _STRONG * np.max(envelope[starts])
+    parts = [part for part, good in zip(_until_next(envelope, starts), strong, strict=True) if good]
+    start, end = max(parts, key=lambda part: part[1] - part[0])
+    return start, end, float(envelope[start])
+
+
+def _slowest_period(record: Record, quiet: FloatArray, start: int, end: int) -> float | None:
+    """Period in samples of the lowest mode in the tail of a decay."""
     tail = start + int(_TAIL * (end - start))
-    if end - tail < 16:
-        return start
+    if end - tail < _LEAST_TAIL:
+        return None
     peaks = decay_spectrum(replace(record, response=quiet[tail:end])).peaks
     modes = [peak.frequency_hz for peak in peaks if peak.amplitude > _MODE_SHARE * peaks[0].amplitude]
-    if not modes:
-        return start
-    one = 1.0 / (min(modes) * record.period_s)
-    moving = np.abs(_mean_over(quiet, one)[start:tail]) > _MOTION_SHARE * np.sqrt(2.0) * level
-    window = max(1, round(one))
+    return 1.0 / (min(modes) * record.period_s) if modes else None
+
+
+def _rest_after_motion(quiet: FloatArray, period_samples: float, level: float, start: int, end: int) -> int:
+    """First sample from which the axis itself stays at rest for a period of the lowest mode."""
+    moving = np.abs(_mean_over(quiet, period_samples)[start:end]) > _MOTION_SHARE * np.sqrt(2.0) * level
+    window = max(1, round(period_samples))
     ahead = maximum_filter1d(moving.astype(np.uint8), window, mode="nearest", origin=-(window // 2))
     rest = np.flatnonzero(ahead == 0)
     return start + int(rest[0]) if rest.size else start
@@ -114,16 +133,19 @@ def find_decay(record: Record, start_s: float | None = None) -> Record:
     if frequency == 0.0:
         raise RecordError(f"{record.source}: {len(response)} samples and no vibration with three periods or more")
     quiet = np.asarray(response - np.median(response), dtype=np.float64)
-    shaking = quiet - _mean_over(quiet, 1.0 / (frequency * record.period_s))
-    envelope = _forward_rms(shaking, max(2, round(_ENVELOPE_PERIODS / (frequency * record.period_s))))
+    period = 1.0 / (frequency * record.period_s)
     if start_s is not None:
         first = int(np.ceil((start_s - record.start_s) / record.period_s - 1e-9))
-        starts = np.append(first, [at for at in _events(envelope) if at > first])
+        part = replace(record, response=response[first:])
+        period = _slowest_period(part, quiet[first:], 0, len(part.response)) or period
+        envelope = _envelope(quiet, period)
+        starts = np.append(first, [at for at in _events(envelope) if at > first + period])
         start, end = _until_next(envelope, starts)[0]
     else:
-        starts = _events(envelope)
-        strong = envelope[starts] >= _STRONG * np.max(envelope[starts])
-        parts = [part for part, good in zip(_until_next(envelope, starts), strong, strict=True) if good]
-        start, end = max(parts, key=lambda part: part[1] - part[0])
-        start = _after_motion(record, quiet, float(envelope[start]), start, end)
+        start, end, level = _longest(quiet, period)
+        slowest = _slowest_period(record, quiet, start, end)
+        if slowest is not None:
+            # Envelope and motion are told apart by the slowest mode, which is known only now.
+            start, end, level = _longest(quiet, slowest)
+            start = _rest_after_motion(quiet, slowest, level, start, end)
     return replace(record, response=response[start:end], start_s=record.start_s + start * record.period_s)

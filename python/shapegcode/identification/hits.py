@@ -20,8 +20,9 @@ _SMALLEST_PULSE = 0.03
 _SMALLEST_HIT = 0.1
 #: ... and above so many standard deviations of noise, which a million samples of noise do not reach.
 _PULSE_NOISE = 7.0
-#: A pulse that comes again before this is the same hit with a dent: filters ring for a few samples.
-_DENT_SAMPLES = 3
+#: A pulse that comes again within so many samples belongs to the one before: anti-aliasing filters ring for a few
+#: samples, in force and response alike.
+_RINGING_SAMPLES = 8
 #: Nobody hits twice on purpose within this time: a hammer that comes down again sooner has bounced.
 _BOUNCE_S = 0.1
 #: Between two hits on purpose the response has fallen to this share of its peak.
@@ -65,7 +66,7 @@ def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
     above = np.flatnonzero(force > level)
     if above.size == 0:
         return []
-    parts = np.split(above, np.flatnonzero(np.diff(above) > _DENT_SAMPLES) + 1)
+    parts = np.split(above, np.flatnonzero(np.diff(above) > _RINGING_SAMPLES) + 1)
     floor = max(_PULSE_ENDS * peak, _NOISE_ENDS * sigma)
     low = np.flatnonzero(force <= floor)
     found = []
@@ -80,14 +81,12 @@ def _pulses(force: FloatArray, sigma: float) -> list[Hit]:
     return found
 
 
-def _rested(record: Record, hit: Hit, next_hit: Hit) -> bool:
-    """Whether the response has died away between two hits."""
-    between = record.response[hit.first : next_hit.first]
-    quiet = record.response - np.median(record.response)
-    short = max(1, len(between) // 10)
-    peak = float(np.max(np.abs(quiet[hit.first : next_hit.first])))
-    last = float(np.sqrt(2.0 * np.mean(quiet[next_hit.first - short : next_hit.first] ** 2)))
-    return last <= _AT_REST * peak + _NOISE_ENDS * robust_sigma(record.response)
+def _rested(record: Record, noise: float, hit: Hit, next_hit: Hit) -> bool:
+    """Whether the response has died away between two hits, or down to its noise."""
+    between = (record.response - np.median(record.response))[hit.end : next_hit.first]
+    peak = float(np.max(np.abs(between)))
+    power = float(np.mean(between[-max(1, len(between) // 10) :] ** 2)) - noise**2
+    return bool(np.sqrt(2.0 * max(power, 0.0)) <= _AT_REST * peak)
 
 
 def find_hits(record: Record) -> list[Hit]:
@@ -102,11 +101,14 @@ def find_hits(record: Record) -> list[Hit]:
     sign = 1.0 if np.max(force) >= -np.min(force) else -1.0
     hits: list[Hit] = []
     largest = float(np.max(sign * force))
+    noise = 0.0
     for pulse in _pulses(sign * force, robust_sigma(force)):
+        if not hits and pulse.first > 1:
+            noise = float(np.std(record.response[: pulse.first - 1]))
         if hits:
             gap = (pulse.first - hits[-1].end) * record.period_s
             small = pulse.peak_n < _SMALLEST_HIT * largest
-            if small or gap < _BOUNCE_S or not _rested(record, hits[-1], pulse):
+            if small or gap < _BOUNCE_S or not _rested(record, noise, hits[-1], pulse):
                 share = pulse.peak_n / abs(hits[-1].peak_n)
                 if share > hits[-1].second_share:
                     late = (pulse.peak - hits[-1].peak) * record.period_s

@@ -284,7 +284,10 @@ def tap_plan(machine: Machine | None = None) -> str:
     else:
         rows = [(name, recording_for(_modes(axis))) for name, axis in zip(_AXES, machine.axes.as_tuple(), strict=True)]
         title = f"TAP TEST OF {machine.name}"
-        about = f"Rates and lengths follow from the modes of the machine file; an axis without modes is looked at from {usual}."
+        about = (
+            "Rates and lengths follow from the modes of the machine file; an axis without modes is looked at from "
+            f"{usual}."
+        )
     hardest = max((how for _, how in rows), key=lambda how: how.highest_hz)
     dwell = max(_LONG_STOP_S, 2.0 * max(how.duration_s for _, how in rows))
     parts = [

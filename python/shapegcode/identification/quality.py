@@ -69,8 +69,11 @@ def excited_hz(force_n: FloatArray, period_s: float) -> float:
     count = max(4096, 16 * len(pulse))
     spectrum = np.abs(np.fft.rfft(pulse, count))
     low = np.flatnonzero(spectrum < _EXCITED * spectrum[0])
-    at = int(low[0]) if low.size else len(spectrum) - 1
-    return at / (count * period_s)
+    if not low.size:
+        return 0.5 / period_s
+    at = int(low[0])
+    above, below = spectrum[at - 1] - _EXCITED * spectrum[0], spectrum[at] - _EXCITED * spectrum[0]
+    return float(at - below / (below - above)) / (count * period_s)
 
 
 def refuse_short(

@@ -100,7 +100,7 @@ def _is_row(cells: list[str], strict: bool, delimiter: str) -> bool:
 def _rows(lines: list[str], delimiter: str, strict: bool, least: int) -> _Rows | None:
     run: list[int] = []
     split = [cells_of(line, delimiter) for line in lines]
-    filled = [index for index, line in enumerate(lines) if line.strip()]
+    filled = [index for index, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
     for index in filled:
         cells = split[index]
         if len(cells) < least or not _is_row(cells, strict, delimiter):
@@ -231,9 +231,10 @@ def _choose_header(
         units = next((line[1:] for _, line in reversed(above) if line[0].lower() == "y_unit_label"), [])
         return above[-1], ["", *units] if units else []
     filled = [cell for cell in cells if cell.strip(" -[]()")]
-    if filled and all(find_unit(cell) for cell in filled) and len(above) > 1:
+    known = sum(find_unit(cell) is not None for cell in filled)
+    if filled and 2 * known >= len(filled) and len(above) > 1:
         before = above[-2]
-        if _labels_known(before[1]) or len(before[1]) == len(cells) > 1:
+        if len(before[1]) == len(cells) and (known == len(filled) or _labels_known(before[1]) > 1):
             return before, cells
     if _labels_known(cells) and not _is_row(cells, False, rows.delimiter):
         return above[-1], []

@@ -137,17 +137,13 @@ def _split_unit(text: str) -> tuple[str, Unit | None, str]:
         unknown = inner or unknown
     if unknown:
         return name, None, unknown
-    for separator in (",", " in ", "/"):
-        head, found, tail = text.partition(separator)
-        if found and tail.strip() and head.strip():
-            if unit := find_unit(tail):
-                return head, unit, ""
-            if separator == "/" and _words(tail) != [tail.strip().lower()]:
-                return head, None, tail.strip()
-    parts = re.split(r"[_ ]+", text.strip())
-    for count in (3, 2, 1):
-        if count < len(parts) and (unit := find_unit("_".join(parts[-count:]))):
-            return " ".join(parts[:-count]), unit, ""
+    for split in re.finditer(r"[_ ,/]+", text):
+        head, tail = text[: split.start()], text[split.end() :]
+        if head and (unit := find_unit(tail)):
+            return re.sub(r" in$", "", head), unit, ""
+    head, found, tail = text.partition("/")
+    if found and head and _words(tail) != [tail.strip().lower()]:
+        return head, None, tail.strip()
     return text, None, ""
 
 
@@ -176,8 +172,8 @@ def _meaning(words: list[str]) -> tuple[Measured | Literal["response"] | None, s
 
 def read_label(text: str, unit_text: str = "") -> Label:
     """Read a label; *unit_text* is what a row of units below it says."""
-    if text.strip().lower() in {"x_value", "x value"}:  # LabVIEW's name of the time
-        return Label(text, "time", None, find_unit(unit_text))
+    if text.strip().lower() in {"x_value", "x value"}:  # LabVIEW's name of the time, which it writes in seconds
+        return Label(text, "time", None, find_unit(unit_text or "s"))
     name, unit, unknown = _split_unit(text)
     if unit_text.strip(" []()-"):
         unit = find_unit(unit_text)

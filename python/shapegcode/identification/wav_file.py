@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import warnings
 from pathlib import Path
 
@@ -22,9 +23,7 @@ def _channels(path: Path) -> tuple[int, FloatArray, bool]:
             # Chunks with titles and the like, which measuring programs add, are of no interest.
             warnings.simplefilter("ignore", wavfile.WavFileWarning)
             rate, data = wavfile.read(path)
-    except (ValueError, EOFError, OSError, KeyError, TypeError) as error:
-        if isinstance(error, FileNotFoundError | PermissionError):
-            raise
+    except (ValueError, EOFError, KeyError, TypeError, struct.error) as error:
         raise RecordError(
             f"{path}: the WAV file cannot be read ({error}); needed is PCM of 16, 24 or 32 bits, or float of 32 or 64"
         ) from error
