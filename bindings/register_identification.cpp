@@ -155,18 +155,19 @@ For a free decay the force is a unit impulse at the first sample. Source: paper 
           "True if phi settled; otherwise this is the best of all rounds.");
   m.def(
       "arma_driven",
-      [](const std::vector<VectorArray>& forces, const std::vector<VectorArray>& responses, int n_modes) {
+      [](const std::vector<VectorArray>& forces, const std::vector<VectorArray>& responses, int n_modes, bool plain) {
         const auto taps = taps_of(forces, responses);
         const py::gil_scoped_release released;
-        return arma_driven(taps, n_modes);
+        return arma_driven(taps, n_modes, plain);
       },
-      py::arg("forces"), py::arg("responses"), py::arg("n_modes"),
+      py::arg("forces"), py::arg("responses"), py::arg("n_modes"), py::arg("plain") = false,
       R"(ARMA model of one or several taps of the same point, by iterated least squares.
 
 Args:
     forces: Force per tap in N, each of shape (n,), at rest at the first sample.
     responses: Response per tap at the same instants, each of shape (n,); poles and numerator are common.
     n_modes: Number of modes, 1 to 50; the model has 2*n_modes poles and 2*n_modes+1 numerator terms.
+    plain: One round of unfiltered least squares, which noise bends, instead of the iterated one.
 
 Returns:
     The model whose phi settled, or the best of all rounds with converged False.
@@ -179,17 +180,18 @@ Raises:
 Source: K. Steiglitz, L. McBride 1965; paper 003, eq. 1.)");
   m.def(
       "arma_decay",
-      [](const std::vector<VectorArray>& responses, int n_modes) {
+      [](const std::vector<VectorArray>& responses, int n_modes, bool plain) {
         const auto records = spans_of(responses, "response");
         const py::gil_scoped_release released;
-        return arma_decay(records, n_modes);
+        return arma_decay(records, n_modes, plain);
       },
-      py::arg("responses"), py::arg("n_modes"),
+      py::arg("responses"), py::arg("n_modes"), py::arg("plain") = false,
       R"(ARMA model of one or several free decays: common poles, each record's own initial state.
 
 Args:
     responses: Response per decay, each of shape (n,), in any unit.
     n_modes: Number of modes, 1 to 50.
+    plain: One round of unfiltered least squares instead of the iterated one.
 
 Returns:
     The model, as from arma_driven with a unit impulse at the first sample for the force.
@@ -430,12 +432,17 @@ Source: paper 003, section 2.2; K.-J. Bathe, Finite Element Procedures, 9.2.)");
   m.def(
       "equivalent_mass_closed_form",
       [](const VectorArray& force_n, const VectorArray& response, double period_s, double omega_rad_s,
-         double damping_ratio, const std::string& quantity, double theta) {
-        return equivalent_mass_closed_form({span_of(force_n, "force"), span_of(response, "response")}, period_s,
-                                           omega_rad_s, damping_ratio, quantity_of(quantity), theta);
+         double damping_ratio, const std::string& quantity, double theta, double impulse_n_s) {
+        return equivalent_mass_closed_form({{span_of(force_n, "force"), span_of(response, "response")},
+                                            period_s,
+                                            omega_rad_s,
+                                            damping_ratio,
+                                            quantity_of(quantity),
+                                            theta,
+                                            impulse_n_s});
       },
       py::arg("force_n"), py::arg("response"), py::arg("period_s"), py::arg("omega_rad_s"), py::arg("damping_ratio"),
-      py::arg("quantity") = "acceleration", py::arg("theta") = 1.4,
+      py::arg("quantity") = "acceleration", py::arg("theta") = 1.4, py::arg("impulse_n_s") = 0.0,
       R"(Equivalent mass by one simulation: the response is proportional to 1/m.
 
 Args:
@@ -446,6 +453,7 @@ Args:
     damping_ratio: 0 to 1.
     quantity: "acceleration", "velocity" or "displacement".
     theta: Of the Wilson theta method.
+    impulse_n_s: Besides the force: an impulse just before the first sample, in N s.
 
 Returns:
     The mass that makes the RMS of simulated and measured response equal.
@@ -458,14 +466,19 @@ Source: spec 8; paper 003, section 2.2.)");
       "equivalent_mass_bisection",
       [](const VectorArray& force_n, const VectorArray& response, double period_s, double omega_rad_s,
          double damping_ratio, double low_kg, double high_kg, double tolerance, int most_halvings,
-         const std::string& quantity, double theta) {
-        return equivalent_mass_bisection({span_of(force_n, "force"), span_of(response, "response")}, period_s,
-                                         omega_rad_s, damping_ratio, {low_kg, high_kg, tolerance, most_halvings},
-                                         quantity_of(quantity), theta);
+         const std::string& quantity, double theta, double impulse_n_s) {
+        return equivalent_mass_bisection({{span_of(force_n, "force"), span_of(response, "response")},
+                                          period_s,
+                                          omega_rad_s,
+                                          damping_ratio,
+                                          quantity_of(quantity),
+                                          theta,
+                                          impulse_n_s},
+                                         {low_kg, high_kg, tolerance, most_halvings});
       },
       py::arg("force_n"), py::arg("response"), py::arg("period_s"), py::arg("omega_rad_s"), py::arg("damping_ratio"),
       py::arg("low_kg") = 1e-3, py::arg("high_kg") = 1e3, py::arg("tolerance") = 0.01, py::arg("most_halvings") = 100,
-      py::arg("quantity") = "acceleration", py::arg("theta") = 1.4,
+      py::arg("quantity") = "acceleration", py::arg("theta") = 1.4, py::arg("impulse_n_s") = 0.0,
       R"(Equivalent mass by bisection: paper 003's steps 1 to 7, the check of the closed form.
 
 Args:
@@ -480,6 +493,7 @@ Args:
     most_halvings: After which the search gives up, with converged False.
     quantity: "acceleration", "velocity" or "displacement".
     theta: Of the Wilson theta method.
+    impulse_n_s: Besides the force: an impulse just before the first sample, in N s.
 
 Returns:
     The mass, the number of halvings and both RMS.

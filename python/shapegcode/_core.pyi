@@ -3149,13 +3149,14 @@ def acceleration_filters(model: ControllerModel) -> list[Fir]:
     """
     Filters behind interpolation in order, none, one or two.
     """
-def arma_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_modes: typing.SupportsInt | typing.SupportsIndex) -> Arma:
+def arma_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_modes: typing.SupportsInt | typing.SupportsIndex, plain: bool = False) -> Arma:
     """
     ARMA model of one or several free decays: common poles, each record's own initial state.
     
     Args:
         responses: Response per decay, each of shape (n,), in any unit.
         n_modes: Number of modes, 1 to 50.
+        plain: One round of unfiltered least squares instead of the iterated one.
     
     Returns:
         The model, as from arma_driven with a unit impulse at the first sample for the force.
@@ -3166,7 +3167,7 @@ def arma_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing
     
     Source: K. Steiglitz, L. McBride 1965; paper 003, eq. 1.
     """
-def arma_driven(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_modes: typing.SupportsInt | typing.SupportsIndex) -> Arma:
+def arma_driven(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_modes: typing.SupportsInt | typing.SupportsIndex, plain: bool = False) -> Arma:
     """
     ARMA model of one or several taps of the same point, by iterated least squares.
     
@@ -3174,6 +3175,7 @@ def arma_driven(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.A
         forces: Force per tap in N, each of shape (n,), at rest at the first sample.
         responses: Response per tap at the same instants, each of shape (n,); poles and numerator are common.
         n_modes: Number of modes, 1 to 50; the model has 2*n_modes poles and 2*n_modes+1 numerator terms.
+        plain: One round of unfiltered least squares, which noise bends, instead of the iterated one.
     
     Returns:
         The model whose phi settled, or the best of all rounds with converged False.
@@ -3225,7 +3227,7 @@ def count_slowed_blocks(blocks: Path, corner_speed_difference_mm_per_s: typing.A
     """
     Blocks that a controller with look-ahead would run slower than programmed.
     """
-def equivalent_mass_bisection(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, low_kg: typing.SupportsFloat | typing.SupportsIndex = 0.001, high_kg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.01, most_halvings: typing.SupportsInt | typing.SupportsIndex = 100, quantity: str = 'acceleration', theta: typing.SupportsFloat | typing.SupportsIndex = 1.4) -> EquivalentMass:
+def equivalent_mass_bisection(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, low_kg: typing.SupportsFloat | typing.SupportsIndex = 0.001, high_kg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.01, most_halvings: typing.SupportsInt | typing.SupportsIndex = 100, quantity: str = 'acceleration', theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, impulse_n_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> EquivalentMass:
     """
     Equivalent mass by bisection: paper 003's steps 1 to 7, the check of the closed form.
     
@@ -3241,6 +3243,7 @@ def equivalent_mass_bisection(force_n: typing.Annotated[numpy.typing.ArrayLike, 
         most_halvings: After which the search gives up, with converged False.
         quantity: "acceleration", "velocity" or "displacement".
         theta: Of the Wilson theta method.
+        impulse_n_s: Besides the force: an impulse just before the first sample, in N s.
     
     Returns:
         The mass, the number of halvings and both RMS.
@@ -3250,7 +3253,7 @@ def equivalent_mass_bisection(force_n: typing.Annotated[numpy.typing.ArrayLike, 
     
     Source: paper 003, section 2.2, steps 1-7.
     """
-def equivalent_mass_closed_form(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, quantity: str = 'acceleration', theta: typing.SupportsFloat | typing.SupportsIndex = 1.4) -> EquivalentMass:
+def equivalent_mass_closed_form(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, quantity: str = 'acceleration', theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, impulse_n_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> EquivalentMass:
     """
     Equivalent mass by one simulation: the response is proportional to 1/m.
     
@@ -3262,6 +3265,7 @@ def equivalent_mass_closed_form(force_n: typing.Annotated[numpy.typing.ArrayLike
         damping_ratio: 0 to 1.
         quantity: "acceleration", "velocity" or "displacement".
         theta: Of the Wilson theta method.
+        impulse_n_s: Besides the force: an impulse just before the first sample, in N s.
     
     Returns:
         The mass that makes the RMS of simulated and measured response equal.

@@ -98,7 +98,7 @@ class IteratedLeastSquares {
   IteratedLeastSquares(std::vector<InputOutput> records, Index order, Index terms, bool shared)
       : records_(std::move(records)), order_(order), terms_(terms), shared_(shared) {}
 
-  Arma from(VectorXd phi) const {
+  Arma from(VectorXd phi, int rounds) const {
     Arma best;
     double best_squares = std::numeric_limits<double>::infinity();
     double last_squares = best_squares;
@@ -106,7 +106,7 @@ class IteratedLeastSquares {
     for (const InputOutput& record : records_) {
       response_squares += record.output.squaredNorm() / static_cast<double>(record.output.size());
     }
-    for (int round = 1; round <= most_rounds; ++round) {
+    for (int round = 1; round <= rounds; ++round) {
       const VectorXd next = stable(denominator(phi));
       if (!next.allFinite()) break;
       const double change = phi.size() == next.size() ? (next - phi).cwiseAbs().maxCoeff() : 1.0;
@@ -208,13 +208,25 @@ double total_squares(const Arma& arma) {
                    .squaredNorm();
 }
 
+/// One unfiltered round.
+Arma plain_least_squares(const IteratedLeastSquares& problem) {
+  Arma arma = problem.from({}, 1);
+  arma.converged = true;
+  return arma;
+}
+
 /// Starts from the subspace method's poles, and from the plain least squares if that does not settle.
-Arma best_start(const IteratedLeastSquares& problem, const std::vector<Complex>& poles) {
-  Arma arma = problem.from(stable(phi_of(poles)));
+Arma iterated(const IteratedLeastSquares& problem, const std::vector<Complex>& poles) {
+  Arma arma = problem.from(stable(phi_of(poles)), most_rounds);
   if (!arma.converged) {
-    Arma plain = problem.from({});
-    if (total_squares(plain) < total_squares(arma)) arma = std::move(plain);
+    Arma other = problem.from({}, most_rounds);
+    if (total_squares(other) < total_squares(arma)) arma = std::move(other);
   }
+  return arma;
+}
+
+/// What follows from phi and numerator.
+Arma complete(Arma arma) {
   if (arma.phi.size() == 0) {
     throw Error(ErrorKind::numeric, "the least squares of an ARMA model gave no finite coefficients");
   }
@@ -229,17 +241,17 @@ Arma best_start(const IteratedLeastSquares& problem, const std::vector<Complex>&
 
 }  // namespace
 
-Arma arma_driven(std::span<const TapSignals> taps, int n_modes) {
+Arma arma_driven(std::span<const TapSignals> taps, int n_modes, bool plain) {
   check_modes_asked(n_modes);
   const Index order = 2 * static_cast<Index>(n_modes);
   check_taps(taps, static_cast<std::size_t>(std::max<Index>(2 * order + 2, 4 * order + 8)));
   std::vector<InputOutput> records;
   for (const TapSignals& tap : taps) records.push_back({column_of(tap.force_n), column_of(tap.response)});
-  const auto poles = stabilisation_poles(taps, n_modes);
-  return best_start({std::move(records), order, order + 1, true}, poles.back());
+  const IteratedLeastSquares problem(std::move(records), order, order + 1, true);
+  return complete(plain ? plain_least_squares(problem) : iterated(problem, stabilisation_poles(taps, n_modes).back()));
 }
 
-Arma arma_decay(Responses responses, int n_modes) {
+Arma arma_decay(Responses responses, int n_modes, bool plain) {
   check_modes_asked(n_modes);
   const Index order = 2 * static_cast<Index>(n_modes);
   check_responses(responses, static_cast<std::size_t>(4 * order + 8));
@@ -249,8 +261,9 @@ Arma arma_decay(Responses responses, int n_modes) {
     impulse[0] = 1.0;
     records.push_back({std::move(impulse), column_of(response)});
   }
-  const auto poles = stabilisation_poles(responses, n_modes);
-  return best_start({std::move(records), order, order, false}, poles.back());
+  const IteratedLeastSquares problem(std::move(records), order, order, false);
+  return complete(plain ? plain_least_squares(problem)
+                        : iterated(problem, stabilisation_poles(responses, n_modes).back()));
 }
 
 NaturalModes poles_to_modes(std::span<const Complex> poles, double period_s) {

@@ -22,49 +22,45 @@ double rms(std::span<const double> values) {
   return std::sqrt(squares / static_cast<double>(values.size()));
 }
 
-/// RMS of the response of a mass with given frequency and damping.
+/// RMS of the response of a mass with the problem's frequency and damping.
 class SimulatedRms {
  public:
-  SimulatedRms(const TapSignals& tap, double period_s, double omega_rad_s, double damping_ratio, Quantity quantity,
-               double theta)
-      : force_n_(tap.force_n),
-        period_s_(period_s),
-        omega_rad_s_(omega_rad_s),
-        damping_ratio_(damping_ratio),
-        quantity_(quantity),
-        theta_(theta) {
-    check_period(period_s);
-    const TapSignals taps[] = {tap};
-    check_taps(taps, 2);
-    check_positive(omega_rad_s, "natural frequency in rad/s");
-    if (!(damping_ratio >= 0.0) || !(damping_ratio <= 1.0)) {
+  explicit SimulatedRms(const MassProblem& problem) : problem_(problem) {
+    check_period(problem.period_s);
+    if (!std::isfinite(problem.impulse_n_s)) throw Error(ErrorKind::argument, "impulse is not finite");
+    const std::span<const double> responses[] = {problem.tap.response};
+    const TapSignals taps[] = {problem.tap};
+    if (problem.impulse_n_s == 0.0 || problem.tap.force_n.size() != problem.tap.response.size()) {
+      check_taps(taps, 2);
+    } else {
+      check_responses(responses, 2);
+    }
+    check_positive(problem.omega_rad_s, "natural frequency in rad/s");
+    if (!(problem.damping_ratio >= 0.0) || !(problem.damping_ratio <= 1.0)) {
       std::ostringstream message;
-      message << "damping ratio is " << damping_ratio << ", must be between 0 and 1";
+      message << "damping ratio is " << problem.damping_ratio << ", must be between 0 and 1";
       throw Error(ErrorKind::argument, message.str());
     }
-    measured_ = rms(tap.response);
+    measured_ = rms(problem.tap.response);
     if (measured_ == 0.0) throw Error(ErrorKind::argument, "response is zero throughout");
   }
 
   [[nodiscard]] double measured() const { return measured_; }
 
   [[nodiscard]] double at(double mass_kg) const {
-    const EquivalentOscillator oscillator{mass_kg, 2.0 * damping_ratio_ * omega_rad_s_ * mass_kg,
-                                          omega_rad_s_ * omega_rad_s_ * mass_kg};
-    const OscillatorMotion motion = wilson_theta(oscillator, force_n_, period_s_, theta_);
-    const Eigen::VectorXd& values = quantity_ == Quantity::acceleration ? motion.acceleration_m_per_s2
-                                    : quantity_ == Quantity::velocity   ? motion.velocity_m_per_s
-                                                                        : motion.displacement_m;
+    const double omega = problem_.omega_rad_s;
+    const EquivalentOscillator oscillator{mass_kg, 2.0 * problem_.damping_ratio * omega * mass_kg,
+                                          omega * omega * mass_kg};
+    const OscillatorMotion motion = wilson_theta(oscillator, problem_.tap.force_n, problem_.period_s, problem_.theta,
+                                                 0.0, problem_.impulse_n_s / mass_kg);
+    const Eigen::VectorXd& values = problem_.quantity == Quantity::acceleration ? motion.acceleration_m_per_s2
+                                    : problem_.quantity == Quantity::velocity   ? motion.velocity_m_per_s
+                                                                                : motion.displacement_m;
     return rms({values.data(), static_cast<std::size_t>(values.size())});
   }
 
  private:
-  std::span<const double> force_n_;
-  double period_s_;
-  double omega_rad_s_;
-  double damping_ratio_;
-  Quantity quantity_;
-  double theta_;
+  MassProblem problem_;
   double measured_ = 0.0;
 };
 
@@ -117,20 +113,17 @@ OscillatorMotion wilson_theta(const EquivalentOscillator& oscillator, std::span<
   return motion;
 }
 
-EquivalentMass equivalent_mass_closed_form(const TapSignals& tap, double period_s, double omega_rad_s,
-                                           double damping_ratio, Quantity quantity, double theta) {
-  const SimulatedRms simulated(tap, period_s, omega_rad_s, damping_ratio, quantity, theta);
+EquivalentMass equivalent_mass_closed_form(const MassProblem& problem) {
+  const SimulatedRms simulated(problem);
   const double mass_kg = simulated.at(1.0) / simulated.measured();
   return {mass_kg, simulated.measured(), simulated.measured(), 0, true};
 }
 
-EquivalentMass equivalent_mass_bisection(const TapSignals& tap, double period_s, double omega_rad_s,
-                                         double damping_ratio, const MassSearch& search, Quantity quantity,
-                                         double theta) {
+EquivalentMass equivalent_mass_bisection(const MassProblem& problem, const MassSearch& search) {
   check_positive(search.low_kg, "lower end of the masses in kg");
   check_positive(search.high_kg - search.low_kg, "width of the range of masses in kg");
   check_positive(search.tolerance, "tolerance of the RMS");
-  const SimulatedRms simulated(tap, period_s, omega_rad_s, damping_ratio, quantity, theta);
+  const SimulatedRms simulated(problem);
   EquivalentMass result;
   result.measured_rms = simulated.measured();
   double low = search.low_kg;

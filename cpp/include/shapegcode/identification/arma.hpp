@@ -27,13 +27,16 @@ struct Arma {
 /// and response are filtered with 1/A of the last round (Steiglitz, McBride 1965), so that noise on the response does
 /// not bend the poles as it bends those of the plain least squares. Unstable poles are reflected into the unit circle.
 ///
+/// `plain`: one round of unfiltered least squares instead (the equation's error, not the response's, is made small).
+/// Without noise and with the right number of modes both are exact.
+///
 /// The numerator has 2n+1 terms: with a force linear between samples the acceleration follows it at once.
 /// Throws Error(argument) on signals that check_taps refuses, n_modes outside 1 ... 50, or fewer samples than terms.
-[[nodiscard]] Arma arma_driven(std::span<const TapSignals> taps, int n_modes);
+[[nodiscard]] Arma arma_driven(std::span<const TapSignals> taps, int n_modes, bool plain = false);
 
 /// Joint model of several free decays: the same with a unit impulse at the first sample for the force; poles are
 /// common, numerators (initial states) each record's own. Errors as in arma_driven.
-[[nodiscard]] Arma arma_decay(Responses responses, int n_modes);
+[[nodiscard]] Arma arma_decay(Responses responses, int n_modes, bool plain = false);
 
 /// Modes of discrete poles, ascending in frequency: omega = |ln lambda|/period, zeta = -Re(ln lambda)/|ln lambda| (spec
 /// 8; the same as paper 003, eq. 5-6). Kept are complex pairs that are stable: real poles (among them those at the

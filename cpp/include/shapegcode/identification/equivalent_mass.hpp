@@ -33,6 +33,17 @@ struct OscillatorMotion {
                                             double period_s, double theta = 1.4, double displacement_m = 0.0,
                                             double velocity_m_per_s = 0.0);
 
+/// What is compared: the response (m, m/s or m/s²) of an oscillator of given natural frequency and damping ratio.
+struct MassProblem {
+  TapSignals tap;
+  double period_s;
+  double omega_rad_s;
+  double damping_ratio;
+  Quantity quantity = Quantity::acceleration;
+  double theta = 1.4;        ///< of the Wilson theta method
+  double impulse_n_s = 0.0;  ///< besides the force: an impulse just before the first sample, too short for samples
+};
+
 /// Where bisection looks for the mass and when it stops.
 struct MassSearch {
   double low_kg = 1e-3;
@@ -49,20 +60,16 @@ struct EquivalentMass {
   bool converged = false;      ///< the RMS agree within the tolerance
 };
 
-/// Mass with which the oscillator of the given natural frequency (rad/s) and damping ratio answers the force with the
-/// measured RMS. The response is proportional to 1/m, so one simulation with 1 kg tells: m = its RMS / measured RMS.
+/// Mass with which the oscillator answers the force with the measured RMS. The response is proportional to 1/m, so one
+/// simulation with 1 kg tells: m = its RMS / measured RMS.
 ///
-/// Throws Error(argument) on signals that check_taps refuses, a response that is zero throughout, a frequency that is
-/// not above 0, a damping ratio outside 0 ... 1, and as wilson_theta. Source: spec 8; paper 003, section 2.2.
-[[nodiscard]] EquivalentMass equivalent_mass_closed_form(const TapSignals& tap, double period_s, double omega_rad_s,
-                                                         double damping_ratio,
-                                                         Quantity quantity = Quantity::acceleration,
-                                                         double theta = 1.4);
+/// Throws Error(argument) on signals that check_taps refuses (with an impulse, the force may be zero), a response that
+/// is zero throughout, a frequency that is not above 0, a damping ratio outside 0 ... 1, and as wilson_theta. Source:
+/// spec 8; paper 003, section 2.2.
+[[nodiscard]] EquivalentMass equivalent_mass_closed_form(const MassProblem& problem);
 
 /// The same by halving the range of masses until the RMS agree: paper 003's steps 1 to 7, kept as the check. Errors
 /// also on a range or tolerance that is not positive. A range without solution ends at one of its ends, not converged.
-[[nodiscard]] EquivalentMass equivalent_mass_bisection(const TapSignals& tap, double period_s, double omega_rad_s,
-                                                       double damping_ratio, const MassSearch& search,
-                                                       Quantity quantity = Quantity::acceleration, double theta = 1.4);
+[[nodiscard]] EquivalentMass equivalent_mass_bisection(const MassProblem& problem, const MassSearch& search);
 
 }  // namespace shapegcode
