@@ -30,9 +30,13 @@ KEYS = {
 }  # fmt: skip
 
 
+def times(samples: int) -> FloatArray:
+    return np.asarray(np.arange(samples) * PERIOD_S, dtype=np.float64)
+
+
 def pulse(samples: int, newton: float = 500.0) -> FloatArray:
     """A half sine of 4 ms that begins after 20 ms."""
-    t = np.arange(samples) * PERIOD_S - 0.02
+    t = times(samples) - 0.02
     return np.where((t > 0.0) & (t < 0.004), newton * np.sin(np.pi * t / 0.004), 0.0)
 
 
@@ -63,7 +67,7 @@ def write_tap(
     force = pulse(samples, 400.0 + 50.0 * seed)
     noise = np.random.default_rng(100 + seed).normal(size=samples) * 0.05
     columns = {
-        "time [s]": np.arange(samples) * PERIOD_S,
+        "time [s]": times(samples),
         "force [N]": force + noise,
         f"acc{axis} [m/s^2]": response(force, modes, snr_db, seed),
     }
@@ -72,7 +76,7 @@ def write_tap(
 
 def write_stop(file: Path, axis: str = "") -> Path:
     """The free decay of paper 000's modes after a stop at .3 s, 40 dB."""
-    t = np.arange(3072) * PERIOD_S - 0.3
+    t = times(3072) - 0.3
     decay = sum(
         size * np.exp(-zeta * 2.0 * math.pi * hertz * t.clip(0.0)) * np.cos(2.0 * math.pi * hertz * t)
         for hertz, zeta, size in ((46.0, 0.02, 0.8), (131.0, 0.02, 0.5))
@@ -219,7 +223,7 @@ def test_nothing_supported(capsys: pytest.CaptureFixture[str], tmp_path: Path, m
     noise = np.random.default_rng(3).normal(size=2048)
     silent = write_csv(
         tmp_path / "noise.csv",
-        {"time [s]": np.arange(2048) * PERIOD_S, "force [N]": pulse(2048), "acc_x [m/s^2]": noise},
+        {"time [s]": times(2048), "force [N]": pulse(2048), "acc_x [m/s^2]": noise},
     )
     before = mine.read_bytes()
     result = asked(capsys, str(silent), "--update", str(mine), code=2)
@@ -241,7 +245,7 @@ def test_bad_input_is_told_in_the_json_too(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, columns: dict[str, str], message: str
 ) -> None:
     rows = 60 if "short" in columns.values() else 2048
-    t = np.arange(rows) * PERIOD_S
+    t = times(rows)
     values = {"t": t, "0": 0.0 * t, "f": pulse(rows), "a": np.sin(300.0 * t) * np.exp(-t), "short": t**2}
     file = write_csv(tmp_path / "bad.csv", {header: values[name] for header, name in columns.items()})
     out = tmp_path / "out.json"
