@@ -17,7 +17,6 @@ from scipy.linalg import eigh
 from shapegcode._core import (
     Arma,
     arma_decay,
-    arma_driven,
     equivalent_mass_bisection,
     equivalent_mass_closed_form,
     poles_to_modes,
@@ -159,7 +158,7 @@ def _system(acceleration: FloatArray) -> tuple[list[dict[str, Any]], dict[str, A
         _modes(each.poles, _PERIOD_S) for each in (exact, stepped)
     )
     low_hz, high_hz = _half_unit_reach(_PAPER_PHI, _PERIOD_S)
-    masses = _system_mass()
+    masses = _system_mass(np.asarray(wilson), stepped_hz, stepped_damping)
     closed, halved = masses["closed_form_kg"], masses["bisection_kg"]
     omega = 2.0 * math.pi * exact_hz
     rows = [
@@ -198,7 +197,6 @@ def _system(acceleration: FloatArray) -> tuple[list[dict[str, Any]], dict[str, A
         ),
         _row(
             "3", "halvings of 0.001 ... 1000 kg", "12", str(masses["halvings"]), masses["halvings"] == 12,
-            f"{masses['middles_tried']} middles tried",
         ),
     ]  # fmt: skip
     return rows, {
@@ -226,24 +224,15 @@ def _agree(here: float, paper: float, within: float) -> bool:
     return bool(abs(here - paper) <= within)
 
 
-def _system_mass() -> dict[str, Any]:
-    """The mass from a tap of 1 N·s within two samples, both sides by Wilson-theta as in the paper."""
-    force = np.zeros(_SAMPLES)
-    force[1] = 1.0 / _PERIOD_S
-    response = wilson_theta(
-        SYSTEM.mass_kg, SYSTEM.damping_n_s_per_m, SYSTEM.stiffness_n_per_m, force, _PERIOD_S
-    )[2]  # fmt: skip
-    hertz, damping = _modes(arma_driven([force], [response], 1).poles, _PERIOD_S)
-    tap = (force, response, _PERIOD_S, 2.0 * math.pi * hertz, damping)
+def _system_mass(response: FloatArray, hertz: float, damping: float) -> dict[str, Any]:
+    """The mass from the simulated record and its impulse, as in the paper: by Wilson-theta, then by halving."""
+    tap = (np.zeros(_SAMPLES), response, _PERIOD_S, 2.0 * math.pi * hertz, damping)
     low, high = _RANGE_KG
-    closed = equivalent_mass_closed_form(*tap)
-    halved = equivalent_mass_bisection(*tap, low_kg=low, high_kg=high, tolerance=_TOLERANCE)
-    return {
-        "closed_form_kg": closed.mass_kg,
-        "bisection_kg": halved.mass_kg,
-        "middles_tried": halved.halvings,
-        "halvings": halved.halvings - 1,
-    }
+    closed = equivalent_mass_closed_form(*tap, theta=_PAPER_THETA, impulse_n_s=1.0)
+    halved = equivalent_mass_bisection(
+        *tap, low_kg=low, high_kg=high, tolerance=_TOLERANCE, theta=_PAPER_THETA, impulse_n_s=1.0
+    )
+    return {"closed_form_kg": closed.mass_kg, "bisection_kg": halved.mass_kg, "halvings": halved.halvings}
 
 
 def _end_mill() -> tuple[list[dict[str, Any]], dict[str, Any]]:
