@@ -123,6 +123,8 @@ def run(args: argparse.Namespace) -> int:
         return _plan(args)
     if not args.files:
         raise ArgumentError("name the file of a tap test or decay, or ask how to do the test: identify --tap-plan")
+    if args.machine is not None or args.set:
+        raise ArgumentError("-m and --set go with --tap-plan; --update names the machine file that takes the modes")
     return _identify(args)
 
 
@@ -175,7 +177,8 @@ def _identify(args: argparse.Namespace) -> int:
             console.print(f"{args.update}: {note}", markup=False, soft_wrap=True)
     console.print(f"next: {_next_step(args, test)}", markup=False, soft_wrap=True)
     if not test.modes:
-        print(f"shapegcode: {test.reason}", file=sys.stderr)
+        reason = test.reason.replace("\n", "\nshapegcode: ")
+        print(f"shapegcode: {reason}", file=sys.stderr)
         return ExitCode.BAD_INPUT
     return ExitCode.OUT_OF_TOLERANCE if test.refused else ExitCode.OK
 

@@ -55,8 +55,9 @@ def write_tap_pictures(test: TapTest, folder: str | Path) -> list[str]:
     pictures: dict[str, Callable[[Path], None]] = {
         "traces": lambda file: plot_traces(file, test),
         "stabilisation": lambda file: plot_stabilisation(file, test),
-        "decay": lambda file: plot_decay(file, test),
     }
+    if test.modes:
+        pictures["decay"] = lambda file: plot_decay(file, test)
     if test.is_decay:
         pictures["spectrum"] = lambda file: plot_spectrum(file, test)
     else:
@@ -183,18 +184,20 @@ def plot_decay(file: str | Path, test: TapTest) -> None:
     """Envelope of each mode's band of the first record while it decays, measured and of the model.
 
     Raises:
-        ValueError: a wrong ending.
+        ValueError: a wrong ending, or no mode.
         OSError: the file cannot be written.
     """
     found = _found(test)
     frequencies = [mode.frequency_hz.value for mode in found.modes][:_MOST_ENVELOPES]
+    if not frequencies:
+        raise ValueError(f"no mode in {', '.join(test.files)}: no decay to draw")
     record, model = _fitted_part(test)[0], _as_fitted(test)[0]
     begin = _after_hit(record)
     record, model = (replace(each, response=each.response[begin:], force_n=None) for each in (record, model))
-    figure = canvas.figure(9.0, 1.4 + 2.0 * max(1, len(frequencies)))
-    column = canvas.panels(figure, max(1, len(frequencies)), 1)[0]
+    figure = canvas.figure(9.0, 1.4 + 2.0 * len(frequencies))
+    column = canvas.panels(figure, len(frequencies), 1)[0]
     pairs = zip(mode_envelopes(record, frequencies), mode_envelopes(model, frequencies), strict=True)
-    for panel, (measured, fitted), frequency in zip(column, pairs, frequencies, strict=False):
+    for panel, (measured, fitted), frequency in zip(column, pairs, frequencies, strict=True):
         time_s = measured.time_s - measured.time_s[0]
         panel.semilogy(time_s, measured.envelope, color=_MEASURED, linewidth=2.2, label="measured")
         panel.semilogy(time_s, fitted.envelope, "--", color=_FITTED, linewidth=1.1, label="model")

@@ -157,6 +157,7 @@ class _Edit:
                 self.notes.append(f"removed {toml(gone['frequency_hz'])} Hz, which was not found: {toml(gone)}")
         fresh = [mode for number, mode in enumerate(modes) if number not in taken]
         if fresh:
+            self.notes += _shares(modes)
             self._insert(lines, sorted(kept), [self._table(mode) for mode in fresh])
         return "".join(lines)
 
@@ -293,6 +294,16 @@ class _Edit:
                 return number
         heads = [n for n, part in enumerate(self.parts) if part.kind == "table" and part.path == self.path[:2]]
         return self._end(heads[0]) - 1 if heads else len(self.parts) - 1
+
+
+def _shares(modes: Sequence[IdentifiedMode]) -> list[str]:
+    """What participations would follow from the masses."""
+    masses = [mode.mass_kg.value for mode in modes if mode.mass_kg is not None]
+    if len(masses) < 2 or len(masses) < len(modes):
+        return []
+    total = sum(1.0 / mass for mass in masses)
+    shares = ", ".join(f"{1.0 / mass / total:.2f}" for mass in masses)
+    return [f"if the mass that the axis moves sits at the tapped point, the participations are {shares}"]
 
 
 def _matches(modes: Sequence[IdentifiedMode], old_hz: Sequence[float]) -> dict[int, int]:
