@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from shapegcode import canvas
 from shapegcode.cli import main
 from shapegcode.demo_tap import COLLET, END_MILL, SYSTEM, TapDemo, tap_demo
 
@@ -93,13 +94,17 @@ def test_differences_are_said(demo: TapDemo) -> None:
     assert rows(demo)["end mill under 100 N"]["paper"] == "18 um"
 
 
-def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["demo", "tap", "--json", str(tmp_path / "tap.json")]) == 0
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(canvas, "FORMATS", (".svg",))
+    plots = ["--plots", str(tmp_path / "plots")]
+    assert main(["demo", "tap", "--json", str(tmp_path / "tap.json"), *plots]) == 0
     out = capsys.readouterr().out
     assert "Paper 003" in out
     assert "next: shapegcode identify --tap-plan" in out
     result = json.loads((tmp_path / "tap.json").read_text(encoding="utf-8"))
-    assert result.keys() == {"rows", "agrees", "system", "end_mill", "collet", "series", "remark"}
+    assert result.keys() == {"rows", "agrees", "system", "end_mill", "collet", "series", "remark", "pictures"}
     assert all(row.keys() == {"section", "what", "paper", "here", "agrees", "note"} for row in result["rows"])
-    assert main(["demo", "tap", "--json", "-"]) == 0
+    assert "4.50 Hz" in Path(result["pictures"][0]).read_text(encoding="utf-8")
+    assert "end mill: 1.97 µm, 95.5 %" in Path(result["pictures"][1]).read_text(encoding="utf-8")
+    assert main(["demo", "tap", "--json", "-", *plots]) == 0
     assert json.loads(capsys.readouterr().out) == result

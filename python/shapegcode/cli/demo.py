@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--plots",
         metavar="DIR",
         default="demo-output",
-        help="folder for the pictures of `shaper` (PNG and SVG; default: %(default)s)",
+        help="folder for the pictures of `shaper` and `tap` (PNG and SVG; default: %(default)s)",
     )
     add_json_argument(parser)
 
@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     if args.name == "shaper":
         return _shaper(args.json, args.plots)
     if args.name == "tap":
-        return _tap(args.json)
+        return _tap(args.json, args.plots)
     return _cycle_time(args.json) if args.name == "cycle-time" else _path(args.json)
 
 
@@ -73,18 +73,21 @@ def _shaper(json_target: str | None, folder: str) -> int:
     return ExitCode.OK if demo.report["agrees"] else ExitCode.OUT_OF_TOLERANCE
 
 
-def _tap(json_target: str | None) -> int:
+def _tap(json_target: str | None, folder: str) -> int:
     from rich.table import Table
 
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
     from shapegcode.demo_tap import tap_demo
+    from shapegcode.demo_tap_picture import write_demo_pictures
 
     with progress("paper 003", json_target) as bar:
         bar.wait()
-        result = tap_demo().report
+        demo = tap_demo()
+        pictures = write_demo_pictures(demo, folder)
+    result = demo.report
     if json_target is not None:
-        write_json(result, json_target)
+        write_json({**result, "pictures": pictures}, json_target)
     console = output_console(json_target)
     table = Table(title="Paper 003: mass, damping and stiffness from a tap")
     table.add_column("section", no_wrap=True)
@@ -97,6 +100,7 @@ def _tap(json_target: str | None) -> int:
         )  # fmt: skip
     console.print(table)
     console.print(result["remark"], markup=False)
+    console.print(f"pictures: {folder}/paper003-*", markup=False)
     console.print("next: shapegcode identify --tap-plan", markup=False)
     return ExitCode.OK if result["agrees"] else ExitCode.OUT_OF_TOLERANCE
 

@@ -113,11 +113,14 @@ def plot_response(file: str | Path, test: TapTest) -> None:
     figure = canvas.figure(9.0, 2.1 + 1.8 * rows)
     column = canvas.panels(figure, rows, 1)[0]
     magnitude, phase = column[:2]
-    for each, colour, width, label in ((measured, _MEASURED, 1.6, "measured"), (model, _FITTED, 1.0, "model")):
+    for each, style, colour, width, label in (
+        (measured, "-", _MEASURED, 2.2, "measured"),
+        (model, "--", _FITTED, 1.1, "model"),
+    ):
         frequency, ratio = each.frequency_hz[seen], each.response[seen]
-        magnitude.semilogy(frequency, np.abs(ratio), color=colour, linewidth=width, label=label)
+        magnitude.semilogy(frequency, np.abs(ratio), style, color=colour, linewidth=width, label=label)
         # From -90 to 270 degrees: below a mode the phase of an acceleration is 180 and noise would wrap it.
-        phase.plot(frequency, 90.0 + np.degrees(np.angle(-1j * ratio)), color=colour, linewidth=width)
+        phase.plot(frequency, 90.0 + np.degrees(np.angle(-1j * ratio)), style, color=colour, linewidth=width)
     if measured.coherence is not None:
         column[2].plot(measured.frequency_hz[seen], measured.coherence[seen], color=canvas.COLOURS[1], linewidth=1.0)
         column[2].set_ylabel("coherence")
@@ -126,6 +129,8 @@ def plot_response(file: str | Path, test: TapTest) -> None:
     phase.set_ylabel("phase in degrees")
     phase.set_yticks([-90, 0, 90, 180, 270])
     column[-1].set_xlabel("frequency in Hz")
+    bottom, top = magnitude.get_ylim()
+    magnitude.set_ylim(bottom, 4.0 * top)  # room for the labels
     _mark_modes(column, found)
     canvas.legend_above(magnitude)
     taps = len(test.records)
