@@ -88,7 +88,7 @@ def write_stop(file: Path, axis: str = "") -> Path:
 @pytest.fixture(scope="module")
 def taps(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     folder = tmp_path_factory.mktemp("taps")
-    return [str(write_tap(folder / f"tap{seed}.csv", seed=seed)) for seed in (1, 2, 3)]
+    return [str(write_tap(folder / f"tap{seed}.csv", seed=seed, samples=1024)) for seed in (1, 2, 3)]
 
 
 @pytest.fixture
@@ -149,9 +149,9 @@ def test_the_shaper_and_the_verdict_use_it(capsys: pytest.CaptureFixture[str], t
 
 
 def test_the_same_again_changes_nothing(taps: list[str], mine: Path) -> None:
-    assert main(["identify", *taps, "--update", str(mine)]) == 0
+    assert main(["identify", taps[0], "--update", str(mine)]) == 0
     once = mine.read_bytes()
-    assert main(["identify", *taps, "--update", str(mine)]) == 0
+    assert main(["identify", taps[0], "--update", str(mine)]) == 0
     assert mine.read_bytes() == once
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shapegcode._core import NumericError
+from shapegcode._core import ArgumentError, NumericError
 from shapegcode.identification import fit
 from shapegcode.identification.checks import Prepared, prepare
 from shapegcode.identification.read import ReadOptions, read_records
-from shapegcode.identification.record import Record, RecordError
+from shapegcode.identification.record import Record
 from shapegcode.identification.results import Identification, IdentifiedMode
 
 __all__ = ["MOST_MODES", "TapTest", "identify", "tap_test"]
@@ -144,7 +144,7 @@ def tap_test(
     try:
         prepared = _prepared(files, options, band_hz, start_s)
         found = fit.identify(prepared.records, band_hz=band_hz, most_modes=most_modes, modes=modes, prepared=prepared)
-    except (RecordError, NumericError) as error:
+    except (ArgumentError, NumericError) as error:
         return TapTest(names, prepared, None, str(error))
     return TapTest(names, prepared, found, "" if found.modes else _nothing(found))
 
