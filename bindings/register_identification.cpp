@@ -20,6 +20,7 @@
 #include "shapegcode/identification/decay_fit.hpp"
 #include "shapegcode/identification/equivalent_mass.hpp"
 #include "shapegcode/identification/modal_fit.hpp"
+#include "shapegcode/identification/mode_ranking.hpp"
 
 namespace py = pybind11;
 
@@ -389,6 +390,51 @@ Raises:
 Source: spec 8.)");
 }
 
+void register_ranking(py::module_& m) {
+  py::class_<ModeRanking>(m, "ModeRanking", "Candidates in the order in which they explain what others leave.")
+      .def_readonly("chosen", &ModeRanking::chosen, "Indices into the candidates, best first.")
+      .def_property_readonly(
+          "sum_of_squares", [](const ModeRanking& self) { return array_of(self.sum_of_squares); },
+          "What is left after each choice, shape (len(chosen),), in the response's unit squared.")
+      .def_readonly("total", &ModeRanking::total, "Squares of the responses, offsets taken out.");
+  m.def(
+      "rank_modes",
+      [](const std::vector<VectorArray>& responses, double period_s, const VectorArray& omega_rad_s,
+         const VectorArray& damping_ratio, std::size_t most, const std::optional<std::vector<VectorArray>>& forces,
+         const std::string& quantity) {
+        const auto records = spans_of(responses, "response");
+        const auto taps = forces ? taps_of(*forces, responses) : std::vector<TapSignals>{};
+        const NaturalModes candidates = modes_of(omega_rad_s, damping_ratio);
+        const Quantity measured = quantity_of(quantity);
+        const py::gil_scoped_release released;
+        return forces ? rank_modes(taps, period_s, candidates, most, measured)
+                      : rank_modes(records, period_s, candidates, most);
+      },
+      py::arg("responses"), py::arg("period_s"), py::arg("omega_rad_s"), py::arg("damping_ratio"), py::arg("most"),
+      py::arg("forces") = py::none(), py::arg("quantity") = "acceleration",
+      R"(Ranks candidate modes by forward selection: starts for fit_modes and fit_decay from the poles of a chart.
+
+At each step the candidate is chosen that, together with those before it, leaves the least squares; residues (of
+decays: amplitudes and phases per record) are fitted, frequencies and damping ratios are not.
+
+Args:
+    responses: Response per record, each of shape (n,).
+    period_s: Time between samples in s, above 0.
+    omega_rad_s: Candidates, undamped natural frequencies in rad/s, shape (n_candidates,), below Nyquist.
+    damping_ratio: Candidates, 0 < zeta < 1, shape (n_candidates,).
+    most: How many to choose, at least 1.
+    forces: Force per record in N at the same instants; None: the records are free decays.
+    quantity: "acceleration", "velocity" or "displacement"; only with forces.
+
+Returns:
+    The ranking; shorter than asked for where no candidate explains anything more.
+
+Raises:
+    ArgumentError: As fit_modes.
+
+Source: this project (orthogonal least squares; S. Chen, S. Billings, W. Luo 1989).)");
+}
+
 void register_equivalent_mass(py::module_& m) {
   py::class_<EquivalentMass>(m, "EquivalentMass", "Mass whose simulated response has the measured RMS.")
       .def_readonly("mass_kg", &EquivalentMass::mass_kg, "Equivalent mass in kg.")
@@ -510,6 +556,7 @@ Source: paper 003, section 2.2, steps 1-7.)");
 void register_identification(py::module_& module) {
   register_arma(module);
   register_fits(module);
+  register_ranking(module);
   register_equivalent_mass(module);
 }
 

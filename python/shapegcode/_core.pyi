@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EquivalentMass', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_decay', 'fit_modes', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'time_program', 'wilson_theta', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EquivalentMass', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_decay', 'fit_modes', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'time_program', 'wilson_theta', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -1779,6 +1779,25 @@ class DecayFit:
     def sum_of_squares(self) -> float:
         """
         Sum of the squared residuals, in the response's unit squared.
+        """
+class ModeRanking:
+    """
+    Candidates in the order in which they explain what others leave.
+    """
+    @property
+    def chosen(self) -> list[int]:
+        """
+        Indices into the candidates, best first.
+        """
+    @property
+    def sum_of_squares(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        What is left after each choice, shape (len(chosen),), in the response's unit squared.
+        """
+    @property
+    def total(self) -> float:
+        """
+        Squares of the responses, offsets taken out.
         """
 class EquivalentMass:
     """
@@ -3593,6 +3612,30 @@ def poles_to_modes(poles: collections.abc.Sequence[complex | typing.SupportsComp
         ArgumentError: The period is not positive.
     
     Source: spec 8; paper 003, eq. 5-6.
+    """
+def rank_modes(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], most: typing.SupportsInt | typing.SupportsIndex, forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None, quantity: str = 'acceleration') -> ModeRanking:
+    """
+    Ranks candidate modes by forward selection: starts for fit_modes and fit_decay from the poles of a chart.
+    
+    At each step the candidate is chosen that, together with those before it, leaves the least squares; residues (of
+    decays: amplitudes and phases per record) are fitted, frequencies and damping ratios are not.
+    
+    Args:
+        responses: Response per record, each of shape (n,).
+        period_s: Time between samples in s, above 0.
+        omega_rad_s: Candidates, undamped natural frequencies in rad/s, shape (n_candidates,), below Nyquist.
+        damping_ratio: Candidates, 0 < zeta < 1, shape (n_candidates,).
+        most: How many to choose, at least 1.
+        forces: Force per record in N at the same instants; None: the records are free decays.
+        quantity: "acceleration", "velocity" or "displacement"; only with forces.
+    
+    Returns:
+        The ranking; shorter than asked for where no candidate explains anything more.
+    
+    Raises:
+        ArgumentError: As fit_modes.
+    
+    Source: this project (orthogonal least squares; S. Chen, S. Billings, W. Luo 1989).
     """
 def rapid_samples(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: ControllerModel) -> numpy.ndarray:
     """

@@ -298,7 +298,7 @@ def test_the_decay_begins_when_the_axis_has_stopped(noise: float, ramp_s: float)
     assert decay.start_s + len(decay.response) * decay.period_s > 1.2
     peaks = decay_spectrum(decay).peaks
     assert len(peaks) >= 2
-    assert sorted(peak.frequency_hz for peak in peaks[:2]) == pytest.approx([46.0, 131.0], abs=0.5)
+    assert sorted(peak.frequency_hz for peak in peaks[:2]) == pytest.approx([46.0, 131.0], abs=1.5)
     assert min(peaks[:2], key=lambda each: each.frequency_hz).label.startswith("4")
 
 

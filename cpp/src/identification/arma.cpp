@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <numeric>
 #include <string>
 #include <utility>
 
@@ -92,6 +91,14 @@ VectorXd stable(const VectorXd& phi) {
   return changed ? phi_of(poles) : phi;
 }
 
+/// Sum over records of the mean squared residual; infinite without a model.
+double total_squares(const Arma& arma) {
+  return arma.residual_rms.empty()
+             ? std::numeric_limits<double>::infinity()
+             : Eigen::Map<const VectorXd>(arma.residual_rms.data(), static_cast<Index>(arma.residual_rms.size()))
+                   .squaredNorm();
+}
+
 class IteratedLeastSquares {
  public:
   /// `shared`: one numerator of `terms` terms for all records, otherwise one for each.
@@ -106,14 +113,17 @@ class IteratedLeastSquares {
     for (const InputOutput& record : records_) {
       response_squares += record.output.squaredNorm() / static_cast<double>(record.output.size());
     }
+    if (phi.size() > 0) {
+      best = with_numerators(phi);
+      best_squares = total_squares(best);
+    }
     for (int round = 1; round <= rounds; ++round) {
       const VectorXd next = stable(denominator(phi));
       if (!next.allFinite()) break;
       const double change = phi.size() == next.size() ? (next - phi).cwiseAbs().maxCoeff() : 1.0;
       phi = next;
       Arma tried = with_numerators(phi);
-      const double squares = std::accumulate(tried.residual_rms.begin(), tried.residual_rms.end(), 0.0,
-                                             [](double sum, double rms) { return sum + rms * rms; });
+      const double squares = total_squares(tried);
       const bool has_settled = change <= settled_phi * phi.cwiseAbs().maxCoeff() ||
                                std::abs(squares - last_squares) <= settled_squares * squares ||
                                squares <= exact_fit * response_squares;
@@ -199,13 +209,6 @@ void check_modes_asked(int n_modes) {
 
 VectorXd column_of(std::span<const double> values) {
   return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
-}
-
-double total_squares(const Arma& arma) {
-  return arma.residual_rms.empty()
-             ? std::numeric_limits<double>::infinity()
-             : Eigen::Map<const VectorXd>(arma.residual_rms.data(), static_cast<Index>(arma.residual_rms.size()))
-                   .squaredNorm();
 }
 
 /// One unfiltered round.
