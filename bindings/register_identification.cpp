@@ -401,17 +401,17 @@ void register_ranking(py::module_& m) {
       "rank_modes",
       [](const std::vector<VectorArray>& responses, double period_s, const VectorArray& omega_rad_s,
          const VectorArray& damping_ratio, std::size_t most, const std::optional<std::vector<VectorArray>>& forces,
-         const std::string& quantity) {
+         const std::string& quantity, std::size_t kept) {
         const auto records = spans_of(responses, "response");
         const auto taps = forces ? taps_of(*forces, responses) : std::vector<TapSignals>{};
         const NaturalModes candidates = modes_of(omega_rad_s, damping_ratio);
         const Quantity measured = quantity_of(quantity);
         const py::gil_scoped_release released;
-        return forces ? rank_modes(taps, period_s, candidates, most, measured)
-                      : rank_modes(records, period_s, candidates, most);
+        return forces ? rank_modes(taps, period_s, candidates, most, kept, measured)
+                      : rank_modes(records, period_s, candidates, most, kept);
       },
       py::arg("responses"), py::arg("period_s"), py::arg("omega_rad_s"), py::arg("damping_ratio"), py::arg("most"),
-      py::arg("forces") = py::none(), py::arg("quantity") = "acceleration",
+      py::arg("forces") = py::none(), py::arg("quantity") = "acceleration", py::arg("kept") = 0,
       R"(Ranks candidate modes by forward selection: starts for fit_modes and fit_decay from the poles of a chart.
 
 At each step the candidate is chosen that, together with those before it, leaves the least squares; residues (of
@@ -425,6 +425,8 @@ Args:
     most: How many to choose, at least 1.
     forces: Force per record in N at the same instants; None: the records are free decays.
     quantity: "acceleration", "velocity" or "displacement"; only with forces.
+    kept: The first so many candidates are chosen before all others, in their order; handed over as fitted, they leave
+        only what is new to the rest.
 
 Returns:
     The ranking; shorter than asked for where no candidate explains anything more.
