@@ -104,8 +104,8 @@ def test_the_force_window_keeps_the_momentum_and_nothing_else() -> None:
     prepared = one(shifted)
     windowed = prepared.records[0].force_n
     assert windowed is not None
-    assert np.all(windowed[:200] == 0.0)
-    assert np.all(windowed[213:] == 0.0)
+    assert np.all(windowed[:193] == 0.0)
+    assert np.all(windowed[220:] == 0.0)
     np.testing.assert_allclose(windowed, force, atol=1e-9)
     np.testing.assert_allclose(prepared.records[0].response, record.response, atol=1e-9)
     assert any("offset of the force, 40 N" in text for text in prepared.warnings)
