@@ -25,18 +25,11 @@ def write_demo_pictures(demo: TapDemo, folder: str | Path) -> list[str]:
     Raises:
         OSError: the folder cannot be made or a file not be written.
     """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    pictures: dict[str, Callable[[Path, TapDemo], None]] = {
-        "figures2-3-acceleration": plot_acceleration,
-        "deflection": plot_deflection,
+    pictures: dict[str, Callable[[Path], None]] = {
+        "figures2-3-acceleration": lambda file: plot_acceleration(file, demo),
+        "deflection": lambda file: plot_deflection(file, demo),
     }
-    files = []
-    for name, plot in pictures.items():
-        for suffix in canvas.FORMATS:
-            files.append(folder / f"paper003-{name}{suffix}")
-            plot(files[-1], demo)
-    return [str(file) for file in files]
+    return canvas.write_pictures(folder, "paper003", pictures)
 
 
 def plot_acceleration(file: str | Path, demo: TapDemo) -> None:

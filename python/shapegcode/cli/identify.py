@@ -34,7 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "files", metavar="FILE", nargs="*", help="CSV, UFF (dataset 58) or WAV; several taps of the same point together"
     )
     parser.add_argument(
-        "--axis", choices=("x", "y", "z"), default=None, help="use the response along this axis; where the file names none, it is this one"
+        "--axis",
+        choices=("x", "y", "z"),
+        default=None,
+        help="use the response along this axis; where the file names none, it is this one",
     )
     parser.add_argument(
         "--update", metavar="MACHINE.toml", default=None, help="put the supported modes into this machine file"

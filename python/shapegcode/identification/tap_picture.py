@@ -50,8 +50,6 @@ def write_tap_pictures(test: TapTest, folder: str | Path) -> list[str]:
     """
     if test.found is None:
         raise ValueError(f"no model of {', '.join(test.files)}: nothing to draw")
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     pictures: dict[str, Callable[[Path], None]] = {
         "traces": lambda file: plot_traces(file, test),
         "stabilisation": lambda file: plot_stabilisation(file, test),
@@ -62,12 +60,7 @@ def write_tap_pictures(test: TapTest, folder: str | Path) -> list[str]:
         pictures["spectrum"] = lambda file: plot_spectrum(file, test)
     else:
         pictures["response"] = lambda file: plot_response(file, test)
-    files = []
-    for name, plot in pictures.items():
-        for suffix in canvas.FORMATS:
-            files.append(folder / f"identify-{name}{suffix}")
-            plot(files[-1])
-    return [str(file) for file in files]
+    return canvas.write_pictures(folder, "identify", pictures)
 
 
 def plot_traces(file: str | Path, test: TapTest) -> None:
