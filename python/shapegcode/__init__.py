@@ -27,6 +27,9 @@ if TYPE_CHECKING:
         FirStream as FirStream,
     )
     from shapegcode._core import (
+        LinearPlant as LinearPlant,
+    )
+    from shapegcode._core import (
         Mode as Mode,
     )
     from shapegcode._core import (
@@ -95,8 +98,8 @@ if TYPE_CHECKING:
 _HOME = {
     **dict.fromkeys(
         (
-            "ArgumentError", "DesignError", "Fir", "FirStream", "Mode", "NumericError", "Path", "ProgramError",
-            "Segment", "ShapegcodeError", "Shaper", "__version__", "convolved_zv", "grid_polynomial",
+            "ArgumentError", "DesignError", "Fir", "FirStream", "LinearPlant", "Mode", "NumericError", "Path",
+            "ProgramError", "Segment", "ShapegcodeError", "Shaper", "__version__", "convolved_zv", "grid_polynomial",
             "minimal_two_mode", "zv",
         ),
         "_core",
