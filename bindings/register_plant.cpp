@@ -11,6 +11,7 @@
 #include "register.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/plant/linear_plant.hpp"
+#include "shapegcode/plant/modal_response.hpp"
 #include "shapegcode/plant/mode_table.hpp"
 
 namespace py = pybind11;
@@ -106,9 +107,49 @@ Raises:
     NumericError: The result exceeds all numbers.)");
 }
 
+// NumPy owns the result, in the memory order of the command.
+py::array_t<double> modal_response(const py::array_t<double, py::array::forcecast>& command_mm,
+                                   const std::vector<std::vector<Mode>>& modes, double period_s) {
+  ModalResponse plant(modes, period_s);
+  if (command_mm.ndim() != 2) throw Error(ErrorKind::argument, "command must have the shape (n_samples, n_axes)");
+  constexpr auto size = static_cast<py::ssize_t>(sizeof(double));
+  const py::ssize_t rows = command_mm.shape(0);
+  const py::ssize_t columns = command_mm.shape(1);
+  const bool by_row = (command_mm.flags() & py::array::c_style) != 0;
+  py::array_t<double> response({rows, columns}, {by_row ? size * columns : size, by_row ? size : size * rows});
+  const auto stride = [](const py::array& array) {
+    return Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>(array.strides(1) / size, array.strides(0) / size);
+  };
+  using Matrix = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>>;
+  using MutableMatrix = Eigen::Map<Eigen::MatrixXd, 0, Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>>;
+  const Matrix command(command_mm.data(), rows, columns, stride(command_mm));
+  MutableMatrix result(response.mutable_data(), rows, columns, stride(response));
+  {
+    const py::gil_scoped_release release;
+    plant.apply(command, result);
+  }
+  return response;
+}
+
 }  // namespace
 
 void register_plant(py::module_& module) {
+  module.def("plant_response", &modal_response, py::arg("command_mm"), py::arg("modes"), py::arg("period_s"),
+             R"(Response of base-excited modes to a whole record of set-points, exact for set-points linear in between.
+
+What the real-time plant of the core gives sample by sample, to the last bit, at the speed of a batch. At rest at the
+first row.
+
+Args:
+    command_mm: Set-points in mm, shape (n_samples, n_axes), one per period.
+    modes: The modes of each axis; none: the axis follows its command.
+    period_s: Time between samples in s, above 0.
+
+Returns:
+    Positions of the table in mm at the same instants, (n_samples, n_axes), in the memory order of the command.
+
+Raises:
+    ArgumentError: Not as many lists of modes as axes, a command that is not finite, an invalid mode or period.)");
   register_linear_plant(module);
   py::class_<ModeTable>(module, "ModeTable", R"(How a mode depends on where an axis stands. Immutable.
 

@@ -63,6 +63,9 @@ if TYPE_CHECKING:
         minimal_two_mode as minimal_two_mode,
     )
     from shapegcode._core import (
+        plant_response as plant_response,
+    )
+    from shapegcode._core import (
         zv as zv,
     )
     from shapegcode.block_grid import choose_grid as choose_grid
@@ -100,7 +103,7 @@ _HOME = {
         (
             "ArgumentError", "DesignError", "Fir", "FirStream", "LinearPlant", "Mode", "NumericError", "Path",
             "ProgramError", "Segment", "ShapegcodeError", "Shaper", "__version__", "convolved_zv", "grid_polynomial",
-            "minimal_two_mode", "zv",
+            "minimal_two_mode", "plant_response", "zv",
         ),
         "_core",
     ),
