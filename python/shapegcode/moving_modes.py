@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 __all__ = [
     "NO_OFFSET",
     "Offset",
+    "axis_modes",
+    "damping_scale",
     "machine_warnings",
     "mode_tables",
     "moving_axis",
@@ -54,12 +56,41 @@ def still_mode(mode: Mode, part_mass_kg: float | None) -> _core.Mode:
     return _core.ModeTable(0, over.mass_kg, over.frequency_hz, over.damping_ratio or ()).mode_at(nominal, part_mass_kg)
 
 
+def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
+    """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty, its damping at its low end.
+
+    A table over the part's mass is looked up; of one over a position the nominal frequency is taken.
+    """
+    return [
+        [
+            _core.Mode(
+                still.frequency_hz * (1.0 + shift * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
+                still.damping_ratio * damping_scale(mode, shift),
+                still.participation,
+            )
+            for mode in axis.modes
+            for still in (still_mode(mode, machine.shaping.part_mass_kg),)
+        ]
+        for axis in machine.axes.as_tuple()
+    ]
+
+
 def slowest_mode(mode: Mode) -> tuple[float, float]:
-    """Lowest frequency (Hz) and least damping ratio that a mode may have, by its tables."""
+    """Lowest frequency (Hz) by a mode's tables, and least damping ratio by them and by its stated uncertainty."""
     over = mode.frequency_over
+    least = damping_scale(mode, 1.0)
     if over is None:
-        return mode.frequency_hz, mode.damping_ratio
-    return min(over.frequency_hz), min(over.damping_ratio or (mode.damping_ratio,))
+        return mode.frequency_hz, mode.damping_ratio * least
+    return min(over.frequency_hz), min(over.damping_ratio or (mode.damping_ratio,)) * least
+
+
+def damping_scale(mode: Mode, shift: float) -> float:
+    """What a mode's damping ratio is multiplied by where its frequency is moved by `shift` of its uncertainty.
+
+    Both ways it is the lower end of the stated damping that counts. To first order a shaper leaves the same at either
+    end: what counts is how far the pole is off, |dw/w + i dzeta|. Beyond that less damping leaves more.
+    """
+    return 1.0 - abs(shift) * (mode.damping_uncertainty_percent or 0.0) / 100.0
 
 
 def mode_tables(machine: Machine, shift: float = 0.0, offset: Offset = NO_OFFSET) -> list[list[_core.ModeTable]]:
@@ -67,7 +98,7 @@ def mode_tables(machine: Machine, shift: float = 0.0, offset: Offset = NO_OFFSET
 
     Args:
         machine: whose modes.
-        shift: share of each mode's stated uncertainty by which its frequencies are moved.
+        shift: share of each mode's stated uncertainty by which its frequencies are moved; see `damping_scale`.
         offset: from the command's positions to the machine's; where it is None for the axis of a table, the mode
             stays nominal.
     """
@@ -207,7 +238,7 @@ def _table(mode: Mode, shift: float, offset: Offset) -> _core.ModeTable:
         axis,
         [position - start for position in over.abscissa],
         [frequency * scale for frequency in over.frequency_hz],
-        over.damping_ratio or (),
+        [ratio * damping_scale(mode, shift) for ratio in over.damping_ratio or ()],
     )
 
 
