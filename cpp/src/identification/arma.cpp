@@ -19,7 +19,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int most_rounds = 40;
+constexpr int most_least_squares = 40;
 // Relative changes of phi and of the residual's squares at which a round has changed nothing. The coefficients of poles
 // close to each other are hardly determined, so the residual settles before phi does.
 constexpr double settled_phi = 1e-11;
@@ -206,9 +206,9 @@ Arma plain_least_squares(const IteratedLeastSquares& problem) {
 
 /// Starts from the subspace method's poles, and from the plain least squares if that does not settle.
 Arma iterated(const IteratedLeastSquares& problem, const std::vector<Complex>& poles) {
-  Arma arma = problem.from(stable(phi_of(poles)), most_rounds);
+  Arma arma = problem.from(stable(phi_of(poles)), most_least_squares);
   if (!arma.converged) {
-    Arma other = problem.from({}, most_rounds);
+    Arma other = problem.from({}, most_least_squares);
     if (total_squares(other) < total_squares(arma)) arma = std::move(other);
   }
   return arma;
