@@ -63,7 +63,7 @@ class FeedDrive {
   /// At rest at zero. `rtol` relative tolerance (of following error, deflections and speeds), `atol_mm` absolute
   /// tolerance of lengths; that of speeds is 100 atol_mm per second. Throws Error(argument) on parameters or
   /// tolerances outside their range or a period <= 0.
-  FeedDrive(FeedDriveParameters parameters, double period_s, double rtol = 1e-6, double atol_mm = 1e-7);
+  FeedDrive(FeedDriveParameters parameters, double period_s, double rtol = 1e-6, double atol_mm = 1e-6);
   ~FeedDrive();
   FeedDrive(const FeedDrive& other);
   FeedDrive& operator=(const FeedDrive& other);
