@@ -82,7 +82,7 @@ class Drive:
 
     def rate(self, t: float, y: Sequence[float]) -> list[float]:
         """Derivatives of the unknowns."""
-        xm, vm, xt, vt, q, z = y[:6]
+        xm, vm, xt, vt, q, z = map(float, y[:6])
         now = self.now
         setpoint = now.setpoint_m + now.velocity * (t - now.begin_s)
         speed_error = self.kp * (setpoint - (xt if self.scale else xm)) + self.ff * now.velocity - vm
@@ -101,18 +101,18 @@ class Drive:
             bristle,
         ]
         for i, (omega, zeta, _) in enumerate(self.modes):
-            d, v = y[6 + 2 * i], y[7 + 2 * i]
+            d, v = float(y[6 + 2 * i]), float(y[7 + 2 * i])
             rates += [v, -omega * omega * d - 2 * zeta * omega * v - table]
         return rates
 
     def jacobian(self, t: float, y: Sequence[float]) -> Vector:
         """Matrix of the derivatives of `rate`, without force limit and backlash, LuGre friction."""
-        vt, z = y[3], y[5]
+        vt, z = float(y[3]), float(y[5])
         excess = (self.fs - self.fc) * math.exp(-((vt / self.vs) ** 2))
         level = self.fc + excess
         relaxation = self.s0 * abs(vt) / level
         slope = -2 * excess * vt / self.vs**2
-        rate_v = 1 - z * (self.s0 * ((vt > 0) - (vt < 0)) - relaxation * slope) / level
+        rate_v = 1 - z * (self.s0 * math.copysign(1.0, vt) - relaxation * slope) / level
         friction_v = self.viscous + self.s1 * rate_v
         friction_z = self.s0 - self.s1 * relaxation
         m, mt = self.motor_mass, self.table_mass
