@@ -1,4 +1,4 @@
-"""Plants beside SciPy: `python tests/benchmarks/plants.py`.
+"""Feed drives beside SciPy: `python tests/benchmarks/feed_drives.py`.
 
 Two axes with friction (LuGre) and a mode on each table, on a circle of 20 mm at 100 mm/s, one set-point per ms. A tight
 Radau solution of a second implementation says how far each is off.
@@ -7,6 +7,7 @@ Radau solution of a second implementation says how far each is off.
 from __future__ import annotations
 
 import argparse
+import copy
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -21,6 +22,8 @@ from table import Row, Sample, comparison_table, markdown
 
 import feed_drive_reference as reference
 from shapegcode import _core
+from shapegcode.feed_drive import drive_parameters
+from shapegcode.machine import Machine
 
 Vector = npt.NDArray[np.float64]
 
@@ -35,7 +38,7 @@ def _circle(samples: int) -> tuple[Vector, Vector]:
     return 20.0 * np.sin(way / 20.0), 20.0 - 20.0 * np.cos(way / 20.0)
 
 
-def _drive() -> _core.FeedDriveParameters:
+def _drive(forward: float = 0.0) -> _core.FeedDriveParameters:
     friction = _core.FrictionParameters(
         _core.FrictionModel.lugre, viscous_n_s_per_m=1500, coulomb_n=300, static_n=450, stribeck_velocity_m_per_s=0.005,
         bristle_stiffness_n_per_m=3e7, bristle_damping_n_s_per_m=3e4,
@@ -44,6 +47,7 @@ def _drive() -> _core.FeedDriveParameters:
         motor_mass_kg=150, table_mass_kg=400, stiffness_n_per_m=1.2e8, damping_n_s_per_m=1e4, position_gain_per_s=30,
         velocity_gain_n_s_per_m=1.65e5, velocity_integral_time_s=0.02, table_friction=friction,
         motor_friction=_core.FrictionParameters(viscous_n_s_per_m=500), modes=[_core.Mode(46, 0.02)],
+        velocity_feed_forward_ratio=forward, acceleration_feed_forward_ratio=forward,
     )  # fmt: skip
 
 
@@ -101,6 +105,41 @@ def feed_drive_tables(samples: int, repetitions: int) -> tuple[list[Row], list[l
     return rows, table
 
 
+def _evaluations(parameters: _core.FeedDriveParameters, axis: Vector, restart: bool) -> tuple[float, Vector]:
+    """Evaluations of the equations for each set-point, and the responses; a copy has no history and starts anew."""
+    drive = _core.FeedDrive(parameters, _PERIOD_S)
+    evaluations, responses = 0, []
+    for setpoint in axis:
+        if restart:
+            evaluations += drive.rhs_evaluations
+            drive = copy.copy(drive)
+        responses.append(drive.step(setpoint))
+    return (evaluations + drive.rhs_evaluations) / len(axis), np.array(responses)
+
+
+def method_table(samples: int) -> list[list[str]]:
+    """What running on over the set-points is worth, and the substeps of the real-time form, on drives of one axis."""
+    axis = _circle(samples)[0]
+    rows = []
+    drives = {
+        "no feed-forward": _drive(),
+        "speed and acceleration fed forward": _drive(1.0),
+        "vx500, X": drive_parameters(Machine.load("vx500"))[0],
+    }
+    for name, parameters in drives.items():
+        exact = _core.FeedDrive(parameters, _PERIOD_S, 1e-10, 1e-11).play(axis)[:, 0]
+        for restart in (False, True):
+            evaluations, found = _evaluations(parameters, axis, restart)
+            what = "restarted at every set-point" if restart else "running on"
+            error_um = float(np.abs(found - exact).max()) * 1e3
+            rows.append([name, f"FeedDrive, {what}", f"{evaluations:.1f}", f"{error_um:.3f}"])
+        for substeps in (1, 2, 4, 8):
+            found = _core.FeedDriveRealTime(parameters, _PERIOD_S, substeps).play(axis)
+            error_um = float(np.abs(found - exact).max()) * 1e3
+            rows.append([name, f"FeedDriveRealTime, substeps: {substeps}", f"{3 * substeps}", f"{error_um:.3f}"])
+    return rows
+
+
 def main() -> int:
     """Print the tables; 0 if every goal is met."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
@@ -109,7 +148,9 @@ def main() -> int:
     arguments = parser.parse_args()
     rows, table = feed_drive_tables(arguments.samples, arguments.repetitions)
     print(comparison_table(rows), end="\n\n")
-    print(markdown(["two axes with friction, rtol 1e-6", "thousand samples/s", "largest error, µm"], table))
+    print(markdown(["two axes with friction, rtol 1e-6", "thousand samples/s", "largest error, µm"], table), end="\n\n")
+    head = ["drive", "method", "evaluations per set-point", "largest error, µm"]
+    print(markdown(head, method_table(arguments.samples)))
     return 0 if all(row.met is not False for row in rows) else 1
 
 
