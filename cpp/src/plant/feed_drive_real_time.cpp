@@ -1,6 +1,7 @@
 #include "shapegcode/plant/feed_drive_real_time.hpp"
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <string>
 #include <utility>
@@ -33,6 +34,17 @@ constexpr std::array<double, stages> stage_time{0, 0, 1, 1};
 constexpr std::array<double, stages> time_share{0.5, 1.5, 0, 0};
 constexpr std::array<bool, stages> asks_again{true, false, true, true};  // stage 2 stands where stage 1 does
 
+constexpr std::size_t error_stage = 3;  // its k is the difference to the embedded method of second order
+
+// A step whose error is past this share of the motion, or these amounts, is taken again in parts; what a machine can
+// follow stays far below. Twice at most, so that the work is bounded.
+constexpr std::size_t most_divisions = 2;
+constexpr int parts = 4;
+constexpr double error_share = 0.01;
+constexpr double error_length_m = 1e-6;
+constexpr double error_speed_m_per_s = 1e-3;
+constexpr double error_bristle_m = 1e-6;
+
 }  // namespace
 
 struct FeedDriveRealTime::Impl {
@@ -50,8 +62,21 @@ struct FeedDriveRealTime::Impl {
   VectorXd rate = y;
   VectorXd rate_by_time = y;
   std::array<VectorXd, stages> k{y, y, y, y};
+  std::array<VectorXd, most_divisions> before{y, y};
+  VectorXd allowed = y;  // error of a step beside its share of the motion
   DriveMatrix jacobian = DriveMatrix::Zero(equations.layout().modes, equations.layout().modes);
   Eigen::PartialPivLU<DriveMatrix> lu{jacobian};
+
+  Impl(FeedDriveParameters parameters, double period, int steps)
+      : equations(std::move(parameters), period), period_s(period), substeps(steps) {
+    const FeedDriveEquations::Layout& at = equations.layout();
+    allowed.setConstant(error_length_m);
+    allowed[at.speed] = error_speed_m_per_s;
+    allowed[at.table_velocity] = error_speed_m_per_s;
+    if (at.table_bristle >= 0) allowed[at.table_bristle] = error_bristle_m;
+    if (at.motor_bristle >= 0) allowed[at.motor_bristle] = error_bristle_m;
+    for (int i = at.modes + 1; i < at.size; i += 2) allowed[i] = error_speed_m_per_s;
+  }
 
   /// Solves (diagonal - J) k = right in place. The modes only follow the table: each is a 2x2 system of its own.
   void solve(double diagonal, VectorXd& right) const noexcept {
@@ -81,6 +106,26 @@ struct FeedDriveRealTime::Impl {
       rate_by_time[i] = 0.0;
       rate_by_time[i + 1] = -rate_by_time[at.table_velocity];
     }
+  }
+
+  /// Whether the last step can be kept; a value that is not finite cannot.
+  [[nodiscard]] bool is_good() const noexcept {
+    bool good = true;
+    for (Eigen::Index i = 0; i < y.size(); ++i) {
+      good = good && std::abs(k[error_stage][i]) <= allowed[i] + error_share * std::abs(y[i]);
+    }
+    return good;
+  }
+
+  void advance(double step_s, std::size_t divisions) noexcept {
+    if (divisions < most_divisions) before[divisions] = y;
+    substep(step_s);
+    if (divisions == most_divisions || is_good()) {
+      since_s += step_s;
+      return;
+    }
+    y = before[divisions];
+    for (int i = 0; i < parts; ++i) advance(step_s / parts, divisions + 1);
   }
 
   void substep(double step_s) noexcept {
@@ -117,7 +162,7 @@ FeedDriveRealTime::FeedDriveRealTime(FeedDriveParameters parameters, double peri
     throw Error(ErrorKind::argument,
                 std::to_string(substeps) + " substeps in a period, must be 1 ... " + std::to_string(most_substeps));
   }
-  impl_ = std::make_unique<Impl>(Impl{FeedDriveEquations(std::move(parameters), period_s), period_s, substeps});
+  impl_ = std::make_unique<Impl>(std::move(parameters), period_s, substeps);
 }
 
 FeedDriveRealTime::~FeedDriveRealTime() = default;
@@ -146,7 +191,7 @@ double FeedDriveRealTime::step(double setpoint_mm) noexcept {
   const double step_s = self.period_s / self.substeps;
   for (int i = 0; i < self.substeps; ++i) {
     self.since_s = i * step_s;
-    self.substep(step_s);
+    self.advance(step_s, 0);
   }
   self.since_s = self.period_s;
   return response_mm();
