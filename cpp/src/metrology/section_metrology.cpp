@@ -158,9 +158,9 @@ void SectionMetrology::step(const Vector3& command, const Vector3& response) noe
     running->response.add(response_deviation);
   }
   if (count_ == 0) {
-    walls_.sweep(response, response, response_.tracker.s_mm(), response_.tracker.s_mm());
+    walls_.sweep(response, response, response_.tracker.s_mm(), response_.tracker.s_mm(), response_deviation);
   } else {
-    walls_.sweep(response_.last, response, response_.last_foot, response_.tracker.s_mm());
+    walls_.sweep(response_.last, response, response_.last_foot, response_.tracker.s_mm(), response_deviation);
     pass_stations(command_, command, &ArcTrack::command);
     pass_stations(response_, response, &ArcTrack::response);
   }

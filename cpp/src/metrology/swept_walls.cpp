@@ -15,7 +15,10 @@ using Eigen::Vector2d;
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double no_wall = std::numeric_limits<double>::quiet_NaN();
 // The programmed path is swept in chords that leave an arc by no more than this.
-constexpr double chord_error_mm = 1e-6;
+constexpr double chord_error_mm = 1e-5;
+// How far a disc reaches depends on the largest deviation; so far it may have been less than it will be.
+constexpr double least_deviation_mm = 0.01;
+constexpr double growth = 2.0;
 // Where the programmed wall lies further out than the tool's radius by more than this share, another leg made it.
 constexpr double overlap_share = 1e-3;
 constexpr double least_horizontal = 1e-6;
@@ -41,6 +44,8 @@ SweptWalls::SweptWalls(const Path& path, const std::vector<PathSection>& section
   }
   double length = 0.0;
   for (const PathSection& section : sections) length += section.length_mm();
+  deviation_ = least_deviation_mm;
+  least_fall_ = 1.0 / radius_;
   spacing_ = std::max(spacing_mm, length / static_cast<double>(std::max<std::size_t>(1, most_stations)));
   std::size_t cursor = 0;
   for (const PathSection& section : sections) {
@@ -67,10 +72,22 @@ void SweptWalls::take_reference(const Path& path) {
     for (double k = 0.0; k < pieces; ++k) {
       const double from = segment.length_mm * k / pieces;
       const double to = segment.length_mm * (k + 1.0) / pieces;
-      sweep(point_at(segment, from), point_at(segment, to), path.distance_mm(i) + from, path.distance_mm(i) + to);
+      sweep_within(point_at(segment, from), point_at(segment, to), path.distance_mm(i) + from, path.distance_mm(i) + to,
+                   radius_);
+    }
+    // Inside of an arc of radius R a neighbouring disc falls back by w^2 (1/r - 1/R) / 2 at a distance w: less than on
+    // a line.
+    if (segment.kind == SegmentKind::arc) {
+      const double narrowest = std::min(segment.start_radius_mm, segment.end_radius_mm);
+      if (narrowest > radius_) least_fall_ = std::min(least_fall_, 1.0 / radius_ - 1.0 / narrowest);
     }
   }
-  const double limit = radius_ * (1.0 + overlap_share);
+  // The disc at the station itself cuts one radius; chords are a little inside of an arc.
+  for (Station& station : stations_) {
+    station.left = std::max(station.left, radius_);
+    station.right = std::min(station.right, -radius_);
+  }
+  const double limit = radius_ * (1.0 + overlap_share) + chord_error_mm;
   reference_.reserve(stations_.size());
   for (Station& station : stations_) {
     reference_.push_back(
@@ -80,10 +97,21 @@ void SweptWalls::take_reference(const Path& path) {
   }
 }
 
-void SweptWalls::sweep(const Vector3& from, const Vector3& to, double from_foot_mm, double to_foot_mm) noexcept {
-  const double begin = std::min(from_foot_mm, to_foot_mm) - radius_;
-  const double end = std::max(from_foot_mm, to_foot_mm) + radius_;
+void SweptWalls::sweep(const Vector3& from, const Vector3& to, double from_foot_mm, double to_foot_mm,
+                       double deviation_mm) noexcept {
+  deviation_ = std::max(deviation_, std::abs(deviation_mm));
+  // Two discs whose centres deviate by at most d each: one at a distance w reaches beyond the other only where
+  // w^2 / 2 times the fall is below 2 d.
+  const double reach = std::sqrt(4.0 * growth * deviation_ / least_fall_) + overlap_share * radius_ + spacing_;
+  sweep_within(from, to, from_foot_mm, to_foot_mm, std::min(reach, radius_));
+}
+
+void SweptWalls::sweep_within(const Vector3& from, const Vector3& to, double from_foot_mm, double to_foot_mm,
+                              double reach_mm) noexcept {
+  const double begin = std::min(from_foot_mm, to_foot_mm) - reach_mm;
+  const double end = std::max(from_foot_mm, to_foot_mm) + reach_mm;
   const double radius2 = radius_ * radius_;
+  const double fall = 0.5 / radius_;
   const Vector2d a = horizontal(from);
   const Vector2d b = horizontal(to);
   const double length = (b - a).norm();
@@ -96,10 +124,13 @@ void SweptWalls::sweep(const Vector3& from, const Vector3& to, double from_foot_
     const Vector2d pb = b - station->point;
     const double va = pa.dot(n);
     const double vb = pb.dot(n);
-    if (std::max(va, vb) + radius_ <= station->left && std::min(va, vb) - radius_ >= station->right) continue;
     const double ua = pa.x() * n.y() - pa.y() * n.x();
     const double ub = pb.x() * n.y() - pb.y() * n.x();
-    if (std::min(ua, ub) > radius_ || std::max(ua, ub) < -radius_ || n.isZero(0.0)) continue;
+    // A disc at u reaches to sqrt(r^2 - u^2) < r - u^2 / (2 r): most have nothing to add.
+    const double nearest = ua * ub <= 0.0 ? 0.0 : std::min(std::abs(ua), std::abs(ub));
+    const double most = radius_ - nearest * nearest * fall;
+    if (std::max(va, vb) + most <= station->left && std::min(va, vb) - most >= station->right) continue;
+    if (nearest > radius_ || n.isZero(0.0)) continue;
     const auto widen = [&station](double low, double high) {
       station->left = std::max(station->left, high);
       station->right = std::min(station->right, low);

@@ -36,8 +36,10 @@ class SweptWalls {
   SweptWalls(const Path& path, const std::vector<PathSection>& sections, double tool_radius_mm, double spacing_mm,
              std::size_t most_stations = 500'000);
 
-  /// The tool's centre goes from one point to another; the arc lengths are those of their feet on the path.
-  void sweep(const Vector3& from, const Vector3& to, double from_foot_mm, double to_foot_mm) noexcept;
+  /// The tool's centre goes from one point to another; the arc lengths are those of their feet on the path, the
+  /// deviation that of the further one from the path.
+  void sweep(const Vector3& from, const Vector3& to, double from_foot_mm, double to_foot_mm,
+             double deviation_mm) noexcept;
   [[nodiscard]] Profile profile(std::size_t section) const;
   [[nodiscard]] std::size_t station_count(std::size_t section) const noexcept {
     return first_of_[section + 1] - first_of_[section];
@@ -58,9 +60,13 @@ class SweptWalls {
   };
   [[nodiscard]] static Station station_at(const Path& path, double s, std::size_t& cursor);
   void take_reference(const Path& path);
+  void sweep_within(const Vector3& from, const Vector3& to, double from_foot_mm, double to_foot_mm,
+                    double reach_mm) noexcept;
 
   double radius_;
   double spacing_ = 0.0;
+  double deviation_ = 0.0;   // largest so far
+  double least_fall_ = 0.0;  // 1/mm, see sweep()
   std::vector<Station> stations_;
   std::vector<Reference> reference_;
   std::vector<std::size_t> first_of_;  // per section, and the end
