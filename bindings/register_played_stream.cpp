@@ -39,6 +39,15 @@ void register_played_stream(py::module_& module) {
           "Set-points behind every filter, (k, 3), mm.")
       .def_property_readonly(
           "response_mm", [](PlayedChunk& self) { return view(self.response_mm, py::cast(&self)); }, "(k, 3), mm.")
+      .def_property_readonly(
+          "motor_mm", [](PlayedChunk& self) { return view(self.motor_mm, py::cast(&self)); },
+          "Feed drives: motor as travel of the table, (k, 3), mm; modes: (0, 0).")
+      .def_property_readonly(
+          "motor_force_n", [](PlayedChunk& self) { return view(self.motor_force_n, py::cast(&self)); },
+          "Feed drives: force of the motor, (k, 3), N; modes: (0, 0).")
+      .def_property_readonly(
+          "friction_force_n", [](PlayedChunk& self) { return view(self.friction_force_n, py::cast(&self)); },
+          "Feed drives: friction of the table, against its motion, (k, 3), N; modes: (0, 0).")
       .def_property_readonly("line", &lines_of, "Line of the block that is being interpolated, (k,).")
       .def_property_readonly("kind", &kinds_of, "Value of its BlockKind, (k,).");
 

@@ -31,6 +31,24 @@ PlaybackOptions vertical_machine() {
   return options;
 }
 
+std::vector<FeedDriveParameters> three_drives() {
+  FeedDriveParameters drive;
+  drive.motor_mass_kg = 120.0;
+  drive.table_mass_kg = 200.0;
+  drive.stiffness_n_per_m = 1e8;
+  drive.damping_n_s_per_m = 5e3;
+  drive.position_gain_per_s = 50.0;
+  drive.velocity_gain_n_s_per_m = 1e5;
+  drive.velocity_integral_time_s = 0.02;
+  drive.velocity_feed_forward_ratio = 0.5;
+  drive.table_friction = {FrictionModel::lugre, 400.0, 120.0, 180.0, 2e-3, 0.0, 5e7, 2e4};
+  drive.modes = {{46.0, 0.02, 1.0}};
+  std::vector<FeedDriveParameters> drives(3, drive);
+  drives[1].position_gain_per_s = 80.0;
+  drives[2].table_friction = {};
+  return drives;
+}
+
 struct Played {
   std::vector<Vector3> command, response;
   std::vector<std::uint32_t> line;
@@ -235,12 +253,77 @@ TEST_CASE("played stream: modes that vary with position see the machine's coordi
   CHECK(second > 1e-3);
 }
 
+TEST_CASE("played stream: feed drives get the set-points of their axes; their motion and forces are given") {
+  const auto text = program("G90 G94\nG00 X0. Y0. Z0.\nG01 X3. Y1. Z.5 F3000.\nG04 P20\nG00 X0.");
+  const ControllerModel model;
+  PlaybackOptions options = vertical_machine();
+  options.drives = three_drives();
+  PlayedStream stream(text, model, options);
+  const PlayedChunk chunk = stream.read(100'000);
+  REQUIRE(chunk.size() > 100);
+  REQUIRE(chunk.friction_force_n.rows() == chunk.command_mm.rows());
+  double lag = 0.0;
+  for (Eigen::Index axis = 0; axis < axis_count; ++axis) {
+    FeedDrive drive(options.drives[static_cast<std::size_t>(axis)], model.period_s);
+    drive.reset(chunk.command_mm(0, axis));
+    std::size_t different = 0;
+    for (Eigen::Index i = 0; i < chunk.command_mm.rows(); ++i) {
+      const double response = drive.step(chunk.command_mm(i, axis));
+      const bool same = response == chunk.response_mm(i, axis) && drive.motor_mm() == chunk.motor_mm(i, axis) &&
+                        drive.motor_force_n() == chunk.motor_force_n(i, axis) &&
+                        drive.friction_force_n() == chunk.friction_force_n(i, axis);
+      different += same ? 0U : 1U;
+      lag = std::max(lag, std::abs(response - chunk.command_mm(i, axis)));
+    }
+    CHECK(different == 0);
+  }
+  CHECK(lag > 0.1);
+}
+
+TEST_CASE("playback: residual and settling time of both plants are those of a long rest") {
+  const auto path = some_path();
+  MotionLimits limits;
+  limits.time_constant_s = 0.03;
+  const auto profile = std::make_shared<const SpeedProfile>(plan_speed(*path, limits));
+  PlaybackOptions options = vertical_machine();
+  options.settling_band_mm = 0.002;
+  options.settling_limit_s = 1.5;
+  for (const bool driven : {false, true}) {
+    CAPTURE(driven);
+    if (driven) options.drives = three_drives();
+    const PlaybackFigures figures = play_path(path, profile, options);
+    const Played rest = drained(PlayedStream(path, profile, options, 2.0), 1000);
+    const auto stop = static_cast<std::size_t>(std::lround(figures.duration_s / options.period_s));
+    for (Eigen::Index axis = 0; axis < axis_count; ++axis) {
+      double settling = 0.0;
+      double residual = 0.0;
+      for (std::size_t i = stop; i < rest.line.size(); ++i) {
+        const double deflection = std::abs(rest.response[i][axis] - rest.command[i][axis]);
+        residual = std::max(residual, deflection);
+        if (deflection > options.settling_band_mm) {
+          settling = static_cast<double>(i + 1 - stop) * options.period_s;
+        }
+      }
+      // A copied drive goes on with the same accuracy, not the same digits; modes peak between set-points too.
+      CHECK(figures.settling_s[axis] == doctest::Approx(settling).epsilon(driven ? 0.002 : 0.03));
+      CHECK(figures.residual_mm[axis] == doctest::Approx(residual).epsilon(driven ? 1e-4 : 0.03));
+    }
+    CHECK(figures.settling_s.maxCoeff() > 0.05);
+    options.settling_limit_s = 0.02;
+    CHECK(std::isinf(play_path(path, profile, options).settling_s.maxCoeff()));
+    options.settling_limit_s = 1.5;
+  }
+}
+
 TEST_CASE("played stream: what cannot be is refused") {
   const auto text = program(whole_program);
   const ControllerModel model;
   PlaybackOptions options = vertical_machine();
   CHECK_THROWS_AS(PlayedStream(text, model, options, {Vector3::Zero()}), Error);
   CHECK_THROWS_AS(PlayedStream(text, model, options, {}, -1.0), Error);
+  options.drives.resize(2, three_drives()[0]);
+  CHECK_THROWS_AS(PlayedStream(text, model, options), Error);
+  options.drives.clear();
   options.period_s = 0.002;
   CHECK_THROWS_AS(PlayedStream(text, model, options), Error);
 }

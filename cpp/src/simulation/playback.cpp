@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "axis_plant.hpp"
 #include "filter_chain.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/metrology/corner_reach.hpp"
@@ -34,7 +35,7 @@ class Recorder {
   Recorder(const Path& path, const PlaybackOptions& options, bool command_on_path)
       : options_(options),
         filters_(options.axis_filters),
-        plant_(options.modes, options.period_s, options.mode_tables),
+        plant_(options),
         tracks_contour_(options.measure_contour && path.length_mm() > 0.0),
         tracks_command_(tracks_contour_ && options.measure_command && !command_on_path),
         command_tracker_(tracks_contour_ ? tracker_of(path, options) : ContourTracker(a_point())),
@@ -95,7 +96,9 @@ class Recorder {
     }
     figures_.duration_s = static_cast<double>(last_moving_) * options_.period_s;
     figures_.peak_mm = peak_.cwiseMax(at_rest_plant_.peak());
-    figures_.residual_mm = at_rest_plant_.residual_peak();
+    const detail::AtRest rest = at_rest_plant_.at_rest(last_, options_.settling_band_mm, options_.settling_limit_s);
+    figures_.residual_mm = rest.residual_mm;
+    figures_.settling_s = rest.settling_s;
     figures_.peak_acceleration_mm_per_s2 = acceleration_ / (options_.period_s * options_.period_s);
     figures_.end_mm = last_;
     if (tracks_contour_) {
@@ -152,8 +155,8 @@ class Recorder {
 
   const PlaybackOptions& options_;
   detail::FilterChain filters_;
-  ModalPlant plant_;
-  ModalPlant at_rest_plant_ = plant_;
+  detail::AxisPlant plant_;
+  detail::AxisPlant at_rest_plant_ = plant_;
   bool tracks_contour_;
   bool tracks_command_;
   ContourTracker command_tracker_;

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "axis_plant.hpp"
 #include "filter_chain.hpp"
 #include "program_set_points.hpp"
 #include "shapegcode/error.hpp"
@@ -58,9 +59,7 @@ class Run {
 
 struct PlayedStream::Impl {
   Impl(Source set_points, const PlaybackOptions& options, double rest_s, std::vector<Vector3> offsets = {})
-      : source(std::move(set_points)),
-        plant(options.modes, options.period_s, options.mode_tables),
-        region_offsets_mm(std::move(offsets)) {
+      : source(std::move(set_points)), plant(options), region_offsets_mm(std::move(offsets)) {
     if (!(rest_s >= 0.0) || !std::isfinite(rest_s)) {
       throw Error(ErrorKind::argument, "rest of " + std::to_string(rest_s) + " s must be finite and >= 0");
     }
@@ -97,7 +96,7 @@ struct PlayedStream::Impl {
   }
 
   Source source;
-  ModalPlant plant;
+  detail::AxisPlant plant;
   std::vector<Vector3> region_offsets_mm;
   std::uint64_t rest_samples = 0;
   std::uint64_t sample = 0;
@@ -161,22 +160,33 @@ PlayedStream& PlayedStream::operator=(PlayedStream&&) noexcept = default;
 PlayedChunk PlayedStream::read(std::size_t most) {
   PlayedChunk chunk;
   chunk.first_sample = impl_->sample;
-  const auto rows = static_cast<Eigen::Index>(most);
-  chunk.command_mm.resize(rows, axis_count);
-  chunk.response_mm.resize(rows, axis_count);
+  const std::vector<FeedDrive>& drives = impl_->plant.drives();
+  std::vector<Eigen::MatrixXd*> columns = {&chunk.command_mm, &chunk.response_mm};
+  if (!drives.empty()) {
+    columns.insert(columns.end(), {&chunk.motor_mm, &chunk.motor_force_n, &chunk.friction_force_n});
+  }
+  for (Eigen::MatrixXd* column : columns) {
+    column->resize(static_cast<Eigen::Index>(most), axis_count);
+  }
   chunk.line.reserve(most);
   chunk.kind.reserve(most);
   while (chunk.line.size() < most && impl_->step()) {
     const auto row = static_cast<Eigen::Index>(chunk.line.size());
     chunk.command_mm.row(row) = impl_->now.position_mm;
     chunk.response_mm.row(row) = impl_->response;
+    for (std::size_t i = 0; i < drives.size(); ++i) {
+      const auto axis = static_cast<Eigen::Index>(i);
+      chunk.motor_mm(row, axis) = drives[i].motor_mm() - impl_->offset(impl_->region)[axis];
+      chunk.motor_force_n(row, axis) = drives[i].motor_force_n();
+      chunk.friction_force_n(row, axis) = drives[i].friction_force_n();
+    }
     chunk.line.push_back(impl_->now.line);
     chunk.kind.push_back(impl_->now.kind);
   }
-  const auto found = static_cast<Eigen::Index>(chunk.line.size());
-  if (found < rows) {
-    chunk.command_mm.conservativeResize(found, axis_count);
-    chunk.response_mm.conservativeResize(found, axis_count);
+  if (chunk.size() < most) {
+    for (Eigen::MatrixXd* column : columns) {
+      column->conservativeResize(static_cast<Eigen::Index>(chunk.size()), axis_count);
+    }
   }
   return chunk;
 }

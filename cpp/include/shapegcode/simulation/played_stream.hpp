@@ -16,9 +16,13 @@ namespace shapegcode {
 
 /// A stretch of a played motion, one row per interpolation period.
 struct PlayedChunk {
-  std::uint64_t first_sample = 0;   ///< its time is first_sample * period
-  Eigen::MatrixXd command_mm;       ///< set-points behind every filter, (k, 3)
-  Eigen::MatrixXd response_mm;      ///< (k, 3)
+  std::uint64_t first_sample = 0;  ///< its time is first_sample * period
+  Eigen::MatrixXd command_mm;      ///< set-points behind every filter, (k, 3)
+  Eigen::MatrixXd response_mm;     ///< (k, 3)
+  /// Feed drives only, otherwise without rows: motor as travel of the table, its force, friction of the table, (k, 3).
+  Eigen::MatrixXd motor_mm;
+  Eigen::MatrixXd motor_force_n;
+  Eigen::MatrixXd friction_force_n;
   std::vector<std::uint32_t> line;  ///< of the block that is being interpolated
   std::vector<BlockKind> kind;      ///< what that block is
 
@@ -49,7 +53,8 @@ class PlayedStream {
   PlayedStream(PlayedStream&&) noexcept;
   PlayedStream& operator=(PlayedStream&&) noexcept;
 
-  /// The next rows, at most `most`; none behind the end. Throws Error(argument) on a block of a program without a feed.
+  /// The next rows, at most `most`; none behind the end. Throws Error(argument) on a block of a program without a
+  /// feed, Error(numeric) where the integrator of a drive fails.
   [[nodiscard]] PlayedChunk read(std::size_t most);
   /// Passes over the next rows, at most `most`, playing them; returns how many there were.
   std::uint64_t skip(std::uint64_t most);
