@@ -22,4 +22,5 @@ PYBIND11_MODULE(_core, module) {
   register_emission(module);
   register_simulation(module);
   register_timing(module);
+  register_played_stream(module);
 }

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -2901,6 +2901,64 @@ class InterpolatedTime:
     def total_s(self) -> float:
         """
         Sum of the parts below, s.
+        """
+class PlayedChunk:
+    """
+    A stretch of a played motion, one row per period.
+    """
+    def __len__(self) -> int:
+        ...
+    @property
+    def command_mm(self) -> numpy.ndarray:
+        """
+        Set-points behind every filter, (k, 3), mm.
+        """
+    @property
+    def first_sample(self) -> int:
+        """
+        Number of its first sample; time is number * period.
+        """
+    @property
+    def kind(self) -> numpy.ndarray:
+        """
+        Value of its BlockKind, (k,).
+        """
+    @property
+    def line(self) -> numpy.ndarray:
+        """
+        Line of the block that is being interpolated, (k,).
+        """
+    @property
+    def response_mm(self) -> numpy.ndarray:
+        """
+        (k, 3), mm.
+        """
+class PlayedStream:
+    """
+    A motion played through filters and plant and handed out in pieces.
+    """
+    @staticmethod
+    def of_blocks(blocks: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: PlaybackOptions, rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> PlayedStream:
+        """
+        Blocks at their feed.
+        """
+    @staticmethod
+    def of_path(path: Path, profile: SpeedProfile, options: PlaybackOptions, rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> PlayedStream:
+        """
+        A path under a speed profile; behind its end the set-points rest for rest_s.
+        """
+    @staticmethod
+    def of_program(program: ProgramText, model: ControllerModel, options: PlaybackOptions, region_offsets_mm: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]] = [], rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> PlayedStream:
+        """
+        A whole program on one time axis. region_offsets_mm: from the positions of each region to the machine's, for modes that vary with them. Raises ArgumentError on a model that no controller can have.
+        """
+    def read(self, most: typing.SupportsInt | typing.SupportsIndex) -> PlayedChunk:
+        """
+        The next rows, at most so many; none behind the end.
+        """
+    def skip(self, most: typing.SupportsInt | typing.SupportsIndex) -> int:
+        """
+        Play the next rows, at most so many, without giving them; returns how many there were.
         """
 def acceleration_filters(model: ControllerModel) -> list[Fir]:
     """

@@ -60,17 +60,47 @@ void keep_silent(int, const char*, const char*, char*, void*) {}
 
 Eigen::Map<VectorXd> map_of(N_Vector vector) { return {N_VGetArrayPointer(vector), N_VGetLength(vector)}; }
 
+/// Two functions as a system.
+class FunctionSystem final : public OdeSystem {
+ public:
+  FunctionSystem(OdeSolver::Rhs rhs, OdeSolver::Jacobian jacobian, Eigen::Index size)
+      : rhs_(std::move(rhs)), jacobian_(std::move(jacobian)), size_(size) {
+    if (!rhs_ || !jacobian_) {
+      throw Error(ErrorKind::argument, "an initial value problem needs a right side and a Jacobian");
+    }
+  }
+  void rate(double t, const double* y, double* rate) override {
+    Eigen::Map<VectorXd> result(rate, size_);
+    rhs_(t, Eigen::Map<const VectorXd>(y, size_), result);
+  }
+  void jacobian(double t, const double* y, double* matrix) override {
+    Eigen::Map<Eigen::MatrixXd> result(matrix, size_, size_);
+    jacobian_(t, Eigen::Map<const VectorXd>(y, size_), result);
+  }
+
+ private:
+  OdeSolver::Rhs rhs_;
+  OdeSolver::Jacobian jacobian_;
+  Eigen::Index size_;
+};
+
 }  // namespace
 
+void OdeSystem::magnitudes(double, const double* y, Eigen::Ref<VectorXd> magnitude) {
+  magnitude = Eigen::Map<const VectorXd>(y, magnitude.size()).cwiseAbs();
+}
+
 struct OdeSolver::Impl {
-  Rhs rhs;
-  Jacobian jacobian;
+  std::unique_ptr<FunctionSystem> functions;  // null: the system is another's
+  OdeSystem* system = nullptr;
   VectorXd state;
+  double rtol = 0.0;
+  VectorXd atol;
   double time = 0.0;
   bool failed = false;
   long steps_before_restart = 0;
   long evaluations = 0;
-  std::exception_ptr thrown;  // by rhs or jacobian, kept while C code is on the stack
+  std::exception_ptr thrown;  // by the system, kept while C code is on the stack
 
   // Freed in reverse order: the context last.
   Context context;
@@ -79,9 +109,11 @@ struct OdeSolver::Impl {
   LinearSolver linear_solver;
   Cvode cvode;
 
+  void open(const VectorXd& y0, double t0, double relative, const VectorXd& absolute);
   static int call_rhs(realtype t, N_Vector y, N_Vector rate, void* self) noexcept;
   static int call_jacobian(realtype t, N_Vector y, N_Vector rate, SUNMatrix jacobian, void* self, N_Vector, N_Vector,
                            N_Vector) noexcept;
+  static int call_weights(N_Vector y, N_Vector weights, void* self) noexcept;
 
   void check(int flag, const char* call) {
     if (flag >= 0) return;
@@ -105,9 +137,8 @@ int OdeSolver::Impl::call_rhs(realtype t, N_Vector y, N_Vector rate, void* self_
   auto& self = *static_cast<Impl*>(self_pointer);
   try {
     ++self.evaluations;
-    Eigen::Map<VectorXd> result = map_of(rate);
-    self.rhs(t, map_of(y), result);
-    return result.allFinite() ? 0 : recoverable;
+    self.system->rate(t, N_VGetArrayPointer(y), N_VGetArrayPointer(rate));
+    return map_of(rate).allFinite() ? 0 : recoverable;
   } catch (...) {
     self.thrown = std::current_exception();
     return unrecoverable;
@@ -121,8 +152,23 @@ int OdeSolver::Impl::call_jacobian(realtype t, N_Vector y, N_Vector, SUNMatrix j
     Eigen::Map<Eigen::MatrixXd> result(SUNDenseMatrix_Data(jacobian), SUNDenseMatrix_Rows(jacobian),
                                        SUNDenseMatrix_Columns(jacobian));
     result.setZero();
-    self.jacobian(t, map_of(y), result);
+    self.system->jacobian(t, N_VGetArrayPointer(y), result.data());
     return result.allFinite() ? 0 : recoverable;
+  } catch (...) {
+    self.thrown = std::current_exception();
+    return unrecoverable;
+  }
+}
+
+int OdeSolver::Impl::call_weights(N_Vector y, N_Vector weights, void* self_pointer) noexcept {
+  auto& self = *static_cast<Impl*>(self_pointer);
+  try {
+    double t = self.time;
+    CVodeGetCurrentTime(self.cvode.get(), &t);
+    Eigen::Map<VectorXd> weight = map_of(weights);
+    self.system->magnitudes(t, N_VGetArrayPointer(y), weight);
+    weight = (self.rtol * weight + self.atol).cwiseInverse();
+    return weight.allFinite() ? 0 : unrecoverable;
   } catch (...) {
     self.thrown = std::current_exception();
     return unrecoverable;
@@ -134,45 +180,53 @@ OdeSolver::OdeSolver(Rhs rhs, Jacobian jacobian, const VectorXd& y0, double t0, 
 
 OdeSolver::OdeSolver(Rhs rhs, Jacobian jacobian, const VectorXd& y0, double t0, double rtol, const VectorXd& atol)
     : impl_(std::make_unique<Impl>()) {
-  if (!rhs || !jacobian) throw Error(ErrorKind::argument, "an initial value problem needs a right side and a Jacobian");
+  impl_->functions = std::make_unique<FunctionSystem>(std::move(rhs), std::move(jacobian), y0.size());
+  impl_->system = impl_->functions.get();
+  impl_->open(y0, t0, rtol, atol);
+}
+
+OdeSolver::OdeSolver(OdeSystem& system, const VectorXd& y0, double t0, double rtol, const VectorXd& atol)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->system = &system;
+  impl_->open(y0, t0, rtol, atol);
+}
+
+void OdeSolver::Impl::open(const VectorXd& y0, double t0, double relative, const VectorXd& absolute) {
   if (y0.size() == 0 || !y0.allFinite() || !std::isfinite(t0)) {
     throw Error(ErrorKind::argument,
                 "initial state of " + std::to_string(y0.size()) + " values must be finite and not empty");
   }
-  if (!std::isfinite(rtol) || !(rtol > 0.0)) {
-    throw Error(ErrorKind::argument, "relative tolerance " + std::to_string(rtol) + " must be above 0");
+  if (!std::isfinite(relative) || !(relative > 0.0)) {
+    throw Error(ErrorKind::argument, "relative tolerance " + std::to_string(relative) + " must be above 0");
   }
-  if (atol.size() != y0.size() || !atol.allFinite() || !(atol.minCoeff() >= 0.0)) {
+  if (absolute.size() != y0.size() || !absolute.allFinite() || !(absolute.minCoeff() >= 0.0)) {
     throw Error(ErrorKind::argument, "absolute tolerances must be one per unknown, finite and not below 0");
   }
-  Impl& self = *impl_;
-  self.rhs = std::move(rhs);
-  self.jacobian = std::move(jacobian);
-  self.state = y0;
-  self.time = t0;
+  state = y0;
+  time = t0;
+  rtol = relative;
+  atol = absolute;
 
-  SUNContext context = nullptr;
-  self.check(SUNContext_Create(nullptr, &context), "SUNContext_Create");
-  self.context.reset(context);
+  SUNContext created = nullptr;
+  check(SUNContext_Create(nullptr, &created), "SUNContext_Create");
+  context.reset(created);
   const auto size = static_cast<sunindextype>(y0.size());
-  self.y.reset(N_VNew_Serial(size, context));
-  const Vector tolerances(N_VNew_Serial(size, context));
-  self.matrix.reset(SUNDenseMatrix(size, size, context));
-  self.cvode.reset(CVodeCreate(CV_BDF, context));
-  if (!self.y || !tolerances || !self.matrix || !self.cvode) throw std::bad_alloc();
-  self.linear_solver.reset(SUNLinSol_Dense(self.y.get(), self.matrix.get(), context));
-  if (!self.linear_solver) throw std::bad_alloc();
+  y.reset(N_VNew_Serial(size, created));
+  matrix.reset(SUNDenseMatrix(size, size, created));
+  cvode.reset(CVodeCreate(CV_BDF, created));
+  if (!y || !matrix || !cvode) throw std::bad_alloc();
+  linear_solver.reset(SUNLinSol_Dense(y.get(), matrix.get(), created));
+  if (!linear_solver) throw std::bad_alloc();
 
-  map_of(self.y.get()) = y0;
-  map_of(tolerances.get()) = atol;
-  void* const cvode = self.cvode.get();
-  self.check(CVodeSetErrHandlerFn(cvode, keep_silent, nullptr), "CVodeSetErrHandlerFn");
-  self.check(CVodeInit(cvode, &Impl::call_rhs, t0, self.y.get()), "CVodeInit");
-  self.check(CVodeSetUserData(cvode, &self), "CVodeSetUserData");
-  self.check(CVodeSVtolerances(cvode, rtol, tolerances.get()), "CVodeSVtolerances");
-  self.check(CVodeSetLinearSolver(cvode, self.linear_solver.get(), self.matrix.get()), "CVodeSetLinearSolver");
-  self.check(CVodeSetJacFn(cvode, &Impl::call_jacobian), "CVodeSetJacFn");
-  self.check(CVodeSetMaxNumSteps(cvode, most_steps_per_advance), "CVodeSetMaxNumSteps");
+  map_of(y.get()) = y0;
+  void* const memory = cvode.get();
+  check(CVodeSetErrHandlerFn(memory, keep_silent, nullptr), "CVodeSetErrHandlerFn");
+  check(CVodeInit(memory, &Impl::call_rhs, t0, y.get()), "CVodeInit");
+  check(CVodeSetUserData(memory, this), "CVodeSetUserData");
+  check(CVodeWFtolerances(memory, &Impl::call_weights), "CVodeWFtolerances");
+  check(CVodeSetLinearSolver(memory, linear_solver.get(), matrix.get()), "CVodeSetLinearSolver");
+  check(CVodeSetJacFn(memory, &Impl::call_jacobian), "CVodeSetJacFn");
+  check(CVodeSetMaxNumSteps(memory, most_steps_per_advance), "CVodeSetMaxNumSteps");
 }
 
 OdeSolver::~OdeSolver() = default;
@@ -220,6 +274,13 @@ void OdeSolver::restart(const VectorXd& y, double t) {
   map_of(self.y.get()) = y;
   self.check(CVodeReInit(cvode, t, self.y.get()), "CVodeReInit");
   self.failed = false;
+}
+
+void OdeSolver::limit_step(double longest) {
+  if (!std::isfinite(longest) || !(longest > 0.0)) {
+    throw Error(ErrorKind::argument, "longest step " + std::to_string(longest) + " must be above 0");
+  }
+  impl_->check(CVodeSetMaxStep(impl_->cvode.get(), longest), "CVodeSetMaxStep");
 }
 
 double OdeSolver::time() const noexcept { return impl_->time; }

@@ -7,6 +7,25 @@
 
 namespace shapegcode {
 
+/// Right side and Jacobian of y' = f(t, y) as the inner loop calls them: no allocation, no copies.
+class OdeSystem {
+ public:
+  OdeSystem() = default;
+  virtual ~OdeSystem() = default;
+  OdeSystem(const OdeSystem&) = delete;
+  OdeSystem& operator=(const OdeSystem&) = delete;
+  OdeSystem(OdeSystem&&) = delete;
+  OdeSystem& operator=(OdeSystem&&) = delete;
+
+  /// Writes f(t, y) into `rate`.
+  virtual void rate(double t, const double* y, double* rate) = 0;
+  /// Writes df/dy column by column into `matrix`, which comes filled with zeros.
+  virtual void jacobian(double t, const double* y, double* matrix) = 0;
+  /// Writes the magnitude of each unknown that the relative tolerance is taken of: |y|, unless a problem knows better
+  /// (a position may be large where only its distance from another counts).
+  virtual void magnitudes(double t, const double* y, Eigen::Ref<Eigen::VectorXd> magnitude);
+};
+
 /// A stiff initial value problem y' = f(t, y), solved by backward differentiation (CVODE) with an analytic Jacobian.
 /// The only class behind which SUNDIALS is used.
 class OdeSolver {
@@ -23,6 +42,8 @@ class OdeSolver {
   OdeSolver(Rhs rhs, Jacobian jacobian, const Eigen::VectorXd& y0, double t0, double rtol, double atol);
   /// One absolute tolerance per unknown, for states of different units.
   OdeSolver(Rhs rhs, Jacobian jacobian, const Eigen::VectorXd& y0, double t0, double rtol, const Eigen::VectorXd& atol);
+  /// The same without std::function in the inner loop; `system` must outlive the solver.
+  OdeSolver(OdeSystem& system, const Eigen::VectorXd& y0, double t0, double rtol, const Eigen::VectorXd& atol);
   ~OdeSolver();
   OdeSolver(OdeSolver&&) noexcept;
   OdeSolver& operator=(OdeSolver&&) noexcept;
@@ -34,12 +55,16 @@ class OdeSolver {
   /// Throws what `rhs` or `jacobian` threw; Error(numeric) with CVODE's flag and the time when the solver fails;
   /// Error(argument) if `t` lies before time(). After a failure only restart() continues.
   const Eigen::VectorXd& advance(double t, bool stop_exactly = true);
-  /// Continues at time() from `y`: call it where f or its inputs jump (running on over a jump ends in CV_ERR_FAILURE).
-  /// CVODE forgets its history, as it must, and searches a first step again: handing it the step accepted after the
-  /// last restart was measured and saves nothing (5 % of the evaluations, at 10-25 % more steps).
+  /// Continues at time() from `y`: call it where f jumps (running on over a jump ends in CV_ERR_FAILURE). CVODE forgets
+  /// its history, as it must, and searches a first step again. Handing it one was measured and saves little: on a feed
+  /// drive 10 % of the evaluations, none of the steps. Where f has only kinks do not restart: the history is worth more
+  /// (twice the speed at a tenth of the error, docs/plants.md).
   void restart(const Eigen::VectorXd& y);
   /// The same with another time, e.g. for the next run of the same plant.
   void restart(const Eigen::VectorXd& y, double t);
+  /// No step is longer than this (s) from now on. Half the distance between two stops makes the steps fit between them:
+  /// a short last step before a stop costs more than it covers. Throws Error(argument) on a value <= 0.
+  void limit_step(double longest);
 
   [[nodiscard]] double time() const noexcept;
   [[nodiscard]] const Eigen::VectorXd& state() const noexcept;

@@ -1,0 +1,103 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "shapegcode/mode.hpp"
+#include "shapegcode/plant/friction.hpp"
+
+namespace shapegcode {
+
+/// What the position loop compares with the set-point.
+enum class PositionFeedback : std::uint8_t {
+  motor,  ///< encoder on the motor (semi-closed loop)
+  table,  ///< linear scale on the table (fully closed loop)
+};
+
+/// Feed drive of one axis, SI, everything referred to the travel of the table.
+struct FeedDriveParameters {
+  double motor_mass_kg = 0.0;                                    ///< inertia of motor, coupling and screw; > 0
+  double table_mass_kg = 0.0;                                    ///< table with what it carries; > 0
+  double stiffness_n_per_m = 0.0;                                ///< motor to table, axial; > 0
+  double damping_n_s_per_m = 0.0;                                ///< beside the stiffness; >= 0
+  double backlash_m = 0.0;                                       ///< whole gap; >= 0
+  FrictionParameters table_friction;                             ///< guideways
+  FrictionParameters motor_friction;                             ///< bearings, seals, nut
+  PositionFeedback position_feedback = PositionFeedback::motor;  ///< the speed is always taken from the motor
+  double position_gain_per_s = 0.0;                              ///< > 0
+  double velocity_gain_n_s_per_m = 0.0;                          ///< force over speed error; > 0
+  double velocity_integral_time_s = 0.0;                         ///< of the speed controller; 0: none
+  double velocity_feed_forward_ratio = 0.0;                      ///< 0 ... 1: share of the set-points' speed
+  double acceleration_feed_forward_ratio = 0.0;                  ///< 0 ... 1: share of acceleration times both masses
+  double force_limit_n = 0.0;                                    ///< of the motor; 0: none
+  std::vector<Mode> modes;                                       ///< of the structure, excited by the table
+
+  /// Throws Error(argument) with the value and its limit.
+  void check() const;
+};
+
+/// x' = A x + B w, y = C x + D w with inputs that are linear between the set-points.
+struct FeedDriveLinearModel {
+  Eigen::MatrixXd a;
+  /// Column 0: set-point. Column 1, only where there is acceleration feed-forward: speed of the set-points, whose
+  /// sample at a set-point is the difference to the one before over the period.
+  Eigen::MatrixXd b;
+  Eigen::MatrixXd c;  ///< one row: response (table and modes)
+  Eigen::MatrixXd d;
+};
+
+/// The drive without what is not linear: friction other than viscous, backlash or a force limit make it throw
+/// Error(argument). Lengths in any one unit, s. At rest at a set-point r the state is r times `a^-1 b` reversed in
+/// sign.
+[[nodiscard]] FeedDriveLinearModel linear_model(const FeedDriveParameters& parameters);
+
+/// Motor, ball screw and table of one axis with its position and speed controller, integrated by CVODE (BDF with an
+/// analytic Jacobian). Set-points come once per period and are joined by straight lines; the speed that is fed forward
+/// steps at each of them. A copy takes over the state, not the integrator's history: its next step is as accurate, but
+/// not the same to the last digit. docs/plants.md has the equations.
+class FeedDrive {
+ public:
+  /// At rest at zero. `rtol` relative tolerance (of following error, deflections and speeds), `atol_mm` absolute
+  /// tolerance of lengths; that of speeds is 100 atol_mm per second. Throws Error(argument) on parameters or
+  /// tolerances outside their range or a period <= 0.
+  FeedDrive(FeedDriveParameters parameters, double period_s, double rtol = 1e-6, double atol_mm = 1e-6);
+  ~FeedDrive();
+  FeedDrive(const FeedDrive& other);
+  FeedDrive& operator=(const FeedDrive& other);
+  FeedDrive(FeedDrive&& other) noexcept;
+  FeedDrive& operator=(FeedDrive&& other) noexcept;
+
+  /// At rest at `position_mm`, without force in spring and bristles.
+  void reset(double position_mm);
+  /// Moves set-point and positions alike: a change of coordinates.
+  void shift(double by_mm) noexcept;
+  /// Next set-point; returns the response (table and modes, mm) at that instant. Throws Error(argument) on a set-point
+  /// that is not finite, Error(numeric) with CVODE's flag and the time since reset() when the integrator fails.
+  double step(double setpoint_mm);
+
+  // As of the last set-point.
+  [[nodiscard]] double setpoint_mm() const noexcept;
+  [[nodiscard]] double response_mm() const noexcept;  ///< table and modes
+  [[nodiscard]] double table_mm() const noexcept;
+  [[nodiscard]] double motor_mm() const noexcept;  ///< angle of the motor as travel
+  [[nodiscard]] double table_velocity_mm_per_s() const noexcept;
+  [[nodiscard]] double motor_velocity_mm_per_s() const noexcept;
+  [[nodiscard]] double friction_force_n() const noexcept;  ///< on the table, against its motion
+  [[nodiscard]] double motor_force_n() const noexcept;     ///< torque of the motor as force, within its limit
+  [[nodiscard]] double spring_force_n() const noexcept;    ///< from motor to table
+  [[nodiscard]] double time_s() const noexcept;            ///< since reset()
+  [[nodiscard]] const FeedDriveParameters& parameters() const noexcept;
+
+  /// Internal steps and evaluations of the equations by this object: for tests and reports.
+  [[nodiscard]] long steps() const noexcept;
+  [[nodiscard]] long rhs_evaluations() const noexcept;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace shapegcode
