@@ -16,17 +16,19 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.controller import controller_model
 from shapegcode.converter import written_by_shapegcode
 from shapegcode.machine import Machine
 from shapegcode.metrology_report import measurement_report
-from shapegcode.moving_modes import Offset, machine_warnings, region_offset, region_range_warnings
+from shapegcode.moving_modes import machine_warnings, region_offset, region_range_warnings
 from shapegcode.program import Program
-from shapegcode.verify import play_emitted, play_original, playback_options, vibration_memory_s
+from shapegcode.verify import own_rule, playback_options, vibration_memory_s
 
 __all__ = ["MeasuredProgram", "MeasuredRegion", "Measurement", "WallProfile", "measure"]
 
 FloatArray = npt.NDArray[np.float64]
-_MOST_SAMPLES = 20_000_000  # set-points of a region
+_MOST_SAMPLES = 100_000_000  # set-points of a region: a minute or two of computing
+_CHUNK_SAMPLES = 65_536
 _LONGEST_REST_S = 10.0  # that a vibration is waited for behind a stop
 _LEAST_REST_S = 0.25
 _MOST_PROFILE_STATIONS = 200_000  # kept of each program for pictures
@@ -291,22 +293,20 @@ def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
 def _samples(job: _Job, machine: Machine, shaped: bool) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Command and response of a region, and what follows the stop until the vibration has decayed."""
     offset = region_offset(job.played, machine)
+    rest_s = min(max(vibration_memory_s(machine), _LEAST_REST_S), _LONGEST_REST_S)
     blocks = job.played.path
     if shaped:
-        run = play_emitted(blocks, job.path, machine, contour=False, record_samples=_MOST_SAMPLES, offset=offset)
+        time_constant_s = machine.controller.shaped_time_constant_s
+        options = playback_options(machine, time_constant_s=time_constant_s, offset=offset)
+        stream = _core.PlayedStream.of_blocks(blocks, own_rule(machine), 1.0, options, rest_s)
     else:
-        run = play_original(blocks, machine, record_samples=_MOST_SAMPLES, offset=offset)
-    yield _with_rest(run.recorded_command, job.path, machine, offset)
-
-
-def _with_rest(
-    command: FloatArray, path: _core.Path, machine: Machine, offset: Offset
-) -> tuple[FloatArray, FloatArray]:
-    rest_s = min(max(vibration_memory_s(machine), _LEAST_REST_S), _LONGEST_REST_S)
-    options = playback_options(machine, offset=offset)
-    rest = np.repeat(command[-1:], round(rest_s / options.period_s), axis=0)
-    whole = np.concatenate([command, rest])
-    options.measure_contour = False
-    options.record_samples = len(whole)
-    run = _core.play_samples(np.asfortranarray(whole), path, options)
-    return run.recorded_command, run.recorded_response
+        model = controller_model(machine)
+        options = playback_options(machine, offset=offset)
+        options.axis_filters = _core.acceleration_filters(model)
+        if model.motion == _core.MotionKind.look_ahead:
+            profile = _core.plan_speed(blocks, model.limits)
+            stream = _core.PlayedStream.of_path(blocks, profile, options, rest_s)
+        else:
+            stream = _core.PlayedStream.of_blocks(blocks, model.block_end, 1.0, options, rest_s)
+    while len(chunk := stream.read(_CHUNK_SAMPLES)) > 0:
+        yield chunk.command_mm, chunk.response_mm

@@ -67,6 +67,15 @@ std::span<const double> longest_without_gap(const std::vector<double>& values) {
   return {values.data() + best, best_count};
 }
 
+// While the command stands still the extremes count, the mean does not: it would depend on how long is looked at.
+void add_deviation(DeviationStats& stats, double deviation_mm, bool moves) {
+  const DeviationStats before = stats;
+  stats.add(deviation_mm);
+  if (moves) return;
+  stats.sum_of_squares_mm2 = before.sum_of_squares_mm2;
+  stats.count = before.count;
+}
+
 std::optional<ArcFigures> arc_through(const std::vector<Vector2d>& points, const Vector2d& centre) {
   std::vector<Vector2d> passed;
   passed.reserve(points.size());
@@ -83,11 +92,11 @@ std::optional<ArcFigures> arc_through(const std::vector<Vector2d>& points, const
 
 }  // namespace
 
-double SectionMetrology::Follower::step(const Vector3& p) noexcept {
+double SectionMetrology::Follower::step(const Vector3& p, bool moves) noexcept {
   const double deviation = tracker.step(p);
   reach.step(p, tracker.s_mm());
   orbit.step(p, tracker.segment());
-  whole.add(deviation);
+  add_deviation(whole, deviation, moves);
   return deviation;
 }
 
@@ -145,17 +154,17 @@ void SectionMetrology::step(const Vector3& command, const Vector3& response) noe
   has_moved_ = has_moved_ || moves;
   const Vector3 peak = vibration_.step(command, response);
 
-  const double command_deviation = command_.step(command);
+  const double command_deviation = command_.step(command, moves);
   if (Running* running = running_at(command_.tracker.segment()); running != nullptr) {
-    running->command.add(command_deviation);
+    add_deviation(running->command, command_deviation, moves);
     if (moves) {
       running->time_s += options_.period_s;
       running->peak = running->peak.cwiseMax(peak);
     }
   }
-  const double response_deviation = response_.step(response);
+  const double response_deviation = response_.step(response, moves);
   if (Running* running = running_at(response_.tracker.segment()); running != nullptr) {
-    running->response.add(response_deviation);
+    add_deviation(running->response, response_deviation, moves);
   }
   if (count_ == 0) {
     walls_.sweep(response, response, response_.tracker.s_mm(), response_.tracker.s_mm(), response_deviation);

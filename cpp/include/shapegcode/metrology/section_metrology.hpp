@@ -49,7 +49,7 @@ struct SectionFigures {
   double time_s = 0.0;                ///< while the foot of the command is in it
   Vector3 peak_mm = Vector3::Zero();  ///< largest |response - command| while the command moves
   std::optional<RestVibration> rest;  ///< the worst stop of the command in it (largest residual)
-  DeviationStats command;             ///< signed, from the path; one count per sample
+  DeviationStats command;             ///< signed, from the path; RMS while the command moves
   DeviationStats response;
   std::optional<double> command_orbit_percent;  ///< arcs only; see OrbitError
   std::optional<double> response_orbit_percent;
@@ -122,8 +122,8 @@ class SectionMetrology {
     DeviationStats whole;
     Vector3 last = Vector3::Zero();
     double last_foot = 0.0;
-    /// Deviation of the next point from the path.
-    double step(const Vector3& p) noexcept;
+    /// Deviation of the next point from the path; `moves`: the command does.
+    double step(const Vector3& p, bool moves) noexcept;
   };
 
   void pass_stations(const Follower& follower, const Vector3& p,
