@@ -33,6 +33,14 @@ py::array vector(std::vector<double> values) {
   return py::array_t<double>(static_cast<py::ssize_t>(reference.size()), reference.data(), owner);
 }
 
+py::array points(const std::vector<Eigen::Vector2d>& list) {
+  Eigen::MatrixXd matrix(static_cast<Eigen::Index>(list.size()), 2);
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    matrix.row(static_cast<Eigen::Index>(i)) = list[i];
+  }
+  return take(std::move(matrix));
+}
+
 void register_sections(py::module_& module) {
   py::enum_<SectionKind>(module, "SectionKind", "What a section of a path is.")
       .value("line", SectionKind::line, "Lines of one direction.")
@@ -221,13 +229,16 @@ void register_metrology(py::module_& module) {
               throw py::index_error("section index out of range");
             }
             SweptWalls::Profile profile = self.wall_profile(section);
+            const py::array point = points(profile.point);
+            const py::array normal = points(profile.normal);
             return py::make_tuple(profile.first_mm, profile.spacing_mm, vector(std::move(profile.left)),
-                                  vector(std::move(profile.right)));
+                                  vector(std::move(profile.right)), point, normal);
           },
           py::arg("section"),
           "Distance of the first station from the path's start and spacing, mm; deviation of left and right wall, "
           "(n,), "
-          "mm, positive to the left; NaN where there is no wall.")
+          "mm, positive to the left, NaN where there is no wall; the path's points and left normals seen from above, "
+          "(n, 2).")
       .def_property_readonly("station_spacing_mm", &SectionMetrology::station_spacing_mm,
                              "Largest distance of two stations, mm.");
 }

@@ -8,7 +8,7 @@ cutting forces, the tool's deflection and the marks of its teeth are not in it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +24,7 @@ from shapegcode.moving_modes import machine_warnings, region_offset, region_rang
 from shapegcode.program import Program
 from shapegcode.verify import own_rule, playback_options, vibration_memory_s
 
-__all__ = ["MeasuredProgram", "MeasuredRegion", "Measurement", "WallProfile", "measure"]
+__all__ = ["MeasuredProgram", "MeasuredRegion", "Measurement", "WallProfile", "measure", "measure_run"]
 
 FloatArray = npt.NDArray[np.float64]
 _MOST_SAMPLES = 100_000_000  # set-points of a region: a minute or two of computing
@@ -46,11 +46,15 @@ class WallProfile:
         left_um: deviation of the left wall from what the programmed path cuts, positive to the left, (n,); NaN where
             there is no wall.
         right_um: of the right wall, likewise.
+        point_mm: of the programmed path there, seen from above, (n, 2).
+        normal: unit vectors to the left of the path, (n, 2); zero where it has no horizontal direction.
     """
 
     distance_mm: FloatArray
     left_um: FloatArray
     right_um: FloatArray
+    point_mm: FloatArray
+    normal: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +195,14 @@ def measure(
         regions: list[MeasuredRegion] = []
         kept = 0
         for job in jobs:
-            region = _measure_region(job, machine, is_shaped, options, keep=kept < _MOST_PROFILE_STATIONS)
+            region = measure_run(
+                _samples(job, machine, is_shaped),
+                job.path,
+                job.sections,
+                options,
+                (job.nominal.first_line, job.nominal.last_line),
+                keep_walls=kept < _MOST_PROFILE_STATIONS,
+            )
             kept += sum(wall.distance_mm.size for wall in region.walls if wall is not None)
             regions.append(region)
             done += 1
@@ -199,9 +210,7 @@ def measure(
         warnings = [
             *program.warnings, *machine_warnings(machine), *region_range_warnings(program.regions, machine),
         ]  # fmt: skip
-        measured.append(
-            MeasuredProgram(program.source, is_shaped, nominal.source, tuple(regions), tuple(warnings))
-        )
+        measured.append(MeasuredProgram(program.source, is_shaped, nominal.source, tuple(regions), tuple(warnings)))
     return Measurement(
         machine, tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm, tuple(measured)
     )  # fmt: skip
@@ -273,21 +282,39 @@ def _short_mm(path: _core.Path, machine: Machine, *, own_blocks: bool) -> float:
     return max(_SHORT_MM, _BLOCKS_PER_CURVE * path.fastest_feed_mm_per_s * machine.controller.block_time_s)
 
 
-def _measure_region(
-    job: _Job, machine: Machine, shaped: bool, options: _core.MetrologyOptions, *, keep: bool
+def measure_run(
+    chunks: Iterable[tuple[FloatArray, FloatArray]],
+    path: _core.Path,
+    sections: list[_core.PathSection],
+    options: _core.MetrologyOptions,
+    lines: tuple[int, int],
+    *,
+    keep_walls: bool = True,
 ) -> MeasuredRegion:
-    metrology = _core.SectionMetrology(job.path, job.sections, options)
-    for command, response in _samples(job, machine, shaped):
+    """Measure samples of command and response, wherever they come from.
+
+    Args:
+        chunks: command and response, (n, 3) each, mm, one row per `options.period_s`.
+        path: what was programmed.
+        sections: of this path, in order.
+        options: with what is measured.
+        lines: first and last of the region, for reports.
+        keep_walls: keep the profiles of the walls.
+
+    Raises:
+        ArgumentError: an option outside its range, arrays of other shapes, or values that are not finite.
+    """
+    metrology = _core.SectionMetrology(path, sections, options)
+    for command, response in chunks:
         metrology.feed(command, response)
-    walls = tuple(_wall(metrology, index) if keep else None for index in range(len(job.sections)))
-    return MeasuredRegion(
-        (job.nominal.first_line, job.nominal.last_line), job.path, metrology.finish(), walls
-    )  # fmt: skip
+    walls = tuple(_wall(metrology, index) if keep_walls else None for index in range(len(sections)))
+    return MeasuredRegion(lines, path, metrology.finish(), walls)
 
 
 def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
-    first_mm, spacing_mm, left, right = metrology.wall_profile(index)
-    return WallProfile(first_mm + spacing_mm * np.arange(left.size), left * 1e3, right * 1e3)
+    first_mm, spacing_mm, left, right, point, normal = metrology.wall_profile(index)
+    distance_mm = first_mm + spacing_mm * np.arange(left.size, dtype=np.float64)
+    return WallProfile(distance_mm, left * 1e3, right * 1e3, point, normal)
 
 
 def _samples(job: _Job, machine: Machine, shaped: bool) -> Iterator[tuple[FloatArray, FloatArray]]:

@@ -127,9 +127,7 @@ def _arc(figures: _core.SectionFigures, tool_diameter_mm: float) -> dict[str, An
     }
 
 
-def _circle(
-    arc: _core.ArcFigures | None, nominal_mm: float, figures: _core.SectionFigures
-) -> dict[str, Any] | None:
+def _circle(arc: _core.ArcFigures | None, nominal_mm: float, figures: _core.SectionFigures) -> dict[str, Any] | None:
     if arc is None:
         return None
     offset = (arc.fit.centre_mm - figures.nominal_centre_mm) * 1e3

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.table import Table
 
-__all__ = ["Feature", "features", "measurement_table", "next_step", "section_name", "shown_sections"]
+__all__ = ["Feature", "features", "measurement_tables", "next_step", "section_name"]
 
 _MOST_SECTIONS = 12
+_SIDES = ("left", "right")
 
 Section = Mapping[str, Any]
 
@@ -36,13 +37,19 @@ class Feature:
     out: tuple[bool, ...] = ()
 
 
-def measurement_table(report: Mapping[str, Any]) -> Table:
+def measurement_tables(report: Mapping[str, Any]) -> list[Table]:
+    """One table for the programs that are measured against the same path, which stand side by side in it."""
+    paths = dict.fromkeys(program["measured_against"] for program in report["programs"])
+    groups = [[each for each in report["programs"] if each["measured_against"] == path] for path in paths]
+    return [_table(programs, report) for programs in groups]
+
+
+def _table(programs: Sequence[Mapping[str, Any]], report: Mapping[str, Any]) -> Table:
     """One block of rows per section, one column per program; of many sections the worst ones."""
     from rich.table import Table
     from rich.text import Text
 
-    programs = report["programs"]
-    shown, left_out = shown_sections(report)
+    shown, left_out = _shown_sections(programs)
     machine, diameter = report["machine"], report["tool_diameter_mm"]
     table = Table(title=f"measured on {machine} with a tool of {diameter:g} mm diameter", pad_edge=False)
     table.add_column("section", overflow="fold")
@@ -68,19 +75,15 @@ def measurement_table(report: Mapping[str, Any]) -> Table:
     return table
 
 
-def shown_sections(report: Mapping[str, Any]) -> tuple[list[int], int]:
-    """Indices of the sections that a table shows, in order, and how many are left out.
-
-    Programs with other sections than the first one (each measured against its own path) show what all of them have.
-    """
-    programs = report["programs"]
-    count = min(len(program["sections"]) for program in programs)
+def _shown_sections(programs: Sequence[Mapping[str, Any]]) -> tuple[list[int], int]:
+    """Indices of the sections that a table shows, in order, and how many are left out."""
+    count = len(programs[0]["sections"])
     worst = [
         max(program["sections"][index]["contour_error_um"]["response"]["max"] for program in programs)
         for index in range(count)
     ]
     shown = sorted(sorted(range(count), key=lambda index: -worst[index])[:_MOST_SECTIONS])
-    return shown, max(len(program["sections"]) for program in programs) - len(shown)
+    return shown, count - len(shown)
 
 
 def section_name(section: Section, index: int) -> str:
@@ -95,7 +98,9 @@ def section_name(section: Section, index: int) -> str:
 
 def features(sections: Sequence[Section], report: Mapping[str, Any]) -> Iterator[Feature]:
     """The rows of one section, as it came out in each program."""
-    yield Feature("length mm, time s", f"{sections[0]['length_mm']:.3f}", _each(sections, lambda s: f"{s['time_s']:.3f}"))
+    yield Feature(
+        "length mm, time s", f"{sections[0]['length_mm']:.3f}", _each(sections, lambda s: f"{s['time_s']:.3f}")
+    )
     yield from _contour(sections, report["tolerance_um"]["contour"])
     if sections[0]["arc"] is not None:
         yield from _arc_rows(sections)
@@ -107,15 +112,16 @@ def features(sections: Sequence[Section], report: Mapping[str, Any]) -> Iterator
             "residual at the stop X / Y µm", "", _each(sections, lambda s: _axes(s["residual_vibration_um"], 2))
         )
         band = report["settling_band_um"]
-        yield Feature(f"settled to {band:g} µm X / Y ms", "", _each(sections, lambda s: _settling(s)))
+        yield Feature(f"settled to {band:g} µm X / Y ms", "", _each(sections, _settling))
 
 
 def next_step(report: Mapping[str, Any]) -> str:
     """The one thing to do next, in one sentence."""
     programs = report["programs"]
     if not report["within_tolerance"]:
-        name = Path(next(each for each in programs if not each["within_tolerance"])["program"]).name
-        return f"shapegcode convert {name} with a smaller --contour-tolerance, or lower its feed where it leaves the path"
+        missed = next((each for each in programs if each["shaped"] and not each["within_tolerance"]), None)
+        if missed is not None:
+            return f"convert again with a smaller --contour-tolerance: {Path(missed['program']).name} leaves the path"
     if not any(program["shaped"] for program in programs):
         return "shapegcode convert shapes the program; measure both to see what it gains"
     if len(programs) == 1 and programs[0]["measured_against"] == programs[0]["program"]:
@@ -137,7 +143,7 @@ def _contour(sections: Sequence[Section], limit_um: float) -> Iterator[Feature]:
     def sides(who: str) -> tuple[str, ...]:
         return _each(
             sections,
-            lambda s: f"{s['contour_error_um'][who]['left']:.2f} / {s['contour_error_um'][who]['right']:.2f}",
+            lambda s: _pair([s["contour_error_um"][who][side] for side in _SIDES], 2),
         )
 
     out = tuple(section["contour_error_um"]["response"]["max"] > limit_um for section in sections)
@@ -156,7 +162,7 @@ def _arc_rows(sections: Sequence[Section]) -> Iterator[Feature]:
             f"{name} mm (µm off)",
             f"{nominal:.3f}",
             tuple(
-                "–" if circle is None else f"{circle['fitted_radius_mm']:.4f} ({circle['radius_deviation_um']:+.1f})"
+                "–" if circle is None else f"{circle['fitted_radius_mm']:.4f} ({circle['radius_deviation_um']:+z.1f})"
                 for circle in circles
             ),
         )
@@ -164,9 +170,9 @@ def _arc_rows(sections: Sequence[Section]) -> Iterator[Feature]:
     if any(circle is not None for circle in track):
         yield Feature("form error µm", "0", tuple(_or_dash(circle, "form_error_um", 2) for circle in track))
         yield Feature(
-            "centre off X / Y µm",
+            "centre off µm",
             "0",
-            tuple("–" if each is None else "{:.1f} / {:.1f}".format(*each["centre_offset_um"]) for each in track),
+            tuple("–" if each is None else _pair(each["centre_offset_um"], 1) for each in track),
         )
     yield Feature(
         "orbit error of response %",
@@ -176,25 +182,25 @@ def _arc_rows(sections: Sequence[Section]) -> Iterator[Feature]:
 
 
 def _walls(sections: Sequence[Section]) -> Iterator[Feature]:
-    if all(section["wall_deviation_um"][side]["stations"] == 0 for section in sections for side in ("left", "right")):
+    if all(section["wall_deviation_um"][side]["stations"] == 0 for section in sections for side in _SIDES):
         return
-    for side in ("left", "right"):
+    for side in _SIDES:
         yield Feature(f"{side} wall, from / to µm", "0", _each(sections, lambda s, side=side: _span(s, side)))
     yield Feature(
         "cut-width band left / right µm",
         "0",
-        _each(sections, lambda s: _pair(*(s["wall_deviation_um"][side]["band"] for side in ("left", "right")), 2)),
+        _each(sections, lambda s: _pair([s["wall_deviation_um"][side]["band"] for side in _SIDES], 2)),
     )
     nominal = sections[0]["width_mm"]["nominal"]
     yield Feature(
         "width least / most mm",
         f"{nominal:.3f}",
-        _each(sections, lambda s: _pair(s["width_mm"]["min"], s["width_mm"]["max"], 4)),
+        _each(sections, lambda s: _pair([s["width_mm"]["min"], s["width_mm"]["max"]], 4)),
     )
 
 
 def _roughness(sections: Sequence[Section]) -> Iterator[Feature]:
-    if all(section["roughness"][side] is None for section in sections for side in ("left", "right")):
+    if all(section["roughness"][side] is None for section in sections for side in _SIDES):
         return
     for name, key in (("Ra", "ra_um"), ("Rz", "rz_um"), ("Wa", "wa_um")):
         yield Feature(
@@ -202,14 +208,14 @@ def _roughness(sections: Sequence[Section]) -> Iterator[Feature]:
             "",
             _each(
                 sections,
-                lambda s, key=key: _pair(*((s["roughness"][side] or {}).get(key) for side in ("left", "right")), 3),
+                lambda s, key=key: _pair([(s["roughness"][side] or {}).get(key) for side in _SIDES], 3),
             ),
         )
 
 
 def _span(section: Section, side: str) -> str:
     wall = section["wall_deviation_um"][side]
-    return "–" if wall["stations"] == 0 else f"{wall['min']:+.2f} … {wall['max']:+.2f}"
+    return "–" if wall["stations"] == 0 else f"{wall['min']:+z.2f} … {wall['max']:+z.2f}"
 
 
 def _settling(section: Section) -> str:
@@ -224,8 +230,8 @@ def _axes(values: Mapping[str, float] | None, decimals: int) -> str:
     return "–" if values is None else f"{values['x']:.{decimals}f} / {values['y']:.{decimals}f}"
 
 
-def _pair(one: float | None, other: float | None, decimals: int) -> str:
-    return " / ".join("–" if value is None else f"{value:.{decimals}f}" for value in (one, other))
+def _pair(values: Sequence[float | None], decimals: int) -> str:
+    return " / ".join("–" if value is None else f"{value:z.{decimals}f}" for value in values)
 
 
 def _or_dash(values: Mapping[str, Any] | None, key: str, decimals: int) -> str:

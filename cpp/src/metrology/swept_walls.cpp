@@ -155,6 +155,8 @@ SweptWalls::Profile SweptWalls::profile(std::size_t section) const {
   profile.spacing_mm = spacing_of_[section];
   for (std::size_t i = first_of_[section]; i < first_of_[section + 1]; ++i) {
     if (i == first_of_[section]) profile.first_mm = stations_[i].s;
+    profile.point.push_back(stations_[i].point);
+    profile.normal.push_back(stations_[i].normal);
     const bool cut = stations_[i].left > stations_[i].right;
     profile.left.push_back(cut ? stations_[i].left - reference_[i].left : no_wall);
     profile.right.push_back(cut ? stations_[i].right - reference_[i].right : no_wall);

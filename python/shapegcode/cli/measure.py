@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
     from shapegcode.metrology import measure
-    from shapegcode.metrology_table import measurement_table, next_step
+    from shapegcode.metrology_table import measurement_tables, next_step
     from shapegcode.program import Program
     from shapegcode.report import warning_table
 
@@ -116,7 +116,8 @@ def run(args: argparse.Namespace) -> int:
     if args.json is not None:
         write_json(report, args.json)
     console = output_console(args.json)
-    console.print(measurement_table(report))
+    for table in measurement_tables(report):
+        console.print(table)
     for program in report["programs"]:
         console.print(_said(program), markup=False)
     warnings = list(dict.fromkeys(warning for program in report["programs"] for warning in program["warnings"]))

@@ -29,6 +29,8 @@ class SweptWalls {
     double first_mm = 0.0;  ///< distance of the first station from the path's start
     std::vector<double> left;
     std::vector<double> right;
+    std::vector<Eigen::Vector2d> point;   // of the path, from above
+    std::vector<Eigen::Vector2d> normal;  // unit, to the left; zero where the path has no horizontal direction
   };
 
   /// `spacing_mm` is the largest distance of two stations; it becomes wider where the path would need more than
