@@ -71,6 +71,8 @@ if TYPE_CHECKING:
     from shapegcode.converter import convert as convert
     from shapegcode.machine import Machine as Machine
     from shapegcode.machine import MachineError as MachineError
+    from shapegcode.metrology import Measurement as Measurement
+    from shapegcode.metrology import measure as measure
     from shapegcode.program import Program as Program
     from shapegcode.shaping import (
         ModeBand as ModeBand,
@@ -106,6 +108,7 @@ _HOME = {
     "choose_grid": "block_grid",
     **dict.fromkeys(("Conversion", "convert"), "converter"),
     **dict.fromkeys(("Machine", "MachineError"), "machine"),
+    **dict.fromkeys(("Measurement", "measure"), "metrology"),
     "Program": "program",
     **dict.fromkeys(
         ("ModeBand", "Recommendation", "choose_block_period", "choose_shaper", "shortest_non_negative"), "shaping"

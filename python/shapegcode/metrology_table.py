@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.table import Table
 
-__all__ = ["Feature", "features", "measurement_tables", "next_step", "section_name"]
+__all__ = ["Feature", "demo_table", "features", "measurement_tables", "next_step", "section_name"]
 
 _MOST_SECTIONS = 12
 _SIDES = ("left", "right")
@@ -113,6 +113,52 @@ def features(sections: Sequence[Section], report: Mapping[str, Any]) -> Iterator
         )
         band = report["settling_band_um"]
         yield Feature(f"settled to {band:g} µm X / Y ms", "", _each(sections, _settling))
+
+
+def demo_table(result: Mapping[str, Any], feed_mm_per_s: float) -> Table:
+    """Paper 000's line, arc and line at one feed: one column per program, the paper's specimens below."""
+    from rich.table import Table
+
+    rows = [row for row in result["cases"] if row["feed_mm_per_s"] == feed_mm_per_s]
+    arcs = [row["sections"][1] for row in rows]
+    table = Table(title=f"Paper 000 at {feed_mm_per_s:g} mm/s, tool of {result['tool_diameter_mm']:g} mm, as cut")
+    table.add_column("figure", overflow="fold")
+    for row in rows:
+        table.add_column(row["program"], justify="right", overflow="fold")
+    inside = [arc["arc"]["inside_wall"] for arc in arcs]
+    table.add_row(
+        f"inside radius mm (nominal {inside[0]['nominal_radius_mm']:g})",
+        *(f"{circle['fitted_radius_mm']:.4f}" for circle in inside),
+    )
+    for number in range(2):
+        table.add_row(
+            ("  paper, SM20C (depth .05, .1)", "  paper, Al6061 (depth .05, .1)")[number],
+            *(
+                "" if row["paper"] is None else ", ".join(
+                    f"{radius:.3f}" for radius in list(row["paper"]["inside_radius_mm"].values())[2 * number :][:2]
+                )
+                for row in rows
+            ),
+            end_section=number == 1,
+        )  # fmt: skip
+    table.add_row("band of the arc's walls µm", *(f"{arc['wall_deviation_um']['left']['band']:.1f}" for arc in arcs))
+    for number, name in enumerate(("line in", "arc", "line out")):
+        sections = [row["sections"][number] for row in rows]
+        table.add_row(
+            f"width, {name} mm", *_each(sections, lambda s: _pair([s["width_mm"][key] for key in ("min", "max")], 4))
+        )
+    for name, key, decimals in (("Ra", "ra_um", 3), ("Wa", "wa_um", 2)):
+        table.add_row(
+            f"{name} left wall µm: line, arc, line",
+            *(
+                " / ".join(f"{section['roughness']['left'][key]:z.{decimals}f}" for section in row["sections"])
+                for row in rows
+            ),
+        )
+    ends = [row["sections"][2] for row in rows]
+    table.add_row("residual X / Y µm", *_each(ends, lambda s: _axes(s["residual_vibration_um"], 2)))
+    table.add_row("time s", *(f"{row['time_s']:.3f}" for row in rows))
+    return table
 
 
 def next_step(report: Mapping[str, Any]) -> str:
