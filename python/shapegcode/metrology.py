@@ -97,6 +97,11 @@ class MeasuredProgram:
         """Largest distance of the response from the path, µm."""
         return max((region.figures.response.max_abs_mm for region in self.regions), default=0.0) * 1e3
 
+    @property
+    def judged(self) -> bool:
+        """Whether its path is the programmed one: a shaped program's own path leaves that on purpose."""
+        return not self.shaped or self.against != self.source
+
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
@@ -122,8 +127,9 @@ class Measurement:
 
     @property
     def within_tolerance(self) -> bool:
-        """Whether the response of every program stays within `tolerance.contour_um` of the path."""
-        return all(each.contour_error_um <= self.machine.tolerance.contour_um for each in self.programs)
+        """Whether the response of every program that is judged stays within `tolerance.contour_um` of the path."""
+        limit = self.machine.tolerance.contour_um
+        return all(each.contour_error_um <= limit for each in self.programs if each.judged)
 
     def report(self) -> dict[str, Any]:
         """Everything as the JSON of ``shapegcode measure --json`` (docs/metrology.md)."""

@@ -38,7 +38,7 @@ _PAPER_RADII_MM = {
 _SPECIMENS = ("SM20C 0.05 mm", "SM20C 0.1 mm", "Al6061 0.05 mm", "Al6061 0.1 mm")
 _REMARK = (
     "The model knows feeds, shapers and modes, not material and depth of cut: the four specimens of a feed have one "
-    "column. Radius: the paper's unshaped arcs are .13 to .50 mm too small and shaping brings them .05 to .4 mm "
+    "column. Radius: the paper's unshaped arcs are .13 to .50 mm too small and shaping brings their mean .2 mm "
     "closer; the model's are 3 and 19 um too large (a mode answers the arc's acceleration with R / (1 - (v / R w)^2)) "
     "and 1 to 22 um too small behind a shaper. A vibration of at most 42 um makes no .3 mm: deflection of a 3 mm end "
     "mill under cutting force, and where the camera sees the edge, are not in the model. Width: a rigid disc cuts its "

@@ -35,7 +35,9 @@ def _program(program: MeasuredProgram, measurement: Measurement) -> dict[str, An
         "program": program.source,
         "shaped": program.shaped,
         "measured_against": program.against,
-        "within_tolerance": program.contour_error_um <= measurement.machine.tolerance.contour_um,
+        "within_tolerance": program.contour_error_um <= measurement.machine.tolerance.contour_um
+        if program.judged
+        else None,
         "cutting_time_s": sum(each.duration_s for each in figures),
         "contour_error_um": {
             "command": deviation_um(each.command for each in figures),

@@ -60,7 +60,9 @@ def _table(programs: Sequence[Mapping[str, Any]], report: Mapping[str, Any]) -> 
     table.add_column("limit", justify="right", no_wrap=True)
     for index in shown:
         sections = [program["sections"][index] for program in programs]
-        rows = list(features(sections, report))
+        judged = any(program["within_tolerance"] is not None for program in programs)
+        limit_um = report["tolerance_um"]["contour"] if judged else None
+        rows = list(features(sections, limit_um, report["settling_band_um"]))
         for number, row in enumerate(rows):
             cells = [Text(value) for value in row.values]
             for cell, out in zip(cells, row.out, strict=False):
@@ -96,12 +98,12 @@ def section_name(section: Section, index: int) -> str:
     return f"{index + 1} {kind}, {lines}"
 
 
-def features(sections: Sequence[Section], report: Mapping[str, Any]) -> Iterator[Feature]:
-    """The rows of one section, as it came out in each program."""
+def features(sections: Sequence[Section], limit_um: float | None, band_um: float) -> Iterator[Feature]:
+    """The rows of one section, as it came out in each program; without a limit none is judged."""
     yield Feature(
         "length mm, time s", f"{sections[0]['length_mm']:.3f}", _each(sections, lambda s: f"{s['time_s']:.3f}")
     )
-    yield from _contour(sections, report["tolerance_um"]["contour"])
+    yield from _contour(sections, limit_um)
     if sections[0]["arc"] is not None:
         yield from _arc_rows(sections)
     yield from _walls(sections)
@@ -111,8 +113,7 @@ def features(sections: Sequence[Section], report: Mapping[str, Any]) -> Iterator
         yield Feature(
             "residual at the stop X / Y µm", "", _each(sections, lambda s: _axes(s["residual_vibration_um"], 2))
         )
-        band = report["settling_band_um"]
-        yield Feature(f"settled to {band:g} µm X / Y ms", "", _each(sections, _settling))
+        yield Feature(f"settled to {band_um:g} µm X / Y ms", "", _each(sections, _settling))
 
 
 def demo_table(result: Mapping[str, Any], feed_mm_per_s: float) -> Table:
@@ -165,12 +166,12 @@ def next_step(report: Mapping[str, Any]) -> str:
     """The one thing to do next, in one sentence."""
     programs = report["programs"]
     if not report["within_tolerance"]:
-        missed = next((each for each in programs if each["shaped"] and not each["within_tolerance"]), None)
+        missed = next((each for each in programs if each["shaped"] and each["within_tolerance"] is False), None)
         if missed is not None:
             return f"convert again with a smaller --contour-tolerance: {Path(missed['program']).name} leaves the path"
     if not any(program["shaped"] for program in programs):
         return "shapegcode convert shapes the program; measure both to see what it gains"
-    if len(programs) == 1 and programs[0]["measured_against"] == programs[0]["program"]:
+    if any(program["within_tolerance"] is None for program in programs):
         return "measure it --against the original program: its own path is not the programmed one"
     return "--plots DIR draws the part with its deviations magnified"
 
@@ -185,15 +186,16 @@ def _each(sections: Sequence[Section], text: Any) -> tuple[str, ...]:
     return tuple(text(section) for section in sections)
 
 
-def _contour(sections: Sequence[Section], limit_um: float) -> Iterator[Feature]:
+def _contour(sections: Sequence[Section], limit_um: float | None) -> Iterator[Feature]:
     def sides(who: str) -> tuple[str, ...]:
         return _each(
             sections,
             lambda s: _pair([s["contour_error_um"][who][side] for side in _SIDES], 2),
         )
 
-    out = tuple(section["contour_error_um"]["response"]["max"] > limit_um for section in sections)
-    yield Feature("contour left / right µm", "0", sides("response"), f"{limit_um:g}", out)
+    largest = [section["contour_error_um"]["response"]["max"] for section in sections]
+    out = tuple(limit_um is not None and value > limit_um for value in largest)
+    yield Feature("contour left / right µm", "0", sides("response"), "" if limit_um is None else f"{limit_um:g}", out)
     yield Feature("  RMS µm", "", _each(sections, lambda s: f"{s['contour_error_um']['response']['rms']:.2f}"))
     yield Feature("contour of the command µm", "0", sides("command"))
 

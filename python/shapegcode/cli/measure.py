@@ -119,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
     for table in measurement_tables(report):
         console.print(table)
     for program in report["programs"]:
-        console.print(_said(program), markup=False)
+        console.print(_said(program), markup=False, soft_wrap=True)
     warnings = list(dict.fromkeys(warning for program in report["programs"] for warning in program["warnings"]))
     if warnings:
         console.print(warning_table(warnings))
@@ -131,7 +131,8 @@ def _said(program: dict[str, object]) -> str:
     name, against = program["program"], program["measured_against"]
     how = "block by block, as a shaped program" if program["shaped"] else "with the controller's own motion"
     path = "its own path" if against == name else f"the path of {against}"
-    return f"{name}: played {how}, measured against {path}"
+    judged = "" if program["within_tolerance"] is not None else ", which is not the programmed one: not judged"
+    return f"{name}: played {how}, measured against {path}{judged}"
 
 
 def _lines(text: str) -> tuple[int, int]:
