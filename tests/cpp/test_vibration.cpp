@@ -38,7 +38,7 @@ RestVibration watch(double period_s, double band_mm, double amplitude, double fr
 /// The last instant at which the decay leaves the band: at the last extremum above it, then by bisection.
 double leaves_band_s(double band, double amplitude, double frequency_hz, double damping) {
   double last = 0.0;
-  for (double t = 0.0; t < 10.0; t += 1e-6) {
+  for (double t = 0.0; t < 2.0; t += 1e-5) {
     if (std::abs(decay(t, amplitude, frequency_hz, damping)) > band) last = t;
   }
   return last;

@@ -6,6 +6,8 @@ import functools
 import math
 import random
 import re
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -163,6 +165,27 @@ def test_pieces_of_any_size_give_the_same_figures() -> None:
         np.testing.assert_array_equal(one.peak_mm, other.peak_mm)
     assert whole.duration_s == pytest.approx(played.duration_s)
     assert whole.response.max_abs_mm == pytest.approx(played.response.max_abs_mm)
+
+
+MEMORY = """
+import resource
+import shapegcode as sg
+machine = sg.Machine.load("vx500")
+text = "%\\nO1\\nG21G17G90G94G40G64G00X0Y0Z0\\nG01X100.F{feed}.\\nG03X140.Y40.R40.\\nM30\\n%\\n"
+def measured(feed):
+    program = sg.Program.from_text(text.format(feed=feed), machine)
+    time_s = sg.measure(program, machine, 3.0).programs[0].regions[0].figures.duration_s
+    return round(time_s * 1000), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+print(*measured(3000), *measured(15))
+"""
+
+
+def test_memory_does_not_grow_with_the_samples() -> None:
+    done = subprocess.run([sys.executable, "-c", MEMORY], capture_output=True, text=True, check=True)
+    few, before_kib, many, after_kib = map(int, done.stdout.split())
+    assert many > 100 * few
+    assert many * 48 / 1024 > 25_000  # KiB that the samples of command and response alone would take
+    assert after_kib - before_kib < 12_000
 
 
 def test_vibration_is_that_of_the_playback() -> None:
