@@ -36,7 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "and peak vibration, settling time, contour error of command and response. Of the whole program with its rapids, "
         "dwells and waits: the motion of the axes in time, as table, files and pictures."
     )
-    parser.epilog = "example: shapegcode simulate part.nc -m mine.toml --plant feed-drive --npz motion.npz --plots plots"
+    parser.epilog = (
+        "example: shapegcode simulate part.nc -m mine.toml --plant feed-drive --npz motion.npz --plots plots"
+    )
     add_input_arguments(parser)
     parser.add_argument(
         "--shaped",
@@ -51,7 +53,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "loops of [axes.x.drive] (default: %(default)s)",
     )
     parser.add_argument(
-        "--csv", metavar="FILE", default=None, help="write the motion in time, one line per period; - for standard output"
+        "--csv",
+        metavar="FILE",
+        default=None,
+        help="write the motion in time, one line per period; - for standard output",
     )
     parser.add_argument("--npz", metavar="FILE", default=None, help="write the same columns as a NumPy archive")
     parser.add_argument(
