@@ -67,10 +67,11 @@ Raises:
              friction.check("pair");
              return friction;
            }),
-           py::arg("model") = FrictionModel::viscous, py::kw_only(), py::arg("viscous_n_s_per_m") = 0.0,
-           py::arg("coulomb_n") = 0.0, py::arg("static_n") = 0.0, py::arg("stribeck_velocity_m_per_s") = 0.0,
-           py::arg("smoothing_velocity_m_per_s") = 0.0, py::arg("bristle_stiffness_n_per_m") = 0.0,
-           py::arg("bristle_damping_n_s_per_m") = 0.0, "ArgumentError if it is not what the class asks for.")
+           py::arg_v("model", FrictionModel::viscous, "FrictionModel.viscous"), py::kw_only(),
+           py::arg("viscous_n_s_per_m") = 0.0, py::arg("coulomb_n") = 0.0, py::arg("static_n") = 0.0,
+           py::arg("stribeck_velocity_m_per_s") = 0.0, py::arg("smoothing_velocity_m_per_s") = 0.0,
+           py::arg("bristle_stiffness_n_per_m") = 0.0, py::arg("bristle_damping_n_s_per_m") = 0.0,
+           "ArgumentError if it is not what the class asks for.")
       .def_readonly("model", &FrictionParameters::model, "Model.")
       .def_readonly("viscous_n_s_per_m", &FrictionParameters::viscous_n_s_per_m, "N s/m.")
       .def_readonly("coulomb_n", &FrictionParameters::coulomb_n, "N.")
@@ -135,7 +136,8 @@ Raises:
            py::kw_only(), py::arg("motor_mass_kg"), py::arg("table_mass_kg"), py::arg("stiffness_n_per_m"),
            py::arg("damping_n_s_per_m"), py::arg("position_gain_per_s"), py::arg("velocity_gain_n_s_per_m"),
            py::arg("velocity_integral_time_s") = 0.0, py::arg("velocity_feed_forward_ratio") = 0.0,
-           py::arg("acceleration_feed_forward_ratio") = 0.0, py::arg("position_feedback") = PositionFeedback::motor,
+           py::arg("acceleration_feed_forward_ratio") = 0.0,
+           py::arg_v("position_feedback", PositionFeedback::motor, "PositionFeedback.motor"),
            py::arg("backlash_m") = 0.0, py::arg("force_limit_n") = 0.0,
            py::arg("table_friction") = FrictionParameters(), py::arg("motor_friction") = FrictionParameters(),
            py::arg("modes") = std::vector<Mode>{}, "ArgumentError if it is not what the class asks for.")

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'linear_model', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -1566,6 +1566,347 @@ class ModeTable:
         """
         Positions in mm.
         """
+class FrictionModel:
+    """
+    How a sliding pair resists.
+    
+    Members:
+    
+      viscous : In proportion to the speed alone.
+    
+      stribeck : Coulomb, static and Stribeck, smooth through zero speed.
+    
+      lugre : The same with bristles: presliding, stick, frictional lag.
+    """
+    __members__: typing.ClassVar[dict[str, FrictionModel]]
+    lugre: typing.ClassVar[FrictionModel]
+    stribeck: typing.ClassVar[FrictionModel]
+    viscous: typing.ClassVar[FrictionModel]
+    @typing.overload
+    def __eq__(self, other: FrictionModel) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: FrictionModel) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class FrictionParameters:
+    """
+    Friction of one sliding pair. Immutable.
+    
+    Args:
+        model: See FrictionModel.
+        viscous_n_s_per_m: Viscous friction in N s/m, >= 0.
+        coulomb_n: Sliding friction in N, > 0 unless viscous.
+        static_n: Friction to be overcome from rest in N, >= coulomb_n.
+        stribeck_velocity_m_per_s: Speed in m/s at which static has given way to sliding friction, > 0 unless viscous.
+        smoothing_velocity_m_per_s: Stribeck: sign(v) is tanh(v / this), m/s, > 0.
+        bristle_stiffness_n_per_m: LuGre: force over displacement before sliding in N/m, > 0.
+        bristle_damping_n_s_per_m: LuGre: damping of the bristles in N s/m, >= 0.
+    
+    Raises:
+        ArgumentError: A value outside its range.
+    """
+    def __init__(self, model: FrictionModel = ..., *, viscous_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, coulomb_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, static_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, stribeck_velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, smoothing_velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, bristle_stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, bristle_damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        """
+        ArgumentError if it is not what the class asks for.
+        """
+    @property
+    def bristle_damping_n_s_per_m(self) -> float:
+        """
+        N s/m.
+        """
+    @property
+    def bristle_stiffness_n_per_m(self) -> float:
+        """
+        N/m.
+        """
+    @property
+    def coulomb_n(self) -> float:
+        """
+        N.
+        """
+    @property
+    def model(self) -> FrictionModel:
+        """
+        Model.
+        """
+    @property
+    def smoothing_velocity_m_per_s(self) -> float:
+        """
+        m/s.
+        """
+    @property
+    def static_n(self) -> float:
+        """
+        N.
+        """
+    @property
+    def stribeck_velocity_m_per_s(self) -> float:
+        """
+        m/s.
+        """
+    @property
+    def viscous_n_s_per_m(self) -> float:
+        """
+        N s/m.
+        """
+class PositionFeedback:
+    """
+    What the position loop compares with the set-point.
+    
+    Members:
+    
+      motor : Encoder on the motor (semi-closed loop).
+    
+      table : Linear scale on the table (fully closed loop).
+    """
+    __members__: typing.ClassVar[dict[str, PositionFeedback]]
+    motor: typing.ClassVar[PositionFeedback]
+    table: typing.ClassVar[PositionFeedback]
+    @typing.overload
+    def __eq__(self, other: PositionFeedback) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: PositionFeedback) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class FeedDriveParameters:
+    """
+    Feed drive of one axis, referred to the travel of
+    the table. Immutable.
+    
+    Args:
+        motor_mass_kg: Inertia of motor, coupling and screw in kg, > 0.
+        table_mass_kg: Table with what it carries in kg, > 0.
+        stiffness_n_per_m: Motor to table, axial, in N/m, > 0.
+        damping_n_s_per_m: Beside the stiffness in N s/m, >= 0.
+        position_gain_per_s: Gain of the position loop in 1/s, > 0.
+        velocity_gain_n_s_per_m: Force over speed error in N s/m, > 0.
+        velocity_integral_time_s: Of the speed controller in s; 0: none.
+        velocity_feed_forward_ratio: Share of the set-points' speed that is fed forward, 0 ... 1.
+        acceleration_feed_forward_ratio: Share of acceleration times both masses that is fed forward, 0 ... 1.
+        position_feedback: What the position loop measures; the speed is always taken from the motor.
+        backlash_m: Whole gap between motor and table in m, >= 0.
+        force_limit_n: Of the motor in N; 0: none.
+        table_friction: Friction of the guideways.
+        motor_friction: Friction of bearings, seals and nut.
+        modes: Modes of the structure, excited by the motion of the table.
+    
+    Raises:
+        ArgumentError: A value outside its range.
+    """
+    def __init__(self, *, motor_mass_kg: typing.SupportsFloat | typing.SupportsIndex, table_mass_kg: typing.SupportsFloat | typing.SupportsIndex, stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex, damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex, position_gain_per_s: typing.SupportsFloat | typing.SupportsIndex, velocity_gain_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex, velocity_integral_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, velocity_feed_forward_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, acceleration_feed_forward_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_feedback: PositionFeedback = ..., backlash_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, table_friction: FrictionParameters = ..., motor_friction: FrictionParameters = ..., modes: collections.abc.Sequence[Mode] = []) -> None:
+        """
+        ArgumentError if it is not what the class asks for.
+        """
+    @property
+    def acceleration_feed_forward_ratio(self) -> float:
+        """
+        0 ... 1.
+        """
+    @property
+    def backlash_m(self) -> float:
+        """
+        m.
+        """
+    @property
+    def damping_n_s_per_m(self) -> float:
+        """
+        N s/m.
+        """
+    @property
+    def force_limit_n(self) -> float:
+        """
+        N; 0: none.
+        """
+    @property
+    def modes(self) -> list[Mode]:
+        """
+        Of the structure, on the table.
+        """
+    @property
+    def motor_friction(self) -> FrictionParameters:
+        """
+        Of bearings, seals and nut.
+        """
+    @property
+    def motor_mass_kg(self) -> float:
+        """
+        kg.
+        """
+    @property
+    def position_feedback(self) -> PositionFeedback:
+        """
+        What the position loop measures.
+        """
+    @property
+    def position_gain_per_s(self) -> float:
+        """
+        1/s.
+        """
+    @property
+    def stiffness_n_per_m(self) -> float:
+        """
+        N/m.
+        """
+    @property
+    def table_friction(self) -> FrictionParameters:
+        """
+        Of the guideways.
+        """
+    @property
+    def table_mass_kg(self) -> float:
+        """
+        kg.
+        """
+    @property
+    def velocity_feed_forward_ratio(self) -> float:
+        """
+        0 ... 1.
+        """
+    @property
+    def velocity_gain_n_s_per_m(self) -> float:
+        """
+        N s/m.
+        """
+    @property
+    def velocity_integral_time_s(self) -> float:
+        """
+        s; 0: none.
+        """
+class FeedDrive:
+    """
+    Feed drive of one axis, integrated by CVODE.
+    
+    Set-points come once per period and are joined by straight lines.
+    
+    Args:
+        parameters: The drive.
+        period_s: Time between set-points in s.
+        rtol: Relative tolerance of following error, deflections and speeds.
+        atol_mm: Absolute tolerance of lengths in mm; that of speeds is 100 atol_mm per second.
+    
+    Raises:
+        ArgumentError: A value outside its range.
+    """
+    def __copy__(self) -> FeedDrive:
+        ...
+    def __init__(self, parameters: FeedDriveParameters, period_s: typing.SupportsFloat | typing.SupportsIndex, rtol: typing.SupportsFloat | typing.SupportsIndex = 1e-06, atol_mm: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> None:
+        """
+        ArgumentError on a value outside its range.
+        """
+    def play(self, setpoints_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+        """
+        Runs on over many set-points.
+        
+        Args:
+            setpoints_mm: Shape (n,), mm.
+        
+        Returns:
+            (n, 6): response, table and motor in mm, friction on the table, force of the motor and of the spring in N, each
+            at the instant of its set-point.
+        
+        Raises:
+            ArgumentError: Another shape or a value that is not finite.
+            NumericError: The integrator failed; with CVODE's flag and the time.
+        """
+    def reset(self, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        At rest at a position (mm).
+        """
+    def step(self, setpoint_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Next set-point (mm); the response at that instant in mm. NumericError with CVODE's flag and the time.
+        """
+    @property
+    def motor_mm(self) -> float:
+        """
+        Angle of the motor as travel, mm.
+        """
+    @property
+    def parameters(self) -> FeedDriveParameters:
+        """
+        The drive.
+        """
+    @property
+    def response_mm(self) -> float:
+        """
+        Table and modes, mm.
+        """
+    @property
+    def rhs_evaluations(self) -> int:
+        """
+        Evaluations of the equations so far.
+        """
+    @property
+    def steps(self) -> int:
+        """
+        Internal steps so far.
+        """
+    @property
+    def table_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def time_s(self) -> float:
+        """
+        Since reset(), s.
+        """
 class ContourTarget:
     """
     What shall follow the programmed path.
@@ -2094,6 +2435,14 @@ class PlaybackOptions:
     def axis_filters(self, arg0: collections.abc.Sequence[Fir]) -> None:
         ...
     @property
+    def drives(self) -> list[FeedDriveParameters]:
+        """
+        Feed drives of X, Y and Z in place of the modes; none: modes alone.
+        """
+    @drives.setter
+    def drives(self, arg0: collections.abc.Sequence[FeedDriveParameters]) -> None:
+        ...
+    @property
     def last_seconds(self) -> float:
         """
         Blocks only: play the last so many seconds; 0: all.
@@ -2148,6 +2497,22 @@ class PlaybackOptions:
         """
     @record_samples.setter
     def record_samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def settling_band_mm(self) -> float:
+        """
+        Of the settling time, mm; 0: none.
+        """
+    @settling_band_mm.setter
+    def settling_band_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def settling_limit_s(self) -> float:
+        """
+        How long behind the stop it is looked for; with drives the residual too, s.
+        """
+    @settling_limit_s.setter
+    def settling_limit_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def starved_blocks(self) -> list[int]:
@@ -2258,6 +2623,11 @@ class PlaybackFigures:
     def response(self) -> DeviationStats:
         """
         Deviation of the response from the path.
+        """
+    @property
+    def settling_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        From that instant until |response - command| stays within the band, (3,), s; inf: not within the limit.
         """
     @property
     def starved(self) -> list[StarvedFigures]:
@@ -2919,6 +3289,11 @@ class PlayedChunk:
         Number of its first sample; time is number * period.
         """
     @property
+    def friction_force_n(self) -> numpy.ndarray:
+        """
+        Feed drives: friction of the table, against its motion, (k, 3), N; modes: (0, 0).
+        """
+    @property
     def kind(self) -> numpy.ndarray:
         """
         Value of its BlockKind, (k,).
@@ -2929,9 +3304,24 @@ class PlayedChunk:
         Line of the block that is being interpolated, (k,).
         """
     @property
+    def motor_force_n(self) -> numpy.ndarray:
+        """
+        Feed drives: force of the motor, (k, 3), N; modes: (0, 0).
+        """
+    @property
+    def motor_mm(self) -> numpy.ndarray:
+        """
+        Feed drives: motor as travel of the table, (k, 3), mm; modes: (0, 0).
+        """
+    @property
     def response_mm(self) -> numpy.ndarray:
         """
         (k, 3), mm.
+        """
+    @property
+    def velocity_mm_per_s(self) -> numpy.ndarray:
+        """
+        Of the command over the period that ends with the row, without the jumps of coordinates, (k, 3), mm/s.
         """
 class PlayedStream:
     """
@@ -2955,10 +3345,6 @@ class PlayedStream:
     def read(self, most: typing.SupportsInt | typing.SupportsIndex) -> PlayedChunk:
         """
         The next rows, at most so many; none behind the end.
-        """
-    def skip(self, most: typing.SupportsInt | typing.SupportsIndex) -> int:
-        """
-        Play the next rows, at most so many, without giving them; returns how many there were.
         """
 def acceleration_filters(model: ControllerModel) -> list[Fir]:
     """
@@ -3003,6 +3389,10 @@ def convolved_zv(modes: collections.abc.Sequence[Mode]) -> Shaper:
 def count_slowed_blocks(blocks: Path, corner_speed_difference_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], max_feed_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> int:
     """
     Blocks that a controller with look-ahead would run slower than programmed.
+    """
+def csv_rows(word: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], words: collections.abc.Sequence[str], table: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.f_contiguous"]) -> bytes:
+    """
+    Rows of a CSV file: the row's word, (k,), and the numbers of its row in the table, (k, c), each as the shortest text that reads back as the same number. Raises ArgumentError on unequal lengths or a word that does not exist.
     """
 def extra_insensitive(mode: Mode, vibration_limit: typing.SupportsFloat | typing.SupportsIndex, humps: typing.SupportsInt | typing.SupportsIndex = 1) -> ExtraInsensitive:
     """
@@ -3102,6 +3492,21 @@ def interpolate(path: Path, profile: SpeedProfile, period_s: typing.SupportsFloa
 def interpolate_program(program: ProgramText, model: ControllerModel) -> InterpolatedTime:
     """
     The same by full interpolation, every set-point of every step. Raises ArgumentError on a model that no controller can have, or a program of more than 4e9 set-points.
+    """
+def linear_model(parameters: FeedDriveParameters) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]]:
+    """
+    The drive as x' = A x + B w, y = C x + D w with inputs linear between the set-points.
+    
+    Args:
+        parameters: Without friction other than viscous, backlash and force limit.
+    
+    Returns:
+        A, B, C, D. Input 0 is the set-point; input 1, only with acceleration feed-forward, the speed of the set-points,
+        whose sample is the difference to the one before over the period. The output is the response. Lengths in any one
+        unit, time in s.
+    
+    Raises:
+        ArgumentError: The drive is not linear.
     """
 def minimal_branches(first: Mode, second_damping: typing.SupportsFloat | typing.SupportsIndex, ratios: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], max_duration_s: typing.SupportsFloat | typing.SupportsIndex, *, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> MinimalBranches:
     """
