@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from shapegcode.converter import convert as convert
     from shapegcode.machine import Machine as Machine
     from shapegcode.machine import MachineError as MachineError
+    from shapegcode.played import stream as stream
     from shapegcode.program import Program as Program
     from shapegcode.shaping import (
         ModeBand as ModeBand,
@@ -111,6 +112,7 @@ _HOME = {
         ("ModeBand", "Recommendation", "choose_block_period", "choose_shaper", "shortest_non_negative"), "shaping"
     ),
     **dict.fromkeys(("Simulation", "simulate"), "simulator"),
+    "stream": "played",
     **dict.fromkeys(("CycleTime", "cycle_time"), "timing"),
 }  # fmt: skip
 

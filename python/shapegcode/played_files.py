@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import BinaryIO, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.files import named_errors, replaced_file
@@ -60,7 +59,8 @@ class _Npz:
     def write(self, chunk: Chunk) -> None:
         for name, column in {**chunk.columns(), "kind": chunk.kind}.items():
             if name not in self._columns:
-                file = self._files.enter_context(tempfile.TemporaryFile(dir=self._folder))
+                # The stack closes it, and then it is gone.
+                file = self._files.enter_context(tempfile.TemporaryFile(dir=self._folder))  # noqa: SIM115
                 self._columns[name] = (file, column.dtype)
             self._columns[name][0].write(np.ascontiguousarray(column).data)
         self._rows += len(chunk)

@@ -58,8 +58,8 @@ class Simulation:
         plant: "modal" or "feed-drive".
         regions: in order; their arrays hold at most `record_samples` samples.
         report: `cycle_time_s`, `cutting_time_s`, `plant`, `residual_vibration_um`, `peak_vibration_um`,
-            `settling_time_s` (None: not settled within `settling_limit_s`, or no band), `settling_band_um`, `contour_error_um`
-            (command, response), `orbit_error_percent`, `regions`, `warnings`.
+            `settling_time_s` (None: not settled within `settling_limit_s`, or no band), `settling_band_um`,
+            `contour_error_um` (command, response), `orbit_error_percent`, `regions`, `warnings`.
     """
 
     machine: Machine

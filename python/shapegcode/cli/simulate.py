@@ -32,9 +32,9 @@ _FIGURES_SHARE = 0.5
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Plays a program through the controller's model and the machine's plant. Of each cutting region: time, residual "
-        "and peak vibration, settling time, contour error of command and response. Of the whole program with its rapids, "
-        "dwells and waits: the motion of the axes in time, as table, files and pictures."
+        "Plays a program through the controller's model and the machine's plant. Of each cutting region: time, "
+        "residual and peak vibration, settling time, contour error of command and response. Of the whole program with "
+        "its rapids, dwells and waits: the motion of the axes in time, as table, files and pictures."
     )
     parser.epilog = (
         "example: shapegcode simulate part.nc -m mine.toml --plant feed-drive --npz motion.npz --plots plots"
