@@ -11,6 +11,7 @@
 #include "register.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/plant/feed_drive.hpp"
+#include "shapegcode/plant/feed_drive_real_time.hpp"
 
 namespace py = pybind11;
 
@@ -38,6 +39,17 @@ py::array play(FeedDrive& drive, const VectorArray& setpoints_mm) {
     }
   }
   return take(std::move(played));
+}
+
+py::array play_in_real_time(FeedDriveRealTime& drive, const VectorArray& setpoints_mm) {
+  check_one_axis(setpoints_mm);
+  const double* setpoints = setpoints_mm.data();
+  Eigen::VectorXd played(setpoints_mm.size());
+  {
+    const py::gil_scoped_release release;
+    for (Eigen::Index i = 0; i < played.size(); ++i) played[i] = drive.step(setpoints[i]);
+  }
+  return py::cast(std::move(played));
 }
 
 void register_friction(py::module_& module) {
@@ -221,6 +233,24 @@ Raises:
       .def_property_readonly("steps", &FeedDrive::steps, "Internal steps so far.")
       .def_property_readonly("rhs_evaluations", &FeedDrive::rhs_evaluations, "Evaluations of the equations so far.")
       .def("__copy__", [](const FeedDrive& self) { return FeedDrive(self); });
+
+  py::class_<FeedDriveRealTime>(module, "FeedDriveRealTime",
+                                R"(The same with fixed steps and without error control: the real-time form.
+
+Args:
+    parameters: The drive.
+    period_s: Time between set-points in s.
+    substeps: Steps in a period, 1 ... 1000.
+
+Raises:
+    ArgumentError: A value outside its range.)")
+      .def(py::init<FeedDriveParameters, double, int>(), py::arg("parameters"), py::arg("period_s"),
+           py::arg("substeps") = FeedDriveRealTime::default_substeps, "ArgumentError on a value outside its range.")
+      .def("reset", &FeedDriveRealTime::reset, py::arg("position_mm"), "At rest at a position (mm).")
+      .def("step", &FeedDriveRealTime::step, py::arg("setpoint_mm"),
+           "Next set-point (mm); the response at that instant in mm.")
+      .def("play", &play_in_real_time, py::arg("setpoints_mm"),
+           "Responses (n,) in mm at many set-points (n,) in mm. ArgumentError on another shape.");
 }
 
 }  // namespace shapegcode::bindings

@@ -1,7 +1,7 @@
 """A feed drive written down a second time, in plain Python and in other unknowns than the core's, for SciPy's solvers.
 
-Unknowns in SI: position and speed of the motor, position and speed of the table, integral of the speed error, deflection
-of the bristles, then deflection and its rate of each mode. Friction acts on the table (LuGre or smooth Stribeck) and,
+Unknowns in SI: position and speed of the motor, position and speed of the table, integral of the speed error,
+deflection of the bristles, then deflection and its rate of each mode. Friction acts on the table (LuGre or smooth Stribeck) and,
 viscous, on the motor.
 """
 
