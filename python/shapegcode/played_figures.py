@@ -32,7 +32,7 @@ class Envelope:
         """Further samples, (k, curves)."""
         rest = values if self._rest is None else np.concatenate([self._rest, values])
         whole = len(rest) // self.samples_per_bucket
-        body = rest[: whole * self.samples_per_bucket].reshape(whole, self.samples_per_bucket, -1)
+        body = rest[: whole * self.samples_per_bucket].reshape(whole, self.samples_per_bucket, rest.shape[1])
         self._rest = rest[whole * self.samples_per_bucket :].copy()
         low, high = body.min(axis=1), body.max(axis=1)
         self._low = low if self._low is None else np.concatenate([self._low, low])
@@ -49,8 +49,8 @@ class Envelope:
         if len(self._low) % 2:
             # Its two extremes stand for it until its stretch is full.
             self._rest = np.concatenate([self._padded(self._low[-1], self._high[-1]), self._rest])
-        self._low = self._low[: 2 * pairs].reshape(pairs, 2, -1).min(axis=1)
-        self._high = self._high[: 2 * pairs].reshape(pairs, 2, -1).max(axis=1)
+        self._low = self._low[: 2 * pairs].reshape(pairs, 2, self._low.shape[1]).min(axis=1)
+        self._high = self._high[: 2 * pairs].reshape(pairs, 2, self._high.shape[1]).max(axis=1)
         self.samples_per_bucket *= 2
 
     def _padded(self, low: FloatArray, high: FloatArray) -> FloatArray:

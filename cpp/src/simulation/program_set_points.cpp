@@ -46,6 +46,7 @@ ProgramSetPoints::ProgramSetPoints(const Program& program, const ControllerModel
       servo_(model.position_gain_per_s, model.feed_forward_ratio, model.period_s) {
   time_.region_s.reserve(program_.regions.size());
   set_point_ = first_position();
+  servo_.reset(set_point_);
   next_.position_mm = set_point_;
 }
 
