@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'linear_model', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'linear_model', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -1906,6 +1906,34 @@ class FeedDrive:
     def time_s(self) -> float:
         """
         Since reset(), s.
+        """
+class FeedDriveRealTime:
+    """
+    The same with fixed steps and without error control: the real-time form.
+    
+    Args:
+        parameters: The drive.
+        period_s: Time between set-points in s.
+        substeps: Steps in a period, 1 ... 1000.
+    
+    Raises:
+        ArgumentError: A value outside its range.
+    """
+    def __init__(self, parameters: FeedDriveParameters, period_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 4) -> None:
+        """
+        ArgumentError on a value outside its range.
+        """
+    def play(self, setpoints_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+        """
+        Responses (n,) in mm at many set-points (n,) in mm. ArgumentError on another shape.
+        """
+    def reset(self, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        At rest at a position (mm).
+        """
+    def step(self, setpoint_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Next set-point (mm); the response at that instant in mm.
         """
 class ContourTarget:
     """

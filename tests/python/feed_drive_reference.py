@@ -1,8 +1,8 @@
 """A feed drive written down a second time, in plain Python and in other unknowns than the core's, for SciPy's solvers.
 
 Unknowns in SI: position and speed of the motor, position and speed of the table, integral of the speed error,
-deflection of the bristles, then deflection and its rate of each mode. Friction acts on the table (LuGre or smooth Stribeck) and,
-viscous, on the motor.
+deflection of the bristles, then deflection and its rate of each mode. Friction acts on the table (LuGre or smooth
+Stribeck) and, viscous, on the motor.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from shapegcode import _core
 
 Vector = npt.NDArray[np.float64]
 
-_CONTACT_SHARE = 0.1  # docs/plants.md: over this share of the gap the stiffness builds up
+_CONTACT_SHARE = 0.1  # docs/feed_drive.md: over this share of the gap the stiffness builds up
 
 
 @dataclass
@@ -80,7 +80,7 @@ class Drive:
                 force += self.s0 * z + self.s1 * rate
         return force, rate
 
-    def rate(self, t: float, y: Sequence[float]) -> list[float]:
+    def rate(self, t: float, y: Sequence[float] | Vector) -> list[float]:
         """Derivatives of the unknowns."""
         xm, vm, xt, vt, q, z = map(float, y[:6])
         now = self.now
@@ -105,7 +105,7 @@ class Drive:
             rates += [v, -omega * omega * d - 2 * zeta * omega * v - table]
         return rates
 
-    def jacobian(self, t: float, y: Sequence[float]) -> Vector:
+    def jacobian(self, t: float, y: Sequence[float] | Vector) -> Vector:
         """Matrix of the derivatives of `rate`, without force limit and backlash, LuGre friction."""
         vt, z = float(y[3]), float(y[5])
         excess = (self.fs - self.fc) * math.exp(-((vt / self.vs) ** 2))
@@ -173,6 +173,43 @@ def play(
         y = found.y[:, -1]
         rows.append([drive.response_mm(y), 1e3 * y[2], 1e3 * y[0], drive.friction(y[3], y[5])[0]])
     return np.array(rows)
+
+
+def play_at_once(
+    drives: Sequence[Drive], setpoints_mm: Sequence[Vector], *, rtol: float, atol_m: float
+) -> list[Vector]:
+    """Responses in mm of several axes in one call of solve_ivp (BDF) over the whole command, known beforehand.
+
+    Nothing stops at the set-points: without feed-forward the right side has only kinks there.
+    """
+    period_s, count = drives[0].period_s, len(setpoints_mm[0])
+    commands = [periods(setpoints, period_s) for setpoints in setpoints_mm]
+    places = [slice(i * drives[0].size, (i + 1) * drives[0].size) for i in range(len(drives))]
+
+    def look_up(t: float) -> None:
+        for drive, command in zip(drives, commands, strict=True):
+            drive.now = command[min(int(t / period_s), count - 1)]
+
+    def rate(t: float, y: Vector) -> list[float]:
+        look_up(t)
+        values = y.tolist()
+        return [slope for drive, at in zip(drives, places, strict=True) for slope in drive.rate(t, values[at])]
+
+    def jacobian(t: float, y: Vector) -> Vector:
+        look_up(t)
+        matrix = np.zeros((len(y), len(y)))
+        for drive, at in zip(drives, places, strict=True):
+            matrix[at, at] = drive.jacobian(t, y[at])
+        return matrix
+
+    instants = np.arange(1, count + 1) * period_s
+    atol = np.concatenate([absolute_tolerances(drive, atol_m) for drive in drives])
+    found = solve_ivp(
+        rate, (0.0, instants[-1]), np.zeros(len(atol)), method="BDF", jac=jacobian, rtol=rtol, atol=atol,
+        t_eval=instants,
+    )  # fmt: skip
+    assert found.success, found.message
+    return [np.array([drive.response_mm(y) for y in found.y[at].T]) for drive, at in zip(drives, places, strict=True)]
 
 
 def absolute_tolerances(drive: Drive, atol_m: float) -> Vector:

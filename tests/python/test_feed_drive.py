@@ -59,7 +59,7 @@ def drive(**changes: Any) -> _core.FeedDriveParameters:
 def reversals_mm(count: int) -> Vector:
     """Forth, a rest in which the table sticks, back, and on through zero."""
     t = np.arange(1, count + 1) * PERIOD_S
-    return np.interp(t, [0, 0.04, 0.08, 0.12, 0.2], [0, 1.5, 1.5, 0.5, -1.5]).astype(np.float64)
+    return np.asarray(np.interp(t, [0, 0.04, 0.08, 0.12, 0.2], [0, 1.5, 1.5, 0.5, -1.5]), dtype=np.float64)
 
 
 def quadrant_mm(count: int) -> Vector:

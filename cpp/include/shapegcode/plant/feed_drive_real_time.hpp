@@ -9,7 +9,7 @@ namespace shapegcode {
 /// The equations of FeedDrive with fixed steps, for a controller prototype that needs its plant in bounded time: a
 /// Rosenbrock method (L-stable, third order: Rodas3 of Sandu et al. 1997) whose linear systems are solved in place.
 /// After construction no allocation, no lock, no exception; each step() costs the same. There is no error control:
-/// docs/plants.md states the error beside FeedDrive for the usual drives; twice the substeps show it for another.
+/// docs/feed_drive.md states the error beside FeedDrive for the usual drives; twice the substeps show it for another.
 class FeedDriveRealTime {
  public:
   static constexpr int default_substeps = 4;
