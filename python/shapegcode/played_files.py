@@ -50,7 +50,7 @@ class _Npz:
     A ZIP archive holds its members one after the other, but the columns come side by side.
     """
 
-    def __init__(self, folder: Path, files: contextlib.ExitStack) -> None:
+    def __init__(self, folder: Path | None, files: contextlib.ExitStack) -> None:
         self._folder = folder
         self._files = files
         self._columns: dict[str, tuple[BinaryIO, np.dtype[np.generic]]] = {}
@@ -115,7 +115,9 @@ def npz_file(path: str | Path) -> Iterator[PlayedFile]:
     Raises:
         OSError: the file cannot be written; what was there before stays.
     """
+    target = Path(path).resolve()
     with named_errors(path), contextlib.ExitStack() as files, replaced_file(path) as stream:
-        npz = _Npz(Path(path).resolve().parent, files)
+        # Beside the file, where there is room for it; not beside a device.
+        npz = _Npz(target.parent if target.is_file() or not target.exists() else None, files)
         yield npz
         npz.finish(stream)

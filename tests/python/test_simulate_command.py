@@ -19,6 +19,7 @@ import scipy.signal
 
 import feed_drive_reference as reference
 import shapegcode as sg
+from acceptance import PROGRAMS
 from shapegcode.cli import main
 from shapegcode.motion_picture import plot_motion
 from shapegcode.played import KINDS, REST_S, Chunk, plant_options
@@ -127,6 +128,22 @@ def test_motion_takes_the_cycle_time(motion: str) -> None:
                 played.time_s < block.start_s + block.duration_s - TICK_S / 2
             )
             assert set(played.line[inside]) == {block.line}
+
+
+@pytest.mark.parametrize("name", ["CONTOUR_R.NC", "G17_18_19.NC", "TEST_G90.NC"])
+def test_motion_of_a_real_program_takes_its_cycle_time(name: str) -> None:
+    """The last one changes its work offset on the way: the command jumps then, the plant does not."""
+    machine = sg.Machine.load("vx500")
+    program = sg.Program.read(PROGRAMS / name, machine)
+    samples, fastest, largest = 0, 0.0, 0.0
+    for chunk in sg.stream(program, machine):
+        samples += len(chunk)
+        fastest = max(fastest, float(np.abs(chunk.velocity_mm_per_s).max()))
+        largest = max(largest, float(np.abs(chunk.error_mm).max()))
+    expected = sg.cycle_time(program, machine).full_interpolation_s
+    assert (samples - 1) * TICK_S == pytest.approx(expected + REST_S, abs=TICK_S)
+    assert fastest <= 400.0 * (1 + 1e-9)
+    assert 0.01 < largest < 0.2
 
 
 def test_motion_ends_where_the_program_ends_and_keeps_its_speeds() -> None:
