@@ -11,6 +11,7 @@
 #include "register.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/plant/feed_drive.hpp"
+#include "shapegcode/plant/feed_drive_real_time.hpp"
 
 namespace py = pybind11;
 
@@ -40,6 +41,17 @@ py::array play(FeedDrive& drive, const VectorArray& setpoints_mm) {
   return take(std::move(played));
 }
 
+py::array play_in_real_time(FeedDriveRealTime& drive, const VectorArray& setpoints_mm) {
+  check_one_axis(setpoints_mm);
+  const double* setpoints = setpoints_mm.data();
+  Eigen::VectorXd played(setpoints_mm.size());
+  {
+    const py::gil_scoped_release release;
+    for (Eigen::Index i = 0; i < played.size(); ++i) played[i] = drive.step(setpoints[i]);
+  }
+  return py::cast(std::move(played));
+}
+
 void register_friction(py::module_& module) {
   py::enum_<FrictionModel>(module, "FrictionModel", "How a sliding pair resists.")
       .value("viscous", FrictionModel::viscous, "In proportion to the speed alone.")
@@ -67,10 +79,11 @@ Raises:
              friction.check("pair");
              return friction;
            }),
-           py::arg("model") = FrictionModel::viscous, py::kw_only(), py::arg("viscous_n_s_per_m") = 0.0,
-           py::arg("coulomb_n") = 0.0, py::arg("static_n") = 0.0, py::arg("stribeck_velocity_m_per_s") = 0.0,
-           py::arg("smoothing_velocity_m_per_s") = 0.0, py::arg("bristle_stiffness_n_per_m") = 0.0,
-           py::arg("bristle_damping_n_s_per_m") = 0.0, "ArgumentError if it is not what the class asks for.")
+           py::arg_v("model", FrictionModel::viscous, "FrictionModel.viscous"), py::kw_only(),
+           py::arg("viscous_n_s_per_m") = 0.0, py::arg("coulomb_n") = 0.0, py::arg("static_n") = 0.0,
+           py::arg("stribeck_velocity_m_per_s") = 0.0, py::arg("smoothing_velocity_m_per_s") = 0.0,
+           py::arg("bristle_stiffness_n_per_m") = 0.0, py::arg("bristle_damping_n_s_per_m") = 0.0,
+           "ArgumentError if it is not what the class asks for.")
       .def_readonly("model", &FrictionParameters::model, "Model.")
       .def_readonly("viscous_n_s_per_m", &FrictionParameters::viscous_n_s_per_m, "N s/m.")
       .def_readonly("coulomb_n", &FrictionParameters::coulomb_n, "N.")
@@ -135,7 +148,8 @@ Raises:
            py::kw_only(), py::arg("motor_mass_kg"), py::arg("table_mass_kg"), py::arg("stiffness_n_per_m"),
            py::arg("damping_n_s_per_m"), py::arg("position_gain_per_s"), py::arg("velocity_gain_n_s_per_m"),
            py::arg("velocity_integral_time_s") = 0.0, py::arg("velocity_feed_forward_ratio") = 0.0,
-           py::arg("acceleration_feed_forward_ratio") = 0.0, py::arg("position_feedback") = PositionFeedback::motor,
+           py::arg("acceleration_feed_forward_ratio") = 0.0,
+           py::arg_v("position_feedback", PositionFeedback::motor, "PositionFeedback.motor"),
            py::arg("backlash_m") = 0.0, py::arg("force_limit_n") = 0.0,
            py::arg("table_friction") = FrictionParameters(), py::arg("motor_friction") = FrictionParameters(),
            py::arg("modes") = std::vector<Mode>{}, "ArgumentError if it is not what the class asks for.")
@@ -219,6 +233,24 @@ Raises:
       .def_property_readonly("steps", &FeedDrive::steps, "Internal steps so far.")
       .def_property_readonly("rhs_evaluations", &FeedDrive::rhs_evaluations, "Evaluations of the equations so far.")
       .def("__copy__", [](const FeedDrive& self) { return FeedDrive(self); });
+
+  py::class_<FeedDriveRealTime>(module, "FeedDriveRealTime",
+                                R"(The same with fixed steps and without error control: the real-time form.
+
+Args:
+    parameters: The drive.
+    period_s: Time between set-points in s.
+    substeps: Steps in a period, 1 ... 1000.
+
+Raises:
+    ArgumentError: A value outside its range.)")
+      .def(py::init<FeedDriveParameters, double, int>(), py::arg("parameters"), py::arg("period_s"),
+           py::arg("substeps") = FeedDriveRealTime::default_substeps, "ArgumentError on a value outside its range.")
+      .def("reset", &FeedDriveRealTime::reset, py::arg("position_mm"), "At rest at a position (mm).")
+      .def("step", &FeedDriveRealTime::step, py::arg("setpoint_mm"),
+           "Next set-point (mm); the response at that instant in mm.")
+      .def("play", &play_in_real_time, py::arg("setpoints_mm"),
+           "Responses (n,) in mm at many set-points (n,) in mm. ArgumentError on another shape.");
 }
 
 }  // namespace shapegcode::bindings

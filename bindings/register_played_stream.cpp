@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "arrays.hpp"
 #include "register.hpp"
+#include "shapegcode/simulation/csv_rows.hpp"
 #include "shapegcode/simulation/played_stream.hpp"
 
 namespace py = pybind11;
@@ -39,6 +42,9 @@ void register_played_stream(py::module_& module) {
           "Set-points behind every filter, (k, 3), mm.")
       .def_property_readonly(
           "response_mm", [](PlayedChunk& self) { return view(self.response_mm, py::cast(&self)); }, "(k, 3), mm.")
+      .def_property_readonly(
+          "velocity_mm_per_s", [](PlayedChunk& self) { return view(self.velocity_mm_per_s, py::cast(&self)); },
+          "Of the command over the period that ends with the row, without the jumps of coordinates, (k, 3), mm/s.")
       .def_property_readonly(
           "motor_mm", [](PlayedChunk& self) { return view(self.motor_mm, py::cast(&self)); },
           "Feed drives: motor as travel of the table, (k, 3), mm; modes: (0, 0).")
@@ -82,14 +88,24 @@ void register_played_stream(py::module_& module) {
             const py::gil_scoped_release release;
             return std::make_shared<PlayedChunk>(self.read(most));
           },
-          py::arg("most"), "The next rows, at most so many; none behind the end.")
-      .def(
-          "skip",
-          [](PlayedStream& self, std::uint64_t most) {
-            const py::gil_scoped_release release;
-            return self.skip(most);
-          },
-          py::arg("most"), "Play the next rows, at most so many, without giving them; returns how many there were.");
+          py::arg("most"), "The next rows, at most so many; none behind the end.");
+
+  module.def(
+      "csv_rows",
+      [](const py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>& word,
+         const std::vector<std::string>& words, const Eigen::Ref<const Eigen::MatrixXd>& table) {
+        const std::span<const std::uint8_t> numbers(word.data(), static_cast<std::size_t>(word.size()));
+        std::string text;
+        {
+          const py::gil_scoped_release release;
+          text = csv_rows(numbers, words, table);
+        }
+        return py::bytes(text);
+      },
+      py::arg("word"), py::arg("words"), py::arg("table"),
+      "Rows of a CSV file: the row's word, (k,), and the numbers of its row in the table, (k, c), each as the shortest "
+      "text that reads back as the same number. Raises ArgumentError on unequal lengths or a word that does not "
+      "exist.");
 }
 
 }  // namespace shapegcode::bindings

@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from shapegcode.machine import MachineError as MachineError
     from shapegcode.metrology import Measurement as Measurement
     from shapegcode.metrology import measure as measure
+    from shapegcode.played import stream as stream
     from shapegcode.program import Program as Program
     from shapegcode.shaping import (
         ModeBand as ModeBand,
@@ -114,6 +115,7 @@ _HOME = {
         ("ModeBand", "Recommendation", "choose_block_period", "choose_shaper", "shortest_non_negative"), "shaping"
     ),
     **dict.fromkeys(("Simulation", "simulate"), "simulator"),
+    "stream": "played",
     **dict.fromkeys(("CycleTime", "cycle_time"), "timing"),
 }  # fmt: skip
 

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MetrologyOptions', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_circle', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'line_sections', 'linear_model', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MetrologyOptions', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_circle', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'line_sections', 'linear_model', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -1907,6 +1907,34 @@ class FeedDrive:
         """
         Since reset(), s.
         """
+class FeedDriveRealTime:
+    """
+    The same with fixed steps and without error control: the real-time form.
+    
+    Args:
+        parameters: The drive.
+        period_s: Time between set-points in s.
+        substeps: Steps in a period, 1 ... 1000.
+    
+    Raises:
+        ArgumentError: A value outside its range.
+    """
+    def __init__(self, parameters: FeedDriveParameters, period_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 4) -> None:
+        """
+        ArgumentError on a value outside its range.
+        """
+    def play(self, setpoints_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+        """
+        Responses (n,) in mm at many set-points (n,) in mm. ArgumentError on another shape.
+        """
+    def reset(self, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        At rest at a position (mm).
+        """
+    def step(self, setpoint_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Next set-point (mm); the response at that instant in mm.
+        """
 class ContourTarget:
     """
     What shall follow the programmed path.
@@ -3757,6 +3785,11 @@ class PlayedChunk:
         """
         (k, 3), mm.
         """
+    @property
+    def velocity_mm_per_s(self) -> numpy.ndarray:
+        """
+        Of the command over the period that ends with the row, without the jumps of coordinates, (k, 3), mm/s.
+        """
 class PlayedStream:
     """
     A motion played through filters and plant and handed out in pieces.
@@ -3779,10 +3812,6 @@ class PlayedStream:
     def read(self, most: typing.SupportsInt | typing.SupportsIndex) -> PlayedChunk:
         """
         The next rows, at most so many; none behind the end.
-        """
-    def skip(self, most: typing.SupportsInt | typing.SupportsIndex) -> int:
-        """
-        Play the next rows, at most so many, without giving them; returns how many there were.
         """
 def acceleration_filters(model: ControllerModel) -> list[Fir]:
     """
@@ -3827,6 +3856,10 @@ def convolved_zv(modes: collections.abc.Sequence[Mode]) -> Shaper:
 def count_slowed_blocks(blocks: Path, corner_speed_difference_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], max_feed_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> int:
     """
     Blocks that a controller with look-ahead would run slower than programmed.
+    """
+def csv_rows(word: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], words: collections.abc.Sequence[str], table: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.f_contiguous"]) -> bytes:
+    """
+    Rows of a CSV file: the row's word, (k,), and the numbers of its row in the table, (k, c), each as the shortest text that reads back as the same number. Raises ArgumentError on unequal lengths or a word that does not exist.
     """
 def extra_insensitive(mode: Mode, vibration_limit: typing.SupportsFloat | typing.SupportsIndex, humps: typing.SupportsInt | typing.SupportsIndex = 1) -> ExtraInsensitive:
     """

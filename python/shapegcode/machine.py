@@ -1,8 +1,8 @@
 """The machine file: what shapegcode knows about a machine tool and its controller.
 
-A machine file is TOML. :class:`Machine` is its model; it and its tables (machine_axes, machine_controller,
-machine_input, machine_output) are the only place in the project that holds defaults: every other module takes the
-values from here. Each key carries its unit, its meaning and, where the number is
+A machine file is TOML. :class:`Machine` is its model; it and its tables (machine_axes, machine_drive,
+machine_controller, machine_input, machine_output) are the only place in the project that holds defaults: every other
+module takes the values from here. Each key carries its unit, its meaning and, where the number is
 not known for real machines, the remark *assumed*; :func:`key_documentation` turns that into
 ``docs/machine.md``.
 """
@@ -20,6 +20,7 @@ from pydantic import Field, Strict, ValidationError, model_validator
 
 from shapegcode.machine_axes import Axes, Axis, Mode
 from shapegcode.machine_controller import Controller, PowerOn, Times
+from shapegcode.machine_drive import Drive
 from shapegcode.machine_errors import MachineError, Problem, problems_of, syntax_problem
 from shapegcode.machine_input import Input
 from shapegcode.machine_keys import KeyInfo, KeyValue, PerAxis, Table, Text, key, toml
@@ -30,6 +31,7 @@ __all__ = [
     "Axes",
     "Axis",
     "Controller",
+    "Drive",
     "Emission",
     "Input",
     "KeyInfo",

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from shapegcode.machine_drive import Drive
 from shapegcode.machine_keys import Float, InlineTable, NonNegative, Positive, Table, key, toml
 
 
@@ -105,6 +106,9 @@ class Axis(Table):
         "largest jerk while cutting; left out: not limited", unit="mm/s³", default=None
     )
     modes: tuple[Mode, ...] = key("vibration modes, one table each; none: the axis is taken as rigid", default=())
+    drive: Drive | None = key(
+        "feed drive, for the simulation with friction; left out: the axis follows its set-points exactly", default=None
+    )
 
 
 class Axes(Table):

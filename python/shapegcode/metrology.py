@@ -16,13 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.controller import controller_model
 from shapegcode.converter import written_by_shapegcode
 from shapegcode.machine import Machine
 from shapegcode.metrology_report import measurement_report
 from shapegcode.moving_modes import machine_warnings, region_offset, region_range_warnings
+from shapegcode.played import plant_options, playing_controller
 from shapegcode.program import Program
-from shapegcode.verify import own_rule, playback_options, vibration_memory_s
+from shapegcode.verify import vibration_memory_s
 
 __all__ = ["MeasuredProgram", "MeasuredRegion", "Measurement", "WallProfile", "measure", "measure_run"]
 
@@ -34,6 +34,7 @@ _LEAST_REST_S = 0.25
 _MOST_PROFILE_STATIONS = 200_000  # kept of each program for pictures
 _SAME_PLACE_MM = 0.005
 _SHORT_MM = 0.5
+_LAST_LINE = 2**32 - 1
 _BLOCKS_PER_CURVE = 2.5  # a shaped program's own blocks are shorter than this many block periods at its feed
 
 
@@ -109,6 +110,7 @@ class Measurement:
 
     Attributes:
         machine: that they were played on.
+        plant: "modal" or "feed-drive".
         tool_diameter_mm: of the disc.
         band_um: settled is what stays within it.
         station_spacing_mm: largest distance between two places at which walls were measured.
@@ -118,6 +120,7 @@ class Measurement:
     """
 
     machine: Machine
+    plant: str
     tool_diameter_mm: float
     band_um: float
     station_spacing_mm: float
@@ -141,6 +144,7 @@ def measure(
     machine: Machine,
     tool_diameter_mm: float,
     *,
+    plant: str = "modal",
     against: Program | None = None,
     lines: Sequence[tuple[int, int]] | None = None,
     band_um: float = 1.0,
@@ -157,6 +161,7 @@ def measure(
         programs: what to measure.
         machine: controller and modes.
         tool_diameter_mm: of the disc that is swept along the response.
+        plant: "modal" or "feed-drive", see `sg.stream`.
         against: the program whose path is the nominal one; None: the first of several if shapegcode did not write it
             and did write all the others, else each program's own path.
         lines: sections by lines of the nominal program, first and last; None: maximal runs of lines of one direction
@@ -171,6 +176,8 @@ def measure(
         ArgumentError: no program, a value outside its range, lines that hold no cut, or a program that does not cut
             the regions of the one it is measured against.
         ProgramError: a region takes longer than can be computed.
+        MachineError: the machine has no feed drives.
+        NumericError: the integrator of a feed drive fails.
     """
     several = [programs] if isinstance(programs, Program) else list(programs)
     if not several:
@@ -202,7 +209,7 @@ def measure(
         kept = 0
         for job in jobs:
             region = measure_run(
-                _samples(job, machine, is_shaped),
+                _samples(job, machine, plant, is_shaped),
                 job.path,
                 job.sections,
                 options,
@@ -218,7 +225,7 @@ def measure(
         ]  # fmt: skip
         measured.append(MeasuredProgram(program.source, is_shaped, nominal.source, tuple(regions), tuple(warnings)))
     return Measurement(
-        machine, tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm, tuple(measured)
+        machine, plant, tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm, tuple(measured)
     )  # fmt: skip
 
 
@@ -244,7 +251,7 @@ def _jobs(
         if lines is None:
             sections = _core.path_sections(path, _short_mm(path, machine, own_blocks=shaped and nominal is program))
         else:
-            sections = _core.line_sections(path, list(lines))
+            sections = _core.line_sections(path, [(min(a, _LAST_LINE), min(b, _LAST_LINE)) for a, b in lines])
         if sections:
             jobs.append(_Job(played, region, path, sections))
     if lines is not None and not jobs:
@@ -323,23 +330,16 @@ def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
     return WallProfile(distance_mm, left * 1e3, right * 1e3, point, normal)
 
 
-def _samples(job: _Job, machine: Machine, shaped: bool) -> Iterator[tuple[FloatArray, FloatArray]]:
+def _samples(job: _Job, machine: Machine, plant: str, shaped: bool) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Command and response of a region, and what follows the stop until the vibration has decayed."""
-    offset = region_offset(job.played, machine)
     rest_s = min(max(vibration_memory_s(machine), _LEAST_REST_S), _LONGEST_REST_S)
+    model = playing_controller(machine, shaped=shaped)
+    options = plant_options(machine, plant, offset=region_offset(job.played, machine))
+    options.axis_filters = _core.acceleration_filters(model)
     blocks = job.played.path
-    if shaped:
-        time_constant_s = machine.controller.shaped_time_constant_s
-        options = playback_options(machine, time_constant_s=time_constant_s, offset=offset)
-        stream = _core.PlayedStream.of_blocks(blocks, own_rule(machine), 1.0, options, rest_s)
+    if model.motion == _core.MotionKind.look_ahead:
+        stream = _core.PlayedStream.of_path(blocks, _core.plan_speed(blocks, model.limits), options, rest_s)
     else:
-        model = controller_model(machine)
-        options = playback_options(machine, offset=offset)
-        options.axis_filters = _core.acceleration_filters(model)
-        if model.motion == _core.MotionKind.look_ahead:
-            profile = _core.plan_speed(blocks, model.limits)
-            stream = _core.PlayedStream.of_path(blocks, profile, options, rest_s)
-        else:
-            stream = _core.PlayedStream.of_blocks(blocks, model.block_end, 1.0, options, rest_s)
+        stream = _core.PlayedStream.of_blocks(blocks, model.block_end, 1.0, options, rest_s)
     while len(chunk := stream.read(_CHUNK_SAMPLES)) > 0:
         yield chunk.command_mm, chunk.response_mm

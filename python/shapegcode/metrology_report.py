@@ -18,6 +18,7 @@ def measurement_report(measurement: Measurement) -> dict[str, Any]:
     """The whole measurement (keys: docs/metrology.md)."""
     return {
         "machine": measurement.machine.name,
+        "plant": measurement.plant,
         "tool_diameter_mm": measurement.tool_diameter_mm,
         "settling_band_um": measurement.band_um,
         "station_spacing_mm": measurement.station_spacing_mm,

@@ -15,8 +15,11 @@
 #include "shapegcode/motion/interpolator.hpp"
 #include "shapegcode/motion/look_ahead.hpp"
 #include "shapegcode/motion/rapid.hpp"
+#include "shapegcode/plant/feed_drive_real_time.hpp"
 #include "shapegcode/plant/modal.hpp"
 #include "shapegcode/plant/servo_lag.hpp"
+
+#include "feed_drives.hpp"
 
 namespace {
 
@@ -186,6 +189,16 @@ int main() {
     for (int i = 0; i < 5000; ++i) {
       sink += varying_plant.step(Vector3(0.001 * i * i, 0.0, 0.1 * i)).sum() + varying_plant.peak().sum();
     }
+    return 5000L;
+  });
+
+  FeedDriveParameters drive_parameters = feed_drives::with_friction();
+  drive_parameters.motor_friction = feed_drives::stribeck();
+  drive_parameters.backlash_m = 5e-6;
+  FeedDriveRealTime drive(drive_parameters, 1e-3);
+  expect_none("FeedDriveRealTime::step", [&] {
+    drive.reset(0.0);
+    for (int i = 0; i < 5000; ++i) sink += drive.step(0.00001 * i * i) + drive.motor_mm() + drive.friction_force_n();
     return 5000L;
   });
 

@@ -194,6 +194,32 @@ TEST_CASE("ode: an exception of the right side or of the Jacobian reaches the ca
   CHECK(std::abs(solver.advance(0.1)[0]) < 1e-6);
 }
 
+TEST_CASE("ode: a system of its own, whose tolerance is taken of other magnitudes and whose steps are limited") {
+  // A slow oscillation far from zero: |y| would make the relative tolerance a hundred times the amplitude.
+  struct Far final : shapegcode::OdeSystem {
+    void rate(double, const double* y, double* rate) override {
+      rate[0] = y[1];
+      rate[1] = 1e6 - y[0];
+    }
+    void jacobian(double, const double*, double* matrix) override {
+      matrix[1] = -1.0;  // row 1, column 0
+      matrix[2] = 1.0;
+    }
+    void magnitudes(double, const double* y, Ref<VectorXd> magnitude) override {
+      magnitude << std::abs(y[0] - 1e6), std::abs(y[1]);
+    }
+  } far;
+  OdeSolver solver(far, values({1e6 + 1.0, 0.0}), 0.0, 1e-7, VectorXd::Constant(2, 1e-7));
+  CHECK(solver.advance(20.0)[0] - 1e6 == doctest::Approx(std::cos(20.0)).epsilon(1e-4));
+  const long steps = solver.steps();
+  solver.restart(values({1e6 + 1.0, 0.0}), 0.0);
+  solver.limit_step(0.02);
+  CHECK(solver.advance(20.0)[0] - 1e6 == doctest::Approx(std::cos(20.0)).epsilon(1e-4));
+  CHECK(solver.steps() - steps >= 1000);
+  CHECK_THROWS_AS(solver.limit_step(0.0), Error);
+  CHECK_THROWS_AS(OdeSolver(far, values({1.0, 2.0}), 0.0, 1e-6, values({1.0})), Error);
+}
+
 TEST_CASE("ode: a failure names CVODE's flag and the time") {
   // y' = y^2 from 1 has no solution beyond t = 1.
   OdeSolver solver([](double, const State& y, Ref<VectorXd> rate) { rate[0] = y[0] * y[0]; },

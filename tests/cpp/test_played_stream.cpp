@@ -10,6 +10,7 @@
 #include "shapegcode/error.hpp"
 #include "shapegcode/gcode/interpreter.hpp"
 #include "shapegcode/motion/look_ahead.hpp"
+#include "shapegcode/simulation/csv_rows.hpp"
 #include "shapegcode/simulation/cycle_time.hpp"
 #include "shapegcode/simulation/played_stream.hpp"
 
@@ -50,7 +51,7 @@ std::vector<FeedDriveParameters> three_drives() {
 }
 
 struct Played {
-  std::vector<Vector3> command, response;
+  std::vector<Vector3> command, response, velocity;
   std::vector<std::uint32_t> line;
   std::vector<BlockKind> kind;
 };
@@ -65,6 +66,7 @@ Played drained(PlayedStream stream, std::size_t piece) {
     for (std::size_t i = 0; i < chunk.size(); ++i) {
       played.command.emplace_back(chunk.command_mm.row(static_cast<Eigen::Index>(i)));
       played.response.emplace_back(chunk.response_mm.row(static_cast<Eigen::Index>(i)));
+      played.velocity.emplace_back(chunk.velocity_mm_per_s.row(static_cast<Eigen::Index>(i)));
     }
     played.line.insert(played.line.end(), chunk.line.begin(), chunk.line.end());
     played.kind.insert(played.kind.end(), chunk.kind.begin(), chunk.kind.end());
@@ -164,9 +166,12 @@ TEST_CASE("played stream: a program takes its cycle time, without a jump, and th
     const double closed_s = time_program(*text, model).parts.total_s();
     CHECK(static_cast<double>(played.line.size() - 1) * model.period_s == doctest::Approx(closed_s).epsilon(1e-9));
     CHECK(closed_s == doctest::Approx(interpolate_program(*text, model).total_s).epsilon(1e-9));
+    CHECK(played.velocity.front() == Vector3::Zero());
     double largest_step = 0.0;
     for (std::size_t i = 1; i < played.line.size(); ++i) {
-      largest_step = std::max(largest_step, (played.command[i] - played.command[i - 1]).norm());
+      const Vector3 step = played.command[i] - played.command[i - 1];
+      largest_step = std::max(largest_step, step.norm());
+      CHECK((played.velocity[i] * model.period_s - step).norm() < 1e-12);
     }
     CHECK(largest_step < 0.4 * 1.5);  // rapids: 400 mm/s in each of two axes
     CHECK((played.command.front() - Vector3(0, 0, 5)).norm() < 1e-12);
@@ -174,13 +179,6 @@ TEST_CASE("played stream: a program takes its cycle time, without a jump, and th
     CHECK(std::is_sorted(played.line.begin(), played.line.end()));
     CHECK(std::count(played.kind.begin(), played.kind.end(), BlockKind::dwell) == 250);
     CHECK(std::count(played.kind.begin(), played.kind.end(), BlockKind::tool_change) == 1500);
-    // Every other sample is played: what was passed over moved the plant all the same.
-    PlayedStream halves(text, model, options);
-    for (std::size_t i = 0; i < played.line.size();) {
-      const PlayedChunk one = halves.read(1);
-      CHECK(Vector3(one.response_mm.row(0)) == played.response[i]);
-      i += 1 + static_cast<std::size_t>(halves.skip(99));
-    }
     // The same set-points through the plant of playback, in one piece.
     Samples samples;
     samples.period_s = model.period_s;
@@ -217,13 +215,16 @@ TEST_CASE("played stream: where the coordinates jump, the command jumps and the 
   REQUIRE(jumping.command.size() == continuous.command.size());
   double largest = 0.0;
   double jump = 0.0;
+  double speeds_apart = 0.0;
   for (std::size_t i = 0; i < jumping.command.size(); ++i) {
     const Vector3 deflection = jumping.response[i] - jumping.command[i];
     largest = std::max(largest, (deflection - (continuous.response[i] - continuous.command[i])).norm());
+    speeds_apart = std::max(speeds_apart, (jumping.velocity[i] - continuous.velocity[i]).norm());
     jump = i > 0 ? std::max(jump, (jumping.command[i] - jumping.command[i - 1]).norm()) : 0.0;
   }
   CHECK(largest < 1e-12);
   CHECK(jump > 29.0);
+  CHECK(speeds_apart < 1e-9);
 }
 
 TEST_CASE("played stream: modes that vary with position see the machine's coordinates") {
@@ -313,6 +314,17 @@ TEST_CASE("playback: residual and settling time of both plants are those of a lo
     CHECK(std::isinf(play_path(path, profile, options).settling_s.maxCoeff()));
     options.settling_limit_s = 1.5;
   }
+}
+
+TEST_CASE("csv rows: numbers read back as they were") {
+  Eigen::MatrixXd table(2, 4);
+  table << 0.1, -0.0, 12.0, 1.0 / 3.0, 1e-300, 123456789.125, -2.5e-7, 0.001;
+  const std::vector<std::uint8_t> word = {1, 0};
+  CHECK(csv_rows(word, {"cutting", "rapid"}, table) ==
+        "rapid,0.1,0,12,0.3333333333333333\ncutting,1e-300,123456789.125,-2.5e-07,0.001\n");
+  CHECK(csv_rows({}, {}, Eigen::MatrixXd(0, 4)).empty());
+  CHECK_THROWS_AS((void)csv_rows(word, {"cutting"}, table), Error);
+  CHECK_THROWS_AS((void)csv_rows(word, {"cutting", "rapid"}, Eigen::MatrixXd::Zero(3, 1)), Error);
 }
 
 TEST_CASE("played stream: what cannot be is refused") {

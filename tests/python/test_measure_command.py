@@ -37,7 +37,7 @@ def measured(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> 
 def test_json_of_two_programs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     report = measured(capsys, "part.nc", "shaped.nc", "--set", "tolerance.contour_um=50")
     assert set(report) == {
-        "machine", "tool_diameter_mm", "settling_band_um", "station_spacing_mm", "roughness_cutoff_mm",
+        "machine", "plant", "tool_diameter_mm", "settling_band_um", "station_spacing_mm", "roughness_cutoff_mm",
         "roughness_lambda_s_mm", "tolerance_um", "within_tolerance", "programs",
     }  # fmt: skip
     part, shaped = report["programs"]
@@ -108,10 +108,20 @@ def test_sections_by_lines_and_options(folder: Path, capsys: pytest.CaptureFixtu
     assert (report["settling_band_um"], report["station_spacing_mm"]) == (5.0, pytest.approx(0.02))
 
 
+def test_feed_drives(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    driven = measured(capsys, "part.nc", "--plant", "feed-drive", "--set", "tolerance.contour_um=2000")
+    assert driven["plant"] == "feed-drive"
+    modal = measured(capsys, "part.nc", "--set", "tolerance.contour_um=2000")
+    for one, other in zip(driven["programs"][0]["sections"], modal["programs"][0]["sections"], strict=True):
+        assert one["lines"] == other["lines"]
+        # The servo lags behind by more than a mode vibrates.
+        assert max(one["peak_vibration_um"].values()) > max(other["peak_vibration_um"].values())
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["part.nc", "--lines", "9-8"], "'9-8': must be lines from 1"),
+        (["part.nc", "--lines", "9-8"], "'9-8': must be lines, first to last"),
         (["part.nc", "--lines", "100-200"], "part.nc: no cutting move in lines 100-200"),
         (["part.nc", "--lines", "5-6", "--lines", "6-7"], "lines 5 to 6 and 6 to 7 overlap"),
         (["part.nc", "--band", "0um"], "must be a length above 0"),

@@ -126,11 +126,11 @@ void FeedDriveEquations::rate(const FeedDriveInput& input, double time_s, const 
   }
 }
 
-void FeedDriveEquations::jacobian(const FeedDriveInput& input, double time_s, const double* y,
-                                  double* matrix) const noexcept {
+void FeedDriveEquations::drive_jacobian(const FeedDriveInput& input, double time_s, const double* y, double* matrix,
+                                        int stride) const noexcept {
   const FeedDriveParameters& p = parameters_;
   const Layout& at = layout_;
-  const auto entry = [&](int row, int column) -> double& { return matrix[column * at.size + row]; };
+  const auto entry = [&](int row, int column) -> double& { return matrix[column * stride + row]; };
   const Control control = this->control(input, time_s, y);
   const double motor_velocity = control.motor_velocity;
   const double table_velocity = y[at.table_velocity];
@@ -191,6 +191,13 @@ void FeedDriveEquations::jacobian(const FeedDriveInput& input, double time_s, co
     entry(at.motor_bristle, at.speed) = on_motor.rate_by_velocity;
     entry(at.motor_bristle, at.motor_bristle) = on_motor.rate_by_bristle;
   }
+}
+
+void FeedDriveEquations::jacobian(const FeedDriveInput& input, double time_s, const double* y,
+                                  double* matrix) const noexcept {
+  const Layout& at = layout_;
+  const auto entry = [&](int row, int column) -> double& { return matrix[column * at.size + row]; };
+  drive_jacobian(input, time_s, y, matrix, at.size);
   int i = at.modes;
   for (const ModeRates& mode : modes_) {
     entry(i, i + 1) = 1.0;

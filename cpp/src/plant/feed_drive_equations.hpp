@@ -34,10 +34,18 @@ class FeedDriveEquations {
     int size = 4;
   };
 
+  struct ModeRates {
+    double stiffness = 0.0;  ///< omega^2
+    double damping = 0.0;    ///< 2 zeta omega
+    double participation = 1.0;
+  };
+  static constexpr int most_drive_states = 7;  ///< before the modes
+
   FeedDriveEquations(FeedDriveParameters parameters, double period_s);
 
   [[nodiscard]] const FeedDriveParameters& parameters() const noexcept { return parameters_; }
   [[nodiscard]] const Layout& layout() const noexcept { return layout_; }
+  [[nodiscard]] const std::vector<ModeRates>& modes() const noexcept { return modes_; }
   /// a: by how much the set-points' speed, joined by straight lines, is contained in that of the motor.
   [[nodiscard]] double acceleration_share() const noexcept { return acceleration_share_; }
 
@@ -45,6 +53,9 @@ class FeedDriveEquations {
   /// filled with zeros.
   void rate(const FeedDriveInput& input, double time_s, const double* y, double* rate) const noexcept;
   void jacobian(const FeedDriveInput& input, double time_s, const double* y, double* matrix) const noexcept;
+  /// The same for the states before the modes alone (which do not depend on them), columns `stride` apart.
+  void drive_jacobian(const FeedDriveInput& input, double time_s, const double* y, double* matrix,
+                      int stride) const noexcept;
 
   /// Following error in m, speed of the motor in m/s and integral of the speed error in m.
   [[nodiscard]] double following_error(const FeedDriveInput& input, double time_s, const double* y) const noexcept;
@@ -59,11 +70,6 @@ class FeedDriveEquations {
   [[nodiscard]] bool is_limited(const FeedDriveInput& input, double time_s, const double* y) const noexcept;
 
  private:
-  struct ModeRates {
-    double stiffness = 0.0;  // omega^2
-    double damping = 0.0;    // 2 zeta omega
-    double participation = 1.0;
-  };
   struct Control;
   struct Spring;
   [[nodiscard]] Control control(const FeedDriveInput& input, double time_s, const double* y) const noexcept;

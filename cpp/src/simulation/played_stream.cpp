@@ -59,7 +59,10 @@ class Run {
 
 struct PlayedStream::Impl {
   Impl(Source set_points, const PlaybackOptions& options, double rest_s, std::vector<Vector3> offsets = {})
-      : source(std::move(set_points)), plant(options), region_offsets_mm(std::move(offsets)) {
+      : source(std::move(set_points)),
+        rate_hz(1.0 / options.period_s),
+        plant(options),
+        region_offsets_mm(std::move(offsets)) {
     if (!(rest_s >= 0.0) || !std::isfinite(rest_s)) {
       throw Error(ErrorKind::argument, "rest of " + std::to_string(rest_s) + " s must be finite and >= 0");
     }
@@ -89,6 +92,8 @@ struct PlayedStream::Impl {
       plant.shift(now.jump_mm + offset(now.region) - offset(region));
       region = now.region;
     }
+    velocity = sample == 0 ? Vector3(Vector3::Zero()) : Vector3((now.position_mm - last - now.jump_mm) * rate_hz);
+    last = now.position_mm;
     const Vector3 there = offset(region);
     response = plant.step(now.position_mm + there) - there;
     ++sample;
@@ -96,6 +101,7 @@ struct PlayedStream::Impl {
   }
 
   Source source;
+  double rate_hz;
   detail::AxisPlant plant;
   std::vector<Vector3> region_offsets_mm;
   std::uint64_t rest_samples = 0;
@@ -104,6 +110,8 @@ struct PlayedStream::Impl {
   bool moving = true;
   SetPoint now;
   Vector3 response = Vector3::Zero();
+  Vector3 velocity = Vector3::Zero();  // mm/s
+  Vector3 last = Vector3::Zero();
 };
 
 PlayedStream::PlayedStream(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
@@ -161,7 +169,7 @@ PlayedChunk PlayedStream::read(std::size_t most) {
   PlayedChunk chunk;
   chunk.first_sample = impl_->sample;
   const std::vector<FeedDrive>& drives = impl_->plant.drives();
-  std::vector<Eigen::MatrixXd*> columns = {&chunk.command_mm, &chunk.response_mm};
+  std::vector<Eigen::MatrixXd*> columns = {&chunk.command_mm, &chunk.response_mm, &chunk.velocity_mm_per_s};
   if (!drives.empty()) {
     columns.insert(columns.end(), {&chunk.motor_mm, &chunk.motor_force_n, &chunk.friction_force_n});
   }
@@ -174,6 +182,7 @@ PlayedChunk PlayedStream::read(std::size_t most) {
     const auto row = static_cast<Eigen::Index>(chunk.line.size());
     chunk.command_mm.row(row) = impl_->now.position_mm;
     chunk.response_mm.row(row) = impl_->response;
+    chunk.velocity_mm_per_s.row(row) = impl_->velocity;
     for (std::size_t i = 0; i < drives.size(); ++i) {
       const auto axis = static_cast<Eigen::Index>(i);
       chunk.motor_mm(row, axis) = drives[i].motor_mm() - impl_->offset(impl_->region)[axis];
@@ -189,14 +198,6 @@ PlayedChunk PlayedStream::read(std::size_t most) {
     }
   }
   return chunk;
-}
-
-std::uint64_t PlayedStream::skip(std::uint64_t most) {
-  std::uint64_t passed = 0;
-  while (passed < most && impl_->step()) {
-    ++passed;
-  }
-  return passed;
 }
 
 }  // namespace shapegcode

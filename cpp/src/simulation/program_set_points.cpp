@@ -13,7 +13,7 @@ namespace shapegcode::detail {
 namespace {
 
 constexpr std::uint64_t most_set_points = 4'000'000'000;
-constexpr double memory = 40.0;  // time constants of the servo loop that a wait needs to be played for
+constexpr double settled_time_constants = 40.0;  // time constants of the servo loop that a wait needs to be played for
 constexpr double tick_slack = 1e-9;
 constexpr double rounding_mm = 1e-9;  // between the end of a motion and the start of the next
 
@@ -46,6 +46,7 @@ ProgramSetPoints::ProgramSetPoints(const Program& program, const ControllerModel
       servo_(model.position_gain_per_s, model.feed_forward_ratio, model.period_s) {
   time_.region_s.reserve(program_.regions.size());
   set_point_ = first_position();
+  servo_.reset(set_point_);
   next_.position_mm = set_point_;
 }
 
@@ -263,7 +264,7 @@ void ProgramSetPoints::open_wait(double seconds) {
   owed_periods_ += seconds / model_.period_s;
   const double whole = std::floor(owed_periods_ + tick_slack);
   owed_periods_ -= whole;
-  const double settled = std::ceil(memory / (model_.position_gain_per_s.minCoeff() * model_.period_s));
+  const double settled = std::ceil(settled_time_constants / (model_.position_gain_per_s.minCoeff() * model_.period_s));
   const double played = waits_ == Waits::cut ? std::min(whole, settled) : whole;
   if (!(played <= static_cast<double>(most_set_points))) {
     throw Error(ErrorKind::argument, "wait of " + std::to_string(seconds) + " s takes more than " +

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import re
 from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
@@ -11,6 +10,7 @@ from shapegcode.cli.options import (
     add_machine_argument,
     add_plots_argument,
     add_program_argument,
+    line_range,
     load_machine,
     micrometres,
     refuse_same_file,
@@ -35,6 +35,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--tool-diameter", metavar="LENGTH", type=micrometres, required=True, help="of the tool, for example 3mm"
     )
     parser.add_argument(
+        "--plant",
+        choices=("modal", "feed-drive"),
+        default="modal",
+        help="modal: vibration modes behind an ideal servo; feed-drive: [axes.x.drive] (default: %(default)s)",
+    )
+    parser.add_argument(
         "--against",
         metavar="ORIGINAL",
         default=None,
@@ -44,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--lines",
         metavar="A-B",
-        type=_lines,
+        type=line_range,
         action="append",
         default=None,
         help="measure the cut of these lines as one section; may be repeated (default: every line and arc)",
@@ -100,6 +106,7 @@ def run(args: argparse.Namespace) -> int:
             programs,
             machine,
             args.tool_diameter * 1e-3,
+            plant=args.plant,
             against=against,
             lines=args.lines,
             band_um=args.band,
@@ -133,12 +140,3 @@ def _said(program: dict[str, object]) -> str:
     path = "its own path" if against == name else f"the path of {against}"
     judged = "" if program["within_tolerance"] is not None else ", which is not the programmed one: not judged"
     return f"{name}: played {how}, measured against {path}{judged}"
-
-
-def _lines(text: str) -> tuple[int, int]:
-    """A range of lines such as ``12-40``, or one line."""
-    match = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}))?", text)
-    first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
-    if not 0 < first <= last:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be lines from 1, first and last, for example 12-40")
-    return first, last

@@ -57,7 +57,7 @@ struct FeedDriveLinearModel {
 /// Motor, ball screw and table of one axis with its position and speed controller, integrated by CVODE (BDF with an
 /// analytic Jacobian). Set-points come once per period and are joined by straight lines; the speed that is fed forward
 /// steps at each of them. A copy takes over the state, not the integrator's history: its next step is as accurate, but
-/// not the same to the last digit. docs/plants.md has the equations.
+/// not the same to the last digit. docs/feed_drive.md has the equations.
 class FeedDrive {
  public:
   /// At rest at zero. `rtol` relative tolerance (of following error, deflections and speeds), `atol_mm` absolute

@@ -19,6 +19,8 @@ struct PlayedChunk {
   std::uint64_t first_sample = 0;  ///< its time is first_sample * period
   Eigen::MatrixXd command_mm;      ///< set-points behind every filter, (k, 3)
   Eigen::MatrixXd response_mm;     ///< (k, 3)
+  /// Of the command over the period that ends with the row, (k, 3): without the jumps of coordinates; 0 at the start.
+  Eigen::MatrixXd velocity_mm_per_s;
   /// Feed drives only, otherwise without rows: motor as travel of the table, its force, friction of the table, (k, 3).
   Eigen::MatrixXd motor_mm;
   Eigen::MatrixXd motor_force_n;
@@ -56,8 +58,6 @@ class PlayedStream {
   /// The next rows, at most `most`; none behind the end. Throws Error(argument) on a block of a program without a
   /// feed, Error(numeric) where the integrator of a drive fails.
   [[nodiscard]] PlayedChunk read(std::size_t most);
-  /// Passes over the next rows, at most `most`, playing them; returns how many there were.
-  std::uint64_t skip(std::uint64_t most);
 
  private:
   struct Impl;
