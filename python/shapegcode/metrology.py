@@ -35,6 +35,8 @@ _MOST_PROFILE_STATIONS = 200_000  # kept of each program for pictures
 _SAME_PLACE_MM = 0.005
 _SHORT_MM = 0.5
 _LAST_LINE = 2**32 - 1
+_LARGEST_TOOL_MM = 1000.0
+_LEAST_SPACING_MM = 1e-3
 _BLOCKS_PER_CURVE = 2.5  # a shaped program's own blocks are shorter than this many block periods at its feed
 
 
@@ -67,12 +69,14 @@ class MeasuredRegion:
         path: that path.
         figures: what the core measured.
         walls: one per section; None where so many stations are not kept.
+        station_spacing_mm: largest distance between two stations.
     """
 
     lines: tuple[int, int]
     path: _core.Path
     figures: _core.RunFigures
     walls: tuple[WallProfile | None, ...]
+    station_spacing_mm: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,6 +189,12 @@ def measure(
     for name, value in (("tool diameter", tool_diameter_mm), ("station spacing", station_spacing_mm)):
         if not (math.isfinite(value) and value > 0.0):
             raise _core.ArgumentError(f"{name} is {value:g} mm, must be above 0")
+    if tool_diameter_mm > _LARGEST_TOOL_MM:
+        raise _core.ArgumentError(f"tool diameter is {tool_diameter_mm:g} mm, must be at most {_LARGEST_TOOL_MM:g} mm")
+    if station_spacing_mm < _LEAST_SPACING_MM:
+        raise _core.ArgumentError(
+            f"station spacing is {station_spacing_mm:g} mm, must be at least {_LEAST_SPACING_MM:g} mm"
+        )
     for name, value in (("cut-off", cutoff_mm if cutoff_mm is not None else 0.0), ("lambda s", lambda_s_mm)):
         if not (math.isfinite(value) and value >= 0.0):
             raise _core.ArgumentError(f"{name} is {value:g} mm, must be at least 0")
@@ -221,8 +231,16 @@ def measure(
             done += 1
             on_progress(min(done, total), total)
         warnings = [
-            *program.warnings, *machine_warnings(machine), *region_range_warnings(program.regions, machine),
-        ]  # fmt: skip
+            *program.warnings,
+            *machine_warnings(machine),
+            *region_range_warnings(program.regions, machine),
+            *(
+                f"lines {region.lines[0]} to {region.lines[1]}: so long a path that its walls are measured every "
+                f"{region.station_spacing_mm:.3g} mm, not every {station_spacing_mm:g} mm"
+                for region in regions
+                if region.station_spacing_mm > station_spacing_mm
+            ),
+        ]
         measured.append(MeasuredProgram(program.source, is_shaped, nominal.source, tuple(regions), tuple(warnings)))
     return Measurement(
         machine, plant, tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm, tuple(measured)
@@ -321,7 +339,7 @@ def measure_run(
     for command, response in chunks:
         metrology.feed(command, response)
     walls = tuple(_wall(metrology, index) if keep_walls else None for index in range(len(sections)))
-    return MeasuredRegion(lines, path, metrology.finish(), walls)
+    return MeasuredRegion(lines, path, metrology.finish(), walls, metrology.station_spacing_mm)
 
 
 def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:

@@ -271,6 +271,8 @@ def test_refusals() -> None:
     for arguments, message in (
         ({"programs": []}, "no program"),
         ({"tool_diameter_mm": 0.0}, "tool diameter is 0 mm"),
+        ({"tool_diameter_mm": 2e3}, "tool diameter is 2000 mm, must be at most 1000 mm"),
+        ({"station_spacing_mm": 1e-4}, "station spacing is 0.0001 mm, must be at least 0.001 mm"),
         ({"station_spacing_mm": math.nan}, "station spacing is nan mm"),
         ({"band_um": 0.0}, "band 0.000000 mm must be > 0"),
         ({"cutoff_mm": -1.0}, "cut-off is -1 mm"),
@@ -284,6 +286,13 @@ def test_refusals() -> None:
     with pytest.raises(sg.ArgumentError, match="differ in length"):
         metrology = _core.SectionMetrology(path, _core.path_sections(path), _core.MetrologyOptions())
         metrology.feed(np.zeros((3, 3)), np.zeros((4, 3)))
+
+
+def test_a_spacing_that_a_long_path_cannot_have_is_said() -> None:
+    machine = sg.Machine.load("vx500")
+    (measured,) = sg.measure(program(["G01X30000.F15000."], machine), machine, TOOL_MM).programs
+    # 30 m of path, at most 500 000 stations.
+    assert any("walls are measured every 0.06 mm, not every 0.05 mm" in warning for warning in measured.warnings)
 
 
 def test_a_program_without_cuts_measures_nothing() -> None:
