@@ -20,7 +20,7 @@ FloatArray = npt.NDArray[np.float64]
 _SHARE_OF_TOOL = 0.8  # of the tool's radius that the largest deviation takes in the drawing
 _SHARE_OF_PART = 0.03
 _LEAST_DRAWN_UM = 1e-3
-_MOST_NAMED = 12
+_MOST_MARKED = 12
 
 
 def write_measurement_pictures(measurement: Measurement, folder: str | Path) -> list[str]:
@@ -60,22 +60,22 @@ def plot_part(file: str | Path, measurement: Measurement, region: int) -> None:
     """
     radius = measurement.tool_diameter_mm / 2.0
     drawn = _drawn(measurement, region)
-    everything = np.concatenate([wall.point_mm for _, each in drawn for wall in _walls(each)])
+    everything = np.concatenate([wall.point_mm for wall in _walls(drawn[0][1])])
     extent = float(np.ptp(everything, axis=0).max())
     largest_mm = max(_largest_um(each) for _, each in drawn) * 1e-3
     magnified = _round(max(_SHARE_OF_TOOL * radius, _SHARE_OF_PART * extent) / max(largest_mm, _LEAST_DRAWN_UM * 1e-3))
     figure = canvas.figure(7.5, 7.5)
     panel = figure.subplots()
-    for wall in _walls(drawn[0][1]):
-        for side in (radius, -radius):
-            panel.plot(*_edge(wall, np.zeros(wall.left_um.size), side).T, color=canvas.GREY, linewidth=0.9)
-        panel.plot(*wall.point_mm.T, color=canvas.GREY, linewidth=0.6, linestyle=(0, (8, 3, 2, 3)))
+    nominal = _joined(drawn[0][1])
+    for side in (radius, -radius):
+        panel.plot(*_edge(nominal, np.zeros(nominal.left_um.size), side).T, color=canvas.GREY, linewidth=0.9)
+    panel.plot(*nominal.point_mm.T, color=canvas.GREY, linewidth=0.6, linestyle=(0, (8, 3, 2, 3)))
     for number, (program, each) in enumerate(drawn):
         colour = canvas.COLOURS[number % len(canvas.COLOURS)]
-        for index, wall in enumerate(_walls(each)):
-            for deviation, side in ((wall.left_um, radius), (wall.right_um, -radius)):
-                label = _label(program) if index == 0 and side > 0.0 else None
-                panel.plot(*_edge(wall, deviation * 1e-3 * magnified, side).T, color=colour, linewidth=1.2, label=label)
+        wall = _joined(each)
+        for deviation, side in ((wall.left_um, radius), (wall.right_um, -radius)):
+            label = _label(program) if side > 0.0 else None
+            panel.plot(*_edge(wall, deviation * 1e-3 * magnified, side).T, color=colour, linewidth=1.2, label=label)
     panel.set_aspect("equal")
     panel.set_xlabel("X in mm")
     panel.set_ylabel("Y in mm")
@@ -90,7 +90,7 @@ def plot_part(file: str | Path, measurement: Measurement, region: int) -> None:
 
 
 def plot_walls(file: str | Path, measurement: Measurement, region: int) -> None:
-    """Left wall, right wall and width along the path; the borders of the sections are marked.
+    """Left wall, right wall and width along the path; the borders of a few sections are marked.
 
     Args:
         file: ``.png`` or ``.svg``.
@@ -107,11 +107,10 @@ def plot_walls(file: str | Path, measurement: Measurement, region: int) -> None:
     left, right, width = column
     for number, (program, each) in enumerate(drawn):
         colour = canvas.COLOURS[number % len(canvas.COLOURS)]
-        for index, wall in enumerate(_walls(each)):
-            label = _label(program) if index == 0 else None
-            left.plot(wall.distance_mm, wall.left_um, color=colour, linewidth=1.1, label=label)
-            right.plot(wall.distance_mm, wall.right_um, color=colour, linewidth=1.1)
-            width.plot(wall.distance_mm, wall.left_um - wall.right_um, color=colour, linewidth=1.1)
+        wall = _joined(each)
+        left.plot(wall.distance_mm, wall.left_um, color=colour, linewidth=1.1, label=_label(program))
+        right.plot(wall.distance_mm, wall.right_um, color=colour, linewidth=1.1)
+        width.plot(wall.distance_mm, wall.left_um - wall.right_um, color=colour, linewidth=1.1)
     left.set_ylabel("left wall, µm\npositive: cut too far")
     right.set_ylabel("right wall, µm\nnegative: cut too far")
     width.set_ylabel(f"width less {measurement.tool_diameter_mm:g} mm, µm")
@@ -124,11 +123,11 @@ def plot_walls(file: str | Path, measurement: Measurement, region: int) -> None:
 
 def _mark_sections(panels: list[Axes], region: MeasuredRegion) -> None:
     sections = [each.section for each in region.figures.sections]
+    if len(sections) > _MOST_MARKED:
+        return
     for panel in panels:
         for section in sections[1:]:
             panel.axvline(section.begin_mm, color=canvas.GREY, linewidth=0.7, linestyle=":")
-    if len(sections) > _MOST_NAMED:
-        return
     for section in sections:
         middle = (section.begin_mm + section.end_mm) / 2.0
         panels[-1].annotate(
@@ -164,6 +163,20 @@ def _walls(region: MeasuredRegion) -> list[WallProfile]:
         for wall in region.walls
         if wall is not None and bool((np.isfinite(wall.left_um) | np.isfinite(wall.right_um)).any())
     ]
+
+
+def _joined(region: MeasuredRegion) -> WallProfile:
+    """All walls of a region as one, with a gap between two sections."""
+    walls = _walls(region)
+    gap = WallProfile(*(np.full(1, np.nan) for _ in range(3)), *(np.full((1, 2), np.nan) for _ in range(2)))
+    with_gaps = [each for wall in walls for each in (wall, gap)]
+    return WallProfile(
+        np.concatenate([each.distance_mm for each in with_gaps]),
+        np.concatenate([each.left_um for each in with_gaps]),
+        np.concatenate([each.right_um for each in with_gaps]),
+        np.concatenate([each.point_mm for each in with_gaps]),
+        np.concatenate([each.normal for each in with_gaps]),
+    )
 
 
 def _largest_um(region: MeasuredRegion) -> float:
