@@ -4263,12 +4263,12 @@ def fit_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.
     
     Source: spec 8; G. Golub, V. Pereyra 2003.
     """
-def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, quantity: str = 'acceleration', with_offset: bool = True, with_mass_line: bool = False, with_compliance: bool = False, coloured_residuals: bool = False, force_noise_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, most_iterations: typing.SupportsInt | typing.SupportsIndex = 60) -> ModalFit:
+def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, quantity: str = 'acceleration', with_offset: bool = True, with_mass_line: bool = False, with_compliance: bool = False, coloured_residuals: bool = False, hold: str = 'linear', force_noise_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, most_iterations: typing.SupportsInt | typing.SupportsIndex = 60) -> ModalFit:
     """
     Output-error (for white noise: maximum likelihood) fit of modes to one or several taps of the same point.
     
     The response is the sum over modes of (1/m) s^q/(s^2 + 2 zeta omega s + omega^2) applied to the force, from rest at the
-    first sample, the force linear between samples. Search by Levenberg-Marquardt in ln omega and ln zeta with exact
+    first sample. Search by Levenberg-Marquardt in ln omega and ln zeta with exact
     derivatives; everything linear is eliminated.
     
     Args:
@@ -4282,7 +4282,10 @@ def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.Arr
         with_mass_line: Add a free mass, for modes far below.
         with_compliance: Add a spring without mass, for modes far above.
         coloured_residuals: Covariance that holds for residuals correlated over time (stationary) as well.
-        force_noise_n: Standard deviation of white noise on the force in N, added to the covariance to first order.
+        hold: How the force runs between samples: "linear"; "band_limited", as behind an anti-aliasing filter (sinc
+            interpolation); "impulse", blows just before the samples, of force times period.
+        force_noise_n: Standard deviation of white noise on the force in N. In pulses of up to 128 samples the true force is
+            estimated along with the modes; else its effect is added to the covariance to first order.
         most_iterations: Steps after which the search gives up, with converged False.
     
     Returns:
@@ -4459,9 +4462,9 @@ def minimal_two_mode(first: Mode, second: Mode, max_duration_s: typing.SupportsF
     
     Source: paper 002, eq. 12-17; the search is this project's.
     """
-def modal_response(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], quantity: str = 'acceleration') -> numpy.typing.NDArray[numpy.float64]:
+def modal_response(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], quantity: str = 'acceleration', hold: str = 'linear') -> numpy.typing.NDArray[numpy.float64]:
     """
-    Response of modes to a force that is linear between samples, exact, from rest: the model of fit_modes.
+    Response of modes to a force, exact, from rest: the model of fit_modes.
     
     Args:
         force_n: Force in N, shape (n,).
@@ -4470,6 +4473,7 @@ def modal_response(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float
         damping_ratio: Damping ratios, 0 < zeta < 1, shape (n_modes,).
         inverse_mass: Residues 1/m in 1/kg, shape (n_modes,).
         quantity: "acceleration", "velocity" or "displacement".
+        hold: How the force runs between samples, as in fit_modes.
     
     Returns:
         Response in SI units, shape (n,).
@@ -4563,7 +4567,7 @@ def poles_to_modes(poles: collections.abc.Sequence[complex | typing.SupportsComp
     
     Source: spec 8; paper 003, eq. 5-6.
     """
-def rank_modes(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], most: typing.SupportsInt | typing.SupportsIndex, forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None, quantity: str = 'acceleration') -> ModeRanking:
+def rank_modes(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], most: typing.SupportsInt | typing.SupportsIndex, forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None, quantity: str = 'acceleration', kept: typing.SupportsInt | typing.SupportsIndex = 0) -> ModeRanking:
     """
     Ranks candidate modes by forward selection: starts for fit_modes and fit_decay from the poles of a chart.
     
@@ -4578,6 +4582,8 @@ def rank_modes(responses: collections.abc.Sequence[typing.Annotated[numpy.typing
         most: How many to choose, at least 1.
         forces: Force per record in N at the same instants; None: the records are free decays.
         quantity: "acceleration", "velocity" or "displacement"; only with forces.
+        kept: The first so many candidates are chosen before all others, in their order; handed over as fitted, they leave
+            only what is new to the rest.
     
     Returns:
         The ranking; shorter than asked for where no candidate explains anything more.

@@ -129,6 +129,7 @@ def test_only_pictures_import_matplotlib() -> None:
     }
     assert users == {
         "canvas.py",
+        "identification/tap_picture.py",
         "metrology_picture.py",
         "motion_picture.py",
         "plotting.py",
