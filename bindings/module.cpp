@@ -16,10 +16,11 @@ PYBIND11_MODULE(_core, module) {
   register_gcode(module);
   register_plant(module);
   register_feed_drive(module);
-  register_metrology(module);
   register_identification(module);
   register_shaped_command(module);
   register_emission(module);
   register_simulation(module);
+  register_metrology(module);
   register_timing(module);
+  register_played_stream(module);
 }

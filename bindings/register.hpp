@@ -22,5 +22,6 @@ void register_metrology(pybind11::module_& module);
 void register_identification(pybind11::module_& module);
 void register_simulation(pybind11::module_& module);
 void register_timing(pybind11::module_& module);
+void register_played_stream(pybind11::module_& module);
 
 }  // namespace shapegcode::bindings

@@ -46,6 +46,11 @@ void register_simulation(py::module_& module) {
       .def_readwrite("modes", &PlaybackOptions::modes, "Modes of X, Y and Z.")
       .def_readwrite("mode_tables", &PlaybackOptions::mode_tables,
                      "How the modes of X, Y and Z vary with position, one table per mode; none: constant modes.")
+      .def_readwrite("drives", &PlaybackOptions::drives,
+                     "Feed drives of X, Y and Z in place of the modes; none: modes alone.")
+      .def_readwrite("settling_band_mm", &PlaybackOptions::settling_band_mm, "Of the settling time, mm; 0: none.")
+      .def_readwrite("settling_limit_s", &PlaybackOptions::settling_limit_s,
+                     "How long behind the stop it is looked for; with drives the residual too, s.")
       .def_readwrite("measure_contour", &PlaybackOptions::measure_contour, "Deviations and orbit errors.")
       .def_readwrite("measure_command", &PlaybackOptions::measure_command,
                      "False: the deviation of the response alone, no orbit errors.")
@@ -70,6 +75,9 @@ void register_simulation(py::module_& module) {
       .def_readonly("duration_s", &PlaybackFigures::duration_s, "Until the set-points rest, s.")
       .def_readonly("residual_mm", &PlaybackFigures::residual_mm,
                     "Largest |response - command| from the instant at which the set-points rest, (3,), mm.")
+      .def_readonly("settling_s", &PlaybackFigures::settling_s,
+                    "From that instant until |response - command| stays within the band, (3,), s; inf: not within the "
+                    "limit.")
       .def_readonly("peak_mm", &PlaybackFigures::peak_mm, "Largest |response - command| before it, (3,), mm.")
       .def_readonly("peak_acceleration_mm_per_s2", &PlaybackFigures::peak_acceleration_mm_per_s2,
                     "Of the command, (3,), mm/s^2.")

@@ -82,6 +82,9 @@ if TYPE_CHECKING:
     from shapegcode.identification.tap_test import identify as identify
     from shapegcode.machine import Machine as Machine
     from shapegcode.machine import MachineError as MachineError
+    from shapegcode.metrology import Measurement as Measurement
+    from shapegcode.metrology import measure as measure
+    from shapegcode.played import stream as stream
     from shapegcode.program import Program as Program
     from shapegcode.shaping import (
         ModeBand as ModeBand,
@@ -118,6 +121,7 @@ _HOME = {
     **dict.fromkeys(("Conversion", "convert"), "converter"),
     "Identification": "identification.results",
     **dict.fromkeys(("Machine", "MachineError"), "machine"),
+    **dict.fromkeys(("Measurement", "measure"), "metrology"),
     "Program": "program",
     "ReadOptions": "identification.read",
     **dict.fromkeys(("Record", "RecordError"), "identification.record"),
@@ -126,6 +130,7 @@ _HOME = {
         ("ModeBand", "Recommendation", "choose_block_period", "choose_shaper", "shortest_non_negative"), "shaping"
     ),
     **dict.fromkeys(("Simulation", "simulate"), "simulator"),
+    "stream": "played",
     **dict.fromkeys(("CycleTime", "cycle_time"), "timing"),
 }  # fmt: skip
 

@@ -43,7 +43,6 @@ __all__ = [
     "before_after_table",
     "next_step",
     "nothing_to_shape",
-    "simulation_table",
     "warning_table",
 ]
 
@@ -51,7 +50,7 @@ __all__ = [
 _STILL_MM = 1e-9
 # A percentage of less than this compares rounding with rounding.
 _LEAST_COMPARED_UM = 1.0
-_CONTOURS = {"command": "contour error of the command", "response": "contour error of the table (response)"}
+CONTOURS = {"command": "contour error of the command", "response": "contour error of the table (response)"}
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -205,7 +204,7 @@ def before_after_rows(report: Mapping[str, Any]) -> Iterator[Row]:
 
     section = True
     contour = report.get("contour_error_um") or {}
-    for key, name in _CONTOURS.items():
+    for key, name in CONTOURS.items():
         for statistic, suffix in (("max", "largest"), ("rms", "RMS"), ("gouge", "gouge"), ("excess", "excess")):
             pair = _pair(contour.get(key), statistic)
             if pair is not None:
@@ -359,25 +358,3 @@ def _misses(report: Mapping[str, Any]) -> Iterator[str]:
         first, last = region["lines"]
         for miss in region.get("misses") or []:
             yield f"lines {first} to {last}: {miss}"
-
-
-def simulation_table(report: Mapping[str, Any]) -> Table:
-    """Table of a simulation's figures (see :class:`shapegcode.simulator.Simulation`)."""
-    from rich.table import Table
-
-    table = Table(title=f"{report['program']} on {report['machine']}")
-    table.add_column("figure")
-    table.add_column("value", justify="right")
-    table.add_column("unit")
-    table.add_row("cycle time", f"{report['cycle_time_s']:.2f}", "s")
-    table.add_row("of it cutting regions", f"{report['cutting_time_s']:.2f}", "s", end_section=True)
-    for name, key in (("residual vibration", "residual_vibration_um"), ("peak vibration", "peak_vibration_um")):
-        for axis, value in report[key].items():
-            table.add_row(f"{name} {axis.upper()}", f"{value:.2f}", "µm", end_section=axis == "z")
-    for key, name in _CONTOURS.items():
-        deviation = report["contour_error_um"][key]
-        table.add_row(f"{name}, largest", f"{deviation['max']:.2f}", "µm")
-        table.add_row(f"{name}, RMS", f"{deviation['rms']:.2f}", "µm", end_section=key == "response")
-    if report["orbit_error_percent"]:
-        table.add_row("orbit error, largest", f"{max(report['orbit_error_percent']):.4f}", "%")
-    return table

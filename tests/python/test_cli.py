@@ -221,7 +221,7 @@ def test_simulate_says_of_a_shaped_program_what_convert_said(folder: Path) -> No
 def test_simulate_writes_plots_and_prints_a_table(folder: Path) -> None:
     done = run(folder, "simulate", "part.nc", "-m", "vx500", "--plots", "plots")
     assert (done.returncode, done.stderr) == (0, "")
-    assert len(files(folder / "plots")) == 6
+    assert len(files(folder / "plots")) == 8
     assert "cycle time" in done.stdout
     assert files(folder) == ["part.nc", "plots"]
 

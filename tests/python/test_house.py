@@ -130,6 +130,8 @@ def test_only_pictures_import_matplotlib() -> None:
     assert users == {
         "canvas.py",
         "identification/tap_picture.py",
+        "metrology_picture.py",
+        "motion_picture.py",
         "plotting.py",
         "shaper_picture.py",
         "time_picture.py",

@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "axis_plant.hpp"
+#include "filter_chain.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/metrology/corner_reach.hpp"
 #include "shapegcode/metrology/orbit.hpp"
@@ -32,33 +34,25 @@ class Recorder {
   // `command_on_path`: the command follows the path exactly, so only the response can leave it.
   Recorder(const Path& path, const PlaybackOptions& options, bool command_on_path)
       : options_(options),
-        plant_(options.modes, options.period_s, options.mode_tables),
+        filters_(options.axis_filters),
+        plant_(options),
         tracks_contour_(options.measure_contour && path.length_mm() > 0.0),
         tracks_command_(tracks_contour_ && options.measure_command && !command_on_path),
         command_tracker_(tracks_contour_ ? tracker_of(path, options) : ContourTracker(a_point())),
         response_tracker_(command_tracker_),
         orbit_(tracks_contour_ ? path : a_point()),
         command_reach_(tracks_contour_ ? path : a_point()),
-        response_reach_(command_reach_) {
-    for (const Fir& fir : options.axis_filters) {
-      filters_.emplace_back(fir, axis_count);
-      tail_ += fir.duration_samples();
-    }
-  }
+        response_reach_(command_reach_) {}
 
   // `waiting`: the set-point is one of a wait for the next block.
   void add(Vector3 setpoint, bool waiting = false) {
     if (count_ == 0) {
-      for (FirStream& filter : filters_) {
-        filter.reset({setpoint.data(), axis_count});
-      }
+      filters_.reset(setpoint);
       plant_.reset(setpoint);
       last_ = setpoint;
       before_last_ = setpoint;
     }
-    for (FirStream& filter : filters_) {
-      filter.step({setpoint.data(), axis_count});
-    }
+    filters_.step(setpoint);
     const Vector3& command = setpoint;
     const bool moves = (command - last_).cwiseAbs().maxCoeff() > 0.0;
     if (moves) {
@@ -94,7 +88,7 @@ class Recorder {
   }
 
   PlaybackFigures finish(const Vector3& end) {
-    for (int i = 0; i < tail_; ++i) {
+    for (int i = 0; i < filters_.tail(); ++i) {
       add(end);
     }
     if (last_moving_ + 1 == count_) {
@@ -102,7 +96,9 @@ class Recorder {
     }
     figures_.duration_s = static_cast<double>(last_moving_) * options_.period_s;
     figures_.peak_mm = peak_.cwiseMax(at_rest_plant_.peak());
-    figures_.residual_mm = at_rest_plant_.residual_peak();
+    const detail::AtRest rest = at_rest_plant_.at_rest(last_, options_.settling_band_mm, options_.settling_limit_s);
+    figures_.residual_mm = rest.residual_mm;
+    figures_.settling_s = rest.settling_s;
     figures_.peak_acceleration_mm_per_s2 = acceleration_ / (options_.period_s * options_.period_s);
     figures_.end_mm = last_;
     if (tracks_contour_) {
@@ -158,9 +154,9 @@ class Recorder {
   }
 
   const PlaybackOptions& options_;
-  std::vector<FirStream> filters_;
-  ModalPlant plant_;
-  ModalPlant at_rest_plant_ = plant_;
+  detail::FilterChain filters_;
+  detail::AxisPlant plant_;
+  detail::AxisPlant at_rest_plant_ = plant_;
   bool tracks_contour_;
   bool tracks_command_;
   ContourTracker command_tracker_;
@@ -179,7 +175,6 @@ class Recorder {
   std::vector<Vector3> responses_;
   std::size_t count_ = 0;
   std::size_t last_moving_ = 0;
-  int tail_ = 0;
 };
 
 template <class Step>

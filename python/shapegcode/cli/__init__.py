@@ -65,6 +65,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("shaper", "compare input shapers for some vibration modes, and recommend one"),
     Command("simulate", "play a program on the machine's model: cycle time, vibration, contour error"),
     Command("expand", "write the plain program that calls, macros and coordinate modes come to"),
+    Command("measure", "measure the part that programs would cut: contour, radius, walls, roughness, vibration"),
     Command("time", "predict the cycle time of a program and show where the time goes"),
     Command("check", "list what the controller would refuse in a program, or not run as programmed"),
     Command("machine", "write or explain a machine file, or import one from the control's parameters"),

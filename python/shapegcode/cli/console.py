@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import errno
 import json
 import os
-import stat
 import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
+
+from shapegcode.files import named_errors, replaced_file
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -106,18 +106,12 @@ def write_bytes(path: str | Path, data: bytes, *, overwrite: bool = True) -> Non
         FileExistsError: the file exists and *overwrite* is False.
         OSError: with the name of *path* and the reason.
     """
-    target = Path(os.path.realpath(path))
-    try:
-        if not overwrite:
-            _write_new(target, data)
-        elif target.exists() and not stat.S_ISREG(target.stat().st_mode):
-            with open(target, "wb") as stream:
+    with named_errors(path):
+        if overwrite:
+            with replaced_file(path) as stream:
                 stream.write(data)
         else:
-            _replace(target, data)
-    except OSError as error:
-        # A failed write() does not name the file, and a temporary file's name would mislead.
-        raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+            _write_new(Path(os.path.realpath(path)), data)
 
 
 def _write_new(target: Path, data: bytes) -> None:
@@ -128,22 +122,6 @@ def _write_new(target: Path, data: bytes) -> None:
         except BaseException:
             target.unlink(missing_ok=True)
             raise
-
-
-def _replace(target: Path, data: bytes) -> None:
-    mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
-        with open(temporary, "xb") as stream:
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())
-        if mode is not None:
-            temporary.chmod(mode)
-        os.replace(temporary, target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
 
 
 class ProgressBar:

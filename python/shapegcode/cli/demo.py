@@ -15,10 +15,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "name",
         metavar="NAME",
-        choices=("path", "cycle-time", "shaper", "tap"),
+        choices=("path", "cycle-time", "shaper", "metrology", "tap"),
         help="path: line, arc, line of paper 000 at both feeds and reductions; "
         "cycle-time: a test piece with the features of ISO 10791-7 with both sets of constants of paper 004; "
         "shaper: the two-mode shapers of paper 002, figures 2 to 6, and its test on a stage; "
+        "metrology: the specimens of paper 000, measured on the model; "
         "tap: the equivalent systems of paper 003, and what end mill and collet deflect",
     )
     parser.add_argument(
@@ -38,6 +39,8 @@ def run(args: argparse.Namespace) -> int:
     """
     if args.name == "shaper":
         return _shaper(args.json, args.plots)
+    if args.name == "metrology":
+        return _metrology(args.json)
     if args.name == "tap":
         return _tap(args.json, args.plots)
     return _cycle_time(args.json) if args.name == "cycle-time" else _path(args.json)
@@ -184,3 +187,22 @@ def _cycle_time(json_target: str | None) -> int:
     console.print(result["remark"], markup=False)
     console.print("next: shapegcode time YOUR.NC -m YOUR_MACHINE.toml", markup=False)
     return ExitCode.OK if result["agrees"] else ExitCode.OUT_OF_TOLERANCE
+
+
+def _metrology(json_target: str | None) -> int:
+    from shapegcode.cli import ExitCode
+    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.metrology_demo import metrology_demo
+    from shapegcode.metrology_table import demo_table
+
+    with progress("paper 000", json_target) as bar:
+        bar.wait()
+        result = metrology_demo()
+    if json_target is not None:
+        write_json(result, json_target)
+    console = output_console(json_target)
+    for feed in sorted({row["feed_mm_per_s"] for row in result["cases"]}):
+        console.print(demo_table(result, feed))
+    console.print(result["remark"], markup=False)
+    console.print("next: shapegcode measure YOUR.NC SHAPED.NC -m YOUR_MACHINE.toml --tool-diameter 3mm", markup=False)
+    return ExitCode.OK

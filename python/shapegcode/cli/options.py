@@ -171,6 +171,23 @@ def refuse_json_over_input(args: argparse.Namespace) -> None:
         refuse_same_file([Path(args.json)], [Path(args.input), Path(args.machine)])
 
 
+def line_range(text: str) -> tuple[int, int]:
+    """Lines such as ``120-180`` or ``120``, first and last, from 1."""
+    match = re.fullmatch(r"0*([1-9][0-9]{0,9})(?:-0*([1-9][0-9]{0,9}))?", text)
+    first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
+    if first > last:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be lines, first to last, for example 120-180")
+    return first, last
+
+
+def count(text: str) -> int:
+    """A whole number, 1 or more."""
+    match = re.fullmatch(r"0*([1-9][0-9]{0,11})", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 1 or more")
+    return int(match[1])
+
+
 def ratio(text: str) -> float:
     """A share such as ``60%`` or ``0.6``, above 0 and at most 1."""
     value = _number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)

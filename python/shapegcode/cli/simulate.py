@@ -3,18 +3,41 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_input_arguments, add_plots_argument, load_machine, refuse_json_over_input
+from shapegcode.cli.options import (
+    add_input_arguments,
+    add_plots_argument,
+    count,
+    line_range,
+    load_machine,
+    refuse_same_file,
+)
+
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
+    from shapegcode.played_figures import MotionTraces
+    from shapegcode.program import Program
 
 __all__ = ["add_arguments", "run"]
+
+# Of the progress bar, for the figures of the regions; the rest is the motion in time.
+_FIGURES_SHARE = 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Plays the cutting regions of a program through the controller's model and the machine's modes: time, residual "
-        "and peak vibration, contour error of command and response."
+        "Plays a program through the controller's model and the machine's plant. Of each cutting region: time, "
+        "residual and peak vibration, settling time, contour error of command and response. Of the whole program with "
+        "its rapids, dwells and waits: the motion of the axes in time, as table, files and pictures."
+    )
+    parser.epilog = (
+        "example: shapegcode simulate part.nc -m mine.toml --plant feed-drive --npz motion.npz --plots plots"
     )
     add_input_arguments(parser)
     parser.add_argument(
@@ -22,7 +45,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="IN was written by shapegcode: play its blocks at their feed, without look-ahead",
     )
-    add_plots_argument(parser)
+    parser.add_argument(
+        "--plant",
+        choices=("modal", "feed-drive"),
+        default="modal",
+        help="modal: vibration modes behind an ideal servo; feed-drive: motor, ball screw, table, friction and servo "
+        "loops of [axes.x.drive] (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--csv",
+        metavar="FILE",
+        default=None,
+        help="write the motion in time, one line per period; - for standard output",
+    )
+    parser.add_argument("--npz", metavar="FILE", default=None, help="write the same columns as a NumPy archive")
+    parser.add_argument(
+        "--every", metavar="N", type=count, default=1, help="write every N-th sample only (default: %(default)d)"
+    )
+    parser.add_argument(
+        "--lines",
+        metavar="A-B",
+        type=line_range,
+        default=None,
+        help="motion in time of these lines alone, as `shapegcode expand` numbers them; the program is played from its "
+        "start in any case",
+    )
+    add_plots_argument(
+        parser,
+        "write pictures (PNG and SVG) into this folder: the motion in time, and path, feed and vibration of the region "
+        "that vibrates most",
+    )
     add_json_argument(parser)
 
 
@@ -30,38 +82,49 @@ def run(args: argparse.Namespace) -> int:
     """Play one program.
 
     Raises:
-        ProgramError, MachineError: bad input.
+        ProgramError, MachineError, ArgumentError: bad input.
+        NumericError: the integrator of a feed drive fails.
         OSError: a file cannot be read or written.
     """
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
     from shapegcode.converter import written_by_shapegcode
     from shapegcode.program import Program
-    from shapegcode.report import simulation_table, warning_table
+    from shapegcode.report import warning_table
+    from shapegcode.simulation_table import motion_table, simulation_table
     from shapegcode.simulator import simulate
 
+    _check_targets(args)
     machine = load_machine(args)
-    refuse_json_over_input(args)
-    with progress(f"playing {args.input}", args.json) as bar:
+    stdout = "-" if "-" in (args.csv, args.json) else None
+    with progress(f"playing {args.input}", stdout) as bar:
         program = Program.read(args.input, machine, program_number=args.program)
         # A program of ours says so; played as an ordinary one it would show figures of nothing.
         shaped = args.shaped or written_by_shapegcode(program)
         simulation = simulate(
             program,
             machine,
+            plant=args.plant,
             shaped=shaped,
             record_samples=0,
-            on_progress=lambda done, total: bar.update(done / total),
+            on_progress=lambda done, total: bar.update(_FIGURES_SHARE * done / total),
         )
-        report = simulation.report
+        motion, traces = _play_motion(
+            args, program, machine, shaped, lambda done: bar.update(_FIGURES_SHARE + (1.0 - _FIGURES_SHARE) * done)
+        )
+        report = {**simulation.report, "motion": motion}
         if args.plots is not None:
+            from shapegcode.motion_picture import write_motion_pictures
             from shapegcode.pictures import write_simulation_pictures
 
-            report = {**report, "plots": write_simulation_pictures(simulation, args.plots)}
+            part = Path(program.source).name + (f", lines {args.lines[0]} to {args.lines[1]}" if args.lines else "")
+            files = write_motion_pictures(traces, args.plots, part)
+            report["plots"] = [*files, *write_simulation_pictures(simulation, args.plots)]
     if args.json is not None:
         write_json(report, args.json)
-    console = output_console(args.json)
+    console = output_console(stdout)
     console.print(simulation_table(report))
+    console.print(motion_table(motion))
     if report["warnings"]:
         console.print(warning_table(report["warnings"]))
     if shaped:
@@ -69,3 +132,57 @@ def run(args: argparse.Namespace) -> int:
     else:
         console.print("next: shapegcode convert shapes this program and shows what it gains", markup=False)
     return ExitCode.OK
+
+
+def _check_targets(args: argparse.Namespace) -> None:
+    """Refuse files that would overwrite each other or what is read.
+
+    Raises:
+        ArgumentError: two of them are one.
+    """
+    from shapegcode._core import ArgumentError
+
+    if args.csv == "-" and args.json == "-":
+        raise ArgumentError("--csv - and --json -: only one of them can have standard output")
+    if args.npz == "-":
+        raise ArgumentError("--npz -: an archive cannot go to standard output, name a file")
+    targets = [Path(name) for name in (args.csv, args.npz, args.json) if name not in (None, "-")]
+    refuse_same_file(targets, [Path(args.input), Path(args.machine)])
+    for number, target in enumerate(targets):
+        refuse_same_file([target], targets[number + 1 :])
+
+
+def _play_motion(
+    args: argparse.Namespace, program: Program, machine: Machine, shaped: bool, on_progress: Callable[[float], None]
+) -> tuple[dict[str, Any], MotionTraces]:
+    """Play the whole program once: write its files, and keep its figures and envelopes.
+
+    Raises:
+        ArgumentError: the lines hold no motion.
+        OSError: a file cannot be written.
+    """
+    from shapegcode import _core
+    from shapegcode.played import playing_controller, stream
+    from shapegcode.played_figures import MotionFigures, MotionTraces
+    from shapegcode.played_files import csv_file, npz_file
+
+    chunks = stream(program, machine, plant=args.plant, shaped=shaped, lines=args.lines)
+    period_s = machine.controller.interpolation_period_s
+    whole_s = _core.time_program(program.core, playing_controller(machine, shaped=shaped)).total_s or period_s
+    figures, traces = MotionFigures(period_s), MotionTraces(period_s)
+    with contextlib.ExitStack() as files:
+        written = [
+            files.enter_context(make(name))
+            for make, name in ((csv_file, args.csv), (npz_file, args.npz))
+            if name is not None
+        ]
+        for chunk in chunks:
+            traces.add(chunk, figures.add(chunk))
+            for file in written:
+                file.write(chunk.every(args.every))
+            on_progress(float(chunk.time_s[-1]) / whole_s)
+        report = figures.report()
+        if not report["samples"]:
+            raise _core.ArgumentError(f"lines {args.lines[0]}-{args.lines[1]}: nothing happens there: name other lines")
+    named = {name: target for name, target in (("csv", args.csv), ("npz", args.npz)) if target is not None}
+    return {**report, "lines": args.lines, "every": args.every, **named}, traces

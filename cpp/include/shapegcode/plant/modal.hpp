@@ -30,6 +30,8 @@ class ModalPlant {
   ModalPlant(AxisModes modes, double period_s, AxisModeTables tables = {});
   /// At rest at `position`; peak() restarts from zero.
   void reset(const Vector3& position) noexcept;
+  /// Moves set-point and table alike: a change of coordinates.
+  void shift(const Vector3& by_mm) noexcept { command_ += by_mm; }
   /// Next set-point; returns the response at that instant.
   Vector3 step(const Vector3& command) noexcept;
   /// Deflection u - x at the last set-point.

@@ -10,6 +10,7 @@
 #include "shapegcode/motion/block_player.hpp"
 #include "shapegcode/motion/speed_profile.hpp"
 #include "shapegcode/path/path.hpp"
+#include "shapegcode/plant/feed_drive.hpp"
 #include "shapegcode/plant/modal.hpp"
 
 namespace shapegcode {
@@ -20,6 +21,9 @@ struct PlaybackOptions {
   std::vector<Fir> axis_filters;  ///< after the set-points, in order (acceleration after interpolation)
   AxisModes modes;
   AxisModeTables mode_tables;  ///< how the modes vary with position; none: constant modes
+  /// Feed drives of X, Y and Z in place of modes and tables; none: modes alone. The figures then hold the servo loop's
+  /// lag, and are those at the set-points.
+  std::vector<FeedDriveParameters> drives;
   /// A tracker of the path at its start, whose geometry several runs share; null: each run makes its own.
   std::shared_ptr<const ContourTracker> tracker;
   bool measure_contour = true;  ///< deviation of command and response and orbit errors
@@ -33,6 +37,9 @@ struct PlaybackOptions {
   double starved_s = 0.0;  ///< how long the set-points then wait
   /// So much of the run behind such a wait is looked at (0: all): enough where older vibration has decayed.
   double starved_memory_s = 0.0;
+  double settling_band_mm = 0.0;  ///< of the settling time; 0: not measured
+  /// How long behind the stop the settling time is looked for; with drives the residual too.
+  double settling_limit_s = 1.0;
   /// Keep at most so many samples of command and response for pictures (0: none); longer runs keep their beginning.
   std::size_t record_samples = 0;
 };
@@ -49,8 +56,11 @@ struct StarvedFigures {
 
 /// Figures of one run from rest to rest. Deviations in mm against the programmed path.
 struct PlaybackFigures {
-  double duration_s = 0.0;                                ///< until the set-points rest, after every filter
-  Vector3 residual_mm = Vector3::Zero();                  ///< largest |response - command| from that instant on
+  double duration_s = 0.0;                ///< until the set-points rest, after every filter
+  Vector3 residual_mm = Vector3::Zero();  ///< largest |response - command| from that instant on
+  /// From that instant until |response - command| stays within the band, in whole periods; infinite: the band
+  /// is still left in the last fifth of the limit.
+  Vector3 settling_s = Vector3::Zero();
   Vector3 peak_mm = Vector3::Zero();                      ///< largest |response - command| before it
   Vector3 peak_acceleration_mm_per_s2 = Vector3::Zero();  ///< of the command, second difference
   DeviationStats command;
@@ -63,7 +73,8 @@ struct PlaybackFigures {
 };
 
 /// Plays a path under a speed profile (a controller with look-ahead) through filters and plant. Streams: memory does
-/// not grow with the length of the run.
+/// not grow with the length of the run. Throws Error(argument) on a plant that cannot be, Error(numeric) where the
+/// integrator of a drive fails.
 [[nodiscard]] PlaybackFigures play_path(const std::shared_ptr<const Path>& path,
                                         std::shared_ptr<const SpeedProfile> profile, const PlaybackOptions& options);
 /// The same, measured against another path: that of `programmed`, of which `path` is made.

@@ -1,0 +1,148 @@
+"""A measurement as a plain dictionary: the JSON of ``shapegcode measure``. Units are in the names."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from shapegcode import _core
+from shapegcode.verify import deviation_um, largest_um, xyz
+
+if TYPE_CHECKING:
+    from shapegcode.metrology import MeasuredProgram, Measurement
+
+__all__ = ["measurement_report", "section_report"]
+
+
+def measurement_report(measurement: Measurement) -> dict[str, Any]:
+    """The whole measurement (keys: docs/metrology.md)."""
+    return {
+        "machine": measurement.machine.name,
+        "plant": measurement.plant,
+        "tool_diameter_mm": measurement.tool_diameter_mm,
+        "settling_band_um": measurement.band_um,
+        "station_spacing_mm": measurement.station_spacing_mm,
+        "roughness_cutoff_mm": measurement.cutoff_mm,
+        "roughness_lambda_s_mm": measurement.lambda_s_mm,
+        "tolerance_um": {"contour": measurement.machine.tolerance.contour_um},
+        "within_tolerance": measurement.within_tolerance,
+        "programs": [_program(program, measurement) for program in measurement.programs],
+    }
+
+
+def _program(program: MeasuredProgram, measurement: Measurement) -> dict[str, Any]:
+    figures = [region.figures for region in program.regions]
+    return {
+        "program": program.source,
+        "shaped": program.shaped,
+        "measured_against": program.against,
+        "within_tolerance": program.contour_error_um <= measurement.machine.tolerance.contour_um
+        if program.judged
+        else None,
+        "cutting_time_s": sum(each.duration_s for each in figures),
+        "contour_error_um": {
+            "command": deviation_um(each.command for each in figures),
+            "response": deviation_um(each.response for each in figures),
+        },
+        "residual_vibration_um": largest_um(each.rest.residual_mm for each in figures),
+        "sections": [
+            {"region": number, **section_report(section, measurement.tool_diameter_mm)}
+            for number, region in enumerate(program.regions, start=1)
+            for section in region.figures.sections
+        ],
+        "warnings": list(program.warnings),
+    }
+
+
+def section_report(figures: _core.SectionFigures, tool_diameter_mm: float) -> dict[str, Any]:
+    """One section; figures that do not apply are null."""
+    section, rest = figures.section, figures.rest
+    return {
+        "kind": section.kind.name,
+        "lines": [section.first_line, section.last_line],
+        "begin_mm": section.begin_mm,
+        "length_mm": section.length_mm,
+        "time_s": figures.time_s,
+        "peak_vibration_um": xyz(figures.peak_mm * 1e3),
+        "residual_vibration_um": None if rest is None else xyz(rest.residual_mm * 1e3),
+        "settling_time_s": None
+        if rest is None
+        else {axis: _number(value) for axis, value in zip("xyz", rest.settling_s, strict=True)},
+        "observed_rest_s": None if rest is None else rest.observed_s,
+        "contour_error_um": {
+            "command": deviation_um([figures.command]),
+            "response": deviation_um([figures.response]),
+        },
+        "arc": _arc(figures, tool_diameter_mm) if section.kind == _core.SectionKind.arc else None,
+        "wall_deviation_um": {"left": _wall(figures.left), "right": _wall(figures.right)},
+        "width_mm": {
+            "nominal": tool_diameter_mm,
+            **(
+                {"min": None, "mean": None, "max": None, "stations": 0}
+                if figures.width.stations == 0
+                else {
+                    "min": figures.width.least_mm,
+                    "mean": figures.width.mean_mm,
+                    "max": figures.width.largest_mm,
+                    "stations": figures.width.stations,
+                }
+            ),
+        },
+        "roughness": {"left": _roughness(figures.left_roughness), "right": _roughness(figures.right_roughness)},
+    }
+
+
+def _wall(wall: _core.WallFigures) -> dict[str, float | int | None]:
+    if wall.stations == 0:
+        return {"min": None, "mean": None, "max": None, "band": None, "stations": 0}
+    return {
+        "min": wall.least_mm * 1e3,
+        "mean": wall.mean_mm * 1e3,
+        "max": wall.largest_mm * 1e3,
+        "band": wall.band_mm * 1e3,
+        "stations": wall.stations,
+    }
+
+
+def _roughness(roughness: _core.Roughness | None) -> dict[str, float] | None:
+    if roughness is None:
+        return None
+    return {
+        "ra_um": roughness.ra_mm * 1e3,
+        "rz_um": roughness.rz_mm * 1e3,
+        "wa_um": roughness.wa_mm * 1e3,
+        "cutoff_mm": roughness.cutoff_mm,
+        "evaluated_mm": roughness.evaluated_mm,
+    }
+
+
+def _arc(figures: _core.SectionFigures, tool_diameter_mm: float) -> dict[str, Any]:
+    nominal, radius = figures.nominal_radius_mm, tool_diameter_mm / 2.0
+    walls = (figures.left_wall_arc, figures.right_wall_arc)
+    inside, outside = walls if figures.turns_left else walls[::-1]
+    return {
+        "nominal_radius_mm": nominal,
+        "command": _circle(figures.command_arc, nominal, figures),
+        "response": _circle(figures.response_arc, nominal, figures),
+        "inside_wall": _circle(inside, nominal - radius, figures),
+        "outside_wall": _circle(outside, nominal + radius, figures),
+        "orbit_error_percent": {"command": figures.command_orbit_percent, "response": figures.response_orbit_percent},
+    }
+
+
+def _circle(arc: _core.ArcFigures | None, nominal_mm: float, figures: _core.SectionFigures) -> dict[str, Any] | None:
+    if arc is None:
+        return None
+    offset = (arc.fit.centre_mm - figures.nominal_centre_mm) * 1e3
+    return {
+        "nominal_radius_mm": nominal_mm,
+        "fitted_radius_mm": arc.fit.radius_mm,
+        "radius_deviation_um": (arc.fit.radius_mm - nominal_mm) * 1e3,
+        "mean_radius_deviation_um": (arc.mean_radius_mm - nominal_mm) * 1e3,
+        "centre_offset_um": [float(offset[0]), float(offset[1])],
+        "form_error_um": arc.fit.form_mm * 1e3,
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

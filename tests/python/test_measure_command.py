@@ -1,0 +1,152 @@
+"""`shapegcode measure` and `demo metrology` as a shell sees them: tables, JSON, pictures, exit codes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import shapegcode as sg
+from acceptance import machine_with
+from shapegcode.cli import main
+
+LINES = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X20.F12000\nG3X40.Y20.R20.\nG1Y40.\nG0Z50.\nM30\n%\n"
+SECTION_KEYS = {
+    "region", "kind", "lines", "begin_mm", "length_mm", "time_s", "peak_vibration_um", "residual_vibration_um",
+    "settling_time_s", "observed_rest_s", "contour_error_um", "arc", "wall_deviation_um", "width_mm", "roughness",
+}  # fmt: skip
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "part.nc").write_text(LINES)
+    machine = machine_with({"tolerance.contour_um": 50.0})
+    (tmp_path / "shaped.nc").write_bytes(sg.convert(sg.Program.from_text(LINES, machine), machine).text)
+    return tmp_path
+
+
+def measured(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> dict[str, Any]:
+    assert main(["measure", *words, "-m", "vx500", "--tool-diameter", "3mm", "--json", "-"]) == code
+    report: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return report
+
+
+def test_json_of_two_programs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    report = measured(capsys, "part.nc", "shaped.nc", "--set", "tolerance.contour_um=50")
+    assert set(report) == {
+        "machine", "plant", "tool_diameter_mm", "settling_band_um", "station_spacing_mm", "roughness_cutoff_mm",
+        "roughness_lambda_s_mm", "tolerance_um", "within_tolerance", "programs",
+    }  # fmt: skip
+    part, shaped = report["programs"]
+    assert (part["shaped"], shaped["shaped"]) == (False, True)
+    assert part["measured_against"] == shaped["measured_against"] == "part.nc"
+    for program in (part, shaped):
+        assert [section["kind"] for section in program["sections"]] == ["line", "arc", "line"]
+        assert all(set(section) == SECTION_KEYS for section in program["sections"])
+        assert [section["lines"] for section in program["sections"]] == [[5, 5], [6, 6], [7, 7]]
+        assert program["sections"][0]["residual_vibration_um"] is None
+        assert program["sections"][1]["arc"]["inside_wall"]["nominal_radius_mm"] == 18.5
+        assert program["sections"][0]["arc"] is None
+        assert program["sections"][2]["width_mm"]["nominal"] == 3.0
+    band = [program["sections"][1]["wall_deviation_um"]["left"]["band"] for program in (part, shaped)]
+    assert band[1] < 0.5 * band[0]
+    residual = [program["sections"][2]["residual_vibration_um"]["x"] for program in (part, shaped)]
+    assert residual[1] < 0.05 * residual[0]
+    assert shaped["contour_error_um"]["response"]["max"] == pytest.approx(
+        max(section["contour_error_um"]["response"]["max"] for section in shaped["sections"])
+    )
+
+
+def test_exit_code_says_whether_the_tolerance_is_kept(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert measured(capsys, "part.nc", code=1)["within_tolerance"] is False  # 42 um of 20
+    assert measured(capsys, "part.nc", "--set", "tolerance.contour_um=50")["within_tolerance"] is True
+    assert measured(capsys, "shaped.nc", "--against", "part.nc")["within_tolerance"] is True
+
+
+def test_table_like_a_measuring_report(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["measure", "part.nc", "shaped.nc", "-m", "vx500", "--tool-diameter", "3mm", "--plots", "plots"]
+    assert main(words) == 1
+    said = capsys.readouterr().out
+    for text in (
+        "2 arc R20, line 6", "inside wall mm (µm off)", "18.500", "cut-width band left / right µm",
+        "Ra left / right µm", "settled to 1 µm X / Y ms", "next: ",
+        "part.nc: played with the controller's own motion, measured against its own path",
+        "shaped.nc: played block by block, as a shaped program, measured against the path of part.nc",
+    ):  # fmt: skip
+        assert text in said, text
+    written = {file.name for file in (folder / "plots").iterdir()}
+    assert written == {f"measure-{name}.{suffix}" for name in ("part", "walls") for suffix in ("png", "svg")}
+    picture = (folder / "plots" / "measure-part.svg").read_text()
+    assert "deviations magnified" in picture
+    assert "shaped.nc" in picture
+
+
+def test_a_shaped_program_alone_says_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["measure", "shaped.nc", "-m", "vx500", "--tool-diameter", "3mm"]) == 0
+    said = capsys.readouterr().out
+    assert "measured against its own path, which is not the programmed one: not judged" in said
+    assert "--against the original program" in said
+    assert measured(capsys, "shaped.nc")["programs"][0]["within_tolerance"] is None
+
+
+def test_programs_of_different_parts_have_tables_of_their_own(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "other.nc").write_text("%\nO2\nG21G17G90G94\nG0X0Y0Z0\nG1X30.F3000\nM30\n%\n")
+    assert main(["measure", "part.nc", "other.nc", "-m", "vx500", "--tool-diameter", "3mm"]) == 1
+    assert capsys.readouterr().out.count("measured on") == 2
+
+
+def test_sections_by_lines_and_options(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--lines", "6-7", "--band", "5um", "--station", "0.02mm", "--cutoff", "2.5mm", "--lambda-s", "0.1mm"]
+    report = measured(capsys, "part.nc", *words, code=1)
+    (section,) = report["programs"][0]["sections"]
+    assert section["kind"] == "curve"
+    assert section["lines"] == [6, 7]
+    assert section["roughness"]["left"]["cutoff_mm"] == 2.5
+    assert (report["settling_band_um"], report["station_spacing_mm"]) == (5.0, pytest.approx(0.02))
+
+
+def test_feed_drives(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    driven = measured(capsys, "part.nc", "--plant", "feed-drive", "--set", "tolerance.contour_um=2000")
+    assert driven["plant"] == "feed-drive"
+    modal = measured(capsys, "part.nc", "--set", "tolerance.contour_um=2000")
+    for one, other in zip(driven["programs"][0]["sections"], modal["programs"][0]["sections"], strict=True):
+        assert one["lines"] == other["lines"]
+        # The servo lags behind by more than a mode vibrates.
+        assert max(one["peak_vibration_um"].values()) > max(other["peak_vibration_um"].values())
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["part.nc", "--lines", "9-8"], "'9-8': must be lines, first to last"),
+        (["part.nc", "--lines", "100-200"], "part.nc: no cutting move in lines 100-200"),
+        (["part.nc", "--lines", "5-6", "--lines", "6-7"], "lines 5 to 6 and 6 to 7 overlap"),
+        (["part.nc", "--band", "0um"], "must be a length above 0"),
+        (["gone.nc"], "gone.nc: no such file"),
+        (["shaped.nc", "--against", "short.nc"], "it was not made from that program"),
+        (["part.nc", "--json", "part.nc"], "part.nc would overwrite part.nc"),
+    ],
+)
+def test_bad_input(folder: Path, capsys: pytest.CaptureFixture[str], words: list[str], message: str) -> None:
+    (folder / "short.nc").write_text("%\nO2\nG21G17G90G94\nG0X0Y0Z0\nG1X30.F3000\nM30\n%\n")
+    assert main(["measure", *words, "-m", "vx500", "--tool-diameter", "3mm"]) == 2
+    assert message in capsys.readouterr().err
+    assert (folder / "part.nc").read_text() == LINES
+
+
+def test_a_tool_is_needed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["measure", "part.nc", "-m", "vx500"]) == 2
+    assert "--tool-diameter" in capsys.readouterr().err
+
+
+def test_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "240")
+    assert main(["demo", "metrology", "--json", str(tmp_path / "demo.json")]) == 0
+    said = capsys.readouterr().out
+    for text in ("Paper 000 at 100 mm/s", "18.350, 18.373", "contour-preserving", "not material and depth of cut"):
+        assert text in said, text
+    cases = json.loads((tmp_path / "demo.json").read_text())["cases"]
+    assert {(row["feed_mm_per_s"], row["program"]) for row in cases} >= {(100, "unshaped"), (200, "shaped 40 %")}

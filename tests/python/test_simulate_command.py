@@ -1,0 +1,447 @@
+"""``shapegcode simulate``: the motion of a whole program in time, its files and figures, with either plant."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import resource
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import scipy.signal
+
+import feed_drive_reference as reference
+import shapegcode as sg
+from acceptance import PROGRAMS
+from shapegcode.cli import main
+from shapegcode.motion_picture import plot_motion
+from shapegcode.played import KINDS, REST_S, Chunk, plant_options
+from shapegcode.played_figures import Envelope, MotionFigures, MotionTraces
+
+COMMAND = Path(sys.executable).with_name("shapegcode")
+TICK_S = 0.001
+WHOLE = """%
+O1
+G21 G17 G90 G94
+G00 X0. Y0. Z5.
+M06 T1
+G00 X0. Y0. Z5.
+G01 Z-1. F600.
+X30. F6000.
+G03 X40. Y10. R10.
+G01 Y30.
+G04 P250
+G00 Z20.
+X100. Y50.
+G01 X90. F3000.
+Y45.
+M30
+%
+"""
+SHORT = "%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\nG01 X2. Y.5 F1500.\nG00 X0.\nM30\n%\n"
+DRIVE = {
+    "motor_inertia_kg_m2": 0.004,
+    "screw_lead_mm": 10.0,
+    "table_mass_kg": 250.0,
+    "stiffness_n_per_um": 120.0,
+    "velocity_bandwidth_hz": 40.0,
+    "friction_model": "lugre",
+    "friction_viscous_n_s_per_m": 500.0,
+    "friction_coulomb_n": 120.0,
+    "friction_static_n": 160.0,
+}
+
+Vector = npt.NDArray[np.float64]
+
+
+def machine_with(drive: dict[str, Any] | None = None, **tables: dict[str, Any]) -> sg.Machine:
+    """The built-in vx500 with values of its tables, and the drive on every axis."""
+    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
+    for table, values in tables.items():
+        data[table] |= values
+    for axis in "xyz":
+        data["axes"][axis].pop("drive", None)
+        if drive is not None:
+            data["axes"][axis]["drive"] = drive
+    return sg.Machine.from_data(data, "test")
+
+
+def toml_file(folder: Path, machine: sg.Machine) -> str:
+    """The machine as a file."""
+    (folder / "machine.toml").write_text(machine.to_toml())
+    return str(folder / "machine.toml")
+
+
+def streamed(text: str, machine: sg.Machine, **options: Any) -> Chunk:
+    """The whole motion in one piece."""
+    chunks = list(sg.stream(sg.Program.from_text(text, machine), machine, chunk_samples=10_000_000, **options))
+    assert len(chunks) == 1
+    return chunks[0]
+
+
+def axis(columns: dict[str, Any], name: str) -> Vector:
+    """A column of X, Y and Z as one array."""
+    return np.column_stack([columns[f"{letter}_{name}"] for letter in "xyz"])
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "part.nc").write_text(WHOLE)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    """The message with which the command refuses its arguments."""
+    before = sorted(os.listdir())
+    assert main(["simulate", "part.nc", "-m", "vx500", *words]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert sorted(os.listdir()) == before
+    return err
+
+
+# ---- time --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("motion", ["look_ahead", "after_interpolation"])
+def test_motion_takes_the_cycle_time(motion: str) -> None:
+    machine = machine_with(controller={"motion": motion}, times={"tool_change_s": 2.5, "m_function_s": 0.125})
+    played = streamed(WHOLE, machine)
+    time = sg.cycle_time(sg.Program.from_text(WHOLE, machine), machine, per_block=True)
+    assert played.time_s[-1] == pytest.approx(time.total_s + REST_S, abs=1e-9)
+    assert played.time_s[-1] == pytest.approx(time.full_interpolation_s + REST_S, abs=1e-9)
+    # What `time` says of each kind of block is what happens there.
+    for name in ("rapid", "dwell", "tool_change"):
+        counted = np.count_nonzero(played.kind == KINDS.index(name)) * TICK_S
+        assert counted == pytest.approx(sum(block.duration_s for block in time.blocks if block.kind == name), abs=1e-9)
+    for block in time.blocks:
+        if block.kind in ("rapid", "dwell"):
+            inside = (played.time_s > block.start_s + TICK_S / 2) & (
+                played.time_s < block.start_s + block.duration_s - TICK_S / 2
+            )
+            assert set(played.line[inside]) == {block.line}
+
+
+@pytest.mark.parametrize("name", ["CONTOUR_R.NC", "G17_18_19.NC", "TEST_G90.NC"])
+def test_motion_of_a_real_program_takes_its_cycle_time(name: str) -> None:
+    """The last one changes its work offset on the way: the command jumps then, the plant does not."""
+    machine = sg.Machine.load("vx500")
+    program = sg.Program.read(PROGRAMS / name, machine)
+    samples, fastest, largest = 0, 0.0, 0.0
+    for chunk in sg.stream(program, machine):
+        samples += len(chunk)
+        fastest = max(fastest, float(np.abs(chunk.velocity_mm_per_s).max()))
+        largest = max(largest, float(np.abs(chunk.error_mm).max()))
+    expected = sg.cycle_time(program, machine).full_interpolation_s
+    assert (samples - 1) * TICK_S == pytest.approx(expected + REST_S, abs=TICK_S)
+    assert fastest <= 400.0 * (1 + 1e-9)
+    assert 0.01 < largest < 0.2
+
+
+def test_motion_ends_where_the_program_ends_and_keeps_its_speeds() -> None:
+    machine = sg.Machine.load("vx500")
+    played = streamed(WHOLE, machine)
+    assert played.command_mm[0] == pytest.approx([0.0, 0.0, 5.0])
+    assert played.command_mm[-1] == pytest.approx([90.0, 45.0, 20.0])
+    steps = np.diff(played.command_mm, axis=0) / TICK_S
+    assert played.velocity_mm_per_s[1:] == pytest.approx(steps, abs=1e-9)
+    cutting = (played.kind == KINDS.index("cutting"))[1:]
+    assert np.linalg.norm(steps[cutting], axis=1).max() == pytest.approx(100.0, rel=1e-6)
+    rapids = [axis.rapid_mm_per_min / 60.0 for axis in machine.axes.as_tuple()]
+    assert (np.abs(steps).max(axis=0) <= np.array(rapids) * (1 + 1e-9)).all()
+
+
+def test_shaped_program_moves_block_by_block() -> None:
+    machine = sg.Machine.load("vx500")
+    conversion = sg.convert(sg.Program.from_text(WHOLE, machine), machine)
+    emitted = sg.Program.from_text(conversion.text, machine, source="emitted")
+    # Cutting blocks at their feed, and what the filter adds to each region.
+    figures = [run.figures for run in sg.simulate(emitted, machine, shaped=True, record_samples=0).regions]
+    played = streamed(conversion.text.decode(), machine, shaped=True)
+    cutting = np.count_nonzero(played.kind == KINDS.index("cutting"))
+    expected = sum(round(each.duration_s / TICK_S) for each in figures)
+    # The end of a region is seen one period behind its last motion; the rest behind the program's end is cutting's too.
+    assert abs(cutting - expected - round(REST_S / TICK_S)) <= len(figures) + 1
+
+
+# ---- files -------------------------------------------------------------------------------------------------
+
+
+def read_csv(file: Path) -> dict[str, Any]:
+    table = np.genfromtxt(file, delimiter=",", names=True, dtype=None, encoding="utf-8")
+    return {name: table[name] for name in table.dtype.names}
+
+
+def test_csv_and_npz_hold_the_same_motion_as_the_api(folder: Path) -> None:
+    assert main(["simulate", "part.nc", "-m", "vx500", "--csv", "m.csv", "--npz", "m.npz", "--json", "r.json"]) == 0
+    csv, npz = read_csv(folder / "m.csv"), np.load(folder / "m.npz")
+    machine = sg.Machine.load("vx500")
+    played = streamed(WHOLE, machine)
+    assert list(csv) == ["kind", *played.columns()]
+    assert set(npz) == {*csv, "kind_names"}
+    for name, column in played.columns().items():
+        assert npz[name].dtype == column.dtype
+        np.testing.assert_array_equal(npz[name], column)
+        np.testing.assert_array_equal(csv[name], npz[name])
+    assert (npz["kind_names"][npz["kind"]] == csv["kind"]).all()
+    assert zipfile.ZipFile(folder / "m.npz").testzip() is None
+    motion = json.loads((folder / "r.json").read_text())["motion"]
+    assert motion["samples"] == len(csv["kind"])
+    error_um = 1e3 * np.abs(axis(csv, "error_mm")).max(axis=0)
+    assert [motion["largest_error_um"][name] for name in "xyz"] == pytest.approx(error_um)
+    second = np.abs(np.diff(axis(csv, "command_mm"), n=2, axis=0)).max(axis=0) / TICK_S**2
+    assert [motion["largest_acceleration_mm_per_s2"][name] for name in "xyz"] == pytest.approx(second, rel=1e-6)
+    assert sorted(os.listdir(folder)) == ["m.csv", "m.npz", "part.nc", "r.json"]
+
+
+def test_every_and_lines_choose_rows_of_the_whole_motion(folder: Path) -> None:
+    def columns(*words: str) -> dict[str, Any]:
+        assert main(["simulate", "part.nc", "-m", "vx500", "--npz", "m.npz", *words]) == 0
+        archive = np.load(folder / "m.npz")
+        return {name: archive[name] for name in archive if name != "kind_names"}
+
+    whole, tenth = columns(), columns("--every", "10")
+    for name, column in whole.items():
+        np.testing.assert_array_equal(tenth[name], column[::10])
+    some = columns("--lines", "9-11")
+    inside = (whole["line"] >= 9) & (whole["line"] <= 11)
+    assert 0 < inside.sum() < len(inside)
+    for name, column in whole.items():
+        np.testing.assert_array_equal(some[name], column[inside])
+    # Vibration that the blocks before excited is there at the first row.
+    assert abs(some["x_error_mm"][0]) > 1e-4
+    both = columns("--lines", "9-11", "--every", "7")
+    np.testing.assert_array_equal(both["time_s"], whole["time_s"][inside & (np.arange(len(inside)) % 7 == 0)])
+
+
+def test_csv_on_standard_output(folder: Path, capfdbinary: pytest.CaptureFixture[bytes]) -> None:
+    assert main(["simulate", "part.nc", "-m", "vx500", "--csv", "m.csv"]) == 0
+    capfdbinary.readouterr()
+    assert main(["simulate", "part.nc", "-m", "vx500", "--csv", "-"]) == 0
+    assert capfdbinary.readouterr().out == (folder / "m.csv").read_bytes()
+
+
+def test_pieces_of_any_size_are_the_same_motion() -> None:
+    machine = sg.Machine.load("vx500")
+    program = sg.Program.from_text(WHOLE, machine)
+    whole = streamed(WHOLE, machine)
+    pieces = list(sg.stream(program, machine, chunk_samples=777))
+    assert max(map(len, pieces)) == 777
+    for name in ("time_s", "line", "kind", "command_mm", "response_mm"):
+        np.testing.assert_array_equal(np.concatenate([getattr(each, name) for each in pieces]), getattr(whole, name))
+
+
+# ---- plants ------------------------------------------------------------------------------------------------
+
+
+def test_modal_response_is_that_of_scipy_on_the_exported_commands(folder: Path) -> None:
+    """Each mode: 2 ζ ω s + ω² over s² + 2 ζ ω s + ω², with set-points joined by straight lines."""
+    assert main(["simulate", "part.nc", "-m", "vx500", "--npz", "m.npz"]) == 0
+    columns = np.load(folder / "m.npz")
+    for letter, of_axis in zip("xyz", sg.Machine.load("vx500").axes.as_tuple(), strict=True):
+        command = columns[f"{letter}_command_mm"]
+        response = command.copy()
+        for mode in of_axis.modes:
+            omega = 2 * np.pi * mode.frequency_hz
+            damping = 2 * mode.damping_ratio * omega
+            system = scipy.signal.StateSpace(*scipy.signal.tf2ss([damping, omega**2], [1.0, damping, omega**2]))
+            moved = scipy.signal.lsim(system, command - command[0], columns["time_s"])[1] + command[0]
+            response += mode.participation * (moved - command)
+        np.testing.assert_allclose(columns[f"{letter}_response_mm"], response, atol=2e-9)
+
+
+def test_feed_drive_response_is_that_of_solve_ivp(folder: Path) -> None:
+    """A second implementation of the drive by SciPy's implicit Runge-Kutta method on the exported commands."""
+    machine = machine_with(DRIVE)
+    (folder / "part.nc").write_text(SHORT)
+    words = ["--plant", "feed-drive", "--npz", "m.npz", "--json", "r.json"]
+    assert main(["simulate", "part.nc", "-m", toml_file(folder, machine), *words]) == 0
+    columns = np.load(folder / "m.npz")
+    drive = plant_options(machine, "feed-drive").drives[0]
+    command = columns["x_command_mm"][:160]
+    assert np.ptp(command) > 1.0
+    assert command[0] == 0.0
+    played = reference.play(reference.Drive(drive, TICK_S), command[1:], method="Radau", rtol=1e-7, atol_m=1e-11)
+    np.testing.assert_allclose(columns["x_response_mm"][1:160], played[:, 0], atol=2e-5)
+    np.testing.assert_allclose(columns["x_motor_mm"][1:160], played[:, 2], atol=2e-5)
+    np.testing.assert_allclose(columns["x_friction_force_n"][1:160], played[:, 3], atol=1.0)
+    report = json.loads((folder / "r.json").read_text())
+    assert report["plant"] == "feed-drive"
+    force = report["motion"]["largest_motor_force_n"]["x"]
+    assert force == pytest.approx(np.abs(columns["x_motor_force_n"]).max())
+    # The lag of a position loop: speed over gain.
+    lag_um = 1e3 * 25.0 / drive.position_gain_per_s
+    assert report["motion"]["largest_error_um"]["x"] > 0.5 * lag_um
+    assert report["peak_vibration_um"]["x"] > 0.5 * lag_um
+    assert report["settling_time_s"]["x"] > 0.0
+
+
+def test_feed_drive_gives_motor_and_forces_only_there() -> None:
+    machine = machine_with(DRIVE)
+    assert "x_motor_force_n" not in streamed(SHORT, machine).columns()
+    driven = streamed(SHORT, machine, plant="feed-drive").columns()
+    assert {"x_motor_mm", "y_motor_force_n", "z_friction_force_n"} <= set(driven)
+    # Nothing moves in Z, so nothing acts there.
+    assert np.abs(driven["z_motor_force_n"]).max() < 1e-3
+
+
+def test_machine_without_drives_is_refused_with_the_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    machine = toml_file(folder, machine_with())
+    assert main(["simulate", "part.nc", "-m", machine, "--plant", "feed-drive", "--csv", "m.csv"]) == 2
+    assert "axes.x.drive" in capsys.readouterr().err
+    assert not (folder / "m.csv").exists()
+
+
+def test_modes_that_vary_see_the_machine_s_position() -> None:
+    """A work offset that puts the whole program beyond the table of the mode is the mode of the table's end."""
+    over = {"axis": "x", "position_mm": [100.0, 400.0], "frequency_hz": [46.0, 30.0]}
+    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
+    data["axes"]["x"]["modes"][0]["frequency_over"] = over
+    data["input"]["work_offsets"] = {"G54": [500.0, 0.0, 0.0]}
+    far = streamed(WHOLE, sg.Machine.from_data(data, "far"))
+    data["axes"]["x"]["modes"][0].pop("frequency_over")
+    data["axes"]["x"]["modes"][0]["frequency_hz"] = 30.0
+    slow = streamed(WHOLE, sg.Machine.from_data(data, "slow"))
+    data["axes"]["x"]["modes"][0]["frequency_hz"] = 46.0
+    fast = streamed(WHOLE, sg.Machine.from_data(data, "fast"))
+    np.testing.assert_array_equal(far.command_mm, slow.command_mm)
+    np.testing.assert_allclose(far.response_mm, slow.response_mm, atol=1e-9)
+    assert np.abs(far.response_mm - fast.response_mm).max() > 1e-3
+
+
+def test_settling_time_is_that_of_a_long_rest() -> None:
+    machine = sg.Machine.load("vx500")
+    text = "%\nO1\nG90 G94\nG00 X0. Y0. Z0.\nG01 X50. F9000.\nG04 X3.\nM30\n%\n"
+    program = sg.Program.from_text(text, machine)
+    simulation = sg.simulate(program, machine)
+    stop = round(simulation.regions[0].figures.duration_s / TICK_S)
+    deflection = 1e3 * np.abs(streamed(text, machine).error_mm[stop:, 0])
+    outside = np.flatnonzero(deflection > simulation.report["settling_band_um"])
+    assert 0 < outside[-1] < len(deflection) / 2
+    swing = 1.0 / min(mode.frequency_hz for mode in machine.axes.x.modes)
+    # Between samples it may leave the band once more.
+    assert (outside[-1] + 1) * TICK_S <= simulation.report["settling_time_s"]["x"] <= outside[-1] * TICK_S + swing
+    data = machine.model_dump(exclude_none=True)
+    data["tolerance"]["residual_floor_um"] = 0.0
+    assert sg.simulate(program, sg.Machine.from_data(data, "no band")).report["settling_time_s"]["x"] is None
+
+
+# ---- pictures, memory --------------------------------------------------------------------------------------
+
+
+def test_picture_of_the_motion(tmp_path: Path) -> None:
+    machine = machine_with(DRIVE)
+    figures, traces = MotionFigures(TICK_S), MotionTraces(TICK_S)
+    for chunk in sg.stream(sg.Program.from_text(SHORT, machine), machine, plant="feed-drive"):
+        traces.add(chunk, figures.add(chunk))
+    plot_motion(tmp_path / "motion.svg", traces, "short.nc, lines 5 to 6")
+    drawn = (tmp_path / "motion.svg").read_text()
+    for said in ("lines 5 to 6", "acceleration", "response", "motor", "friction"):
+        assert said in drawn
+
+
+def test_envelope_is_that_of_all_samples_at_once() -> None:
+    rng = np.random.default_rng(1)
+    values = np.cumsum(rng.normal(size=(54_321, 2)), axis=0)
+    envelope = Envelope(most=100)
+    for piece in np.split(values, np.sort(rng.integers(0, len(values), 40))):
+        envelope.add(piece)
+    middles, low, high = envelope.result()
+    size = envelope.samples_per_bucket
+    assert 50 <= len(low) <= 101
+    assert size & (size - 1) == 0
+    for number in range(len(low)):
+        bucket = values[number * size : (number + 1) * size]
+        assert middles[number] == pytest.approx(number * size + (len(bucket) - 1) / 2)
+        np.testing.assert_array_equal(low[number], bucket.min(axis=0))
+        np.testing.assert_array_equal(high[number], bucket.max(axis=0))
+    assert len(low) * size >= len(values)
+
+
+def most_memory_mb(folder: Path, turns: int) -> float:
+    """Largest resident size of a process that writes the motion of so many squares of 24 s each."""
+    square = "G01 X20. F200.\nY20.\nX0.\nY0.\n"
+    (folder / "part.nc").write_text("%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\n" + square * turns + "M30\n%\n")
+    code = (
+        "import resource, sys\nfrom shapegcode.cli import main\n"
+        "assert main(['simulate', 'part.nc', '-m', 'vx500', '--npz', 'm.npz']) == 0\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True)
+    return float(done.stdout.splitlines()[-1])
+
+
+def test_memory_does_not_grow_with_the_length(folder: Path) -> None:
+    short = most_memory_mb(folder, 10)
+    size = (folder / "m.npz").stat().st_size
+    long = most_memory_mb(folder, 60)
+    grown = (folder / "m.npz").stat().st_size - size
+    assert grown > 80e6
+    assert long < short + 15.0
+
+
+# ---- bad input ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--lines", "90-99"], "1-17"),
+        (["--lines", "3-18"], "1-17"),
+        (["--lines", "1-2"], "nothing happens"),
+        (["--csv", "a", "--npz", "a"], "a would overwrite a"),
+        (["--npz", "a", "--json", "a"], "a would overwrite a"),
+        (["--csv", "part.nc"], "part.nc would overwrite part.nc"),
+        (["--npz", "-"], "standard output"),
+        (["--csv", "-", "--json", "-"], "standard output"),
+        (["--csv", "nowhere/m.csv"], "nowhere"),
+        (["--npz", "nowhere/m.npz"], "nowhere"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_what_cannot_be_is_refused(
+    folder: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    message = refused(capsys, *words)
+    assert message.startswith("shapegcode: ")
+    assert said in message
+
+
+@pytest.mark.parametrize("words", [["--lines", "9-3"], ["--lines", "0"], ["--every", "0"], ["--plant", "other"]])
+def test_arguments_that_mean_nothing_are_refused(folder: Path, words: list[str]) -> None:
+    assert main(["simulate", "part.nc", "-m", "vx500", *words]) == 2
+
+
+def test_api_refuses_before_anything_is_played() -> None:
+    machine = sg.Machine.load("vx500")
+    program = sg.Program.from_text(WHOLE, machine)
+    for options in ({"plant": "other"}, {"lines": (5, 4)}, {"lines": (1, 99)}, {"chunk_samples": 0}):
+        with pytest.raises(sg.ArgumentError):
+            sg.stream(program, machine, **options)
+
+
+@pytest.mark.parametrize("name", ["--csv", "--npz"])
+@pytest.mark.parametrize("existing", [False, True])
+def test_full_disk_leaves_no_half_file(folder: Path, name: str, existing: bool) -> None:
+    if existing:
+        (folder / "motion").write_text("as it was")
+    before = sorted(os.listdir(folder))
+    done = subprocess.run(
+        [COMMAND, "simulate", "part.nc", "-m", "vx500", name, "motion"],
+        cwd=folder, capture_output=True, text=True, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)),
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.startswith("shapegcode: motion: ")
+    assert os.strerror(errno.EFBIG) in done.stderr
+    assert sorted(os.listdir(folder)) == before
+    if existing:
+        assert (folder / "motion").read_text() == "as it was"
