@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DesignError', 'DeviationStats', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalState', 'Mode', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'linear_model', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'time_program', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_decay', 'fit_modes', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'linear_model', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'time_program', 'wilson_theta', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -1935,6 +1935,268 @@ class FeedDriveRealTime:
         """
         Next set-point (mm); the response at that instant in mm.
         """
+class Arma:
+    """
+    ARMA(2n, 2n-1) model: response = B(z)/A(z) force, A = 1 - phi_1/z - ... - phi_2n/z^2n.
+    
+    For a free decay the force is a unit impulse at the first sample. Source: paper 003, eq. 1-4.
+    """
+    @property
+    def converged(self) -> bool:
+        """
+        True if phi settled; otherwise this is the best of all rounds.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Rounds of least squares.
+        """
+    @property
+    def numerator(self) -> numpy.ndarray:
+        """
+        b_0, b_1, ...: shape (1, 2n+1) of taps, (records, 2n) of free decays.
+        """
+    @property
+    def phi(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        phi_1 ... phi_2n, shape (2n,): lambda^2n - phi_1 lambda^(2n-1) - ... = 0 gives the poles.
+        """
+    @property
+    def poles(self) -> numpy.typing.NDArray[numpy.complex128]:
+        """
+        Roots lambda, complex, shape (2n,).
+        """
+    @property
+    def residual_rms(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        RMS of response minus B/A force per record, shape (records,), in the response's unit.
+        """
+    @property
+    def theta(self) -> numpy.ndarray:
+        """
+        theta_k = -b_k/b_0, one column less than the numerator; nan where b_0 is 0.
+        """
+class ModalFit:
+    """
+    Modes fitted to taps by fit_modes, with their covariance.
+    """
+    @property
+    def compliance(self) -> float:
+        """
+        What modes far above add: m/N of a spring without mass; 0 without it.
+        """
+    @property
+    def converged(self) -> bool:
+        """
+        True if a minimum was reached.
+        """
+    @property
+    def covariance(self) -> numpy.ndarray:
+        """
+        Covariance, shape (3n, 3n), of omega, zeta, 1/m of the first mode, then of the second, ...
+        """
+    @property
+    def damping_ratio(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Damping ratios, no unit, shape (n,).
+        """
+    @property
+    def fitted(self) -> list[numpy.typing.NDArray[numpy.float64]]:
+        """
+        Response of the model per record, each of shape (n,), offset included.
+        """
+    @property
+    def inverse_mass(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Residues 1/m in 1/kg, shape (n,); negative where the mode shape has opposite signs at tap and sensor.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Steps of the search.
+        """
+    @property
+    def log_likelihood(self) -> float:
+        """
+        Logarithm of the likelihood, for white normal residuals of the same variance in all records.
+        """
+    @property
+    def mass_line(self) -> float:
+        """
+        What modes far below add: 1/kg of a free mass; 0 without it.
+        """
+    @property
+    def offset(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Offset per record, shape (records,), in the response's unit.
+        """
+    @property
+    def omega_rad_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Undamped natural frequencies in rad/s, shape (n,), in the order of the starts.
+        """
+    @property
+    def parameters(self) -> int:
+        """
+        Fitted parameters, offsets and amplitudes included.
+        """
+    @property
+    def reason(self) -> str:
+        """
+        Why it has not converged; else empty.
+        """
+    @property
+    def residual_autocorrelation(self) -> float:
+        """
+        Autocorrelation of the residuals at a lag of one sample, no unit; about 0 where they are white.
+        """
+    @property
+    def residual_rms(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        RMS of the residuals per record, shape (records,), in the response's unit.
+        """
+    @property
+    def samples(self) -> int:
+        """
+        Samples of all records together.
+        """
+    @property
+    def sum_of_squares(self) -> float:
+        """
+        Sum of the squared residuals, in the response's unit squared.
+        """
+class DecayFit:
+    """
+    Modes fitted to free decays by fit_decay, with their covariance.
+    """
+    @property
+    def amplitude(self) -> numpy.ndarray:
+        """
+        Amplitudes at the first sample, shape (records, n), in the response's unit.
+        """
+    @property
+    def converged(self) -> bool:
+        """
+        True if a minimum was reached.
+        """
+    @property
+    def covariance(self) -> numpy.ndarray:
+        """
+        Covariance, shape (2n, 2n), of omega, zeta of the first mode, then of the second, ...
+        """
+    @property
+    def damping_ratio(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Damping ratios, no unit, shape (n,).
+        """
+    @property
+    def fitted(self) -> list[numpy.typing.NDArray[numpy.float64]]:
+        """
+        Response of the model per record, each of shape (n,), offset included.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Steps of the search.
+        """
+    @property
+    def log_likelihood(self) -> float:
+        """
+        Logarithm of the likelihood, for white normal residuals of the same variance in all records.
+        """
+    @property
+    def offset(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Offset per record, shape (records,), in the response's unit.
+        """
+    @property
+    def omega_rad_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Undamped natural frequencies in rad/s, shape (n,), in the order of the starts.
+        """
+    @property
+    def parameters(self) -> int:
+        """
+        Fitted parameters, offsets and amplitudes included.
+        """
+    @property
+    def phase_rad(self) -> numpy.ndarray:
+        """
+        Phases of the cosines at the first sample in rad, shape (records, n).
+        """
+    @property
+    def reason(self) -> str:
+        """
+        Why it has not converged; else empty.
+        """
+    @property
+    def residual_autocorrelation(self) -> float:
+        """
+        Autocorrelation of the residuals at a lag of one sample, no unit; about 0 where they are white.
+        """
+    @property
+    def residual_rms(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        RMS of the residuals per record, shape (records,), in the response's unit.
+        """
+    @property
+    def samples(self) -> int:
+        """
+        Samples of all records together.
+        """
+    @property
+    def sum_of_squares(self) -> float:
+        """
+        Sum of the squared residuals, in the response's unit squared.
+        """
+class ModeRanking:
+    """
+    Candidates in the order in which they explain what others leave.
+    """
+    @property
+    def chosen(self) -> list[int]:
+        """
+        Indices into the candidates, best first.
+        """
+    @property
+    def sum_of_squares(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        What is left after each choice, shape (len(chosen),), in the response's unit squared.
+        """
+    @property
+    def total(self) -> float:
+        """
+        Squares of the responses, offsets taken out.
+        """
+class EquivalentMass:
+    """
+    Mass whose simulated response has the measured RMS.
+    """
+    @property
+    def converged(self) -> bool:
+        """
+        True if both RMS agree within the tolerance.
+        """
+    @property
+    def halvings(self) -> int:
+        """
+        How often the range was halved before its middle was right; 0 in closed form.
+        """
+    @property
+    def mass_kg(self) -> float:
+        """
+        Equivalent mass in kg.
+        """
+    @property
+    def measured_rms(self) -> float:
+        """
+        RMS of the measured response, in its unit.
+        """
+    @property
+    def simulated_rms(self) -> float:
+        """
+        RMS of the simulated one, in the same unit.
+        """
 class ContourTarget:
     """
     What shall follow the programmed path.
@@ -3378,6 +3640,44 @@ def acceleration_filters(model: ControllerModel) -> list[Fir]:
     """
     Filters behind interpolation in order, none, one or two.
     """
+def arma_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_modes: typing.SupportsInt | typing.SupportsIndex, plain: bool = False) -> Arma:
+    """
+    ARMA model of one or several free decays: common poles, each record's own initial state.
+    
+    Args:
+        responses: Response per decay, each of shape (n,), in any unit.
+        n_modes: Number of modes, 1 to 50.
+        plain: One round of unfiltered least squares instead of the iterated one.
+    
+    Returns:
+        The model, as from arma_driven with a unit impulse at the first sample for the force.
+    
+    Raises:
+        ArgumentError: As arma_driven.
+        NumericError: No finite coefficients.
+    
+    Source: K. Steiglitz, L. McBride 1965; paper 003, eq. 1.
+    """
+def arma_driven(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_modes: typing.SupportsInt | typing.SupportsIndex, plain: bool = False) -> Arma:
+    """
+    ARMA model of one or several taps of the same point, by iterated least squares.
+    
+    Args:
+        forces: Force per tap in N, each of shape (n,), at rest at the first sample.
+        responses: Response per tap at the same instants, each of shape (n,); poles and numerator are common.
+        n_modes: Number of modes, 1 to 50; the model has 2*n_modes poles and 2*n_modes+1 numerator terms.
+        plain: One round of unfiltered least squares, which noise bends, instead of the iterated one.
+    
+    Returns:
+        The model whose phi settled, or the best of all rounds with converged False.
+    
+    Raises:
+        ArgumentError: No record, unequal lengths, a value that is not finite, a force that is zero throughout, a number
+            of modes outside its range, or fewer samples than 8*n_modes+8.
+        NumericError: No finite coefficients.
+    
+    Source: K. Steiglitz, L. McBride 1965; paper 003, eq. 1.
+    """
 def block_overlap_time_s(lengths_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], model: ControllerModel) -> float:
     """
     Time of a run of overlapping cutting blocks, s: sum of ceil(l / (F T)) T plus the length of the filters (paper 004). No override. Raises ArgumentError on unequal sizes or a feed <= 0.
@@ -3422,6 +3722,54 @@ def csv_rows(word: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], words:
     """
     Rows of a CSV file: the row's word, (k,), and the numbers of its row in the table, (k, c), each as the shortest text that reads back as the same number. Raises ArgumentError on unequal lengths or a word that does not exist.
     """
+def equivalent_mass_bisection(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, low_kg: typing.SupportsFloat | typing.SupportsIndex = 0.001, high_kg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.01, most_halvings: typing.SupportsInt | typing.SupportsIndex = 100, quantity: str = 'acceleration', theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, impulse_n_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> EquivalentMass:
+    """
+    Equivalent mass by bisection: paper 003's steps 1 to 7, the check of the closed form.
+    
+    Args:
+        force_n: Measured force in N, shape (n,).
+        response: Measured response in SI units, shape (n,).
+        period_s: Time between samples in s, above 0.
+        omega_rad_s: Undamped natural frequency in rad/s, above 0.
+        damping_ratio: 0 to 1.
+        low_kg: Lower end of the range, above 0.
+        high_kg: Upper end of the range.
+        tolerance: Of the RMS, relative to the measured one.
+        most_halvings: After which the search gives up, with converged False.
+        quantity: "acceleration", "velocity" or "displacement".
+        theta: Of the Wilson theta method.
+        impulse_n_s: Besides the force: an impulse just before the first sample, in N s.
+    
+    Returns:
+        The mass, the number of halvings and both RMS.
+    
+    Raises:
+        ArgumentError: A value outside its range, or a force or response that is zero throughout.
+    
+    Source: paper 003, section 2.2, steps 1-7.
+    """
+def equivalent_mass_closed_form(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, quantity: str = 'acceleration', theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, impulse_n_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> EquivalentMass:
+    """
+    Equivalent mass by one simulation: the response is proportional to 1/m.
+    
+    Args:
+        force_n: Measured force in N, shape (n,).
+        response: Measured response in SI units, shape (n,).
+        period_s: Time between samples in s, above 0.
+        omega_rad_s: Undamped natural frequency in rad/s, above 0.
+        damping_ratio: 0 to 1.
+        quantity: "acceleration", "velocity" or "displacement".
+        theta: Of the Wilson theta method.
+        impulse_n_s: Besides the force: an impulse just before the first sample, in N s.
+    
+    Returns:
+        The mass that makes the RMS of simulated and measured response equal.
+    
+    Raises:
+        ArgumentError: A value outside its range, or a force or response that is zero throughout.
+    
+    Source: spec 8; paper 003, section 2.2.
+    """
 def extra_insensitive(mode: Mode, vibration_limit: typing.SupportsFloat | typing.SupportsIndex, humps: typing.SupportsInt | typing.SupportsIndex = 1) -> ExtraInsensitive:
     """
     Extra-insensitive (EI) shaper with one, two or three humps, damped or not, solved from its definition.
@@ -3450,6 +3798,57 @@ def fastest_block_ends(blocks: Path) -> list[int]:
 def fit_blocks(command: ShapedCommand, breaks: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: FitOptions) -> FittedBlocks:
     """
     Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. Raises ArgumentError on a position outside +-99999.999 mm.
+    """
+def fit_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, with_offset: bool = True, coloured_residuals: bool = False, most_iterations: typing.SupportsInt | typing.SupportsIndex = 60) -> DecayFit:
+    """
+    Least-squares fit of decaying cosines to one or several free decays; omega and zeta are common.
+    
+    Args:
+        responses: Response per record, each of shape (n,), in any unit.
+        period_s: Time between samples in s, above 0.
+        omega_rad_s: Starts, undamped natural frequencies in rad/s, shape (n_modes,), below Nyquist.
+        damping_ratio: Starts, 0 < zeta < 1, shape (n_modes,).
+        with_offset: Fit a constant offset per record.
+        coloured_residuals: Covariance that holds for residuals correlated over time (stationary) as well.
+        most_iterations: Steps after which the search gives up, with converged False.
+    
+    Returns:
+        The fit; look at converged and reason before use.
+    
+    Raises:
+        ArgumentError: As fit_modes.
+    
+    Source: spec 8; G. Golub, V. Pereyra 2003.
+    """
+def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, quantity: str = 'acceleration', with_offset: bool = True, with_mass_line: bool = False, with_compliance: bool = False, coloured_residuals: bool = False, force_noise_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, most_iterations: typing.SupportsInt | typing.SupportsIndex = 60) -> ModalFit:
+    """
+    Output-error (for white noise: maximum likelihood) fit of modes to one or several taps of the same point.
+    
+    The response is the sum over modes of (1/m) s^q/(s^2 + 2 zeta omega s + omega^2) applied to the force, from rest at the
+    first sample, the force linear between samples. Search by Levenberg-Marquardt in ln omega and ln zeta with exact
+    derivatives; everything linear is eliminated.
+    
+    Args:
+        forces: Force per tap in N, each of shape (n,).
+        responses: Response per tap at the same instants in SI units, each of shape (n,).
+        period_s: Time between samples in s, above 0.
+        omega_rad_s: Starts, undamped natural frequencies in rad/s, shape (n_modes,), below Nyquist.
+        damping_ratio: Starts, 0 < zeta < 1, shape (n_modes,).
+        quantity: "acceleration", "velocity" or "displacement".
+        with_offset: Fit a constant offset per record.
+        with_mass_line: Add a free mass, for modes far below.
+        with_compliance: Add a spring without mass, for modes far above.
+        coloured_residuals: Covariance that holds for residuals correlated over time (stationary) as well.
+        force_noise_n: Standard deviation of white noise on the force in N, added to the covariance to first order.
+        most_iterations: Steps after which the search gives up, with converged False.
+    
+    Returns:
+        The fit; look at converged and reason before use.
+    
+    Raises:
+        ArgumentError: Records as in arma_driven, a start or option outside its range, or too few samples.
+    
+    Source: spec 8; L. Ljung, System Identification, ch. 7; G. Golub, V. Pereyra 2003.
     """
 def grid_polynomial(modes: collections.abc.Sequence[Mode], period_s: typing.SupportsFloat | typing.SupportsIndex) -> Shaper:
     """
@@ -3605,6 +4004,26 @@ def minimal_two_mode(first: Mode, second: Mode, max_duration_s: typing.SupportsF
     
     Source: paper 002, eq. 12-17; the search is this project's.
     """
+def modal_response(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], quantity: str = 'acceleration') -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Response of modes to a force that is linear between samples, exact, from rest: the model of fit_modes.
+    
+    Args:
+        force_n: Force in N, shape (n,).
+        period_s: Time between samples in s, above 0.
+        omega_rad_s: Undamped natural frequencies in rad/s, shape (n_modes,), below Nyquist.
+        damping_ratio: Damping ratios, 0 < zeta < 1, shape (n_modes,).
+        inverse_mass: Residues 1/m in 1/kg, shape (n_modes,).
+        quantity: "acceleration", "velocity" or "displacement".
+    
+    Returns:
+        Response in SI units, shape (n,).
+    
+    Raises:
+        ArgumentError: Unequal lengths or a value outside its range.
+    
+    Source: spec 8.
+    """
 def mzv(mode: Mode) -> Shaper:
     """
     Modified ZV: three non-negative taps, 3/8 of the damped period apart.
@@ -3667,6 +4086,48 @@ def play_samples(positions_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.fl
     """
     Play set-points (n, 3), measured against the programmed path. Raises ArgumentError on another shape.
     """
+def poles_to_modes(poles: collections.abc.Sequence[complex | typing.SupportsComplex | typing.SupportsFloat | typing.SupportsIndex], period_s: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Natural frequencies and damping ratios of discrete poles: complex pairs that are stable, ascending.
+    
+    omega = |ln lambda|/period, zeta = -Re(ln lambda)/|ln lambda|.
+    
+    Args:
+        poles: Poles lambda, complex.
+        period_s: Time between samples in s, above 0.
+    
+    Returns:
+        (omega_rad_s, damping_ratio), two arrays of equal length, empty if no pole is a mode.
+    
+    Raises:
+        ArgumentError: The period is not positive.
+    
+    Source: spec 8; paper 003, eq. 5-6.
+    """
+def rank_modes(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], most: typing.SupportsInt | typing.SupportsIndex, forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None, quantity: str = 'acceleration') -> ModeRanking:
+    """
+    Ranks candidate modes by forward selection: starts for fit_modes and fit_decay from the poles of a chart.
+    
+    At each step the candidate is chosen that, together with those before it, leaves the least squares; residues (of
+    decays: amplitudes and phases per record) are fitted, frequencies and damping ratios are not.
+    
+    Args:
+        responses: Response per record, each of shape (n,).
+        period_s: Time between samples in s, above 0.
+        omega_rad_s: Candidates, undamped natural frequencies in rad/s, shape (n_candidates,), below Nyquist.
+        damping_ratio: Candidates, 0 < zeta < 1, shape (n_candidates,).
+        most: How many to choose, at least 1.
+        forces: Force per record in N at the same instants; None: the records are free decays.
+        quantity: "acceleration", "velocity" or "displacement"; only with forces.
+    
+    Returns:
+        The ranking; shorter than asked for where no candidate explains anything more.
+    
+    Raises:
+        ArgumentError: As fit_modes.
+    
+    Source: this project (orthogonal least squares; S. Chen, S. Billings, W. Luo 1989).
+    """
 def rapid_samples(start_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], model: ControllerModel) -> numpy.ndarray:
     """
     Set-points of a rapid, one per period, (n, 3), mm, read-only. Raises ArgumentError on an unusable model.
@@ -3720,9 +4181,51 @@ def simulate_circle(radius_mm: typing.SupportsFloat | typing.SupportsIndex, feed
     """
     Run circles in XY at a constant feed and measure the mean radius over whole turns. Raises ArgumentError on a radius or feed <= 0.
     """
+def stabilisation_poles(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], n_max: typing.SupportsInt | typing.SupportsIndex, forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None) -> list[numpy.typing.NDArray[numpy.complex128]]:
+    """
+    Poles of models with 1 ... n_max modes, for a stabilisation chart and for starts. Quick.
+    
+    All orders are read off one covariance matrix of the free decay (ESPRIT); of taps the decay is the correlation of
+    response with force, which weighs all taps.
+    
+    Args:
+        responses: Response per record, each of shape (n,).
+        n_max: Largest number of modes, 1 to 50.
+        forces: Force per record in N at the same instants; None: the records are free decays.
+    
+    Returns:
+        n_max complex arrays; entry n-1 holds the 2n discrete poles of the model with n modes.
+    
+    Raises:
+        ArgumentError: As arma_driven; fewer samples than 8*n_max+8.
+    
+    Source: R. Roy, T. Kailath 1989.
+    """
 def time_program(program: ProgramText, model: ControllerModel, per_block: bool = False) -> CycleTime:
     """
     Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in look-ahead. Raises ArgumentError on a model that no controller can have.
+    """
+def wilson_theta(mass_kg: typing.SupportsFloat | typing.SupportsIndex, damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex, stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex, force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, displacement_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Step-by-step integration of m x'' + c x' + k x = force by the Wilson theta method.
+    
+    Args:
+        mass_kg: Mass, above 0.
+        damping_n_s_per_m: Viscous damping, at least 0.
+        stiffness_n_per_m: Stiffness, above 0.
+        force_n: Force in N, shape (n,).
+        period_s: Time between samples in s, above 0.
+        theta: Stretch of the step over which the acceleration is linear, at least 1; stable from 1.37 on.
+        displacement_m: At the first sample.
+        velocity_m_per_s: At the first sample.
+    
+    Returns:
+        (displacement in m, velocity in m/s, acceleration in m/s^2), each of shape (n,).
+    
+    Raises:
+        ArgumentError: A value outside its range.
+    
+    Source: paper 003, section 2.2; K.-J. Bathe, Finite Element Procedures, 9.2.
     """
 def worst_residual(shaper: Shaper, mode: Mode, lowest_hz: typing.SupportsFloat | typing.SupportsIndex, highest_hz: typing.SupportsFloat | typing.SupportsIndex) -> WorstResidual:
     """

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.moving_modes import moving_axis, shaper_track, still_mode
+from shapegcode.moving_modes import axis_modes, moving_axis, shaper_track
 
 if TYPE_CHECKING:
     from shapegcode.shaping import BlockPeriodCandidate, ModeBand
@@ -80,6 +79,7 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
     """
     # SciPy's solvers take a quarter of a second to load: not before they are needed.
     from shapegcode.shaping import choose_robust_grid, machine_bands, robust_candidate
+    from shapegcode.shaping.comparison import check_block_period
 
     if not any(axis.modes for axis in machine.axes.as_tuple()):
         raise _core.ArgumentError("the machine file gives no vibration mode (axes.x.modes): nothing to shape for")
@@ -87,7 +87,7 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
     shaping, controller = machine.shaping, machine.controller
     period = block_period_s if block_period_s is not None else machine.emission.block_period_s
     if period is not None:
-        _check_period(period, machine)
+        check_block_period(period, machine)
     if shaping.family != "auto":
         if shaping.per_axis:
             raise _core.ArgumentError(f'shaping.per_axis needs shaping.family = "auto": it is {shaping.family!r}')
@@ -131,10 +131,7 @@ def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
             )
         return grid
     longest = machine.shaping.max_duration_s if wanted else grid.shaper.duration_s - 0.5 * grid.block_period_s
-    modes = [
-        [still_mode(mode, machine.shaping.part_mass_kg) for mode in axis.modes] for axis in machine.axes.as_tuple()
-    ]
-    firs = design_per_axis(modes, grid.block_period_s, longest)
+    firs = design_per_axis(axis_modes(machine), grid.block_period_s, longest)
     if firs is None:
         if wanted:
             raise _core.DesignError(
@@ -176,23 +173,6 @@ def _of_family(name: str, bands: list[ModeBand], machine: Machine, period_s: flo
             f"shaping.vibration_limit is {shaping.vibration_limit:.1%}"
         )
     return make_grid(period, best.shaper, _track(machine, period), family=name, note=note)
-
-
-def _check_period(period_s: float, machine: Machine) -> None:
-    controller = machine.controller
-    if not (math.isfinite(period_s) and period_s > 0.0):
-        raise _core.ArgumentError(f"block period is {period_s} s, must be finite and above 0")
-    ticks = period_s / controller.interpolation_period_s
-    if round(ticks) < 1 or not math.isclose(ticks, round(ticks), abs_tol=1e-6):
-        raise _core.ArgumentError(
-            f"block period {period_s * 1e3:g} ms is no whole multiple of the interpolation period "
-            f"{controller.interpolation_period_s * 1e3:g} ms"
-        )
-    if period_s < controller.block_time_s * (1 - 1e-9):
-        raise _core.ArgumentError(
-            f"block period {period_s * 1e3:g} ms is below the block time {controller.block_time_s * 1e3:g} ms "
-            "(controller.block_time_s)"
-        )
 
 
 def _track(machine: Machine, period_s: float) -> ShaperTrack | None:

@@ -7,6 +7,7 @@ apart.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "FORMATS", "GREY", "figure", "heading", "legend_above", "panels", "save"]
+__all__ = ["COLOURS", "FORMATS", "GREY", "figure", "heading", "legend_above", "panels", "save", "write_pictures"]
 
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
 GREY = "#8a8a8a"
@@ -50,6 +51,30 @@ def heading(figure: Figure, text: str, part: str) -> None:
 def legend_above(panel: Axes) -> None:
     """Legend between the panel and what is above it, where it hides no curve."""
     panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.2, fontsize=9)
+
+
+def write_pictures(folder: str | Path, prefix: str, pictures: Mapping[str, Callable[[Path], None]]) -> list[str]:
+    """Write pictures in every format into a folder, which is made where it is missing.
+
+    Args:
+        folder: into which.
+        prefix: of the files' names, before a minus.
+        pictures: what draws one into a file, by the rest of its name.
+
+    Returns:
+        The files written.
+
+    Raises:
+        OSError: the folder cannot be made or a file not be written.
+    """
+    place = Path(folder)
+    place.mkdir(parents=True, exist_ok=True)
+    files = []
+    for name, plot in pictures.items():
+        for suffix in FORMATS:
+            files.append(place / f"{prefix}-{name}{suffix}")
+            plot(files[-1])
+    return [str(file) for file in files]
 
 
 def save(figure: Figure, file: str | Path) -> None:

@@ -9,7 +9,7 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from shapegcode import _core
 from shapegcode.advice import binding_warnings, controller_warnings, region_warnings, worse_warnings
@@ -19,6 +19,7 @@ from shapegcode.compensation import guard_lines, header_lines, read_for_conversi
 from shapegcode.emit import emit_region, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.moving_modes import (
+    axis_modes,
     machine_warnings,
     region_offset,
     region_range_warnings,
@@ -26,14 +27,10 @@ from shapegcode.moving_modes import (
 from shapegcode.program import Program
 from shapegcode.rapids import ShapedRapids, rapid_warnings, shape_rapids
 from shapegcode.verdict import RegionFigures, contour_target, contour_um, measure, summarise
-from shapegcode.verify import Placed, axis_modes, other_time_s, play_original, read_back
-
-if TYPE_CHECKING:
-    pass
+from shapegcode.verify import Placed, other_time_s, play_original, read_back
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
 _MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin
-_HASTE = 0.9  # of the original's time: a region that takes less cuts faster than programmed
 _HELPED = 0.98  # of what was reached before: less room that brings no more is taken back
 _ATTEMPTS = 8  # each with less room for the regions that left the contour tolerance; few need more than two
 _COMMENT_WIDTH = 60
@@ -142,7 +139,9 @@ def convert(
                 lambda other: _write(program, machine, other, ratio, reasons, room_um, spending),
             )  # fmt: skip
         written, emitted, figures = settle(grid, reasons)
-        while spending is not None and spending.give_up(grid, written, summarise(figures, written.placed, machine)):
+        while spending is not None and spending.give_up(
+            grid, written, summarise(figures, written.placed, machine, grid.block_period_s)
+        ):
             reasons = [spending.given_up.get(index, reason) for index, reason in enumerate(reasons)]
             written, emitted, figures = settle(grid, reasons)
         rapids: ShapedRapids | None = None
@@ -152,7 +151,8 @@ def convert(
         kept_s = sum(play.result().duration_s for play, reason in zip(playbacks, reasons, strict=True) if reason)
     finally:
         pool.shutdown(cancel_futures=True)
-    report = _report(program, machine, grid, written, kept_s, summarise(figures, written.placed, machine), spending)
+    summary = summarise(figures, written.placed, machine, grid.block_period_s)
+    report = _report(program, machine, grid, written, kept_s, summary, spending)
     if rapids is not None:
         report["rapids"] = _tidy(rapids.report)
         report["cycle_time_s"]["emitted"] += rapids.extra_s
@@ -370,13 +370,6 @@ def _report(
         warnings.append(f"{program.source}: no cutting moves that can be shaped: the text is unchanged")
     for region in figures["regions"]:
         first, last = region["lines"]
-        was_s, now_s = region["time_s"]["original"], region["time_s"]["emitted"]
-        if now_s < _HASTE * was_s:
-            # Feeds so slow that an increment lasts several blocks: F words of its resolution do not meet their ticks.
-            region["misses"].append(
-                f"runs in {now_s:.1f} s instead of {was_s:.1f} s: too slow a feed for blocks of "
-                f"{grid.block_period_s * 1e3:g} ms; raise controller.minimum_feed_mm_per_min above it to keep its text"
-            )
         where = f"{program.place(first)}: lines {first} to {last}" + (" expanded" if program.core.expanded else "")
         warnings += [f"{where}: {miss}" for miss in region["misses"]]
     warnings += binding_warnings(figures, machine)

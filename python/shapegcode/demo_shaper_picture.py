@@ -26,8 +26,6 @@ def write_demo_pictures(demo: ShaperDemo, folder: str | Path) -> list[str]:
     Raises:
         OSError: the folder cannot be made or a file not be written.
     """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     labelled = {f"{name}, {shaper.duration_s:.4g} s": shaper for name, shaper in demo.shapers.items()}
     minimal = {label: shaper for label, shaper in labelled.items() if len(shaper.times_s) == 3}
     compared = {label: shaper for label, shaper in labelled.items() if not label.startswith("medium")}
@@ -41,12 +39,7 @@ def write_demo_pictures(demo: ShaperDemo, folder: str | Path) -> list[str]:
         "figure8-stage-short": lambda file: plot_stage(file, demo.runs, "short"),
         "figure9-stage-long": lambda file: plot_stage(file, demo.runs, "long"),
     }
-    files = []
-    for name, plot in pictures.items():
-        for suffix in canvas.FORMATS:
-            files.append(folder / f"paper002-{name}{suffix}")
-            plot(files[-1])
-    return [str(file) for file in files]
+    return canvas.write_pictures(folder, "paper002", pictures)
 
 
 def plot_branch_amplitudes(file: str | Path, branches: MinimalBranches) -> None:

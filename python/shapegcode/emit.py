@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +12,8 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.block_grid import Grid
 from shapegcode.machine import Machine
-from shapegcode.moving_modes import NO_OFFSET, Offset, mode_tables, region_offset
+from shapegcode.moving_modes import NO_OFFSET, Offset, axis_modes, mode_tables, region_offset
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
-
-if TYPE_CHECKING:
-    pass
 
 _DEGREE = math.pi / 180.0
 _PLUNGE_CORNER_DEG = 45.0
@@ -103,8 +99,6 @@ def shaping_options(
         offset: from the region's positions to the machine's; where it is not known of the axis that the grid's track
             follows, the grid's one shaper is used.
     """
-    from shapegcode.verify import axis_modes  # which imports this module
-
     options = _core.ShapingOptions()
     options.limits = limits
     options.block_period_s = grid.block_period_s
@@ -189,8 +183,7 @@ def emit_region(
     periods: list[npt.NDArray[np.uint32]] = []
     piece = shaper.next(_PIECE_PERIODS)
     assert piece is not None  # the first one always exists
-    start = [round(float(x) / increment) for x in piece.grid_mm[0]]
-    motion, plane = 1, region.entry.plane
+    starts: list[list[int]] = []  # of the pieces, in increments
     while piece is not None:
         following = shaper.next(_PIECE_PERIODS)
         if following is None:
@@ -200,10 +193,8 @@ def emit_region(
         here, breaks = marks.within(piece, last=following is None)
         fitted = _core.fit_blocks(piece, sorted({*piece.run_ends, *breaks}), fit)
         fit.lent_periods = fitted.left_periods
-        text, motion, plane = _core.write_blocks(
-            fitted, [round(float(x) / increment) for x in piece.grid_mm[0]], here, writer
-        )
-        writer.motion, writer.plane = motion, plane
+        starts.append([round(float(x) / increment) for x in piece.grid_mm[0]])
+        text, writer.motion, writer.plane = _core.write_blocks(fitted, starts[-1], here, writer)
         texts.append(text)
         periods.append(fitted.periods)
         piece = following
@@ -212,12 +203,12 @@ def emit_region(
     first_number, line_end = marks.first_number, program.core.line_end
 
     # A search for the region's N word must not skip the prologue.
-    head = [*machine.emission.prologue, _safe_line(region, start, writer.position_decimals, machine)]
+    head = [*machine.emission.prologue, _safe_line(region, starts[0], writer.position_decimals, machine)]
     if first_number >= 0:
         head[0] = f"N{first_number}{head[0]}"
     if machine.emission.prefill_dwell_s > 0.0:
         head.append(f"G04P{round(machine.emission.prefill_dwell_s * 1e3)}")
-    tail = [_restore_line(region, motion, plane), *machine.emission.epilogue]
+    tail = [_restore_line(region, writer.motion, writer.plane), *machine.emission.epilogue]
     end = line_end.encode()
     before = b"".join(line.encode("latin-1") + end for line in head)
     after = b"".join(line.encode("latin-1") + end for line in tail)

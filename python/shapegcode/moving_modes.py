@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = [
     "NO_OFFSET",
     "Offset",
+    "axis_modes",
     "machine_warnings",
     "mode_tables",
     "moving_axis",
@@ -52,6 +53,25 @@ def still_mode(mode: Mode, part_mass_kg: float | None) -> _core.Mode:
         return nominal
     # The core interpolates over any abscissa.
     return _core.ModeTable(0, over.mass_kg, over.frequency_hz, over.damping_ratio or ()).mode_at(nominal, part_mass_kg)
+
+
+def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
+    """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty.
+
+    A table over the part's mass is looked up; of one over a position the nominal frequency is taken.
+    """
+    return [
+        [
+            _core.Mode(
+                still.frequency_hz * (1.0 + shift * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
+                still.damping_ratio,
+                still.participation,
+            )
+            for mode in axis.modes
+            for still in (still_mode(mode, machine.shaping.part_mass_kg),)
+        ]
+        for axis in machine.axes.as_tuple()
+    ]
 
 
 def slowest_mode(mode: Mode) -> tuple[float, float]:

@@ -135,7 +135,7 @@ def shape_rapids(
             kept[BUDGET] += 1
             choice.text = b""
     splice = partial(_splice, emitted.core.text, placed)
-    _judge([choice for choice in choices if choice.text], splice, machine, plant, pool)
+    _judge([choice for choice in choices if choice.text], splice, machine, grid, plant, pool)
     for open_gap in open_gaps:
         open_gap.drop(OUT_OF_TOLERANCE, kept, lambda choice: bool(choice.text and choice.summary["misses"]))
         open_gap.drop_useless(kept)
@@ -255,6 +255,7 @@ def _judge(
     choices: Sequence[_Choice],
     splice: Callable[[Sequence[_Choice]], _Spliced],
     machine: Machine,
+    grid: Grid,
     plant: RapidPlant,
     pool: Executor,
 ) -> None:
@@ -267,7 +268,7 @@ def _judge(
         blocks = emitted.core.cutting_path(place.first_line, place.last_line)
         running.append(pool.submit(plant.blocks, blocks, choice.region, stops_s))
     figures = measure(emitted, spliced.moves, [choice.original for choice in choices], machine, pool)
-    summaries = summarise(figures, spliced.moves, machine)["regions"]
+    summaries = summarise(figures, spliced.moves, machine, grid.block_period_s)["regions"]
     for choice, timing, played, summary in zip(choices, running, figures, summaries, strict=True):
         choice.after = timing.result()
         choice.slowed_blocks = played.slowed_blocks

@@ -45,8 +45,6 @@ def write_shaper_pictures(result: Recommendation, folder: str | Path) -> list[st
     Raises:
         OSError: the folder cannot be made or a file not be written.
     """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     designs = {name(each): each.shaper for each in selected(result)}
     modes = [band.mode for band in result.bands]
     pictures: dict[str, Callable[[Path], None]] = {
@@ -58,12 +56,7 @@ def write_shaper_pictures(result: Recommendation, folder: str | Path) -> list[st
     branches = _branches(result)
     if branches is not None:
         pictures["branches"] = lambda file: plot_branches(file, branches, modes)
-    files = []
-    for kind, plot in pictures.items():
-        for suffix in canvas.FORMATS:
-            files.append(folder / f"shaper-{kind}{suffix}")
-            plot(files[-1])
-    return [str(file) for file in files]
+    return canvas.write_pictures(folder, "shaper", pictures)
 
 
 def name(each: Design) -> str:

@@ -41,6 +41,7 @@ from shapegcode.worst_case import (
 __all__ = ["OVERRIDES", "RegionFigures", "contour_target", "contour_um", "measure", "summarise"]
 
 OVERRIDES = (0.8, 0.9, 1.1, 1.2)  # of the report's override_residual; the cases have more
+_HASTE = 0.9  # of its time: a region that takes less cuts faster than programmed
 _BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 
 Step = Callable[[int, int], None]
@@ -200,8 +201,17 @@ def _starved_figures(run: _core.PlaybackFigures, waited_s: float) -> CaseFigures
     )
 
 
-def summarise(figures: Sequence[RegionFigures], placed: Sequence[Placed], machine: Machine) -> dict[str, Any]:
-    """The figures of all regions as the stable keys of the report; the emitted ones are the worse of both rules."""
+def summarise(
+    figures: Sequence[RegionFigures], placed: Sequence[Placed], machine: Machine, block_period_s: float
+) -> dict[str, Any]:
+    """The figures of all regions as the stable keys of the report; the emitted ones are the worse of both rules.
+
+    Args:
+        figures: per region, as played.
+        placed: the regions.
+        machine: tolerances.
+        block_period_s: of the emitted blocks, s.
+    """
     emitted = [run for region in figures for run in region.emitted]
     originals = [region.original for region in figures]
     cases = stated_cases(machine)
@@ -254,7 +264,7 @@ def summarise(figures: Sequence[RegionFigures], placed: Sequence[Placed], machin
         "cases": entries,
         "worst_case": worst_counted(entries),
         "regions": [
-            _region_summary(region, place, cases, limit)
+            _region_summary(region, place, cases, limit, block_period_s)
             for region, place, limit in zip(figures, placed, limits, strict=True)
         ],
     }
@@ -290,7 +300,24 @@ def _limits(figures: RegionFigures, place: Placed, machine: Machine) -> Limits:
     )
 
 
-def _region_summary(figures: RegionFigures, place: Placed, cases: Sequence[Case], limits: Limits) -> dict[str, Any]:
+def _haste(figures: RegionFigures, place: Placed, block_period_s: float) -> list[str]:
+    """The miss of a region that runs faster than programmed.
+
+    At feeds so slow that an increment lasts several blocks, F words of its resolution do not meet their ticks. A rapid
+    may take longer than its replacement, and an original longer than its feeds say: neither makes that too fast.
+    """
+    was_s, now_s = figures.original.duration_s, max(run.duration_s for run in figures.emitted)
+    if now_s >= _HASTE * min(was_s, place.region.path.programmed_time_s):
+        return []
+    return [
+        f"runs in {now_s:.1f} s instead of {was_s:.1f} s: too slow a feed for blocks of {block_period_s * 1e3:g} ms "
+        "(raise controller.minimum_feed_mm_per_min above it to keep its text)"
+    ]
+
+
+def _region_summary(
+    figures: RegionFigures, place: Placed, cases: Sequence[Case], limits: Limits, block_period_s: float
+) -> dict[str, Any]:
     after = np.max([run.residual_mm for run in figures.emitted], axis=0) * 1e3
     return {
         "lines": [place.region.first_line, place.region.last_line],
@@ -302,5 +329,5 @@ def _region_summary(figures: RegionFigures, place: Placed, cases: Sequence[Case]
         "residual_vibration_um": {"original": xyz(figures.original.residual_mm * 1e3), "emitted": xyz(after)},
         "residual_limit_um": xyz(limits.residual_um),
         "contour_error_um": max(getattr(run, limits.target).max_abs_mm for run in figures.emitted) * 1e3,
-        "misses": region_misses(cases, figures.cases, limits),
+        "misses": [*region_misses(cases, figures.cases, limits), *_haste(figures, place, block_period_s)],
     }

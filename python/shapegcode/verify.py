@@ -16,7 +16,7 @@ from shapegcode import _core
 from shapegcode.controller import controller_model
 from shapegcode.emit import motion_limits
 from shapegcode.machine import Machine
-from shapegcode.moving_modes import NO_OFFSET, Offset, mode_tables, slowest_mode, still_mode
+from shapegcode.moving_modes import NO_OFFSET, Offset, axis_modes, mode_tables, slowest_mode
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.worst_case import Deviation
 
@@ -48,25 +48,6 @@ class Placed:
     last_line: int
 
 
-def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
-    """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty.
-
-    A table over the part's mass is looked up; of one over a position the nominal frequency is taken.
-    """
-    return [
-        [
-            _core.Mode(
-                still.frequency_hz * (1.0 + shift * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
-                still.damping_ratio,
-                still.participation,
-            )
-            for mode in axis.modes
-            for still in (still_mode(mode, machine.shaping.part_mass_kg),)
-        ]
-        for axis in machine.axes.as_tuple()
-    ]
-
-
 def playback_options(
     machine: Machine, *, time_constant_s: float = 0.0, shift: float = 0.0, offset: Offset = NO_OFFSET
 ) -> _core.PlaybackOptions:
@@ -75,7 +56,7 @@ def playback_options(
     Args:
         machine: modes and controller.
         time_constant_s: length of the filter; 0: none.
-        shift: see `axis_modes`.
+        shift: see `moving_modes.axis_modes`.
         offset: from the command's positions to the machine's, for modes that vary with them.
     """
     options = _core.PlaybackOptions()
@@ -136,7 +117,7 @@ def play_emitted(
         contour: measure the deviations too.
         command_contour: that of the command among them.
         last_seconds: play no more than the end; 0: all.
-        shift: see `axis_modes`.
+        shift: see `moving_modes.axis_modes`.
         record_samples: samples kept for pictures.
         offset: see `playback_options`.
         starved_blocks: behind each of these, tried one by one, the buffer is empty for `verdict.starved_s`.

@@ -106,10 +106,7 @@ double largest_difference(const Column& found, const Eigen::VectorXd& expected) 
 
 Fir shaper_on_half_grid(double period_s) {
   const std::vector<Mode> modes{{46.0, 0.02, 1.0}, {131.0, 0.02, 1.0}};
-  const Fir shaper = to_fir(shapegcode::grid_polynomial(modes, period_s), period_s);
-  std::vector<int> delays = shaper.delays();
-  for (int& delay : delays) delay *= 2;
-  return {delays, shaper.taps()};
+  return to_fir(shapegcode::grid_polynomial(modes, period_s), period_s).on_finer_grid(2);
 }
 
 /// Kernels as they occur: shapers on half the grid with every other tap zero, and those followed by a mode.

@@ -97,6 +97,15 @@ TEST_CASE("fir: moments") {
   CHECK(zv.variance_samples2() == doctest::Approx(0.24 * 16.0));
 }
 
+TEST_CASE("fir: on a finer grid the taps stay and the delays are multiplied") {
+  const Fir finer = Fir({0, 3, 7}, {0.5, 0.25, 0.25}).on_finer_grid(3);
+  CHECK(finer.delays() == std::vector<int>{0, 9, 21});
+  CHECK(finer.taps() == std::vector<double>{0.5, 0.25, 0.25});
+  CHECK(Fir::moving_average(3).on_finer_grid(2).delays() == std::vector<int>{0, 2, 4});
+  CHECK_FALSE(Fir::moving_average(3).on_finer_grid(2).is_moving_average());
+  CHECK_THROWS_AS((void)finer.on_finer_grid(0), Error);
+}
+
 TEST_CASE("fir: holds the first value before the start and the last after the end") {
   const std::vector<double> out = filtered(Fir({1, 3}, {0.25, 0.75}), {2.0, 4.0, 8.0});
   const std::vector<double> expected{2.0, 2.0, 2.5, 3.5, 5.0, 8.0};

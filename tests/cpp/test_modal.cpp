@@ -24,6 +24,8 @@ namespace {
 
 constexpr double two_pi = 2.0 * std::numbers::pi;
 
+using State = std::array<double, 2>;  // position and velocity
+
 struct Oscillator {
   double omega, zeta, omega_d;
   explicit Oscillator(const Mode& mode)
@@ -32,7 +34,22 @@ struct Oscillator {
   [[nodiscard]] double after_velocity_jump(double t) const {
     return t <= 0.0 ? 0.0 : -std::exp(-zeta * omega * t) * std::sin(omega_d * t) / omega_d;
   }
+  /// Rate of position and velocity behind a command x that moves at xv: u'' = 2 zeta omega (xv - u') + omega^2 (x - u).
+  [[nodiscard]] State rate(const State& u, double x, double xv) const {
+    return {u[1], 2.0 * zeta * omega * (xv - u[1]) + omega * omega * (x - u[0])};
+  }
 };
+
+/// One step of the classical fourth-order method from t to t + h; `rate`: of time and state.
+template <typename Rate>
+void runge_kutta_step(State& y, double t, double h, const Rate& rate) {
+  const auto ahead = [&y](const State& r, double dt) { return State{y[0] + dt * r[0], y[1] + dt * r[1]}; };
+  const State k1 = rate(t, y);
+  const State k2 = rate(t + h / 2, ahead(k1, h / 2));
+  const State k3 = rate(t + h / 2, ahead(k2, h / 2));
+  const State k4 = rate(t + h, ahead(k3, h));
+  for (std::size_t j = 0; j < 2; ++j) y[j] += h / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j]);
+}
 
 /// A command with every kind of change, in mm.
 double command_at(double t) {
@@ -109,7 +126,7 @@ TEST_CASE("modal: several modes against an independent Runge-Kutta integration o
   ModalPlant plant(on_x(modes), period);
   plant.reset(Vector3::Zero());
   // u'' = 2 zeta omega (x' - u') + omega^2 (x - u), one u per mode; response x + sum participation (u - x).
-  std::array<std::array<double, 2>, 3> state{};
+  std::array<State, 3> state{};
   double worst = 0.0;
   double fine_peak = 0.0;
   for (int i = 1; i <= 300; ++i) {
@@ -121,20 +138,9 @@ TEST_CASE("modal: several modes against an independent Runge-Kutta integration o
       deflection = 0.0;
       for (std::size_t m = 0; m < 3; ++m) {
         const Oscillator o(modes[m]);
-        const auto rate = [&](double t, const std::array<double, 2>& y) -> std::array<double, 2> {
-          return {y[1], 2.0 * o.zeta * o.omega * (xv - y[1]) + o.omega * o.omega * (x0 + xv * t - y[0])};
-        };
-        const auto ahead = [](const std::array<double, 2>& y, const std::array<double, 2>& r, double dt) {
-          return std::array<double, 2>{y[0] + dt * r[0], y[1] + dt * r[1]};
-        };
-        auto& y = state[m];
         const double t = k * h;
-        const auto k1 = rate(t, y);
-        const auto k2 = rate(t + h / 2, ahead(y, k1, h / 2));
-        const auto k3 = rate(t + h / 2, ahead(y, k2, h / 2));
-        const auto k4 = rate(t + h, ahead(y, k3, h));
-        for (std::size_t j = 0; j < 2; ++j) y[j] += h / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j]);
-        deflection += modes[m].participation * (y[0] - (x0 + xv * (t + h)));
+        runge_kutta_step(state[m], t, h, [&](double at, const State& y) { return o.rate(y, x0 + xv * at, xv); });
+        deflection += modes[m].participation * (state[m][0] - (x0 + xv * (t + h)));
       }
       fine_peak = std::max(fine_peak, std::abs(deflection));
     }
@@ -301,7 +307,7 @@ TEST_CASE("modal: a mode that varies with position against a Runge-Kutta integra
     const double h = period / fine;
     ModalPlant plant(on_x(modes), period, AxisModeTables{{{table}, {}, {}}});
     plant.reset({0.0, 0.0, z_at(0.0)});
-    std::array<std::array<double, 2>, 2> state{};
+    std::array<State, 2> state{};
     double worst = 0.0;
     double fine_peak = 0.0;
     const int steps = static_cast<int>(0.8 / period);
@@ -315,28 +321,18 @@ TEST_CASE("modal: a mode that varies with position against a Runge-Kutta integra
       for (int k = 0; k < fine; ++k) {
         deflection = 0.0;
         for (std::size_t m = 0; m < 2; ++m) {
-          const auto rate = [&](double t, const std::array<double, 2>& y) -> std::array<double, 2> {
+          const double t = k * h;
+          runge_kutta_step(state[m], t, h, [&](double at, const State& y) {
             Mode here = modes[m];
             if (m == 0) {
-              const double z = z0 + (z1 - z0) * t / period;
+              const double z = z0 + (z1 - z0) * at / period;
               const double share = std::clamp(z / 100.0, 0.0, 2.0);
               here.frequency_hz = share < 1.0 ? 52.0 - 6.0 * share : 46.0 - 5.0 * (share - 1.0);
               here.damping_ratio = share < 1.0 ? 0.02 + 0.01 * share : 0.03 - 0.02 * (share - 1.0);
             }
-            const Oscillator o(here);
-            return {y[1], 2.0 * o.zeta * o.omega * (xv - y[1]) + o.omega * o.omega * (x0 + xv * t - y[0])};
-          };
-          const auto ahead = [](const std::array<double, 2>& y, const std::array<double, 2>& r, double dt) {
-            return std::array<double, 2>{y[0] + dt * r[0], y[1] + dt * r[1]};
-          };
-          auto& y = state[m];
-          const double t = k * h;
-          const auto k1 = rate(t, y);
-          const auto k2 = rate(t + h / 2, ahead(y, k1, h / 2));
-          const auto k3 = rate(t + h / 2, ahead(y, k2, h / 2));
-          const auto k4 = rate(t + h, ahead(y, k3, h));
-          for (std::size_t j = 0; j < 2; ++j) y[j] += h / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j]);
-          deflection += modes[m].participation * (y[0] - (x0 + xv * (t + h)));
+            return Oscillator(here).rate(y, x0 + xv * at, xv);
+          });
+          deflection += modes[m].participation * (state[m][0] - (x0 + xv * (t + h)));
         }
         fine_peak = std::max(fine_peak, std::abs(deflection));
       }

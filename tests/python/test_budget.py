@@ -256,6 +256,24 @@ def test_what_misses_its_tolerance_only_for_the_longer_period_is_kept() -> None:
     assert entry["reason"].endswith(f"limit 1.2 um, at a block period of {period_ms:g} ms")
 
 
+def test_what_runs_too_fast_only_for_the_longer_period_is_kept() -> None:
+    """A circle at F1, at whose feed blocks of that length do not last as long as they should."""
+    keys = {
+        "axes.x.modes": [],
+        "axes.y.modes": [],
+        "axes.z.modes": [{"frequency_hz": 46.0, "damping_ratio": 0.02}],
+    }
+    circles = "G1X5.F3000\n" + "G2X5.Y0I5.\n" * 6 + "G1X0\n"
+    text = HEAD + "G03I.166J.116F1.\nG0Z5.\nX0Y0\n" + circles + TAIL
+    assert convert(text, machine_with(keys)).conversion.within_tolerance
+    judged = budgeted(text, keys, max_blocks_per_second=60)
+    assert judged.conversion.within_tolerance
+    (entry,) = judged.conversion.report["budget"]["given_up"]
+    assert entry["lines"] == [5, 5]
+    assert entry["reason"].startswith("runs in ")
+    assert "too slow a feed" in entry["reason"]
+
+
 @pytest.mark.parametrize("name", ["TEST_G90.NC", "TEST_G91.NC", "PROGRAM2.NC"])
 def test_sample_under_all_three(name: str) -> None:
     keys = {"controller.calculator_decimal_point": True}

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 import shapegcode as sg
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper, convolved_zv, minimal_two_mode
+from shapegcode.block_grid import choose_grid
 from shapegcode.shaping import (
     FAMILIES,
     Design,
@@ -302,9 +303,15 @@ def test_a_machine_gives_modes_bands_and_grids() -> None:
     assert result.design.duration_s <= exact.duration_s
     assert result.best_by_period[0.005] == result.grid_index == result.index
     assert all(each.period_s is not None and each.period_s >= 0.005 - 1e-12 for each in result.designs)
-    for period_s, message in ((0.0055, "whole multiple"), (0.003, "below the block time")):
+    for period_s, message in (
+        (0.0055, "block period 5.5 ms is no whole multiple of the interpolation period 1 ms"),
+        (0.003, "block period 3 ms is below the block time 5 ms"),
+        (math.nan, "block period is nan s, must be finite and above 0"),
+    ):
         with pytest.raises(ArgumentError, match=message):
             sg.choose_shaper(machine=machine, periods_s=[period_s])
+        with pytest.raises(ArgumentError, match=message):
+            choose_grid(machine, period_s)
 
 
 def test_long_shapers_only_where_no_short_one_is_good() -> None:

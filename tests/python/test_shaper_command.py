@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from shapegcode.cli import main
 from shapegcode.modal_response import respond, shaped_step
 from shapegcode.shaper_picture import plot_pareto, residual_curve, selected
 from shapegcode.shaper_table import radial_error_um
-from shapegcode.shaping import Design, choose_shaper
+from shapegcode.shaping import FAMILIES, Design, choose_shaper
 
 FEW = ("--family", "zv", "mzv", "minimal", "polynomial", "non-negative", "robust")  # quick ones
 PAPER = ("--mode", "46:0.02±5%", "--mode", "131:0.02")
@@ -97,6 +98,9 @@ def test_exit_code_1_if_the_best_leaves_too_much(capsys: pytest.CaptureFixture[s
         (["--mode", "46", "--mode", "46"], "modes 1 and 2 are equal"),
         (["--mode", "0:0.02"], "mode frequency 0 Hz"),
         (["--mode=-46:0.02"], "mode frequency -46 Hz"),
+        (["--mode", "1e-9"], "mode frequency 1e-09 Hz, as typed in '1e-9': must be 0.1 to 10000 Hz"),
+        (["--mode", "0.099:0.02"], "mode frequency 0.099 Hz"),
+        (["--mode", "10001:0.02"], "mode frequency 10001 Hz"),
         (["--mode", "46:1.0"], "damping ratio 1"),
         (["--mode", "46:-0.1"], "damping ratio -0.1"),
         (["--mode", "46:0.02±100%"], "must be at least 0 and below 1"),
@@ -140,6 +144,12 @@ def test_the_families_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     out = capsys.readouterr().out
     for name in ("zv", "polynomial", "non-negative", "Smith"):
         assert name in out
+
+
+def test_the_help_names_every_family(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["shaper", "--help"]) == 0
+    text = re.sub(r"\s+", "", capsys.readouterr().out)  # lines may end within a name
+    assert f"of{','.join(row.name for row in FAMILIES)}(default:all)" in text
 
 
 def test_contour_cost_in_micrometres() -> None:

@@ -248,6 +248,43 @@ def test_exit_code_and_table_follow_the_worst_case(tmp_path: Path, capsys: pytes
     assert "(out)" in out and "(within)" in out
 
 
+#: A mode of Z alone: nothing of a cut in the plane is shaped, and only F words say how long its blocks last.
+ONLY_Z = {"axes.x.modes": [], "axes.y.modes": [], "axes.z.modes": [{"frequency_hz": 46.0, "damping_ratio": 0.02}]}
+CREEP = "%\nO3\nG21G17G90G94\nG00X0Y0Z0\nG03I.166J.116F1.\nG00Z50.\nM30\n%\n"
+
+
+def test_a_region_that_runs_faster_than_programmed_is_missed(tmp_path: Path) -> None:
+    judged = convert(CREEP, machine_with(ONLY_Z), block_period_s=0.007)
+    (miss,) = judged.conversion.report["regions"][0]["misses"]
+    ((_, blocks, entry),) = judged.regions()
+    rules: tuple[BlockEnd, ...] = ("ceil", "carry")
+    lasts_s = max(sum(durations(blocks, period_s=TICK, block_end=rule)) for rule in rules)
+    assert entry["time_s"]["emitted"] == pytest.approx(lasts_s, abs=0.5)
+    programmed_s = 2.0 * math.pi * math.hypot(0.166, 0.116) * 60.0
+    assert entry["time_s"]["original"] == pytest.approx(programmed_s, abs=0.1)
+    assert lasts_s < 0.6 * programmed_s
+    was_s, now_s = entry["time_s"]["original"], entry["time_s"]["emitted"]
+    assert miss.startswith(f"runs in {now_s:.1f} s instead of {was_s:.1f} s: too slow a feed for blocks of 7 ms")
+    # The same feed where its F word fits blocks of 5 ms.
+    assert convert(CREEP, machine_with(ONLY_Z), block_period_s=0.005).conversion.within_tolerance
+
+    (tmp_path / "part.nc").write_text(CREEP)
+    (tmp_path / "machine.toml").write_text(machine_with(ONLY_Z).to_toml(), encoding="utf-8")
+    args = ["part.nc", "-m", "machine.toml", "-o", "out.nc", "--block-period", "7ms"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path)
+        assert main(["convert", *args]) == 1
+
+
+def test_a_region_is_not_too_fast_because_its_original_is_slow() -> None:
+    """1 mm at 100 mm/s takes 10 ms, the original .3 s for its long time constant; the shaped one is faster."""
+    machine = machine_with({"controller.motion": "after_interpolation", "controller.time_constant_s": 0.3})
+    judged = convert("%\nO4\nG21G17G90G94\nG00X0Y0Z0\nG01X1.F6000\nG00Z50.\nM30\n%\n", machine)
+    (entry,) = judged.conversion.report["regions"]
+    assert entry["time_s"]["emitted"] < 0.5 * entry["time_s"]["original"]
+    assert entry["misses"] == []
+
+
 def test_keys_of_a_case_are_stable(judged: Judged) -> None:
     keys = {
         "name", "block_end", "override", "mode", "shift", "look_ahead", "starved_ms", "counts", "residual_um",

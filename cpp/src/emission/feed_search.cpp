@@ -15,7 +15,6 @@ constexpr int raising_rounds = 6;  // behind them speeds are only lowered
 constexpr double aim = 0.97;       // of the tolerance, for the next round
 constexpr double enough = 0.88;    // of the tolerance: what is used so far is not raised
 constexpr double largest_raise = 1.25;
-constexpr double curve_change = 0.0872;  // |change of direction| up to which a junction is part of a curve: 5 degrees
 // A corner that would have to be passed more slowly than this, or than this share of its first speed, is a stop.
 constexpr double creep_mm_per_s = 0.5;
 constexpr double creep_share = 0.02;
@@ -68,7 +67,8 @@ class FeedSearch {
     }
     // Corners that do not answer to a lower speed: what bends them is the change of speed around them.
     for (std::size_t i = 1; i < path_->size(); ++i) {
-      if (caps_.at_junction[i] < none && deviation_.at_junction[i] > tolerance_ && junction_change(i) >= curve_change) {
+      if (caps_.at_junction[i] < none && deviation_.at_junction[i] > tolerance_ &&
+          junction_change(*path_, i) >= corner_change) {
         last.stops.push_back(i);
       }
     }
@@ -123,15 +123,15 @@ class FeedSearch {
         continue;
       }
       const Segment& before = (*path_)[i - 1];
-      const double change = junction_change(i);
+      const double change = junction_change(*path_, i);
       if (change < 1e-6) {
         continue;  // an arc that begins or ends tangentially is slowed as a whole
       }
       const double first = std::min({corner_speed_limit(before, segment, limits_),
                                      segment_speed_limit(segment, limits_), segment_speed_limit(before, limits_)});
       const double passed = std::min(first, static_cast<double>(caps_.at_junction[i]));
-      adjust_one(caps_.at_junction[i], passed, deviation_.at_junction[i], change < curve_change,
-                 change < curve_change ? slowest(first) : 0.0);
+      const bool is_curve = change < corner_change;
+      adjust_one(caps_.at_junction[i], passed, deviation_.at_junction[i], is_curve, is_curve ? slowest(first) : 0.0);
       if (caps_.at_junction[i] < std::max(creep_mm_per_s, creep_share * first)) {
         stops_.push_back(i);
       }
@@ -141,12 +141,6 @@ class FeedSearch {
 
   [[nodiscard]] double slowest(double speed) const noexcept {
     return std::min(speed, std::max(least_feed_, slowest_share * speed));
-  }
-
-  // Change of the direction as segment i is entered: the length of the difference of the unit tangents.
-  [[nodiscard]] double junction_change(std::size_t i) const {
-    const Segment& before = (*path_)[i - 1];
-    return (tangent_at((*path_)[i], 0.0) - tangent_at(before, before.length_mm)).norm();
   }
 
   // Where neither arcs nor corners are to blame it is a ramp on a line across the axes, which bends the response of

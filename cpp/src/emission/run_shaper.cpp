@@ -13,7 +13,6 @@ namespace {
 
 // Deviations below this are left alone: a tenth of what a word can say.
 constexpr double active_mm = 1e-4;
-constexpr double corner_cosine = 0.99619;  // 5 degrees: smoother junctions of polylines are curves
 constexpr std::size_t longest_window = 8192;
 constexpr std::size_t read_ahead = 1024;
 constexpr std::size_t forget_after = 32768;
@@ -22,19 +21,12 @@ constexpr double stiffer = 20.0;  // factor of the smoothness where a limit woul
 constexpr double same_delay_s = 1e-9;
 constexpr double stiffest = 1e12;
 
-Fir on_half_grid(const Fir& shaper) {
-  std::vector<int> delays = shaper.delays();
-  for (int& delay : delays) {
-    delay *= 2;
-  }
-  return Fir(std::move(delays), shaper.taps());
-}
-
 double smooth_step(double x) noexcept { return x * x * (3.0 - 2.0 * x); }
 
-bool is_corner(const Path& path, std::size_t before, std::size_t after) noexcept {
+// Whether there is a corner on the way from one segment to a later one.
+bool passes_corner(const Path& path, std::size_t before, std::size_t after) noexcept {
   for (std::size_t i = before + 1; i <= after; ++i) {
-    if (tangent_at(path[i - 1], path[i - 1].length_mm).dot(tangent_at(path[i], 0.0)) < corner_cosine) {
+    if (junction_change(path, i) >= corner_change) {
       return true;
     }
   }
@@ -42,6 +34,11 @@ bool is_corner(const Path& path, std::size_t before, std::size_t after) noexcept
 }
 
 }  // namespace
+
+double junction_change(const Path& path, std::size_t i) noexcept {
+  const Segment& before = path[i - 1];
+  return (tangent_at(path[i], 0.0) - tangent_at(before, before.length_mm)).norm();
+}
 
 RunFilter::RunFilter(std::span<const Fir> shapers, ContourTarget contour_target, const AxisModes& axis_modes,
                      double block_period_s, double weight, const std::optional<FollowingFir>& followed,
@@ -61,7 +58,7 @@ RunFilter::RunFilter(std::span<const Fir> shapers, ContourTarget contour_target,
       throw Error(ErrorKind::argument, "shapers of several axes have mean delays of " + std::to_string(other_s) +
                                            " s and " + std::to_string(mean_delay_s) + " s, must be equal");
     }
-    half_shapers.push_back(on_half_grid(shaper));
+    half_shapers.push_back(shaper.on_finer_grid(2));
     longest_ = std::max(longest_, half_shapers.back().duration_samples());
   }
   if (followed) following = followed->on_finer_grid(2);
@@ -142,7 +139,7 @@ void RunShaper::read_row() {
   }
   // Near a corner the place along the path matters too: it is where both legs meet.
   const double delay_rows = std::max(1.0, filter_.mean_delay_s / filter_.half_period_s);
-  if (is_corner(*path_, segment_before_, segment)) {
+  if (passes_corner(*path_, segment_before_, segment)) {
     since_corner_ = 0.0;
   }
   segment_before_ = segment;
@@ -399,7 +396,7 @@ void RunShaper::measure(std::size_t row) {
   // At a corner the way by which the corner itself is missed counts.
   constexpr std::size_t around = 4;  // rows, within which the place along the path counts fully
   if (segment_[i - around] != segment_[i - around - 1] &&
-      is_corner(*path_, segment_[i - around - 1], segment_[i - around])) {
+      passes_corner(*path_, segment_[i - around - 1], segment_[i - around])) {
     const Vector3& corner = (*path_)[segment_[i - around]].start_mm;
     double nearest = MotionLimits::none;
     for (std::size_t k = row - std::min(row, 2 * around); k < row; ++k) {
@@ -414,7 +411,7 @@ void RunShaper::measure(std::size_t row) {
   const auto found = static_cast<float>(size);
   // A corner's deviation is no reason to slow the whole arc beside it.
   std::vector<float>& on =
-      is_corner(*path_, segment_[i - half], segment_[i + half]) ? measured_->near_corner : measured_->on_segment;
+      passes_corner(*path_, segment_[i - half], segment_[i + half]) ? measured_->near_corner : measured_->on_segment;
   for (std::uint32_t k = segment_[i - half]; k <= segment_[i + half]; ++k) {
     on[k] = std::max(on[k], found);
     if (k > segment_[i - half]) {

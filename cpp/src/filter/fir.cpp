@@ -236,6 +236,15 @@ Fir::Fir(std::vector<int> delays, std::vector<double> taps) : delays_(std::move(
   }
 }
 
+Fir Fir::on_finer_grid(int factor) const {
+  if (factor < 1) {
+    throw Error(ErrorKind::argument, "grid " + std::to_string(factor) + " times as fine, at least 1 needed");
+  }
+  std::vector<int> delays = delays_;
+  for (int& delay : delays) delay *= factor;
+  return Fir(std::move(delays), taps_);
+}
+
 Fir Fir::moving_average(int length) {
   if (length < 1) {
     throw Error(ErrorKind::argument, "moving average over " + std::to_string(length) + " samples, at least 1 needed");

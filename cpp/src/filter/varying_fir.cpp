@@ -80,16 +80,9 @@ double VaryingFir::variance_samples2() const noexcept {
 }
 
 VaryingFir VaryingFir::on_finer_grid(int factor) const {
-  if (factor < 1) {
-    throw Error(ErrorKind::argument, "grid " + std::to_string(factor) + " times as fine, at least 1 needed");
-  }
   std::vector<Fir> finer;
   finer.reserve(set_.size());
-  for (const Fir& fir : set_) {
-    std::vector<int> delays = fir.delays();
-    for (int& delay : delays) delay *= factor;
-    finer.emplace_back(std::move(delays), fir.taps());
-  }
+  for (const Fir& fir : set_) finer.push_back(fir.on_finer_grid(factor));
   return VaryingFir(std::move(finer));
 }
 

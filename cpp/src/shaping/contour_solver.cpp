@@ -40,6 +40,29 @@ void factor_row(double* row, std::size_t band, std::size_t rows_before) noexcept
   row[band] = 1.0 / std::sqrt(row[band] - dot(row, row, band));
 }
 
+// Solves in place behind a factor of rows of `band`+1 values, the diagonal inverted; its last row stands for all that
+// follow.
+void substitute(std::span<const double> factor, std::size_t band, std::span<double> x) noexcept {
+  const std::size_t width = band + 1;
+  const std::size_t last = factor.size() / width - 1;
+  const auto row_of = [&](std::size_t i) { return factor.data() + std::min(i, last) * width; };
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double* row = row_of(i);
+    const std::size_t reach = std::min(i, band);
+    x[i] = (x[i] - dot(row + (band - reach), x.data() + (i - reach), reach)) * row[band];
+  }
+  for (std::size_t i = x.size(); i-- > 0;) {
+    const double* row = row_of(i);
+    x[i] *= row[band];
+    const std::size_t reach = std::min(i, band);
+    double* before = x.data() + (i - reach);
+    const double value = x[i];
+    for (std::size_t j = 0; j < reach; ++j) {
+      before[j] -= row[band - reach + j] * value;
+    }
+  }
+}
+
 }  // namespace
 
 ContourSolver::ContourSolver(std::vector<double> kernel, double smoothness)
@@ -83,27 +106,6 @@ void ContourSolver::extend_factor(std::size_t rows) {
   }
 }
 
-void ContourSolver::substitute(std::span<double> x) const {
-  const std::size_t width = band_ + 1;
-  const std::size_t n = x.size();
-  const auto row_of = [&](std::size_t i) { return factor_.data() + std::min(i, factor_rows_ - 1) * width; };
-  for (std::size_t i = 0; i < n; ++i) {
-    const double* row = row_of(i);
-    const std::size_t reach = std::min(i, band_);
-    x[i] = (x[i] - dot(row + (band_ - reach), x.data() + (i - reach), reach)) * row[band_];
-  }
-  for (std::size_t i = n; i-- > 0;) {
-    x[i] *= row_of(i)[band_];
-    const double* row = row_of(i);
-    const std::size_t reach = std::min(i, band_);
-    double* before = x.data() + (i - reach);
-    const double value = x[i];
-    for (std::size_t j = 0; j < reach; ++j) {
-      before[j] -= row[band_ - reach + j] * value;
-    }
-  }
-}
-
 void ContourSolver::factor_and_solve(std::span<const double> stiffness, std::span<double> x) {
   const std::size_t width = band_ + 1;
   const std::size_t n = x.size();
@@ -121,19 +123,7 @@ void ContourSolver::factor_and_solve(std::span<const double> stiffness, std::spa
     }
     factor_row(row, band_, i);
   }
-  for (std::size_t i = 0; i < n; ++i) {
-    const double* row = own_factor_.data() + i * width;
-    const std::size_t reach = std::min(i, band_);
-    x[i] = (x[i] - dot(row + (band_ - reach), x.data() + (i - reach), reach)) * row[band_];
-  }
-  for (std::size_t i = n; i-- > 0;) {
-    const double* row = own_factor_.data() + i * width;
-    x[i] *= row[band_];
-    const std::size_t reach = std::min(i, band_);
-    for (std::size_t j = 0; j < reach; ++j) {
-      x[i - reach + j] -= row[band_ - reach + j] * x[i];
-    }
-  }
+  substitute(own_factor_, band_, x);
 }
 
 void ContourSolver::solve(std::span<const double> error, std::span<double> correction,
@@ -178,7 +168,7 @@ void ContourSolver::solve(std::span<const double> error, std::span<double> corre
   }
   if (stiffness.empty()) {
     extend_factor(m);
-    substitute(x);
+    substitute(factor_, band_, x);
   } else {
     factor_and_solve(stiffness, x);
   }

@@ -6,7 +6,7 @@ import argparse
 import math
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _LARGEST_OVERRIDE = 2.54
 _SIZE_UNITS = {"": 1, "k": 1024, "M": 1024 * 1024}
 _LENGTH_UNITS = {"um": 1.0, "µm": 1.0, "mm": 1e3}
-_TIME_UNITS = {"ms": 1e-3, "us": 1e-6, "s": 1.0}
+_TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 
 
 def add_input_arguments(parser: argparse.ArgumentParser, metavar: str = "IN") -> None:
@@ -206,25 +206,26 @@ def override(text: str) -> float:
 
 def seconds(text: str) -> float:
     """A time with its unit, such as ``5ms`` or ``0.005s``."""
-    match = re.fullmatch(r"([-+.\d]+(?:[eE][-+]?\d+)?)\s*(ms|us|s)", text)
-    try:
-        value = float(match[1]) * _TIME_UNITS[match[2]] if match else 0.0
-    except ValueError:
-        value = 0.0
-    if not (math.isfinite(value) and value > 0.0):
-        raise argparse.ArgumentTypeError(f"{text!r}: must be a time above 0 with its unit (s, ms, us), for example 5ms")
-    return value
+    return _with_unit(text, "time", _TIME_UNITS, "5ms")
 
 
 def micrometres(text: str) -> float:
     """A length with its unit, such as ``5um`` or ``0.005mm``, in µm."""
-    match = re.fullmatch(r"([-+.\d]+(?:[eE][-+]?\d+)?)\s*(um|µm|mm)", text)
+    return _with_unit(text, "length", _LENGTH_UNITS, "5um")
+
+
+def _with_unit(text: str, what: str, units: Mapping[str, float], example: str) -> float:
+    """A number above 0 with one of the units, times what the unit stands for."""
+    match = re.fullmatch(rf"([-+.\d]+(?:[eE][-+]?\d+)?)\s*({'|'.join(units)})", text)
     try:
-        value = float(match[1]) * _LENGTH_UNITS[match[2]] if match else 0.0
+        value = float(match[1]) * units[match[2]] if match else 0.0
     except ValueError:
         value = 0.0
     if not (math.isfinite(value) and value > 0.0):
-        raise argparse.ArgumentTypeError(f"{text!r}: must be a length above 0 with its unit (um, mm), for example 5um")
+        typed = ", ".join(unit for unit in units if unit.isascii())
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: must be a {what} above 0 with its unit ({typed}), for example {example}"
+        )
     return value
 
 

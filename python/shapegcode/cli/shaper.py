@@ -20,6 +20,11 @@ from shapegcode.cli.options import (
 __all__ = ["add_arguments", "run"]
 
 _CONTINUOUS = "continuous"
+# The registry's, whose solvers take too long to load for a help text.
+_FAMILIES = (
+    "zv", "zvd", "zvdd", "mzv", "ei", "ei2", "ei3", "si", "negative-zv", "simultaneous", "minimal", "polynomial",
+    "non-negative", "robust", "taps",
+)  # fmt: skip
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="HZ[:DAMPING][±BAND]",
         action="append",
         default=[],
-        help="a mode to cancel, such as 46:0.02±5%% or 46:0.02+-2Hz; once for each mode",
+        help="a mode to cancel, such as 46:0.02±5%% or 46:0.02+-2Hz, from 0.1 to 10000 Hz; once for each mode",
     )
     add_machine_argument(parser, required=False)
     parser.add_argument(
@@ -55,9 +60,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "the machine's, or the best few; without a machine continuous times too)",
     )
     parser.add_argument(
-        "--family", metavar="NAME", action="extend", nargs="+", default=None, help="compare only these families"
+        "--family",
+        metavar="NAME",
+        action="extend",
+        nargs="+",
+        default=None,
+        help=f"compare only these families, of {', '.join(_FAMILIES)} (default: all)",
     )
-    parser.add_argument("--list-families", action="store_true", help="say which families there are, and nothing else")
+    parser.add_argument(
+        "--list-families", action="store_true", help="say what each family is and where it comes from, and nothing else"
+    )
     parser.add_argument(
         "--max-duration",
         metavar="TIME",

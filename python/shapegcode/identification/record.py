@@ -32,6 +32,7 @@ class Record:
         force_n: (n,) force of the hammer at the same instants; None: a free decay.
         axis: "x", "y" or "z" where the file says it.
         start_s: time of the first sample in the file.
+        warnings: what reading the file had to assume.
     """
 
     source: str
@@ -41,6 +42,7 @@ class Record:
     force_n: FloatArray | None = None
     axis: str | None = None
     start_s: float = 0.0
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.force_n is not None and len(self.force_n) != len(self.response):

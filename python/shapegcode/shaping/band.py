@@ -9,6 +9,8 @@ from shapegcode._core import ArgumentError, Mode
 
 __all__ = ["ModeBand", "parse_mode_band"]
 
+_SLOWEST_HZ = 0.1  # the swing of a load on 25 m of rope; no machine tool has a slower mode
+_FASTEST_HZ = 10_000.0  # as in a machine file
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _TEXT = re.compile(rf"({_NUMBER})(?::({_NUMBER}))?(?:(?:±|\+-|\+/-)({_NUMBER})(%|Hz)?)?")
 
@@ -53,7 +55,8 @@ def parse_mode_band(text: str) -> ModeBand:
     """A mode such as ``46``, ``46:0.02``, ``46:0.02±5%`` or ``46:0.02+-2.3Hz``: Hz, damping ratio, band.
 
     Raises:
-        ArgumentError: not of that form, or a value outside its range.
+        ArgumentError: not of that form, or a value outside its range; a frequency below 0.1 Hz or above 10 kHz is
+            taken for a slip.
     """
     match = _TEXT.fullmatch(text.strip())
     if match is None:
@@ -61,4 +64,8 @@ def parse_mode_band(text: str) -> ModeBand:
     frequency_hz, damping = float(match[1]), float(match[2] or 0.0)
     band = float(match[3] or 0.0)
     mode = Mode(frequency_hz, damping)
+    if not _SLOWEST_HZ <= frequency_hz <= _FASTEST_HZ:
+        raise ArgumentError(
+            f"mode frequency {frequency_hz:g} Hz, as typed in {text!r}: must be {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz"
+        )
     return ModeBand(mode, band / frequency_hz if match[4] == "Hz" else band / 100.0)

@@ -19,7 +19,7 @@ from shapegcode.shaping.taps import parse_taps
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["candidate_periods", "choose_shaper", "machine_bands"]
+__all__ = ["candidate_periods", "check_block_period", "choose_shaper", "machine_bands"]
 
 _ASSUMED_TICK_S = 0.001  # interpolation period where no machine states one
 _LONGEST_BLOCK_PERIOD_S = 0.02
@@ -27,6 +27,7 @@ _PERIODS_COMPARED = 3
 _SLOWEST_PERIODS = 3.0  # longest shaper where none is stated: three-hump EI of the slowest mode and of a faster one
 _FINEST_SHARE = 1.0 / 32.0  # of the fastest mode's period: a finer grid is as good as continuous times
 _WHOLE = 1e-6  # interpolation periods
+_ROUNDING = 1e-9  # relative
 _BAND = re.compile(r"±|\+-|\+/-")  # a stated band, even one of 0
 
 
@@ -79,7 +80,8 @@ def choose_shaper(
         raise ArgumentError("a comparison of shapers needs modes or a machine: neither is given")
     if periods_s is not None and machine is not None:
         for period_s in periods_s:
-            _check_period(period_s, machine)
+            if period_s is not None:
+                check_block_period(period_s, machine)
     own = parse_taps(taps) if isinstance(taps, str) else taps
     if vibration_limit is None:
         vibration_limit = DesignOptions.vibration_limit if machine is None else machine.shaping.vibration_limit
@@ -109,6 +111,27 @@ def choose_shaper(
             if result.within_limit and result.design.exact:
                 return result
     return compared(longest_s)
+
+
+def check_block_period(period_s: float, machine: Machine) -> None:
+    """Refuse a block period that the machine's controller cannot play.
+
+    Raises:
+        ArgumentError: not finite and above 0, no whole multiple of the interpolation period, or below the block time.
+    """
+    if not (math.isfinite(period_s) and period_s > 0.0):
+        raise ArgumentError(f"block period is {period_s} s, must be finite and above 0")
+    tick_s, block_time_s = machine.controller.interpolation_period_s, machine.controller.block_time_s
+    ticks = period_s / tick_s
+    if round(ticks) < 1 or abs(ticks - round(ticks)) > _WHOLE:
+        raise ArgumentError(
+            f"block period {period_s * 1e3:g} ms is no whole multiple of the interpolation period {tick_s * 1e3:g} ms"
+        )
+    if period_s < block_time_s * (1.0 - _ROUNDING):
+        raise ArgumentError(
+            f"block period {period_s * 1e3:g} ms is below the block time {block_time_s * 1e3:g} ms "
+            "(controller.block_time_s)"
+        )
 
 
 def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
@@ -189,19 +212,3 @@ def _band(given: str | Mode | ModeBand, uncertainty: float) -> ModeBand:
         return given
     band = parse_mode_band(given)
     return band if _BAND.search(given) else ModeBand(band.mode, uncertainty)
-
-
-def _check_period(period_s: float | None, machine: Machine) -> None:
-    """Refuse a grid that the machine's controller cannot play."""
-    if period_s is None:
-        return
-    tick_s, block_time_s = machine.controller.interpolation_period_s, machine.controller.block_time_s
-    ticks = period_s / tick_s
-    if round(ticks) < 1 or abs(ticks - round(ticks)) > _WHOLE:
-        raise ArgumentError(
-            f"period {period_s * 1e3:g} ms is no whole multiple of the interpolation period {tick_s * 1e3:g} ms"
-        )
-    if period_s < block_time_s * (1.0 - _WHOLE):
-        raise ArgumentError(
-            f"period {period_s * 1e3:g} ms is below the block time {block_time_s * 1e3:g} ms (controller.block_time_s)"
-        )

@@ -18,7 +18,10 @@ from scipy.optimize import linprog, nnls
 from shapegcode._core import ArgumentError, DesignError, Mode, ShapegcodeError, Shaper, grid_polynomial
 from shapegcode.shaping.band import ModeBand
 
-__all__ = ["RESIDUAL_LIMIT", "check_modes_and_times", "exact_conditions", "lower_hull", "ms", "shortest_non_negative"]
+__all__ = [
+    "RESIDUAL_LIMIT", "check_modes_and_times", "exact_conditions", "lower_hull", "ms", "shortest_non_negative",
+    "vertex",
+]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
 
@@ -111,7 +114,7 @@ def _non_negative_solution(modes: Sequence[Mode], period_s: float, last: int) ->
     try:
         taps, residual = nnls(matrix, right)
     except RuntimeError:  # it cycled: the linear program decides
-        return _vertex(matrix, right, np.zeros(last + 1))
+        return vertex(matrix, right, np.zeros(last + 1))
     return taps if residual <= _FEASIBLE else None
 
 
@@ -135,8 +138,8 @@ def _smallest_feasible(modes: Sequence[Mode], period_s: float, most: int) -> int
     return enough
 
 
-def _vertex(matrix: FloatArray, right: FloatArray, cost: FloatArray) -> FloatArray | None:
-    """Vertex of the feasible taps that minimises `cost`, or None if the solver finds none."""
+def vertex(matrix: FloatArray, right: FloatArray, cost: FloatArray) -> FloatArray | None:
+    """Vertex of the taps ``x >= 0`` with ``matrix @ x == right`` that minimises ``cost @ x``; None: not found."""
     result = linprog(
         cost,
         A_eq=matrix,
@@ -151,7 +154,7 @@ def _vertex(matrix: FloatArray, right: FloatArray, cost: FloatArray) -> FloatArr
 def _vertices(modes: Sequence[Mode], period_s: float, last: int) -> Iterator[FloatArray]:
     """Solutions worth polishing, the one with the least second central moment first."""
     matrix, right = exact_conditions(modes, period_s, last)
-    yield from lower_hull(lambda cost: _vertex(matrix, right, cost), last)
+    yield from lower_hull(lambda cost: vertex(matrix, right, cost), last)
     # a design at the edge of what is possible may lie within the linear program's tolerance
     taps = _non_negative_solution(modes, period_s, last)
     if taps is not None:

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shapegcode._core import ArgumentError, Fir, Mode
+from shapegcode._core import ArgumentError, Fir, Mode, Shaper
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT
 from shapegcode.shaping.track import mean_range, taps_of_mean
 
 __all__ = ["design_per_axis"]
 
-_RESIDUAL_LIMIT = 1e-10
 _MEANS = 9  # mean delays that are compared
 _ON_GRID = 1e-9  # periods
 _POINT = 1e-8  # periods: means that differ by less are one
@@ -73,13 +73,12 @@ def _of_mean(axis_modes: Sequence[Sequence[Mode]], period_s: float, periods: int
             filters.append(Fir([whole, whole + 1], [1.0 - share, share]) if share > 0.0 else Fir([whole], [1.0]))
             continue
         found = taps_of_mean(modes, period_s, periods, mean * period_s)
-        if found is None or max(_left(*found, mode, period_s) for mode in modes) > _RESIDUAL_LIMIT:
+        if found is None:
             return None
-        filters.append(Fir(found[0].tolist(), found[1].tolist()))
+        delays, taps = found
+        # What is left of a mode does not depend on when the first tap comes.
+        shaper = Shaper(((delays - delays[0]) * period_s).tolist(), taps.tolist())
+        if max(shaper.residual_ratio(mode) for mode in modes) > RESIDUAL_LIMIT:
+            return None
+        filters.append(Fir(delays.tolist(), taps.tolist()))
     return filters
-
-
-def _left(delays: np.ndarray, taps: np.ndarray, mode: Mode, period_s: float) -> float:
-    """Residual ratio of a mode behind taps whose first delay may not be zero."""
-    decay = np.exp(mode.pole.real * period_s * (delays[-1] - delays))
-    return float(abs(np.sum(taps * decay * np.exp(1j * mode.pole.imag * period_s * delays))))

@@ -16,10 +16,9 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode, ModeTable, Shaper, VaryingFir
-from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, shortest_non_negative
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, shortest_non_negative, vertex
 
 __all__ = [
     "MovingMode",
@@ -216,11 +215,11 @@ def taps_of_mean(
     """Delays in periods and taps of `shaper_of_mean`, whose first delay need not be zero; its arguments."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)
-    cost = steps
+    cost = steps / periods
     if mean_s is not None:
-        matrix, right = np.vstack([matrix, steps / periods]), np.append(right, mean_s / period_s / periods)
-        cost = steps**2
-    taps = _vertex(cost, matrix, right)
+        matrix, right = np.vstack([matrix, cost]), np.append(right, mean_s / period_s / periods)
+        cost = steps**2 / periods**2
+    taps = vertex(matrix, right, cost)
     if taps is None:
         return None
     support = np.flatnonzero(taps > _SUPPORT)
@@ -238,18 +237,6 @@ def _conditions(modes: Sequence[Mode], period_s: float, steps: FloatArray) -> tu
     terms = np.exp(np.outer(poles, (steps[-1] - steps) * period_s))
     matrix = np.vstack([terms.real, terms.imag, np.ones(len(steps))])
     return matrix, np.append(np.zeros(len(matrix) - 1), 1.0)
-
-
-def _vertex(cost: FloatArray, matrix: FloatArray, right: FloatArray) -> FloatArray | None:
-    result = linprog(
-        cost / np.abs(cost).max(),
-        A_eq=matrix,
-        b_eq=right,
-        bounds=(0.0, None),
-        method="highs-ds",
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-    )
-    return np.asarray(result.x, dtype=np.float64) if result.status == 0 else None
 
 
 def _equal_means(found: Sequence[Sequence[Mode]], period_s: float, max_duration_s: float) -> list[Shaper]:
@@ -275,7 +262,7 @@ def mean_range(modes: Sequence[Mode], period_s: float, periods: int) -> tuple[fl
     """Least and largest mean delay of non-negative taps, in periods."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)
-    least, largest = _vertex(steps, matrix, right), _vertex(-steps, matrix, right)
+    least, largest = vertex(matrix, right, steps / periods), vertex(matrix, right, -steps / periods)
     if least is None or largest is None:
         return math.inf, -math.inf
     return float(steps @ least) + _SAME_MEAN, float(steps @ largest) - _SAME_MEAN

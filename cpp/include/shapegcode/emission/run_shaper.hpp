@@ -19,6 +19,12 @@
 
 namespace shapegcode {
 
+/// Change of direction as segment `i` >= 1 of a path is entered: the length of the difference of the unit tangents.
+[[nodiscard]] double junction_change(const Path& path, std::size_t i) noexcept;
+
+/// From this `junction_change` on a junction is a corner: 5 degrees. Smoother junctions of polylines are curves.
+inline constexpr double corner_change = 0.0872;
+
 /// What follows the look-ahead of a run, on half the block grid, and how the contour is kept.
 struct RunFilter {
   /// `shapers`: taps in whole block periods, one common to all axes or one for each, of one mean delay. `followed`: a

@@ -34,6 +34,9 @@ class Fir {
   /// Second central moment of the taps in samples^2: the contour cost (spec: dR/R = variance*(v/R)^2/2).
   [[nodiscard]] double variance_samples2() const noexcept;
 
+  /// The same taps on a grid that is `factor` times as fine. Throws Error(argument) on factor < 1.
+  [[nodiscard]] Fir on_finer_grid(int factor) const;
+
   /// Batch form of one axis: input held at its first value before and at its last value after.
   /// out.size() must be in.size() + duration_samples(). Bit-identical to FirStream. `in` and `out` must not overlap.
   /// Throws Error(argument) on an empty input or a wrong output size.

@@ -33,7 +33,6 @@ class ContourSolver {
 
  private:
   void extend_factor(std::size_t rows);
-  void substitute(std::span<double> x) const;
   void factor_and_solve(std::span<const double> stiffness, std::span<double> x);
 
   std::vector<double> kernel_;

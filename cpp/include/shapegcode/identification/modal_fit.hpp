@@ -1,0 +1,77 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "shapegcode/identification/signals.hpp"
+
+namespace shapegcode {
+
+/// What belongs to the model of a tap besides its modes.
+struct ModalFitOptions {
+  Quantity quantity = Quantity::acceleration;
+  /// A constant offset of the response per record.
+  bool with_offset = true;
+  /// Modes far below: the structure moves like a free mass, displacement = integral of the integral of force, over it.
+  bool with_mass_line = false;
+  /// Modes far above: a spring without mass, displacement = compliance * force (acceleration: the force's second
+  /// difference).
+  bool with_compliance = false;
+  /// Intervals that hold for residuals correlated over time as well (stationary noise of any colour).
+  bool coloured_residuals = false;
+  /// Standard deviation in N of white noise on the measured force; its effect is added to the covariance.
+  double force_noise_n = 0.0;
+  int most_iterations = 60;
+};
+
+/// Figures that every fit has.
+struct FitQuality {
+  double sum_of_squares = 0.0;            ///< of the residuals, in the response's unit squared
+  double log_likelihood = 0.0;            ///< for white normal residuals of the same variance in all records
+  std::size_t samples = 0;                ///< of all records together
+  std::size_t parameters = 0;             ///< fitted ones, offsets and amplitudes included
+  double residual_autocorrelation = 0.0;  ///< at a lag of one sample, no unit; white noise: about 0
+  std::vector<double> residual_rms;       ///< per record, in the response's unit
+  std::vector<Eigen::VectorXd> fitted;    ///< per record: the model's response, offset included
+  int iterations = 0;
+  bool converged = false;
+  std::string reason;  ///< why it has not converged; empty if it has
+};
+
+/// Result of fit_modes. Entry r belongs to the r-th start; a mode may have passed another one on the way.
+struct ModalFit {
+  std::vector<double> omega_rad_s;    ///< undamped natural frequencies
+  std::vector<double> damping_ratio;  ///< no unit
+  std::vector<double> inverse_mass;   ///< residues 1/m in 1/kg, negative where the mode's signs differ
+  Eigen::MatrixXd covariance;         ///< (3n, 3n) of omega, zeta, 1/m of the first mode, then of the second, ...
+  double mass_line = 0.0;             ///< 1/kg, 0 without it
+  double compliance = 0.0;            ///< m/N, 0 without it
+  std::vector<double> offset;         ///< per record, in the response's unit
+  FitQuality quality;
+};
+
+/// Fits modes to taps by output error: the least squares, for white noise on the response the maximum likelihood, of
+/// measured minus modelled response. The model is the sum over modes of (1/m) s^q/(s^2 + 2 zeta omega s + omega^2)
+/// applied to the measured force (q = 0 displacement, 1 velocity, 2 acceleration), from rest at the first sample, the
+/// force linear between samples and the modes propagated exactly.
+///
+/// `start`: n >= 1 modes (rad/s, below Nyquist; 0 < zeta < 1), e.g. from arma_driven. The fit is Levenberg-Marquardt in
+/// ln omega and ln zeta with exact derivatives; 1/m and what the options add are linear and eliminated (variable
+/// projection). The covariance is the residual variance over (J'J), with degrees of freedom = samples - parameters;
+/// noise on the force adds, to first order, what it does to the modelled response.
+///
+/// Throws Error(argument) on signals that check_taps refuses, a period or start outside its range, or too few samples
+/// for the parameters. Not converging is told in the result. Source: spec 8; L. Ljung, System Identification, ch. 7.
+[[nodiscard]] ModalFit fit_modes(std::span<const TapSignals> taps, double period_s, const NaturalModes& start,
+                                 const ModalFitOptions& options);
+
+/// Response of given modes to a force, in the unit of `quantity`: the model of fit_modes. Throws Error(argument) on
+/// unequal numbers of parameters or a value outside its range.
+[[nodiscard]] Eigen::VectorXd modal_response(std::span<const double> force_n, double period_s,
+                                             const NaturalModes& modes, std::span<const double> inverse_mass,
+                                             Quantity quantity);
+
+}  // namespace shapegcode
