@@ -132,7 +132,7 @@ def test_motion_takes_the_cycle_time(motion: str) -> None:
 
 @pytest.mark.parametrize("name", ["CONTOUR_R.NC", "G17_18_19.NC", "TEST_G90.NC"])
 def test_motion_of_a_real_program_takes_its_cycle_time(name: str) -> None:
-    """The last one changes its work offset on the way: the command jumps then, the plant does not."""
+    """In the last one the position of X is not known for a while: the command jumps then, the plant does not."""
     machine = sg.Machine.load("vx500")
     program = sg.Program.read(PROGRAMS / name, machine)
     samples, fastest, largest = 0, 0.0, 0.0
