@@ -60,6 +60,13 @@ Quantity quantity_of(const std::string& name) {
   throw Error(ErrorKind::argument, "quantity is '" + name + "', must be 'acceleration', 'velocity' or 'displacement'");
 }
 
+ForceHold hold_of(const std::string& name) {
+  if (name == "linear") return ForceHold::linear;
+  if (name == "band_limited") return ForceHold::band_limited;
+  if (name == "impulse") return ForceHold::impulse;
+  throw Error(ErrorKind::argument, "hold is '" + name + "', must be 'linear', 'band_limited' or 'impulse'");
+}
+
 NaturalModes modes_of(const VectorArray& omega_rad_s, const VectorArray& damping_ratio) {
   const auto omega = span_of(omega_rad_s, "natural frequencies");
   const auto zeta = span_of(damping_ratio, "damping ratios");
@@ -279,23 +286,23 @@ void register_fits(py::module_& m) {
       "fit_modes",
       [](const std::vector<VectorArray>& forces, const std::vector<VectorArray>& responses, double period_s,
          const VectorArray& omega_rad_s, const VectorArray& damping_ratio, const std::string& quantity,
-         bool with_offset, bool with_mass_line, bool with_compliance, bool coloured_residuals, double force_noise_n,
-         int most_iterations) {
+         bool with_offset, bool with_mass_line, bool with_compliance, bool coloured_residuals, const std::string& hold,
+         double force_noise_n, int most_iterations) {
         const auto taps = taps_of(forces, responses);
         const NaturalModes start = modes_of(omega_rad_s, damping_ratio);
         const ModalFitOptions options{quantity_of(quantity), with_offset,   with_mass_line, with_compliance,
-                                      coloured_residuals,    force_noise_n, most_iterations};
+                                      coloured_residuals,    hold_of(hold), force_noise_n,  most_iterations};
         const py::gil_scoped_release released;
         return fit_modes(taps, period_s, start, options);
       },
       py::arg("forces"), py::arg("responses"), py::arg("period_s"), py::arg("omega_rad_s"), py::arg("damping_ratio"),
       py::kw_only(), py::arg("quantity") = "acceleration", py::arg("with_offset") = true,
       py::arg("with_mass_line") = false, py::arg("with_compliance") = false, py::arg("coloured_residuals") = false,
-      py::arg("force_noise_n") = 0.0, py::arg("most_iterations") = 60,
+      py::arg("hold") = "linear", py::arg("force_noise_n") = 0.0, py::arg("most_iterations") = 60,
       R"(Output-error (for white noise: maximum likelihood) fit of modes to one or several taps of the same point.
 
 The response is the sum over modes of (1/m) s^q/(s^2 + 2 zeta omega s + omega^2) applied to the force, from rest at the
-first sample, the force linear between samples. Search by Levenberg-Marquardt in ln omega and ln zeta with exact
+first sample. Search by Levenberg-Marquardt in ln omega and ln zeta with exact
 derivatives; everything linear is eliminated.
 
 Args:
@@ -309,7 +316,10 @@ Args:
     with_mass_line: Add a free mass, for modes far below.
     with_compliance: Add a spring without mass, for modes far above.
     coloured_residuals: Covariance that holds for residuals correlated over time (stationary) as well.
-    force_noise_n: Standard deviation of white noise on the force in N, added to the covariance to first order.
+    hold: How the force runs between samples: "linear"; "band_limited", as behind an anti-aliasing filter (sinc
+        interpolation); "impulse", blows just before the samples, of force times period.
+    force_noise_n: Standard deviation of white noise on the force in N. In pulses of up to 128 samples the true force is
+        estimated along with the modes; else its effect is added to the covariance to first order.
     most_iterations: Steps after which the search gives up, with converged False.
 
 Returns:
@@ -363,15 +373,15 @@ Source: spec 8; G. Golub, V. Pereyra 2003.)");
   m.def(
       "modal_response",
       [](const VectorArray& force_n, double period_s, const VectorArray& omega_rad_s, const VectorArray& damping_ratio,
-         const VectorArray& inverse_mass, const std::string& quantity) {
+         const VectorArray& inverse_mass, const std::string& quantity, const std::string& hold) {
         const auto force = span_of(force_n, "force");
         const auto residues = span_of(inverse_mass, "residues");
         const NaturalModes modes = modes_of(omega_rad_s, damping_ratio);
-        return array_of(modal_response(force, period_s, modes, residues, quantity_of(quantity)));
+        return array_of(modal_response(force, period_s, modes, residues, quantity_of(quantity), hold_of(hold)));
       },
       py::arg("force_n"), py::arg("period_s"), py::arg("omega_rad_s"), py::arg("damping_ratio"),
-      py::arg("inverse_mass"), py::arg("quantity") = "acceleration",
-      R"(Response of modes to a force that is linear between samples, exact, from rest: the model of fit_modes.
+      py::arg("inverse_mass"), py::arg("quantity") = "acceleration", py::arg("hold") = "linear",
+      R"(Response of modes to a force, exact, from rest: the model of fit_modes.
 
 Args:
     force_n: Force in N, shape (n,).
@@ -380,6 +390,7 @@ Args:
     damping_ratio: Damping ratios, 0 < zeta < 1, shape (n_modes,).
     inverse_mass: Residues 1/m in 1/kg, shape (n_modes,).
     quantity: "acceleration", "velocity" or "displacement".
+    hold: How the force runs between samples, as in fit_modes.
 
 Returns:
     Response in SI units, shape (n,).
@@ -401,17 +412,17 @@ void register_ranking(py::module_& m) {
       "rank_modes",
       [](const std::vector<VectorArray>& responses, double period_s, const VectorArray& omega_rad_s,
          const VectorArray& damping_ratio, std::size_t most, const std::optional<std::vector<VectorArray>>& forces,
-         const std::string& quantity) {
+         const std::string& quantity, std::size_t kept) {
         const auto records = spans_of(responses, "response");
         const auto taps = forces ? taps_of(*forces, responses) : std::vector<TapSignals>{};
         const NaturalModes candidates = modes_of(omega_rad_s, damping_ratio);
         const Quantity measured = quantity_of(quantity);
         const py::gil_scoped_release released;
-        return forces ? rank_modes(taps, period_s, candidates, most, measured)
-                      : rank_modes(records, period_s, candidates, most);
+        return forces ? rank_modes(taps, period_s, candidates, most, kept, measured)
+                      : rank_modes(records, period_s, candidates, most, kept);
       },
       py::arg("responses"), py::arg("period_s"), py::arg("omega_rad_s"), py::arg("damping_ratio"), py::arg("most"),
-      py::arg("forces") = py::none(), py::arg("quantity") = "acceleration",
+      py::arg("forces") = py::none(), py::arg("quantity") = "acceleration", py::arg("kept") = 0,
       R"(Ranks candidate modes by forward selection: starts for fit_modes and fit_decay from the poles of a chart.
 
 At each step the candidate is chosen that, together with those before it, leaves the least squares; residues (of
@@ -425,6 +436,8 @@ Args:
     most: How many to choose, at least 1.
     forces: Force per record in N at the same instants; None: the records are free decays.
     quantity: "acceleration", "velocity" or "displacement"; only with forces.
+    kept: The first so many candidates are chosen before all others, in their order; handed over as fitted, they leave
+        only what is new to the rest.
 
 Returns:
     The ranking; shorter than asked for where no candidate explains anything more.

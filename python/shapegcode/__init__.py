@@ -69,6 +69,11 @@ if TYPE_CHECKING:
     from shapegcode.checker import check as check
     from shapegcode.converter import Conversion as Conversion
     from shapegcode.converter import convert as convert
+    from shapegcode.identification.read import ReadOptions as ReadOptions
+    from shapegcode.identification.record import Record as Record
+    from shapegcode.identification.record import RecordError as RecordError
+    from shapegcode.identification.results import Identification as Identification
+    from shapegcode.identification.tap_test import identify as identify
     from shapegcode.machine import Machine as Machine
     from shapegcode.machine import MachineError as MachineError
     from shapegcode.played import stream as stream
@@ -106,8 +111,12 @@ _HOME = {
     "Budget": "budget",
     "choose_grid": "block_grid",
     **dict.fromkeys(("Conversion", "convert"), "converter"),
+    "Identification": "identification.results",
     **dict.fromkeys(("Machine", "MachineError"), "machine"),
     "Program": "program",
+    "ReadOptions": "identification.read",
+    **dict.fromkeys(("Record", "RecordError"), "identification.record"),
+    "identify": "identification.tap_test",
     **dict.fromkeys(
         ("ModeBand", "Recommendation", "choose_block_period", "choose_shaper", "shortest_non_negative"), "shaping"
     ),

@@ -4104,7 +4104,7 @@ def poles_to_modes(poles: collections.abc.Sequence[complex | typing.SupportsComp
     
     Source: spec 8; paper 003, eq. 5-6.
     """
-def rank_modes(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], most: typing.SupportsInt | typing.SupportsIndex, forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None, quantity: str = 'acceleration') -> ModeRanking:
+def rank_modes(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], most: typing.SupportsInt | typing.SupportsIndex, forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None, quantity: str = 'acceleration', kept: typing.SupportsInt | typing.SupportsIndex = 0) -> ModeRanking:
     """
     Ranks candidate modes by forward selection: starts for fit_modes and fit_decay from the poles of a chart.
     
@@ -4119,6 +4119,8 @@ def rank_modes(responses: collections.abc.Sequence[typing.Annotated[numpy.typing
         most: How many to choose, at least 1.
         forces: Force per record in N at the same instants; None: the records are free decays.
         quantity: "acceleration", "velocity" or "displacement"; only with forces.
+        kept: The first so many candidates are chosen before all others, in their order; handed over as fitted, they leave
+            only what is new to the rest.
     
     Returns:
         The ranking; shorter than asked for where no candidate explains anything more.

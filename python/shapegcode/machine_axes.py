@@ -7,8 +7,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+<<<<<<< HEAD
 from shapegcode.machine_drive import Drive
 from shapegcode.machine_keys import Float, InlineTable, NonNegative, Positive, Table, key, toml
+=======
+from shapegcode.machine_keys import Float, InlineTable, NonNegative, Positive, Table, Text, key, toml
+>>>>>>> 01f95ff0ab5ed056e7b5aaa531307bc3a7ecea89
 
 
 class FrequencyOver(InlineTable):
@@ -71,10 +75,26 @@ class Mode(Table):
     )
     frequency_uncertainty_percent: Annotated[NonNegative, Field(lt=100)] | None = key(
         "the frequency may be off by this much either way (position of the table, weight of the workpiece); "
-        "left out: not known, and only the nominal frequency is designed for",
+        "left out: not known. Only the nominal frequency is designed for then, and up to 0.2 %",
         unit="%",
         default=None,
     )
+    damping_uncertainty_percent: Annotated[NonNegative, Field(lt=100)] | None = key(
+        "the damping ratio may be off by this much of itself either way; left out: not known, and the ratio is taken "
+        "as exact",
+        unit="%",
+        default=None,
+    )
+    mass_kg: Positive | None = key(
+        "equivalent mass of this mode at the point that was tapped; its stiffness there is mass_kg * (2 pi "
+        "frequency_hz)^2. Shapers do not need it; left out: not measured",
+        unit="kg",
+        default=None,
+    )
+    mass_uncertainty_percent: NonNegative | None = key(
+        "the mass may be off by this much either way", unit="%", default=None
+    )
+    source: Text | None = key("where the values of this mode come from", default=None)
     frequency_over: FrequencyOver | None = key(
         'table of the frequency over the position of an axis, { axis = "z", position_mm = [0, 200, 400], '
         "frequency_hz = [52, 46, 41] }, or over the mass of the part, { mass_kg = [0, 300], frequency_hz = [46, 38] }; "
@@ -83,6 +103,12 @@ class Mode(Table):
         "table",
         default=None,
     )
+
+    @model_validator(mode="after")
+    def _uncertainty_of_a_mass(self) -> Mode:
+        if self.mass_uncertainty_percent is not None and self.mass_kg is None:
+            raise ValueError("mass_uncertainty_percent is given, mass_kg is not")
+        return self
 
     @model_validator(mode="after")
     def _nominal_in_table(self) -> Mode:

@@ -185,8 +185,8 @@ class Verdict(Table):
         default=(100.0, 100.0),
     )
     mode_uncertainty: Bool = key(
-        "whether every mode must be allowed to be off by its frequency_uncertainty_percent; modes that state none "
-        "are taken as exact",
+        "whether every mode must be allowed to be off by its frequency_uncertainty_percent, with less damping by its "
+        "damping_uncertainty_percent; modes that state neither are taken as exact",
         default=True,
     )
     block_end: Literal["both", "own"] = key(

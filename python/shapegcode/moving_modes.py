@@ -21,6 +21,7 @@ __all__ = [
     "NO_OFFSET",
     "Offset",
     "axis_modes",
+    "damping_scale",
     "machine_warnings",
     "mode_tables",
     "moving_axis",
@@ -56,7 +57,7 @@ def still_mode(mode: Mode, part_mass_kg: float | None) -> _core.Mode:
 
 
 def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
-    """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty.
+    """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty, its damping at its low end.
 
     A table over the part's mass is looked up; of one over a position the nominal frequency is taken.
     """
@@ -64,7 +65,7 @@ def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
         [
             _core.Mode(
                 still.frequency_hz * (1.0 + shift * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
-                still.damping_ratio,
+                still.damping_ratio * damping_scale(mode, shift),
                 still.participation,
             )
             for mode in axis.modes
@@ -75,11 +76,21 @@ def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
 
 
 def slowest_mode(mode: Mode) -> tuple[float, float]:
-    """Lowest frequency (Hz) and least damping ratio that a mode may have, by its tables."""
+    """Lowest frequency (Hz) by a mode's tables, and least damping ratio by them and by its stated uncertainty."""
     over = mode.frequency_over
+    least = damping_scale(mode, 1.0)
     if over is None:
-        return mode.frequency_hz, mode.damping_ratio
-    return min(over.frequency_hz), min(over.damping_ratio or (mode.damping_ratio,))
+        return mode.frequency_hz, mode.damping_ratio * least
+    return min(over.frequency_hz), min(over.damping_ratio or (mode.damping_ratio,)) * least
+
+
+def damping_scale(mode: Mode, shift: float) -> float:
+    """What a mode's damping ratio is multiplied by where its frequency is moved by `shift` of its uncertainty.
+
+    Both ways it is the lower end of the stated damping that counts. To first order a shaper leaves the same at either
+    end: what counts is how far the pole is off, |dw/w + i dzeta|. Beyond that less damping leaves more.
+    """
+    return 1.0 - abs(shift) * (mode.damping_uncertainty_percent or 0.0) / 100.0
 
 
 def mode_tables(machine: Machine, shift: float = 0.0, offset: Offset = NO_OFFSET) -> list[list[_core.ModeTable]]:
@@ -87,7 +98,7 @@ def mode_tables(machine: Machine, shift: float = 0.0, offset: Offset = NO_OFFSET
 
     Args:
         machine: whose modes.
-        shift: share of each mode's stated uncertainty by which its frequencies are moved.
+        shift: share of each mode's stated uncertainty by which its frequencies are moved; see `damping_scale`.
         offset: from the command's positions to the machine's; where it is None for the axis of a table, the mode
             stays nominal.
     """
@@ -227,7 +238,7 @@ def _table(mode: Mode, shift: float, offset: Offset) -> _core.ModeTable:
         axis,
         [position - start for position in over.abscissa],
         [frequency * scale for frequency in over.frequency_hz],
-        over.damping_ratio or (),
+        [ratio * damping_scale(mode, shift) for ratio in over.damping_ratio or ()],
     )
 
 

@@ -184,22 +184,29 @@ class Judged:
         return f"{self.figure} {self.value_um:.{self.decimals}f} um, limit {self.limit_um:.{self.decimals}f} um"
 
 
-def _uncertain_modes(machine: Machine) -> list[tuple[str, str, float]]:
-    """Key, words and uncertainty in percent of every mode that states one."""
-    return [
-        (f"{axis.lower()}.{number}", f"{axis} {mode.frequency_hz:g} Hz", mode.frequency_uncertainty_percent)
-        for axis, table in zip("XYZ", machine.axes.as_tuple(), strict=True)
-        for number, mode in enumerate(table.modes, start=1)
-        if mode.frequency_uncertainty_percent
-    ]
+def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]]]]:
+    """Key of every mode that states an uncertainty, with the words and the shift of its cases."""
+    found = []
+    for axis, table in zip("XYZ", machine.axes.as_tuple(), strict=True):
+        for number, mode in enumerate(table.modes, start=1):
+            name, damping = f"{axis} {mode.frequency_hz:g} Hz", mode.damping_uncertainty_percent
+            less = f", damping {-damping:g} %" if damping else ""
+            if percent := mode.frequency_uncertainty_percent:
+                ways = [(f"{name} {shift * percent:+g} %{less}", shift) for shift in (-1.0, 1.0)]
+            elif damping:
+                ways = [(f"{name}{less}", -1.0)]
+            else:
+                continue
+            found.append((f"{axis.lower()}.{number}", ways))
+    return found
 
 
 def stated_cases(machine: Machine) -> list[Case]:
     """The cases in which a program of this machine is played; the two nominal ones come first (ceil, carry).
 
     Overrides from 50 to 120 % and at the ends of the band, each mode and all of them up and down by their stated
-    uncertainty, both together at the corners of the band, the look-ahead mode left on (for a controller that has
-    one), and a block buffer that runs empty once.
+    uncertainty with as little damping as they state, both together at the corners of the band, the look-ahead mode
+    left on (for a controller that has one), and a block buffer that runs empty once.
     """
     band, own = machine.verdict, machine.controller.block_end
     low, high = band.override_percent
@@ -212,13 +219,12 @@ def stated_cases(machine: Machine) -> list[Case]:
 
     cases += [at_override(percent) for percent in sorted({*_OVERRIDES_PERCENT, low, high} - {100.0})]
     modes = _uncertain_modes(machine)
-    for mode, words, uncertainty in modes:
-        cases += [
-            Case(f"{words} {shift * uncertainty:+g} %", own, band.mode_uncertainty, mode=mode, shift=shift)
-            for shift in (-1.0, 1.0)
-        ]
+    for mode, ways in modes:
+        cases += [Case(words, own, band.mode_uncertainty, mode=mode, shift=shift) for words, shift in ways]
     if modes:
-        together = [(-1.0, "all modes low"), (1.0, "all modes high")]
+        together = [(-1.0, "all modes low")]
+        if any(len(ways) > 1 for _, ways in modes):
+            together.append((1.0, "all modes high"))
         cases += [Case(words, own, band.mode_uncertainty, mode=ALL_MODES, shift=shift) for shift, words in together]
         cases += [
             replace(corner, name=f"{corner.name}, {words}", counts=band.mode_uncertainty, mode=ALL_MODES, shift=shift)
@@ -244,7 +250,9 @@ def with_one_uncertain(machine: Machine, mode: str) -> Machine:
                 "modes": tuple(
                     each
                     if f"{letter}.{number}" == mode
-                    else each.model_copy(update={"frequency_uncertainty_percent": None})
+                    else each.model_copy(
+                        update={"frequency_uncertainty_percent": None, "damping_uncertainty_percent": None}
+                    )
                     for number, each in enumerate(axis.modes, start=1)
                 )
             }

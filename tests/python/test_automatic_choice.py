@@ -106,3 +106,16 @@ def test_a_mode_without_a_band_is_cancelled_or_refused() -> None:
 def test_the_key_knows_every_family_of_the_registry() -> None:
     stated = typing.get_args(Shaping.model_fields["family"].annotation)
     assert stated == ("auto", *(row.name for row in FAMILIES if row.on_grid and row.name != "taps"))
+
+
+@pytest.mark.parametrize("percent", [0.0015, 0.2])
+def test_a_band_as_narrow_as_a_tap_test_gives_it_costs_nothing(percent: float) -> None:
+    """Exact at the nominal frequency, and over the band far below what a robust shaper would leave everywhere."""
+    machine = machine_of([(*X, percent)], [(*Y, percent)], {})
+    grid = choose_grid(machine)
+    assert grid.shaper.amplitudes == pytest.approx(
+        choose_grid(machine_of([(*X, None)], [(*Y, None)], {})).shaper.amplitudes
+    )
+    assert worst_left(machine, grid.shaper) < 0.1 * machine.shaping.vibration_limit
+    wider = machine_of([(*X, 0.21)], [(*Y, 0.21)], {})
+    assert worst_left(wider, choose_grid(wider).shaper) > 0.9 * machine.shaping.vibration_limit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import io
 import json
 import math
@@ -21,12 +22,21 @@ from judge.player import BlockEnd, moving_average
 from shapegcode.case_table import case_table
 from shapegcode.cli import main
 from shapegcode.report import before_after_rows
+from shapegcode.shaping import choose_shaper
+from shapegcode.verify import vibration_memory_s
 from shapegcode.worst_case import CaseFigures, Deviation, Limits, judge_region, stated_cases
 
 Vector = npt.NDArray[np.float64]
 TICK = 0.001
 UNCERTAIN = {
-    "axes.x.modes": [{"frequency_hz": 46.0, "damping_ratio": 0.02, "frequency_uncertainty_percent": 5.0}],
+    "axes.x.modes": [
+        {
+            "frequency_hz": 46.0,
+            "damping_ratio": 0.02,
+            "frequency_uncertainty_percent": 5.0,
+            "damping_uncertainty_percent": 20.0,
+        }
+    ],
     "axes.y.modes": [{"frequency_hz": 131.0, "damping_ratio": 0.02, "frequency_uncertainty_percent": 3.0}],
 }
 # The path of paper 000 at 200 mm/s, and a slanting leg behind it.
@@ -56,13 +66,14 @@ def emitted_cuts(judged: Judged) -> list[Move]:
 
 
 def shifted_modes(judged: Judged, which: str | None, shift: float) -> list[list[Mode]]:
-    """The modes of the machine with one of them ("x.1") or all off by their uncertainty."""
+    """The modes of the machine with one of them ("x.1") or all off by their uncertainty, damping at its low end."""
     uncertainty = {"x": 0.05, "y": 0.03, "z": 0.0}
+    less = {"x": 0.2, "y": 0.0, "z": 0.0}
     return [
         [
             Mode(
                 mode.frequency_hz * (1.0 + (shift * uncertainty[axis] if which in ("all", f"{axis}.1") else 0.0)),
-                mode.damping_ratio,
+                mode.damping_ratio * (1.0 - (less[axis] if which in ("all", f"{axis}.1") else 0.0)),
             )
             for mode in modes
         ]
@@ -85,6 +96,55 @@ def test_overrides_and_shifted_modes_are_the_judges_too(judged: Judged) -> None:
         assert abs(case["time_s"] - lasts) < 1.1 * TICK, case["name"]
         compared += 1
     assert compared == 2 + 7 + 2 * 2 + 2
+
+
+@pytest.mark.parametrize(
+    ("stated", "names"),
+    [
+        ({}, []),
+        (
+            {"frequency_uncertainty_percent": 5.0, "damping_uncertainty_percent": 20.0},
+            ["X 46 Hz -5 %, damping -20 %", "X 46 Hz +5 %, damping -20 %", "all modes low", "all modes high"],
+        ),
+        ({"damping_uncertainty_percent": 20.0}, ["X 46 Hz, damping -20 %", "all modes low"]),
+    ],
+)
+def test_an_uncertain_damping_has_its_cases(stated: dict[str, float], names: list[str]) -> None:
+    machine = machine_with({"axes.x.modes": [{"frequency_hz": 46.0, "damping_ratio": 0.02} | stated]})
+    cases = [case for case in stated_cases(machine) if case.mode is not None]
+    assert [case.name for case in cases] == names
+    if "damping_uncertainty_percent" in stated:
+        assert vibration_memory_s(machine) == pytest.approx(math.log(1e6) / (0.016 * 2.0 * math.pi * 46.0))
+
+
+def test_less_damping_is_the_worse_end() -> None:
+    """Both ends of the damping leave the same to first order, and the lower end more: so it alone is played."""
+    worst = {-1.0: 0.0, 1.0: 0.0}
+    families = ["zv", "mzv", "ei", "non-negative"]
+    for design in choose_shaper(["46:0.02±2%", "131:0.02±1%"], periods_s=[0.005], families=families).designs:
+        for frequency, band in ((46.0, 0.02), (131.0, 0.01)):
+            # left at the last tap: a complex sum over the taps, as no vibration is excited but theirs
+            left = {
+                way: max(
+                    abs(
+                        sum(
+                            a * cmath.exp(pole(frequency * (1.0 + band * side), 0.02 * (1.0 + 0.2 * way)) * (last - t))
+                            for t, a in zip(design.shaper.times_s, design.shaper.amplitudes, strict=True)
+                        )
+                    )
+                    for side in (-1.0, 1.0)
+                )
+                for way in worst
+                for last in (design.shaper.times_s[-1],)
+            }
+            assert left[-1.0] > left[1.0] * 0.98, (design.family, left)
+            worst = {way: max(worst[way], left[way]) for way in worst}
+    assert worst[-1.0] > worst[1.0]
+
+
+def pole(frequency_hz: float, damping: float) -> complex:
+    omega = 2.0 * math.pi * frequency_hz
+    return complex(-damping * omega, omega * math.sqrt(1.0 - damping**2))
 
 
 def test_the_contour_of_a_mode_that_is_off_is_the_judges_too(judged: Judged) -> None:
@@ -192,7 +252,8 @@ def test_a_band_decides_what_counts() -> None:
     def counted(keys: dict[str, Any]) -> set[str]:
         return {case.name for case in stated_cases(machine_with({**UNCERTAIN, **keys})) if case.counts}
 
-    modes = {"X 46 Hz -5 %", "X 46 Hz +5 %", "Y 131 Hz -3 %", "Y 131 Hz +3 %", "all modes low", "all modes high"}
+    off = {"X 46 Hz -5 %, damping -20 %", "X 46 Hz +5 %, damping -20 %"}
+    modes = off | {"Y 131 Hz -3 %", "Y 131 Hz +3 %", "all modes low", "all modes high"}
     assert counted({}) == {"nominal, ceil", "nominal, carry", *modes}
     only = {"verdict.mode_uncertainty": False, "verdict.block_end": "own"}
     assert counted(only) == {"nominal, ceil"}
@@ -349,7 +410,7 @@ def test_the_contour_limit_is_for_the_targeted_deviation() -> None:
 
 def test_what_has_to_be_measured_depends_on_the_target() -> None:
     cases = {case.name: case for case in stated_cases(machine_with(UNCERTAIN))}
-    shift, override = cases["X 46 Hz +5 %"], cases["override 90 %"]
+    shift, override = cases["X 46 Hz +5 %, damping -20 %"], cases["override 90 %"]
     assert (shift.needs_contour("command"), shift.needs_contour("response")) == (False, True)
     assert (override.needs_contour("command"), override.needs_contour("response")) == (False, False)
     counted = {case.name: case for case in stated_cases(machine_with({"verdict.override_percent": [90, 100]}))}

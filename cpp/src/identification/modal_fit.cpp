@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "identification/fit_common.hpp"
+#include "identification/held_force.hpp"
 #include "identification/one_pole.hpp"
 #include "identification/separable_fit.hpp"
 #include "shapegcode/error.hpp"
@@ -19,35 +20,84 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using identification::HeldForce;
 using identification::mode_terms;
 using identification::ModeTerms;
 using identification::one_pole;
 using identification::OnePole;
 
-/// Response of a mode of unit mass, in `column`, and its derivatives to ln omega and ln zeta in the two others. Written
-/// in real numbers: complex products of the standard look for NaN at each sample.
-void mode_columns(std::span<const double> force, double period_s, double omega, double zeta, int order,
-                  Eigen::Ref<VectorXd> column, Eigen::Ref<VectorXd> to_omega, Eigen::Ref<VectorXd> to_zeta) {
-  const ModeTerms terms = mode_terms(omega, zeta, order);
+/// What the force within a period adds to a mode's state z (mode_terms) by its end, and to dz/ds: weights of the force
+/// at the ends of the parts of the period.
+class PeriodInput {
+ public:
+  PeriodInput(Complex pole, double period_s, std::size_t steps) : weight_(steps + 1), derivative_(steps + 1) {
+    const OnePole part = one_pole(pole, period_s / static_cast<double>(steps));
+    // A part's input is carried on over the parts behind it.
+    Complex carry = 1.0;
+    Complex d_carry = 0.0;
+    for (std::size_t i = steps; i-- > 0;) {
+      weight_[i] += carry * part.now;
+      weight_[i + 1] += carry * part.next;
+      derivative_[i] += carry * part.d_now + d_carry * part.now;
+      derivative_[i + 1] += carry * part.d_next + d_carry * part.next;
+      d_carry = d_carry * part.advance + carry * part.d_advance;
+      carry *= part.advance;
+    }
+  }
+  [[nodiscard]] Complex state(std::span<const double> force) const { return dot(weight_, force); }
+  [[nodiscard]] Complex derivative(std::span<const double> force) const { return dot(derivative_, force); }
+
+ private:
+  [[nodiscard]] static Complex dot(const std::vector<Complex>& weights, std::span<const double> force) {
+    double real = 0.0, imag = 0.0;
+    for (std::size_t i = 0; i < force.size(); ++i) {
+      real += weights[i].real() * force[i];
+      imag += weights[i].imag() * force[i];
+    }
+    return {real, imag};
+  }
+  std::vector<Complex> weight_;
+  std::vector<Complex> derivative_;
+};
+
+/// Response of a mode of unit mass, in `column`, and its derivatives to ln omega and ln zeta in the two others, if they
+/// are wanted. Written in real numbers: complex products of the standard look for NaN at each sample.
+void mode_columns(const HeldForce& held, std::span<const double> force, double period_s, double omega, double zeta,
+                  const ModalFitOptions& options, Eigen::Ref<VectorXd> column, Eigen::Ref<VectorXd>* to_omega,
+                  Eigen::Ref<VectorXd>* to_zeta) {
+  const ModeTerms terms = mode_terms(omega, zeta, static_cast<int>(options.quantity));
   const OnePole pole = one_pole(terms.pole, period_s);
-  const double direct = order == 2 ? 1.0 : 0.0;
+  const PeriodInput input(terms.pole, period_s, held.steps());
+  // A blow is over when the response is read: no force then.
+  const bool is_impulse = options.hold == ForceHold::impulse;
+  const double direct = options.quantity == Quantity::acceleration && !is_impulse ? 1.0 : 0.0;
   const Complex w_omega = terms.take * terms.d_pole[0];
   const Complex w_zeta = terms.take * terms.d_pole[1];
   const double ar = pole.advance.real(), ai = pole.advance.imag();
   const double br = pole.d_advance.real(), bi = pole.d_advance.imag();
-  double zr = 0.0, zi = 0.0, wr = 0.0, wi = 0.0;
+  double zr = is_impulse ? period_s * held.blow(0) : 0.0;
+  double zi = 0.0, wr = 0.0, wi = 0.0;
   for (std::size_t k = 0; k < force.size(); ++k) {
     const auto row = static_cast<Index>(k);
     column[row] = terms.take.real() * zi + terms.take.imag() * zr + direct * force[k];
-    to_omega[row] =
-        terms.d_take[0].real() * zi + terms.d_take[0].imag() * zr + w_omega.real() * wi + w_omega.imag() * wr;
-    to_zeta[row] = terms.d_take[1].real() * zi + terms.d_take[1].imag() * zr + w_zeta.real() * wi + w_zeta.imag() * wr;
-    if (k + 1 == force.size()) break;
-    const double now = force[k], next = force[k + 1];
-    const double vr = ar * wr - ai * wi + br * zr - bi * zi + pole.d_now.real() * now + pole.d_next.real() * next;
-    const double vi = ar * wi + ai * wr + br * zi + bi * zr + pole.d_now.imag() * now + pole.d_next.imag() * next;
-    const double yr = ar * zr - ai * zi + pole.now.real() * now + pole.next.real() * next;
-    const double yi = ar * zi + ai * zr + pole.now.imag() * now + pole.next.imag() * next;
+    if (to_omega != nullptr) {
+      (*to_omega)[row] =
+          terms.d_take[0].real() * zi + terms.d_take[0].imag() * zr + w_omega.real() * wi + w_omega.imag() * wr;
+      (*to_zeta)[row] =
+          terms.d_take[1].real() * zi + terms.d_take[1].imag() * zr + w_zeta.real() * wi + w_zeta.imag() * wr;
+    }
+    double vr = ar * wr - ai * wi + br * zr - bi * zi;
+    double vi = ar * wi + ai * wr + br * zi + bi * zr;
+    double yr = ar * zr - ai * zi + period_s * held.blow(k + 1);
+    double yi = ar * zi + ai * zr;
+    if (const std::span<const double> within = held.within(k); !within.empty()) {
+      const Complex y = input.state(within);
+      const Complex v = input.derivative(within);
+      yr += y.real();
+      yi += y.imag();
+      vr += v.real();
+      vi += v.imag();
+    }
     wr = vr;
     wi = vi;
     zr = yr;
@@ -91,6 +141,7 @@ class TapModel final : public identification::SeparableModel {
   TapModel(std::span<const TapSignals> taps, double period_s, std::size_t modes, const ModalFitOptions& options)
       : taps_(taps), period_s_(period_s), modes_(static_cast<Index>(modes)), options_(options) {
     for (const TapSignals& tap : taps) {
+      held_.emplace_back(tap.force_n, options.hold);
       MatrixXd lines(static_cast<Index>(tap.force_n.size()), extra());
       Index column = 0;
       if (options.with_mass_line) lines.col(column++) = mass_line(tap.force_n, period_s, options.quantity);
@@ -99,28 +150,45 @@ class TapModel final : public identification::SeparableModel {
     }
   }
 
+  /// Errors of the force become unknowns of each record: one per sample of its pulse, in units of the force's noise.
+  /// Each is expected to be 0 with a standard deviation of 1: a row of its own per unknown says so, with the weight of
+  /// the response's noise.
+  void estimate_force(std::vector<MatrixXd> responses_to_noise, double response_noise) {
+    force_columns_ = std::move(responses_to_noise);
+    force_errors_ = force_columns_.front().cols();
+    response_noise_ = response_noise;
+  }
+
   [[nodiscard]] Index extra() const { return (options_.with_mass_line ? 1 : 0) + (options_.with_compliance ? 1 : 0); }
   [[nodiscard]] std::size_t records() const override { return taps_.size(); }
   [[nodiscard]] Index samples(std::size_t record) const override {
-    return static_cast<Index>(taps_[record].response.size());
+    return static_cast<Index>(taps_[record].response.size()) + force_errors_;
   }
-  [[nodiscard]] Index local() const override { return options_.with_offset ? 1 : 0; }
+  [[nodiscard]] Index local() const override { return offset() + force_errors_; }
+  [[nodiscard]] Index offset() const { return options_.with_offset ? 1 : 0; }
   [[nodiscard]] Index common() const override { return modes_ + extra(); }
   [[nodiscard]] Index derivatives() const override { return 2 * modes_; }
   [[nodiscard]] Index nonlinear() const override { return 2 * modes_; }
 
   void fill(const VectorXd& theta, std::size_t record, MatrixXd& columns) const override {
     const TapSignals& tap = taps_[record];
-    if (options_.with_offset) columns.col(0).setOnes();
+    const auto n = static_cast<Index>(tap.response.size());
+    if (force_errors_ > 0) {
+      columns.bottomRows(force_errors_).setZero();
+      columns.bottomRows(force_errors_).middleCols(offset(), force_errors_).diagonal().setConstant(response_noise_);
+      columns.topRows(n).middleCols(offset(), force_errors_) = force_columns_[record];
+    }
+    if (options_.with_offset) columns.col(0).head(n).setOnes();
     const Index first = local();
     const Index derivative = first + common();
     for (Index m = 0; m < modes_; ++m) {
-      mode_columns(tap.force_n, period_s_, std::exp(theta[2 * m]), std::exp(theta[2 * m + 1]),
-                   static_cast<int>(options_.quantity), columns.col(first + m), columns.col(derivative + 2 * m),
-                   columns.col(derivative + 2 * m + 1));
+      Eigen::Ref<VectorXd> to_omega(columns.col(derivative + 2 * m).head(n));
+      Eigen::Ref<VectorXd> to_zeta(columns.col(derivative + 2 * m + 1).head(n));
+      mode_columns(held_[record], tap.force_n, period_s_, std::exp(theta[2 * m]), std::exp(theta[2 * m + 1]), options_,
+                   columns.col(first + m).head(n), &to_omega, &to_zeta);
     }
-    columns.middleCols(first + modes_, extra()) = lines_[record];
-    columns.col(width() - 1) = Eigen::Map<const VectorXd>(tap.response.data(), samples(record));
+    columns.topRows(n).middleCols(first + modes_, extra()) = lines_[record];
+    columns.col(width() - 1).head(n) = Eigen::Map<const VectorXd>(tap.response.data(), n);
   }
 
   [[nodiscard]] MatrixXd combine(const VectorXd& /*theta*/, const VectorXd& /*local_values*/,
@@ -137,16 +205,66 @@ class TapModel final : public identification::SeparableModel {
   double period_s_;
   Index modes_;
   ModalFitOptions options_;
+  std::vector<HeldForce> held_;
   std::vector<MatrixXd> lines_;
+  std::vector<MatrixXd> force_columns_;  // per record, of what noise on each sample of the pulse does to the response
+  Index force_errors_ = 0;
+  double response_noise_ = 0.0;
 };
 
 /// Response of the fitted model, without offset, to any force.
-VectorXd model_response(const ModalFit& fit, std::span<const double> force, double period_s, Quantity quantity) {
-  const NaturalModes modes{fit.omega_rad_s, fit.damping_ratio};
-  VectorXd response = modal_response(force, period_s, modes, fit.inverse_mass, quantity);
-  if (fit.mass_line != 0.0) response += fit.mass_line * mass_line(force, period_s, quantity);
-  if (fit.compliance != 0.0) response += fit.compliance * compliance_line(force, period_s, quantity);
+VectorXd model_response(const ModalFit& fit, std::span<const double> force, double period_s,
+                        const ModalFitOptions& options) {
+  VectorXd response = VectorXd::Zero(static_cast<Index>(force.size()));
+  VectorXd column(response.size());
+  const HeldForce held(force, options.hold);
+  for (std::size_t m = 0; m < fit.omega_rad_s.size(); ++m) {
+    mode_columns(held, force, period_s, fit.omega_rad_s[m], fit.damping_ratio[m], options, column, nullptr, nullptr);
+    response += fit.inverse_mass[m] * column;
+  }
+  if (fit.mass_line != 0.0) response += fit.mass_line * mass_line(force, period_s, options.quantity);
+  if (fit.compliance != 0.0) response += fit.compliance * compliance_line(force, period_s, options.quantity);
   return response;
+}
+
+// Rounds in which the noise of the response, and with it the weight of the force, is found; they end when the sum of
+// squares changes by less than this share.
+constexpr int most_rounds = 4;
+constexpr double settled = 1e-3;
+// Samples of a pulse whose force is estimated along with the modes.
+constexpr std::size_t longest_estimated_pulse = 128;
+
+std::size_t longest_pulse(std::span<const TapSignals> taps) {
+  std::size_t longest = 0;
+  for (const TapSignals& tap : taps) longest = std::max(longest, identification::pulse_of(tap.force_n).size());
+  return longest;
+}
+
+/// What noise of `force_noise_n` on each sample of the pulse does to each record: columns of the Toeplitz matrix from
+/// force to response. Records with a shorter pulse than the longest have columns of zeros.
+std::vector<MatrixXd> responses_to_noise(const ModalFit& fit, std::span<const TapSignals> taps, double period_s,
+                                         const ModalFitOptions& options) {
+  const auto pulse_samples = static_cast<Index>(longest_pulse(taps));
+  std::vector<MatrixXd> columns;
+  for (const TapSignals& tap : taps) {
+    const std::size_t n = tap.response.size();
+    const std::size_t reach = HeldForce::reach(options.hold);
+    std::vector<double> force(n + reach, 0.0);
+    force[reach] = options.force_noise_n;
+    const VectorXd impulse = model_response(fit, force, period_s, options);
+    const identification::PulseRange pulse = identification::pulse_of(tap.force_n);
+    MatrixXd record = MatrixXd::Zero(static_cast<Index>(n), pulse_samples);
+    for (std::size_t j = 0; j < pulse.size(); ++j) {
+      // Sample k of the record is sample k - place + reach of the impulse's response.
+      const std::size_t place = pulse.begin + j;
+      const auto from = static_cast<Index>(place > reach ? place - reach : 0);
+      const auto skipped = static_cast<Index>(place > reach ? 0 : reach - place);
+      const Index length = std::min(static_cast<Index>(n) - from, impulse.size() - skipped);
+      record.col(static_cast<Index>(j)).segment(from, length) = impulse.segment(skipped, length);
+    }
+    columns.push_back(std::move(record));
+  }
+  return columns;
 }
 
 /// What white noise on the force does to the modelled response, to first order: with G the (Toeplitz) matrix from force
@@ -157,7 +275,7 @@ struct ForceNoise {
 };
 
 ForceNoise force_noise(const ModalFit& fit, const identification::SeparableFit& separable, double period_s,
-                       Quantity quantity) {
+                       const ModalFitOptions& options) {
   ForceNoise noise;
   noise.middle = MatrixXd::Zero(separable.inverse_gram.rows(), separable.inverse_gram.cols());
   double samples = 0.0;
@@ -169,12 +287,12 @@ ForceNoise force_noise(const ModalFit& fit, const identification::SeparableFit& 
     for (Index j = 0; j < jacobian.cols(); ++j) {
       // The transpose of a Toeplitz matrix is the matrix itself with time running backwards.
       for (Index k = 0; k < n; ++k) force[static_cast<std::size_t>(n - k)] = jacobian(k, j);
-      back.col(j) = model_response(fit, force, period_s, quantity).tail(n);
+      back.col(j) = model_response(fit, force, period_s, options).tail(n);
     }
     noise.middle.noalias() += back.transpose() * back;
     std::ranges::fill(force, 0.0);
     force[1] = 1.0;
-    const VectorXd impulse = model_response(fit, force, period_s, quantity).tail(n);
+    const VectorXd impulse = model_response(fit, force, period_s, options).tail(n);
     for (Index k = 0; k < n; ++k) noise.mean_variance += static_cast<double>(n - k) * impulse[k] * impulse[k];
     samples += static_cast<double>(n);
   }
@@ -184,13 +302,13 @@ ForceNoise force_noise(const ModalFit& fit, const identification::SeparableFit& 
 
 /// Covariance of (omega, zeta, 1/m) of each mode in turn.
 MatrixXd covariance_of(const ModalFit& fit, const identification::SeparableFit& separable, double period_s,
-                       const ModalFitOptions& options) {
+                       const ModalFitOptions& options, bool first_order_force_noise) {
   const auto modes = static_cast<Index>(fit.omega_rad_s.size());
   const double freedom = static_cast<double>(fit.quality.samples - fit.quality.parameters);
   const double variance = separable.sum_of_squares / freedom;
   MatrixXd logarithmic;
-  if (options.force_noise_n > 0.0) {
-    const ForceNoise noise = force_noise(fit, separable, period_s, options.quantity);
+  if (first_order_force_noise) {
+    const ForceNoise noise = force_noise(fit, separable, period_s, options);
     const double force_variance = options.force_noise_n * options.force_noise_n;
     logarithmic =
         options.coloured_residuals
@@ -213,6 +331,15 @@ MatrixXd covariance_of(const ModalFit& fit, const identification::SeparableFit& 
   return change * logarithmic * change.transpose();
 }
 
+/// Takes the rows of expected force errors, which lie behind the samples, out of what is told of the fit.
+void drop_expectations(identification::SeparableFit& fit, std::span<const TapSignals> taps) {
+  for (std::size_t r = 0; r < taps.size(); ++r) {
+    const auto n = static_cast<Index>(taps[r].response.size());
+    fit.fitted[r].conservativeResize(n);
+    fit.residual[r].conservativeResize(n);
+  }
+}
+
 }  // namespace
 
 ModalFit fit_modes(std::span<const TapSignals> taps, double period_s, const NaturalModes& start,
@@ -224,7 +351,7 @@ ModalFit fit_modes(std::span<const TapSignals> taps, double period_s, const Natu
     message << "noise of the force is " << options.force_noise_n << " N, must be finite and at least 0";
     throw Error(ErrorKind::argument, message.str());
   }
-  const TapModel model(taps, period_s, start.omega_rad_s.size(), options);
+  TapModel model(taps, period_s, start.omega_rad_s.size(), options);
   check_taps(taps, static_cast<std::size_t>(model.width()));
   const auto own = static_cast<std::size_t>(model.local()) * taps.size();
   const std::size_t parameters = own + static_cast<std::size_t>(model.common() + model.nonlinear());
@@ -232,43 +359,52 @@ ModalFit fit_modes(std::span<const TapSignals> taps, double period_s, const Natu
   for (const TapSignals& tap : taps) samples += tap.response.size();
   identification::check_enough(samples, parameters);
 
-  identification::SeparableFit separable =
-      identification::fit_separable(model, identification::logarithms(start), options.most_iterations);
-  NaturalModes found = identification::from_logarithms(separable.theta);
   ModalFit fit;
-  fit.omega_rad_s = std::move(found.omega_rad_s);
-  fit.damping_ratio = std::move(found.damping_ratio);
-  const auto modes = static_cast<Index>(start.omega_rad_s.size());
-  fit.inverse_mass.assign(separable.common.begin(), separable.common.begin() + modes);
-  if (options.with_mass_line) fit.mass_line = separable.common[modes];
-  if (options.with_compliance) fit.compliance = separable.common[model.common() - 1];
+  const auto search = [&](const NaturalModes& from) {
+    identification::SeparableFit separable =
+        identification::fit_separable(model, identification::logarithms(from), options.most_iterations);
+    NaturalModes found = identification::from_logarithms(separable.theta);
+    fit.omega_rad_s = std::move(found.omega_rad_s);
+    fit.damping_ratio = std::move(found.damping_ratio);
+    const auto modes = static_cast<Index>(start.omega_rad_s.size());
+    fit.inverse_mass.assign(separable.common.begin(), separable.common.begin() + modes);
+    if (options.with_mass_line) fit.mass_line = separable.common[modes];
+    if (options.with_compliance) fit.compliance = separable.common[model.common() - 1];
+    return separable;
+  };
+  identification::SeparableFit separable = search(start);
+  const bool estimates_force = options.force_noise_n > 0.0 && longest_pulse(taps) <= longest_estimated_pulse;
+  const auto freedom = static_cast<double>(samples - parameters);
+  for (int round = 0; estimates_force && round < most_rounds; ++round) {
+    const double before = separable.sum_of_squares;
+    if (!(before > 0.0)) break;
+    model.estimate_force(responses_to_noise(fit, taps, period_s, options), std::sqrt(before / freedom));
+    separable = search({fit.omega_rad_s, fit.damping_ratio});
+    if (std::abs(separable.sum_of_squares - before) < settled * before) break;
+  }
   for (const VectorXd& local : separable.local) fit.offset.push_back(options.with_offset ? local[0] : 0.0);
+  drop_expectations(separable, taps);
   fit.quality = identification::quality_of(separable, parameters);
-  fit.covariance = covariance_of(fit, separable, period_s, options);
+  fit.covariance = covariance_of(fit, separable, period_s, options, options.force_noise_n > 0.0 && !estimates_force);
   return fit;
 }
 
 Eigen::VectorXd modal_response(std::span<const double> force_n, double period_s, const NaturalModes& modes,
-                               std::span<const double> inverse_mass, Quantity quantity) {
+                               std::span<const double> inverse_mass, Quantity quantity, ForceHold hold) {
   check_period(period_s);
   identification::check_modes(modes, period_s);
   if (inverse_mass.size() != modes.omega_rad_s.size()) {
     throw Error(ErrorKind::argument, std::to_string(inverse_mass.size()) + " residues for " +
                                          std::to_string(modes.omega_rad_s.size()) + " modes");
   }
-  VectorXd response = VectorXd::Zero(static_cast<Index>(force_n.size()));
-  const int order = static_cast<int>(quantity);
-  for (std::size_t m = 0; m < inverse_mass.size(); ++m) {
-    const ModeTerms terms = mode_terms(modes.omega_rad_s[m], modes.damping_ratio[m], order);
-    const OnePole pole = one_pole(terms.pole, period_s);
-    Complex state;
-    for (std::size_t k = 0; k < force_n.size(); ++k) {
-      const double direct = order == 2 ? force_n[k] : 0.0;
-      response[static_cast<Index>(k)] += inverse_mass[m] * ((terms.take * state).imag() + direct);
-      if (k + 1 < force_n.size()) state = pole.advance * state + pole.now * force_n[k] + pole.next * force_n[k + 1];
-    }
-  }
-  return response;
+  ModalFit fit;
+  fit.omega_rad_s = modes.omega_rad_s;
+  fit.damping_ratio = modes.damping_ratio;
+  fit.inverse_mass.assign(inverse_mass.begin(), inverse_mass.end());
+  ModalFitOptions options;
+  options.quantity = quantity;
+  options.hold = hold;
+  return model_response(fit, force_n, period_s, options);
 }
 
 }  // namespace shapegcode

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <limits>
+#include <string>
 #include <utility>
 
 #include "identification/fit_common.hpp"
@@ -61,15 +61,18 @@ void take_out(Products& products, Index column) {
   products.with_response -= share * with_response;
 }
 
-ModeRanking rank(std::vector<Products> problems, double total, Index candidates, Index group, std::size_t most) {
+ModeRanking rank(std::vector<Products> problems, double total, Index candidates, Index group, std::size_t most,
+                 std::size_t kept) {
   ModeRanking ranking;
   ranking.total = total;
   std::vector<bool> taken(static_cast<std::size_t>(candidates), false);
   double left = total;
   while (ranking.chosen.size() < std::min(most, taken.size())) {
-    Index best = -1;
+    const bool given = ranking.chosen.size() < kept;
+    const auto next = static_cast<Index>(ranking.chosen.size());
+    Index best = given ? next : -1;
     double best_gain = 0.0;
-    for (Index c = 0; c < candidates; ++c) {
+    for (Index c = given ? next : 0; c < (given ? next + 1 : candidates); ++c) {
       if (taken[static_cast<std::size_t>(c)]) continue;
       double gain = 0.0;
       for (const Products& products : problems) gain += gain_of(products, c, group);
@@ -90,8 +93,11 @@ ModeRanking rank(std::vector<Products> problems, double total, Index candidates,
   return ranking;
 }
 
-void check_most(std::size_t most) {
+void check_numbers(std::size_t most, std::size_t kept, std::size_t candidates) {
   if (most < 1) throw Error(ErrorKind::argument, "no mode to be chosen, at least 1 needed");
+  if (kept > candidates) {
+    throw Error(ErrorKind::argument, std::to_string(kept) + " candidates to be kept of " + std::to_string(candidates));
+  }
 }
 
 /// The response with its mean taken out.
@@ -104,11 +110,11 @@ VectorXd centred(std::span<const double> response) {
 }  // namespace
 
 ModeRanking rank_modes(std::span<const TapSignals> taps, double period_s, const NaturalModes& candidates,
-                       std::size_t most, Quantity quantity) {
+                       std::size_t most, std::size_t kept, Quantity quantity) {
   check_period(period_s);
   identification::check_modes(candidates, period_s);
   check_taps(taps, 2);
-  check_most(most);
+  check_numbers(most, kept, candidates.omega_rad_s.size());
   const auto count = static_cast<Index>(candidates.omega_rad_s.size());
   Index samples = 0;
   for (const TapSignals& tap : taps) samples += static_cast<Index>(tap.response.size());
@@ -132,14 +138,15 @@ ModeRanking rank_modes(std::span<const TapSignals> taps, double period_s, const 
   const double total = responses.squaredNorm();
   std::vector<Products> problems;
   problems.push_back(products_of(std::move(all), responses));
-  return rank(std::move(problems), total, count, 1, most);
+  return rank(std::move(problems), total, count, 1, most, kept);
 }
 
-ModeRanking rank_modes(Responses responses, double period_s, const NaturalModes& candidates, std::size_t most) {
+ModeRanking rank_modes(Responses responses, double period_s, const NaturalModes& candidates, std::size_t most,
+                       std::size_t kept) {
   check_period(period_s);
   identification::check_modes(candidates, period_s);
   check_responses(responses, 2);
-  check_most(most);
+  check_numbers(most, kept, candidates.omega_rad_s.size());
   const auto count = static_cast<Index>(candidates.omega_rad_s.size());
   std::vector<Products> problems;
   double total = 0.0;
@@ -160,7 +167,7 @@ ModeRanking rank_modes(Responses responses, double period_s, const NaturalModes&
     total += response.squaredNorm();
     problems.push_back(products_of(std::move(columns), response));
   }
-  return rank(std::move(problems), total, count, 2, most);
+  return rank(std::move(problems), total, count, 2, most, kept);
 }
 
 }  // namespace shapegcode

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <numeric>
 #include <string>
 #include <unsupported/Eigen/FFT>
 #include <utility>
@@ -23,6 +22,7 @@ using Eigen::VectorXd;
 constexpr int most_modes = 50;
 constexpr Index widest = 160;           // rows of the covariance matrix
 constexpr double faint_power = 1e-6;    // of the strongest spectral line: below this the spectrum shows nothing
+constexpr double decayed = 0.2;         // RMS of the end of a decay over that of all of it
 constexpr double force_is_over = 0.02;  // of the force's autocorrelation
 
 std::size_t padded(std::size_t n) {
@@ -40,10 +40,15 @@ std::vector<Complex> spectrum(std::span<const double> values, double mean, std::
   return result;
 }
 
-/// Mean of the last eighth, where a decay has decayed: the sensor's offset.
+/// The sensor's offset: the mean of the last eighth if the response has decayed by then. Otherwise that mean says
+/// nothing, and an offset is left to the model, which needs a real pole for it.
 double offset_of(std::span<const double> values) {
-  const auto tail = values.last(std::max<std::size_t>(values.size() / 8, 1));
-  return std::accumulate(tail.begin(), tail.end(), 0.0) / static_cast<double>(tail.size());
+  const Eigen::Map<const VectorXd> all(values.data(), static_cast<Index>(values.size()));
+  const auto tail = all.tail(std::max<Index>(all.size() / 8, 1));
+  const double offset = tail.mean();
+  const double swing = (tail.array() - offset).matrix().norm() / std::sqrt(static_cast<double>(tail.size()));
+  const double whole = (all.array() - offset).matrix().norm() / std::sqrt(static_cast<double>(all.size()));
+  return swing < decayed * whole ? offset : 0.0;
 }
 
 /// Samples per delay such that the highest frequency with content lies below 0.4 of the delays' rate. Looks at blocks

@@ -15,16 +15,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "name",
         metavar="NAME",
-        choices=("path", "cycle-time", "shaper"),
+        choices=("path", "cycle-time", "shaper", "tap"),
         help="path: line, arc, line of paper 000 at both feeds and reductions; "
         "cycle-time: a test piece with the features of ISO 10791-7 with both sets of constants of paper 004; "
-        "shaper: the two-mode shapers of paper 002, figures 2 to 6, and its test on a stage",
+        "shaper: the two-mode shapers of paper 002, figures 2 to 6, and its test on a stage; "
+        "tap: the equivalent systems of paper 003, and what end mill and collet deflect",
     )
     parser.add_argument(
         "--plots",
         metavar="DIR",
         default="demo-output",
-        help="folder for the pictures of `shaper` (PNG and SVG; default: %(default)s)",
+        help="folder for the pictures of `shaper` and `tap` (PNG and SVG; default: %(default)s)",
     )
     add_json_argument(parser)
 
@@ -37,6 +38,8 @@ def run(args: argparse.Namespace) -> int:
     """
     if args.name == "shaper":
         return _shaper(args.json, args.plots)
+    if args.name == "tap":
+        return _tap(args.json, args.plots)
     return _cycle_time(args.json) if args.name == "cycle-time" else _path(args.json)
 
 
@@ -68,6 +71,38 @@ def _shaper(json_target: str | None, folder: str) -> int:
     console.print(f"pictures: {folder}/paper002-*", markup=False)
     console.print("next: shapegcode shaper --mode 1 --mode 4 --period continuous --max-duration 1s", markup=False)
     return ExitCode.OK if demo.report["agrees"] else ExitCode.OUT_OF_TOLERANCE
+
+
+def _tap(json_target: str | None, folder: str) -> int:
+    from rich.table import Table
+
+    from shapegcode.cli import ExitCode
+    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.demo_tap import tap_demo
+    from shapegcode.demo_tap_picture import write_demo_pictures
+
+    with progress("paper 003", json_target) as bar:
+        bar.wait()
+        demo = tap_demo()
+        pictures = write_demo_pictures(demo, folder)
+    result = demo.report
+    if json_target is not None:
+        write_json({**result, "pictures": pictures}, json_target)
+    console = output_console(json_target)
+    table = Table(title="Paper 003: mass, damping and stiffness from a tap")
+    table.add_column("section", no_wrap=True)
+    for column in ("what", "paper", "here", "agrees", "note"):
+        table.add_column(column, overflow="fold")
+    verdicts = {True: "yes", False: "NO", None: ""}
+    for row in result["rows"]:
+        table.add_row(
+            row["section"], row["what"], row["paper"], row["here"], verdicts[row["agrees"]], row["note"]
+        )  # fmt: skip
+    console.print(table)
+    console.print(result["remark"], markup=False)
+    console.print(f"pictures: {folder}/paper003-*", markup=False)
+    console.print("next: shapegcode identify --tap-plan", markup=False)
+    return ExitCode.OK if result["agrees"] else ExitCode.OUT_OF_TOLERANCE
 
 
 def _path(json_target: str | None) -> int:

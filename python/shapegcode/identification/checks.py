@@ -39,6 +39,9 @@ LEAST_LEAD = 8
 _CUT_PULSE = 0.2
 #: The machine was at rest before the hit if it shook less than this share of what it did afterwards.
 _AT_REST = 0.1
+#: The force counts for half a pulse on either side of it, and for so many samples at least: the feet of the pulse hold
+#: some tenths of a percent of its momentum.
+_LEAST_MARGIN = 3
 #: An offset is taken away where it exceeds so many standard errors of its mean.
 _OFFSET_ERRORS = 2.0
 #: An offset of the force above this share of the peak is told.
@@ -183,7 +186,9 @@ def _windowed(
     if abs(offset) > _OFFSET_TOLD * abs(hit.peak_n):
         warnings.append(f"{where}: offset of the force, {offset:.4g} N, taken away")
     force = np.zeros(len(record.force_n))
-    force[hit.first : hit.end] = record.force_n[hit.first : hit.end] - offset
+    margin = max(_LEAST_MARGIN, (hit.end - hit.first) // 2)
+    window = slice(max(hit.first - margin, 0), hit.end + margin)
+    force[window] = record.force_n[window] - offset
     if hit.peak_n < 0.0:
         warnings.append(f"{where}: the pulse is negative: a hammer only pushes, so the sign of the force is turned")
         force = -force

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +23,8 @@ _EXAMPLE = "time_s,force_N,acc_m/s^2"
 _RESPONSES = ("acceleration", "velocity", "displacement")
 #: Fewer samples are no record of a vibration.
 _FEWEST_ROWS = 16
+#: Faults are looked for in pieces of this size.
+_PIECE_BYTES = 4_000_000
 _TEXT_BYTES = frozenset(range(32, 256)) | {9, 10, 12, 13}
 
 
@@ -216,24 +220,14 @@ class _Body:
         Raises:
             RecordError: a cell is not a finite number; with line, column and text.
         """
-        layout = self.layout
-        data = self.data.replace(b",", b".") if layout.decimal_comma else self.data
         try:
-            table = np.loadtxt(
-                io.TextIOWrapper(io.BytesIO(data), encoding="latin-1"),
-                delimiter=None if layout.delimiter == " " else layout.delimiter,
-                usecols=self.used,
-                comments="#",
-                quotechar='"' if b'"' in data else None,
-                ndmin=2,
-                dtype=np.float64,
-            )
+            table = self._table(self.data)
         except (ValueError, IndexError) as error:
             self._refuse_bad_cell()
             raise RecordError(f"{self.path}: {error}") from error
         if not np.isfinite(table).all():
             self._refuse_bad_cell()
-        if layout.decimal_comma:
+        if self.layout.decimal_comma:
             self._refuse_points()
         if len(table) < _FEWEST_ROWS:
             raise RecordError(
@@ -242,23 +236,55 @@ class _Body:
             )
         return table
 
-    def _lines(self) -> list[tuple[int, str]]:
+    def _table(self, data: bytes) -> FloatArray:
+        if self.layout.decimal_comma:
+            data = data.replace(b",", b".")
+        return np.loadtxt(
+            io.TextIOWrapper(io.BytesIO(data), encoding="latin-1"),
+            delimiter=None if self.layout.delimiter == " " else self.layout.delimiter,
+            usecols=self.used,
+            comments="#",
+            quotechar='"' if b'"' in data else None,
+            ndmin=2,
+            dtype=np.float64,
+        )
+
+    def _pieces(self) -> Iterator[tuple[int, bytes]]:
+        """(number of its first line, text) of pieces of the file, so that faults are found without going "
+        "through it all."""
+        number, start = self.layout.first_row, 0
+        while start < len(self.data):
+            end = self.data.find(b"\n", start + _PIECE_BYTES) + 1 or len(self.data)
+            piece = self.data[start:end]
+            yield number, piece
+            number += piece.count(b"\n")
+            start = end
+
+    def _lines(self, first: int, piece: bytes) -> Iterator[tuple[int, str]]:
         """(number, text) of the lines with cells."""
-        found = []
-        for number, line in enumerate(self.data.split(b"\n"), start=self.layout.first_row):
+        for number, line in enumerate(piece.split(b"\n"), start=first):
             text = line.decode("latin-1").partition("#")[0]
             if text.strip():
-                found.append((number, text))
-        return found
+                yield number, text
 
     def line_of(self, row: int) -> int:
         """Line number of a row."""
-        return self._lines()[row][0]
+        lines = (number for piece in self._pieces() for number, _ in self._lines(*piece))
+        return next(islice(lines, row, None))
+
+    def _is_good(self, piece: bytes) -> bool:
+        if not piece.strip():
+            return True
+        try:
+            return bool(np.isfinite(self._table(piece)).all())
+        except (ValueError, IndexError):
+            return False
 
     def _refuse_bad_cell(self) -> None:
         comma = self.layout.decimal_comma
         names = self.layout.header
-        for number, text in self._lines():
+        bad = (piece for piece in self._pieces() if not self._is_good(piece[1]))
+        for number, text in (line for piece in bad for line in self._lines(*piece)):
             cells = cells_of(text, self.layout.delimiter)
             for index in self.used:
                 name = f" ({names[index]})" if index < len(names) else ""
@@ -279,9 +305,8 @@ class _Body:
 
     def _refuse_points(self) -> None:
         """Points for thousands, or both kinds of numbers: where decimal commas are, points are not wanted."""
-        if b"." not in self.data:
-            return
-        for number, text in self._lines():
+        pieces = (piece for piece in self._pieces() if b"." in piece[1])
+        for number, text in (line for piece in pieces for line in self._lines(*piece)):
             cells = cells_of(text, self.layout.delimiter)
             for index in self.used:
                 if "." in cells[index]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,20 +15,27 @@ from shapegcode.identification.spectra import decay_spectrum
 
 __all__ = ["find_decay"]
 
-#: The envelope is the RMS over so many periods: long enough for the beat of two modes an octave apart.
+#: The envelope is the RMS over so many periods of the slowest mode, and over a beat of the two closest modes.
 _ENVELOPE_PERIODS = 2.0
-#: Something happens where the envelope rises by this factor; the beat of two modes makes less of a rise.
+#: While the modes are not known, it is the RMS over this share of the record, at least.
+_ENVELOPE_SHARE = 0.05
+#: Something happens where the envelope rises by this factor ...
 _EVENT_RISES = 1.3
-#: Of the decays that begin with this share of the largest envelope, the longest is taken.
-_STRONG = 0.5
+#: ... to this share of its maximum; weaker rises are beats of modes.
+_EVENT_SHARE = 0.3
 #: The tail of a decay, in which no command is left, begins after this share of it.
 _TAIL = 0.3
 #: Samples below which a tail tells no frequency.
 _LEAST_TAIL = 16
 #: Modes above this share of the tail's largest peak are vibration, whatever is slower is the axis's own motion.
 _MODE_SHARE = 0.2
+#: A window of one period that holds this share of the largest RMS begins half a period early at most: so the decay
+#: begins this share of a period later.
+_ONSET = 0.7
+#: What is slower than this share of the slowest mode is motion of the axis.
+_SLOWER = 0.8
 #: The axis moves where its mean over a period of the lowest mode is above this share of the envelope.
-_MOTION_SHARE = 0.2
+_MOTION_SHARE = 0.4
 #: The search for the strongest frequency leaves out what has fewer than so many periods in the record.
 _FEWEST_PERIODS = 3.0
 
@@ -62,16 +69,16 @@ def _mean_over(values: FloatArray, samples: float) -> FloatArray:
     return np.asarray(uniform_filter1d(values, max(1, round(samples)), mode="nearest"), dtype=np.float64)
 
 
-def _envelope(quiet: FloatArray, period_samples: float) -> FloatArray:
-    shaking = quiet - _mean_over(quiet, period_samples)
-    return _forward_rms(shaking, max(2, round(_ENVELOPE_PERIODS * period_samples)))
+def _envelope(quiet: FloatArray, period_samples: float, window_samples: float) -> FloatArray:
+    return _forward_rms(quiet - _mean_over(quiet, period_samples), max(2, round(window_samples)))
 
 
 def _events(envelope: FloatArray) -> npt.NDArray[np.intp]:
     """Samples from which the envelope falls."""
-    level = np.log(np.maximum(envelope, 1e-6 * np.max(envelope)))
+    largest = float(np.max(envelope))
+    level = np.log(np.maximum(envelope, 1e-6 * largest))
     padded = np.concatenate(([level.min() - 1.0], level))
-    found, _ = signal.find_peaks(padded, prominence=np.log(_EVENT_RISES))
+    found, _ = signal.find_peaks(padded, height=np.log(_EVENT_SHARE * largest), prominence=np.log(_EVENT_RISES))
     return np.asarray(found - 1 if found.size else [np.argmax(envelope)], dtype=np.intp)
 
 
@@ -81,28 +88,63 @@ def _until_next(envelope: FloatArray, starts: npt.NDArray[np.intp]) -> list[tupl
     return list(zip([int(each) for each in starts], [*ends, len(envelope)], strict=True))
 
 
-def _longest(quiet: FloatArray, period_samples: float) -> tuple[int, int, float]:
-    """First and last + 1 sample of the longest of the strong decays, and the envelope at its beginning."""
-    envelope = _envelope(quiet, period_samples)
-    starts = _events(envelope)
-    strong = envelope[starts] >= _STRONG * np.max(envelope[starts])
-    parts = [part for part, good in zip(_until_next(envelope, starts), strong, strict=True) if good]
-    start, end = max(parts, key=lambda part: part[1] - part[0])
-    return start, end, float(envelope[start])
+def _end_of(envelope: FloatArray, start: int, window_samples: float) -> int:
+    """Last + 1 sample of a decay whose beginning is known."""
+    later = [int(at) for at in _events(envelope) if at > start + window_samples]
+    return _until_next(envelope, np.array([start, *later], dtype=np.intp))[0][1]
 
 
-def _slowest_period(record: Record, quiet: FloatArray, start: int, end: int) -> float | None:
-    """Period in samples of the lowest mode in the tail of a decay."""
-    tail = start + int(_TAIL * (end - start))
-    if end - tail < _LEAST_TAIL:
-        return None
-    peaks = decay_spectrum(replace(record, response=quiet[tail:end])).peaks
-    modes = [peak.frequency_hz for peak in peaks if peak.amplitude > _MODE_SHARE * peaks[0].amplitude]
-    return 1.0 / (min(modes) * record.period_s) if modes else None
+def _longest(envelope: FloatArray) -> tuple[int, int]:
+    """First and last + 1 sample of the longest decay."""
+    return max(_until_next(envelope, _events(envelope)), key=lambda part: part[1] - part[0])
+
+
+@dataclass(frozen=True)
+class _Scales:
+    """Of the modes in the tail of a decay, in samples.
+
+    Attributes:
+        slowest: period of the slowest mode.
+        strongest: period of the strongest.
+        window: over which the envelope is smooth.
+    """
+
+    slowest: float
+    strongest: float
+    window: float
+
+
+def _scales(record: Record, quiet: FloatArray, start: int, end: int, fast_samples: float) -> _Scales:
+    """What a decay tells of its modes: the slowest from its tail, where no command is left, the strongest from all.
+
+    A tail that has died away tells nothing: all its modes are about as fast as the one already found.
+    """
+    rate = 1.0 / record.period_s
+    tail = quiet[start + int(_TAIL * (end - start)) : end]
+    peaks = decay_spectrum(replace(record, response=tail)).peaks if len(tail) >= _LEAST_TAIL else ()
+    modes = sorted(peak.frequency_hz for peak in peaks if peak.amplitude > _MODE_SHARE * peaks[0].amplitude)
+    if not modes:
+        return _Scales(fast_samples, fast_samples, _ENVELOPE_PERIODS * fast_samples)
+    beat = max((1.0 / (high - low) for low, high in pairwise(modes)), default=0.0)
+    whole = decay_spectrum(replace(record, response=quiet[start:end])).peaks
+    strongest = next((each.frequency_hz for each in whole if each.frequency_hz > _SLOWER * modes[0]), modes[0])
+    return _Scales(rate / modes[0], rate / strongest, rate * max(_ENVELOPE_PERIODS / modes[0], beat))
+
+
+def _onset(quiet: FloatArray, scales: _Scales, start: int, end: int) -> int:
+    """Where the vibration has begun for certain; a window longer than the decay begins before it.
+
+    A period of the strongest vibration from this sample on holds half of its power.
+    """
+    last = min(end, start + max(2, round(scales.window)))
+    one = max(2, round(scales.strongest))
+    short = _forward_rms(quiet[start : min(end, last + one)], one)
+    enough = short[: last - start] > _ONSET * np.max(short[: last - start])
+    return min(start + int(np.argmax(enough)) + round(_ONSET * one), end - 1)
 
 
 def _rest_after_motion(quiet: FloatArray, period_samples: float, level: float, start: int, end: int) -> int:
-    """First sample from which the axis itself stays at rest for a period of the lowest mode."""
+    """First sample from which the axis itself stays at rest for a period of the slowest mode."""
     moving = np.abs(_mean_over(quiet, period_samples)[start:end]) > _MOTION_SHARE * np.sqrt(2.0) * level
     window = max(1, round(period_samples))
     ahead = maximum_filter1d(moving.astype(np.uint8), window, mode="nearest", origin=-(window // 2))
@@ -134,18 +176,18 @@ def find_decay(record: Record, start_s: float | None = None) -> Record:
         raise RecordError(f"{record.source}: {len(response)} samples and no vibration with three periods or more")
     quiet = np.asarray(response - np.median(response), dtype=np.float64)
     period = 1.0 / (frequency * record.period_s)
+    window = max(_ENVELOPE_PERIODS * period, _ENVELOPE_SHARE * len(quiet))
     if start_s is not None:
-        first = int(np.ceil((start_s - record.start_s) / record.period_s - 1e-9))
-        part = replace(record, response=response[first:])
-        period = _slowest_period(part, quiet[first:], 0, len(part.response)) or period
-        envelope = _envelope(quiet, period)
-        starts = np.append(first, [at for at in _events(envelope) if at > first + period])
-        start, end = _until_next(envelope, starts)[0]
+        start = int(np.ceil((start_s - record.start_s) / record.period_s - 1e-9))
+        end = _end_of(_envelope(quiet, period, window), start, window)
+        scales = _scales(record, quiet, start, end, period)
+        end = _end_of(_envelope(quiet, scales.slowest, scales.window), start, scales.window)
     else:
-        start, end, level = _longest(quiet, period)
-        slowest = _slowest_period(record, quiet, start, end)
-        if slowest is not None:
-            # Envelope and motion are told apart by the slowest mode, which is known only now.
-            start, end, level = _longest(quiet, slowest)
-            start = _rest_after_motion(quiet, slowest, level, start, end)
+        start, end = _longest(_envelope(quiet, period, window))
+        scales = _scales(record, quiet, start, end, period)
+        # Envelope and motion are told apart by the slowest mode, which is known only now.
+        envelope = _envelope(quiet, scales.slowest, scales.window)
+        start, end = _longest(envelope)
+        start = _onset(quiet, scales, start, end)
+        start = _rest_after_motion(quiet, scales.slowest, float(np.max(envelope[start:end])), start, end)
     return replace(record, response=response[start:end], start_s=record.start_s + start * record.period_s)

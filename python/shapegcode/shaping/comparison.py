@@ -19,7 +19,10 @@ from shapegcode.shaping.taps import parse_taps
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["candidate_periods", "check_block_period", "choose_shaper", "machine_bands"]
+__all__ = ["NARROW_PERCENT", "candidate_periods", "check_block_period", "choose_shaper", "machine_bands"]
+
+NARROW_PERCENT = 0.2
+"""A band of a mode of a machine is designed for if it is wider than this, either way."""
 
 _ASSUMED_TICK_S = 0.001  # interpolation period where no machine states one
 _LONGEST_BLOCK_PERIOD_S = 0.02
@@ -137,6 +140,9 @@ def check_block_period(period_s: float, machine: Machine) -> None:
 def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
     """The modes of all axes of a machine with the bands that it states; equal ones once, with the wider band.
 
+    A band as narrow as a tap test gives is none: a shaper that is exact at the nominal frequency leaves less there than
+    one that spends `shaping.vibration_limit` all over it. The verdict plays its ends all the same.
+
     Args:
         machine: its axes' modes; one shaper serves all axes, because different ones would distort the path.
         uncertainty: half width of the band, relative, of modes that state none.
@@ -150,7 +156,9 @@ def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
     for axis in machine.axes.as_tuple():
         for mode in axis.modes:
             stated = mode.frequency_uncertainty_percent
-            width = uncertainty if stated is None else stated / 100.0
+            width = uncertainty
+            if stated is not None:
+                width = stated / 100.0 if stated > NARROW_PERCENT else 0.0
             still = still_mode(mode, machine.shaping.part_mass_kg)
             key = still.frequency_hz, still.damping_ratio
             widths[key] = max(width, widths.get(key, 0.0))

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -9,6 +10,13 @@
 #include "shapegcode/identification/signals.hpp"
 
 namespace shapegcode {
+
+/// How the force runs between its samples.
+enum class ForceHold : std::uint8_t {
+  linear,        ///< straight from sample to sample
+  band_limited,  ///< as behind an anti-aliasing filter: sinc interpolation, right up to .45 of the sampling rate
+  impulse,       ///< blows at the samples, each just before the response is read: force times period is its momentum
+};
 
 /// What belongs to the model of a tap besides its modes.
 struct ModalFitOptions {
@@ -22,7 +30,9 @@ struct ModalFitOptions {
   bool with_compliance = false;
   /// Intervals that hold for residuals correlated over time as well (stationary noise of any colour).
   bool coloured_residuals = false;
-  /// Standard deviation in N of white noise on the measured force; its effect is added to the covariance.
+  ForceHold hold = ForceHold::linear;
+  /// Standard deviation in N of white noise on the measured force. In a pulse of up to 128 samples the true force is
+  /// estimated along with the modes; the effect on a longer one is added to the covariance, to first order.
   double force_noise_n = 0.0;
   int most_iterations = 60;
 };
@@ -55,8 +65,8 @@ struct ModalFit {
 
 /// Fits modes to taps by output error: the least squares, for white noise on the response the maximum likelihood, of
 /// measured minus modelled response. The model is the sum over modes of (1/m) s^q/(s^2 + 2 zeta omega s + omega^2)
-/// applied to the measured force (q = 0 displacement, 1 velocity, 2 acceleration), from rest at the first sample, the
-/// force linear between samples and the modes propagated exactly.
+/// applied to the measured force (q = 0 displacement, 1 velocity, 2 acceleration), from rest at the first sample; the
+/// force runs between its samples as `hold` says and the modes are propagated exactly.
 ///
 /// `start`: n >= 1 modes (rad/s, below Nyquist; 0 < zeta < 1), e.g. from arma_driven. The fit is Levenberg-Marquardt in
 /// ln omega and ln zeta with exact derivatives; 1/m and what the options add are linear and eliminated (variable
@@ -72,6 +82,6 @@ struct ModalFit {
 /// unequal numbers of parameters or a value outside its range.
 [[nodiscard]] Eigen::VectorXd modal_response(std::span<const double> force_n, double period_s,
                                              const NaturalModes& modes, std::span<const double> inverse_mass,
-                                             Quantity quantity);
+                                             Quantity quantity, ForceHold hold = ForceHold::linear);
 
 }  // namespace shapegcode

@@ -20,12 +20,15 @@ struct ModeRanking {
 /// are not. Gives starts for fit_modes out of the poles of a stabilisation chart, also where the model with just as
 /// many modes misses a weak one. Stops early where no candidate explains anything more.
 ///
-/// `candidates` as the starts of fit_modes, `most` >= 1: how many to choose. Throws Error(argument) as fit_modes.
+/// `candidates` as the starts of fit_modes; `most` >= 1: how many to choose. The first `kept` of them are chosen before
+/// all others, in their order: handed over as fitted, they leave only what is new to the rest of the candidates. Throws
+/// Error(argument) as fit_modes.
 [[nodiscard]] ModeRanking rank_modes(std::span<const TapSignals> taps, double period_s, const NaturalModes& candidates,
-                                     std::size_t most, Quantity quantity = Quantity::acceleration);
+                                     std::size_t most, std::size_t kept = 0,
+                                     Quantity quantity = Quantity::acceleration);
 
 /// The same for free decays: amplitude and phase are each record's own.
 [[nodiscard]] ModeRanking rank_modes(Responses responses, double period_s, const NaturalModes& candidates,
-                                     std::size_t most);
+                                     std::size_t most, std::size_t kept = 0);
 
 }  // namespace shapegcode

@@ -1,0 +1,249 @@
+"""Modes of a structure from its taps or its free decays, each with its 95 % interval, or the reason why not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.identification.chart import stabilisation_chart
+from shapegcode.identification.checks import Prepared, prepare
+from shapegcode.identification.model_search import Fit, Search, Starts, search
+from shapegcode.identification.record import Record, RecordError
+from shapegcode.identification.results import Identification, IdentifiedMode
+from shapegcode.identification.support import ACCEPTED_PERCENT, Doubts, estimates_of, refusal_of, rivals_of
+
+FloatArray = npt.NDArray[np.float64]
+
+__all__ = ["ACCEPTED_PERCENT", "identify"]
+
+_COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which they are not taken for white
+_LEAST_SWINGS = 2.0  # of a mode in the record
+_HIGHEST_SHARE = 0.45  # of the sampling rate: the force between samples is known up to there
+_CHART_ORDERS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class _Taps:
+    """Records with force."""
+
+    forces: list[FloatArray]
+    responses: list[FloatArray]
+    period_s: float
+    band_hz: tuple[float, float]
+    quantity: str
+    force_noise_n: float
+    hold: str
+
+    def fit(self, starts: Starts, coloured: bool = False) -> _core.ModalFit:
+        return self._fit(self.responses, starts, coloured)
+
+    def fit_one(self, residuals: Sequence[FloatArray], start: tuple[float, float]) -> _core.ModalFit:
+        return self._fit(residuals, [start], False)
+
+    def _fit(self, responses: Sequence[FloatArray], starts: Starts, coloured: bool) -> _core.ModalFit:
+        omega, zeta = np.array(starts).T
+        return _core.fit_modes(
+            self.forces,
+            list(responses),
+            self.period_s,
+            omega,
+            zeta,
+            quantity=self.quantity,
+            hold=self.hold,
+            force_noise_n=self.force_noise_n,
+            coloured_residuals=coloured,
+        )
+
+    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
+        return _core.stabilisation_poles(self.responses, most, self.forces)
+
+    def record(self, index: int) -> _Taps:
+        return replace(self, forces=[self.forces[index]], responses=[self.responses[index]])
+
+
+@dataclass(frozen=True, eq=False)
+class _Decays:
+    """Records without force."""
+
+    responses: list[FloatArray]
+    period_s: float
+    band_hz: tuple[float, float]
+
+    def fit(self, starts: Starts, coloured: bool = False) -> _core.DecayFit:
+        return self._fit(self.responses, starts, coloured)
+
+    def fit_one(self, residuals: Sequence[FloatArray], start: tuple[float, float]) -> _core.DecayFit:
+        return self._fit(residuals, [start], False)
+
+    def _fit(self, responses: Sequence[FloatArray], starts: Starts, coloured: bool) -> _core.DecayFit:
+        omega, zeta = np.array(starts).T
+        return _core.fit_decay(list(responses), self.period_s, omega, zeta, coloured_residuals=coloured)
+
+    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
+        return _core.stabilisation_poles(self.responses, most)
+
+    def record(self, index: int) -> _Decays:
+        return replace(self, responses=[self.responses[index]])
+
+
+def identify(
+    records: Sequence[Record],
+    *,
+    band_hz: tuple[float, float] | None = None,
+    most_modes: int = 8,
+    modes: int | None = None,
+    accepted_percent: float = ACCEPTED_PERCENT,
+    prepared: Prepared | None = None,
+) -> Identification:
+    """Find the modes that one or several records of the same point support.
+
+    Args:
+        records: taps (all with force) or free decays (all without), of the same quantity and sampling period.
+        band_hz: look for modes in this band only; None: from two swings per record to .45 of the sampling rate.
+        most_modes: largest number of modes of a model.
+        modes: number of modes; None: chosen by evidence.
+        accepted_percent: a mode is refused whose damping ratio or stiffness is less certain than this (95 %).
+        prepared: the same records checked already; None: they are checked here.
+
+    Raises:
+        RecordError: no record can be used, or they do not belong together; the message says what is needed.
+    """
+    ready = prepare(records) if prepared is None else prepared
+    if not ready.records:
+        raise RecordError("; ".join(f"{refused.source}: {refused.reason}" for refused in ready.refused))
+    holds = ("band_limited", "linear") if ready.records[0].force_n is not None else ("",)
+    # The better of the two ways in which the force may run between its samples; they differ by (pi f/rate)^2/3.
+    problems = [_problem(ready, band_hz, hold) for hold in holds]
+    found = [(problem, _search(problem, most_modes, modes)) for problem in problems]
+    problem, models = min(found, key=lambda pair: min(pair[1].evidence))
+    return _result(ready, problem, models, modes or models.order, accepted_percent)
+
+
+def _problem(ready: Prepared, band_hz: tuple[float, float] | None, hold: str) -> _Taps | _Decays:
+    first = ready.records[0]
+    responses = [record.response for record in ready.records]
+    longest_s = max(len(response) for response in responses) * first.period_s
+    band = band_hz or (_LEAST_SWINGS / longest_s, _HIGHEST_SHARE / first.period_s)
+    if not 0.0 <= band[0] < band[1] <= 0.5 / first.period_s:
+        raise RecordError(
+            f"band of {band[0]:g} to {band[1]:g} Hz: must ascend and end below half the sampling rate, "
+            f"{0.5 / first.period_s:g} Hz"
+        )
+    if not hold:
+        return _Decays(responses, first.period_s, band)
+    forces = [record.force_n for record in ready.records if record.force_n is not None]
+    noise = [value for value in ready.force_noise_n if value is not None]
+    return _Taps(
+        forces,
+        responses,
+        first.period_s,
+        band,
+        first.quantity,
+        float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0,
+        hold,
+    )
+
+
+def _search(problem: _Taps | _Decays, most_modes: int, modes: int | None) -> Search:
+    models = search(problem, modes or most_modes)
+    if modes is not None and len(models.fits) < modes:
+        raise RecordError(f"{modes} modes are asked for, and the records hold no more than {len(models.fits)}")
+    return models
+
+
+def _result(
+    ready: Prepared, problem: _Taps | _Decays, models: Search, order: int, accepted_percent: float
+) -> Identification:
+    warnings = [*ready.warnings, *(f"{refused.source}: not used: {refused.reason}" for refused in ready.refused)]
+    evidence = dict(enumerate(models.evidence))
+    chart = stabilisation_chart(problem.poles(_chart_orders(problem)), problem.period_s)
+    squares = sum(float(np.sum(response**2)) for response in problem.responses)
+    used = tuple((0, len(response)) for response in problem.responses)
+    if order == 0:
+        silent = tuple(np.zeros(len(response)) for response in problem.responses)
+        noise = float(np.sqrt(squares / sum(len(response) for response in problem.responses)))
+        return Identification((), (), 0, evidence, chart, 0.0, noise, silent, used, {}, tuple(warnings))
+    fit = models.fits[order - 1]
+    coloured = abs(fit.residual_autocorrelation) * np.sqrt(fit.samples) > _COLOURED
+    if coloured:
+        fit = problem.fit(_starts(fit), coloured=True)
+        warnings.append(
+            f"what the model leaves is no white noise (autocorrelation {fit.residual_autocorrelation:.2f}): the "
+            "intervals allow for it; other causes than modes, or a mode that is not linear"
+        )
+    doubts = Doubts(
+        limit_percent=accepted_percent,
+        band_hz=problem.band_hz,
+        record_s=max(len(response) for response in problem.responses) * problem.period_s,
+        rivals=rivals_of(order, models.fits),
+    )
+    supported, refused = [], []
+    for estimates in estimates_of(fit, _alone(problem, fit)):
+        reason = refusal_of(estimates, doubts)
+        mode = IdentifiedMode(
+            estimates.frequency_hz,
+            estimates.damping_ratio,
+            estimates.mass_kg,
+            estimates.damping_n_s_per_m,
+            estimates.stiffness_n_per_m,
+            reason,
+        )
+        (refused if reason else supported).append(mode)
+    left = float(np.sqrt(fit.sum_of_squares / squares)) if squares > 0.0 else 1.0
+    return Identification(
+        modes=tuple(sorted(supported, key=lambda mode: mode.frequency_hz.value)),
+        refused=tuple(sorted(refused, key=lambda mode: mode.frequency_hz.value)),
+        order=order,
+        evidence=evidence,
+        chart=chart,
+        fit_percent=100.0 * (1.0 - left),
+        noise_rms=float(np.sqrt(fit.sum_of_squares / (fit.samples - fit.parameters))),
+        fitted=tuple(fit.fitted),
+        used=used,
+        checks=_checks(problem, fit),
+        warnings=tuple(warnings),
+    )
+
+
+def _starts(fit: Fit) -> Starts:
+    return list(zip(map(float, fit.omega_rad_s), map(float, fit.damping_ratio), strict=True))
+
+
+def _chart_orders(problem: _Taps | _Decays) -> int:
+    shortest = min(len(response) for response in problem.responses)
+    return max(1, min(_CHART_ORDERS, (shortest - 8) // 8))
+
+
+def _alone(problem: _Taps | _Decays, fit: Fit) -> list[Fit]:
+    """The same modes fitted to each record by itself; none if there is but one, or a record does not hold them."""
+    if len(problem.responses) < 2:
+        return []
+    try:
+        fits: list[Fit] = [problem.record(index).fit(_starts(fit)) for index in range(len(problem.responses))]
+    except _core.ArgumentError:
+        return []
+    return fits
+
+
+def _checks(problem: _Taps | _Decays, fit: _core.ModalFit | _core.DecayFit) -> dict[str, float]:
+    """The equivalent mass by paper 003's way, from the first tap, where the model has one mode."""
+    if isinstance(problem, _Decays) or len(fit.omega_rad_s) != 1:
+        return {}
+    args = (
+        problem.forces[0],
+        problem.responses[0],
+        problem.period_s,
+        float(fit.omega_rad_s[0]),
+        float(fit.damping_ratio[0]),
+    )
+    closed = _core.equivalent_mass_closed_form(*args, quantity=problem.quantity)
+    halved = _core.equivalent_mass_bisection(*args, quantity=problem.quantity)
+    return {
+        "mass_closed_form_kg": closed.mass_kg,
+        "mass_bisection_kg": halved.mass_kg,
+        "bisection_halvings": float(halved.halvings),
+    }

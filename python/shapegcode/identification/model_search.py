@@ -1,0 +1,156 @@
+"""How many modes the data hold: models of growing order, each started where the last one left something unexplained.
+
+A search knows nothing of taps or decays: a `Problem` fits a number of modes to its records and says what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+
+FloatArray = npt.NDArray[np.float64]
+Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
+
+# A further mode must explain this share of the response's energy: sensors are not linear beyond .1 % of amplitude.
+_LEAST_SHARE = 1e-6
+_START_DAMPING = (0.01, 0.05)
+_PEAKS = 2  # of the residual's spectrum that are tried
+# Two models in a row that the data do not ask for end the search: one may only have missed its place.
+_PATIENCE = 2
+
+
+class Fit(Protocol):
+    """What the search needs of a fit."""
+
+    @property
+    def omega_rad_s(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def damping_ratio(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def sum_of_squares(self) -> float: ...  # noqa: D102
+    @property
+    def samples(self) -> int: ...  # noqa: D102
+    @property
+    def parameters(self) -> int: ...  # noqa: D102
+    @property
+    def fitted(self) -> tuple[FloatArray, ...]: ...  # noqa: D102
+
+
+class Problem(Protocol):
+    """Records of one point."""
+
+    @property
+    def responses(self) -> Sequence[FloatArray]: ...  # noqa: D102
+    @property
+    def period_s(self) -> float: ...  # noqa: D102
+    @property
+    def band_hz(self) -> tuple[float, float]: ...  # noqa: D102
+
+    def fit(self, starts: Starts) -> Fit: ...  # noqa: D102
+
+    def fit_one(self, residuals: Sequence[FloatArray], start: tuple[float, float]) -> Fit: ...  # noqa: D102
+
+    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]: ...  # noqa: D102
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Models by number of modes.
+
+    Attributes:
+        fits: the best fit of each number of modes, from 1.
+        evidence: by number of modes, from 0: samples * ln(mean square of the residual) + (parameters + modes) *
+            ln(samples); lower is better. One more than the parameters is counted for each mode, because its place was
+            looked for among all frequencies.
+    """
+
+    fits: tuple[Fit, ...]
+    evidence: tuple[float, ...]
+
+    @property
+    def order(self) -> int:
+        """Number of modes with the best evidence."""
+        return int(np.argmin(self.evidence))
+
+
+def search(problem: Problem, most_modes: int) -> Search:
+    """Fit models of 0, 1, 2, ... modes until the data ask for no more.
+
+    Args:
+        problem: what is fitted.
+        most_modes: largest number of modes.
+
+    Raises:
+        ArgumentError: the records have too few samples for a mode.
+    """
+    squares = sum(float(np.sum((response - response.mean()) ** 2)) for response in problem.responses)
+    samples = sum(len(response) for response in problem.responses)
+    evidence = [_evidence(squares, samples, len(problem.responses), 0)]
+    fits: list[Fit] = []
+    poles = problem.poles(most_modes)
+    while len(fits) < most_modes:
+        best = _next_fit(problem, fits[-1] if fits else None, poles[len(fits)])
+        if best is None:
+            break
+        explained = (fits[-1].sum_of_squares if fits else squares) - best.sum_of_squares
+        if explained < _LEAST_SHARE * squares:
+            break
+        fits.append(best)
+        evidence.append(_evidence(best.sum_of_squares, samples, best.parameters, len(fits)))
+        if len(fits) - int(np.argmin(evidence)) >= _PATIENCE:
+            break
+    return Search(tuple(fits), tuple(evidence))
+
+
+def _evidence(squares: float, samples: int, parameters: int, modes: int) -> float:
+    tiny = np.finfo(float).tiny
+    return float(samples * np.log(max(squares / samples, tiny)) + (parameters + modes) * np.log(samples))
+
+
+def _next_fit(problem: Problem, last: Fit | None, poles: npt.NDArray[np.complex128]) -> Fit | None:
+    """The best fit with one mode more than `last`."""
+    so_far = [] if last is None else list(zip(last.omega_rad_s, last.damping_ratio, strict=True))
+    fitted = [np.zeros(1)] * len(problem.responses) if last is None else last.fitted
+    residuals = [response - model for response, model in zip(problem.responses, fitted, strict=True)]
+    candidates: list[Starts] = []
+    for omega in _peaks(residuals, problem):
+        alone = [_attempt(partial(problem.fit_one, residuals, (omega, zeta))) for zeta in _START_DAMPING]
+        usable = [fit for fit in alone if fit is not None]
+        if usable:
+            fit = min(usable, key=lambda fit: fit.sum_of_squares)
+            candidates.append([*so_far, (float(fit.omega_rad_s[0]), float(fit.damping_ratio[0]))])
+    omega, zeta = _core.poles_to_modes(list(poles), problem.period_s)
+    if len(omega) == len(so_far) + 1:
+        candidates.append(list(zip(map(float, omega), map(float, zeta), strict=True)))
+    fits = [fit for starts in candidates if (fit := _attempt(partial(problem.fit, starts))) is not None]
+    return min(fits, key=lambda fit: fit.sum_of_squares, default=None)
+
+
+def _attempt(task: Callable[[], Fit]) -> Fit | None:
+    """A fit, or None where the start cannot be used (a mode at the end of the band, too few samples)."""
+    try:
+        fit = task()
+    except (_core.ArgumentError, _core.NumericError):
+        return None
+    return fit if np.isfinite(fit.sum_of_squares) else None
+
+
+def _peaks(residuals: Sequence[FloatArray], problem: Problem) -> list[float]:
+    """Frequencies (rad/s) of the highest peaks of the residuals' spectrum within the band, the highest first."""
+    length = 2 * max(len(residual) for residual in residuals)
+    power = np.zeros(length // 2 + 1)
+    for residual in residuals:
+        power += np.abs(np.fft.rfft(residual - residual.mean(), length)) ** 2
+    frequency = np.fft.rfftfreq(length, problem.period_s)
+    low, high = problem.band_hz
+    power[(frequency < low) | (frequency > high)] = 0.0
+    inner = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:])) + 1
+    highest = inner[np.argsort(power[inner])[::-1][:_PEAKS]]
+    return [float(2.0 * np.pi * frequency[index]) for index in highest]

@@ -1,0 +1,191 @@
+"""From a fit to values with intervals, and whether the data support them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from shapegcode import _core
+from shapegcode.identification.model_search import Fit
+from shapegcode.identification.results import Estimate
+
+FloatArray = npt.NDArray[np.float64]
+
+#: A damping ratio or stiffness less certain than this is refused: an error of 10 % is then four standard deviations off.
+ACCEPTED_PERCENT = 5.0
+_FREQUENCY_PERCENT = 2.0
+_NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode that a shaper could deal with
+_LEAST_SWINGS = 2.0  # in the record
+#: A model with one mode more counts as a rival while it fits better by more than chance alone does in one case of 20.
+_RIVAL_PROBABILITY = 0.05
+_SCATTER_PROBABILITY = 0.01  # of taps that differ as much by noise alone
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """One mode of a fit. SI units; the last three are None for a free decay.
+
+    Attributes:
+        frequency_hz: undamped natural frequency.
+        damping_ratio: no unit.
+        mass_kg: equivalent mass.
+        damping_n_s_per_m: equivalent viscous damping.
+        stiffness_n_per_m: equivalent stiffness.
+        opposed: the residue is negative: the mode moves against the push.
+    """
+
+    frequency_hz: Estimate
+    damping_ratio: Estimate
+    mass_kg: Estimate | None
+    damping_n_s_per_m: Estimate | None
+    stiffness_n_per_m: Estimate | None
+    opposed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Doubts:
+    """What a mode must stand up to.
+
+    Attributes:
+        limit_percent: least certainty of damping ratio and stiffness.
+        band_hz: frequencies that were searched.
+        record_s: length of the longest record.
+        rivals: fits of nearly the same evidence.
+    """
+
+    limit_percent: float
+    band_hz: tuple[float, float]
+    record_s: float
+    rivals: Sequence[Fit] = ()
+
+
+def estimates_of(fit: _core.ModalFit | _core.DecayFit, alone: Sequence[Fit]) -> list[Estimates]:
+    """Values and 95 % intervals of each mode of a fit.
+
+    The intervals are those of the fit's covariance, in logarithms. Where taps differ by more than that explains, their
+    scatter takes its place.
+
+    Args:
+        fit: of all records together.
+        alone: of each record by itself, its modes in the same order; fewer than two: no scatter.
+    """
+    freedom = max(fit.samples - fit.parameters, 1)
+    quantile = float(stats.t.ppf(0.975, freedom))
+    rows = [_logarithms(fit, mode) for mode in range(len(fit.omega_rad_s))]
+    found = []
+    for mode, row in enumerate(rows):
+        spread = quantile * np.sqrt(np.diag(row.covariance))
+        if len(alone) > 1:
+            spread = np.maximum(spread, _scatter([_logarithms(one, mode) for one in alone]))
+        values = [
+            Estimate(value, value * float(np.exp(-half)), value * float(np.exp(half)))
+            for value, half in zip(np.exp(row.values), spread, strict=True)
+        ]
+        if len(values) == 2:
+            found.append(Estimates(values[0], values[1], None, None, None))
+        else:
+            found.append(Estimates(values[0], values[1], values[2], values[3], values[4], row.opposed))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Logarithms:
+    """Logarithms of frequency (Hz), damping ratio, mass, viscous damping, stiffness (SI), and their covariance."""
+
+    values: FloatArray
+    covariance: FloatArray
+    opposed: bool
+
+
+def _logarithms(fit: Fit, mode: int) -> _Logarithms:
+    omega, zeta = float(fit.omega_rad_s[mode]), float(fit.damping_ratio[mode])
+    values = [np.log(omega / (2.0 * np.pi)), np.log(zeta)]
+    if isinstance(fit, _core.ModalFit):
+        residue = float(fit.inverse_mass[mode])
+        scale = np.array([1.0 / omega, 1.0 / zeta, 1.0 / residue])
+        # ln of f, zeta, m, c = 2 zeta omega m, k = omega^2 m from ln omega, ln zeta, ln 1/m.
+        change = np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [1, 1, -1], [2, 0, -1]], dtype=np.float64)
+        mass = -np.log(abs(residue))
+        values += [mass, np.log(2.0 * zeta * omega) + mass, 2.0 * np.log(omega) + mass]
+    else:
+        residue = 1.0
+        scale = np.array([1.0 / omega, 1.0 / zeta])
+        change = np.eye(2)
+    size = len(scale)
+    block = fit.covariance[size * mode : size * (mode + 1), size * mode : size * (mode + 1)]
+    covariance = change @ (block * np.outer(scale, scale)) @ change.T
+    return _Logarithms(np.array(values), covariance, residue < 0.0)
+
+
+def _scatter(taps: Sequence[_Logarithms]) -> FloatArray:
+    """Half widths from the scatter of single taps; 0 where noise explains it."""
+    values = np.array([tap.values for tap in taps])
+    expected = np.mean([np.diag(tap.covariance) for tap in taps], axis=0)
+    seen = np.var(values, axis=0, ddof=1)
+    ratio = seen / np.maximum(expected, np.finfo(float).tiny)
+    more = ratio > stats.chi2.ppf(1.0 - _SCATTER_PROBABILITY, len(taps) - 1) / (len(taps) - 1)
+    half = stats.t.ppf(0.975, len(taps) - 1) * np.sqrt(seen / len(taps))
+    return np.where(more, half, 0.0)
+
+
+def rivals_of(order: int, fits: Sequence[Fit]) -> list[Fit]:
+    """Models beside the chosen one that the data do not clearly refuse.
+
+    That is the one with a mode more, if chance alone would seldom make it fit so much better.
+    """
+    chosen = fits[order - 1]
+    if len(fits) <= order:
+        return []
+    larger = fits[order]
+    gain = chosen.samples * np.log(chosen.sum_of_squares / max(larger.sum_of_squares, np.finfo(float).tiny))
+    return [larger] if gain > stats.chi2.ppf(1.0 - _RIVAL_PROBABILITY, larger.parameters - chosen.parameters) else []
+
+
+def refusal_of(mode: Estimates, doubts: Doubts) -> str:
+    """Why the data do not support a mode; empty if they do."""
+    frequency, damping, stiffness = mode.frequency_hz, mode.damping_ratio, mode.stiffness_n_per_m
+    if damping.value > _NO_VIBRATION:
+        return f"damping ratio {damping.value:.2f}: drift or background, no vibration (limit {_NO_VIBRATION:g})"
+    if frequency.value * doubts.record_s < _LEAST_SWINGS:
+        return (
+            f"{frequency.value * doubts.record_s:.1f} swings in the record of {doubts.record_s:.3g} s: "
+            f"{_LEAST_SWINGS:g} or more are needed"
+        )
+    if not doubts.band_hz[0] <= frequency.value <= doubts.band_hz[1]:
+        return f"outside the band of {doubts.band_hz[0]:.4g} to {doubts.band_hz[1]:.4g} Hz that was searched"
+    limits = (
+        ("frequency", frequency, min(_FREQUENCY_PERCENT, doubts.limit_percent)),
+        ("damping ratio", damping, doubts.limit_percent),
+        ("stiffness", stiffness, doubts.limit_percent),
+    )
+    for name, estimate, limit in limits:
+        if estimate is not None and not estimate.uncertainty_percent <= limit:
+            return (
+                f"{name} known to {estimate.uncertainty_percent:.2g} % only (limit {limit:g} %): more taps, a longer "
+                "record or less noise"
+            )
+    if mode.opposed:
+        return "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
+    return _rival_refusal(mode, doubts)
+
+
+def _rival_refusal(mode: Estimates, doubts: Doubts) -> str:
+    for rival in doubts.rivals:
+        # A rival that splits the mode in two or lacks it disagrees as much as one can.
+        rows = [_logarithms(rival, i) for i in range(len(rival.omega_rad_s))]
+        nearest = min(rows, key=lambda row: abs(row.values[0] - np.log(mode.frequency_hz.value)))
+        named = (("frequency", mode.frequency_hz, 0), ("damping ratio", mode.damping_ratio, 1))
+        if mode.stiffness_n_per_m is not None:
+            named = (*named, ("stiffness", mode.stiffness_n_per_m, 4))
+        for name, estimate, index in named:
+            change = 100.0 * abs(float(np.expm1(nearest.values[index] - np.log(estimate.value))))
+            if change > doubts.limit_percent:
+                return (
+                    f"{name} would change by {change:.0f} % with one mode more in the model, which the data cannot "
+                    f"decide (limit {doubts.limit_percent:g} %): more taps or less noise"
+                )
+    return ""

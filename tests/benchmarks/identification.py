@@ -1,0 +1,136 @@
+"""Identification of random structures whose truth is known: errors, coverage of the intervals, honesty of the refusals.
+
+Run from the root of the repository: ``python tests/benchmarks/identification.py``. Each draw is one tap of 2 s on 1 to 4
+modes (20 to 400 Hz, at least 10 % apart, damping .5 to 5 %, stiffnesses within a decade), simulated by SciPy on a grid
+eight times finer, with white noise on response and force.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
+
+from table import markdown
+
+from shapegcode.identification.fit import identify
+from shapegcode.identification.results import Estimate, IdentifiedMode
+from tap_truth import TrueMode, random_modes, tap
+
+NAMES = ("frequency_hz", "damping_ratio", "stiffness_n_per_m")
+WRONG = 0.10  # a mode is wrong if any of its figures is off by more
+SAME = 0.05  # a found mode this near in frequency is meant to be the true one
+
+
+@dataclass
+class Tally:
+    """What the draws of one noise level came to."""
+
+    modes: int = 0
+    missed: int = 0
+    spurious: int = 0
+    accepted: int = 0
+    wrong: int = 0
+    refused_of_wrong: int = 0
+    errors: list[list[float]] = field(default_factory=list)
+    covered: list[list[bool]] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+
+    def add(self, truth: list[TrueMode], found: list[tuple[IdentifiedMode, bool]]) -> None:
+        """Count one draw; `found` with a flag: accepted."""
+        self.modes += len(truth)
+        left = list(found)
+        for mode in truth:
+            near = [pair for pair in left if abs(pair[0].frequency_hz.value / mode.frequency_hz - 1) < SAME]
+            if not near:
+                self.missed += 1
+                continue
+            best = min(near, key=lambda pair: abs(pair[0].frequency_hz.value - mode.frequency_hz))
+            left.remove(best)
+            self._compare(mode, *best)
+        self.spurious += sum(accepted for _, accepted in left)
+
+    def _compare(self, mode: TrueMode, found: IdentifiedMode, accepted: bool) -> None:
+        estimates = [getattr(found, name) for name in NAMES]
+        true = [getattr(mode, name) for name in NAMES]
+        # A refused mode may have no mass at all: it cannot be right.
+        errors = [
+            abs(estimate.value / value - 1) if isinstance(estimate, Estimate) else np.inf
+            for estimate, value in zip(estimates, true, strict=True)
+        ]
+        wrong = max(errors) > WRONG
+        self.wrong += wrong
+        self.refused_of_wrong += wrong and not accepted
+        if accepted:
+            self.accepted += 1
+            self.errors.append(errors)
+            self.covered.append(
+                [estimate.low <= value <= estimate.high for estimate, value in zip(estimates, true, strict=True)]
+            )
+
+
+def study(draws: int, snr_db: float, seed: int) -> Tally:
+    """Identify `draws` random structures at a signal-to-noise ratio."""
+    rng = np.random.default_rng(seed)
+    tally = Tally()
+    for draw in range(draws):
+        truth = random_modes(rng, 1 + draw % 4)
+        record = tap(truth, rng, snr_db=snr_db)
+        start = time.process_time()
+        result = identify([record])
+        tally.seconds.append(time.process_time() - start)
+        tally.add(truth, [*((mode, True) for mode in result.modes), *((mode, False) for mode in result.refused)])
+    return tally
+
+
+def main() -> int:
+    """Print the tables; 0 if the figures of the documentation hold."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--draws", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    rows, good = [], True
+    for snr_db in (40.0, 30.0, 20.0, 10.0):
+        tally = study(arguments.draws, snr_db, arguments.seed)
+        errors = 100 * np.median(tally.errors, axis=0)
+        covered = 100 * np.mean(tally.covered, axis=0)
+        honest = 100 * tally.refused_of_wrong / tally.wrong if tally.wrong else 100.0
+        rows.append(
+            [
+                f"{snr_db:g} dB",
+                *(f"{error:.3f} %" for error in errors),
+                *(f"{share:.1f} %" for share in covered),
+                f"{tally.modes}",
+                f"{tally.accepted}",
+                f"{tally.missed}",
+                f"{tally.spurious}",
+                f"{tally.refused_of_wrong} of {tally.wrong}",
+                f"{1e3 * np.median(tally.seconds):.0f} ms",
+            ]
+        )
+        if snr_db == 40.0:
+            good &= bool(np.all(errors <= (0.1, 2.0, 2.0)) and np.all((covered >= 92.0) & (covered <= 98.0)))
+        good &= honest >= 95.0
+    head = [
+        "noise",
+        *(f"median error {name}" for name in ("f", "zeta", "k")),
+        *(f"covered {name}" for name in ("f", "zeta", "k")),
+        "modes",
+        "accepted",
+        "missed",
+        "spurious",
+        "wrong by over 10 %: refused",
+        "time of a draw",
+    ]
+    print(markdown(head, rows))
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
