@@ -3820,12 +3820,12 @@ def fit_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.
     
     Source: spec 8; G. Golub, V. Pereyra 2003.
     """
-def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, quantity: str = 'acceleration', with_offset: bool = True, with_mass_line: bool = False, with_compliance: bool = False, coloured_residuals: bool = False, force_noise_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, most_iterations: typing.SupportsInt | typing.SupportsIndex = 60) -> ModalFit:
+def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, quantity: str = 'acceleration', with_offset: bool = True, with_mass_line: bool = False, with_compliance: bool = False, coloured_residuals: bool = False, hold: str = 'linear', force_noise_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, most_iterations: typing.SupportsInt | typing.SupportsIndex = 60) -> ModalFit:
     """
     Output-error (for white noise: maximum likelihood) fit of modes to one or several taps of the same point.
     
     The response is the sum over modes of (1/m) s^q/(s^2 + 2 zeta omega s + omega^2) applied to the force, from rest at the
-    first sample, the force linear between samples. Search by Levenberg-Marquardt in ln omega and ln zeta with exact
+    first sample. Search by Levenberg-Marquardt in ln omega and ln zeta with exact
     derivatives; everything linear is eliminated.
     
     Args:
@@ -3839,7 +3839,10 @@ def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.Arr
         with_mass_line: Add a free mass, for modes far below.
         with_compliance: Add a spring without mass, for modes far above.
         coloured_residuals: Covariance that holds for residuals correlated over time (stationary) as well.
-        force_noise_n: Standard deviation of white noise on the force in N, added to the covariance to first order.
+        hold: How the force runs between samples: "linear"; "band_limited", as behind an anti-aliasing filter (sinc
+            interpolation); "impulse", blows just before the samples, of force times period.
+        force_noise_n: Standard deviation of white noise on the force in N. In pulses of up to 128 samples the true force is
+            estimated along with the modes; else its effect is added to the covariance to first order.
         most_iterations: Steps after which the search gives up, with converged False.
     
     Returns:
@@ -4004,9 +4007,9 @@ def minimal_two_mode(first: Mode, second: Mode, max_duration_s: typing.SupportsF
     
     Source: paper 002, eq. 12-17; the search is this project's.
     """
-def modal_response(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], quantity: str = 'acceleration') -> numpy.typing.NDArray[numpy.float64]:
+def modal_response(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse_mass: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], quantity: str = 'acceleration', hold: str = 'linear') -> numpy.typing.NDArray[numpy.float64]:
     """
-    Response of modes to a force that is linear between samples, exact, from rest: the model of fit_modes.
+    Response of modes to a force, exact, from rest: the model of fit_modes.
     
     Args:
         force_n: Force in N, shape (n,).
@@ -4015,6 +4018,7 @@ def modal_response(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float
         damping_ratio: Damping ratios, 0 < zeta < 1, shape (n_modes,).
         inverse_mass: Residues 1/m in 1/kg, shape (n_modes,).
         quantity: "acceleration", "velocity" or "displacement".
+        hold: How the force runs between samples, as in fit_modes.
     
     Returns:
         Response in SI units, shape (n,).
