@@ -7,12 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-<<<<<<< HEAD
 from shapegcode.machine_drive import Drive
-from shapegcode.machine_keys import Float, InlineTable, NonNegative, Positive, Table, key, toml
-=======
 from shapegcode.machine_keys import Float, InlineTable, NonNegative, Positive, Table, Text, key, toml
->>>>>>> 01f95ff0ab5ed056e7b5aaa531307bc3a7ecea89
 
 
 class FrequencyOver(InlineTable):
