@@ -37,6 +37,7 @@ std::span<const double> span_of(const VectorArray& values, const char* what) {
 
 std::vector<std::span<const double>> spans_of(const std::vector<VectorArray>& records, const char* what) {
   std::vector<std::span<const double>> spans;
+  spans.reserve(records.size());
   for (const VectorArray& record : records) spans.push_back(span_of(record, what));
   return spans;
 }

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
         FirStream as FirStream,
     )
     from shapegcode._core import (
+        LinearPlant as LinearPlant,
+    )
+    from shapegcode._core import (
         Mode as Mode,
     )
     from shapegcode._core import (
@@ -58,6 +61,9 @@ if TYPE_CHECKING:
     )
     from shapegcode._core import (
         minimal_two_mode as minimal_two_mode,
+    )
+    from shapegcode._core import (
+        plant_response as plant_response,
     )
     from shapegcode._core import (
         zv as zv,
@@ -101,9 +107,9 @@ if TYPE_CHECKING:
 _HOME = {
     **dict.fromkeys(
         (
-            "ArgumentError", "DesignError", "Fir", "FirStream", "Mode", "NumericError", "Path", "ProgramError",
-            "Segment", "ShapegcodeError", "Shaper", "__version__", "convolved_zv", "grid_polynomial",
-            "minimal_two_mode", "zv",
+            "ArgumentError", "DesignError", "Fir", "FirStream", "LinearPlant", "Mode", "NumericError", "Path",
+            "ProgramError", "Segment", "ShapegcodeError", "Shaper", "__version__", "convolved_zv", "grid_polynomial",
+            "minimal_two_mode", "plant_response", "zv",
         ),
         "_core",
     ),

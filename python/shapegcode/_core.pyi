@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_decay', 'fit_modes', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'linear_model', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'time_program', 'wilson_theta', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LinearPlant', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_decay', 'fit_modes', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'linear_model', 'matrix_exponential', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'time_program', 'wilson_theta', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -1522,6 +1522,77 @@ class ProgramText:
     def warnings(self) -> list:
         """
         (line, column, alarm, message, file) each; alarm 0: none; file empty: the program's own.
+        """
+class LinearPlant:
+    """
+    A linear plant x' = A x + B u, y = C x + D u, propagated exactly from sample to sample.
+    
+    The input is linear between samples (first-order hold), as a servo's set-points are; the state goes over a period by the
+    matrix exponential, so stiff, undamped and integrating plants are as exact as any other. Units: whatever fits together,
+    time in s.
+    
+    Args:
+        a: System matrix, (n, n).
+        b: Input matrix, (n, m).
+        c: Output matrix, (p, n).
+        d: Feed-through, (p, m).
+        period_s: Time between samples in s, above 0.
+    
+    Raises:
+        ArgumentError: Shapes that do not fit, an empty one, a value that is not finite, or a period not above 0.
+        NumericError: The plant outgrows all numbers within a period.
+    """
+    def __init__(self, a: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], b: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], c: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], d: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], period_s: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Make a plant, at rest with state and input 0.
+        """
+    def reset(self, state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
+        """
+        State (n,) at the instant at which the input is `input` (m,); ArgumentError on another shape.
+        """
+    def reset_at_rest(self, input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], near: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None) -> None:
+        """
+        Steady state under a constant input.
+        
+        Args:
+            input: Input, (m,).
+            near: Where integrators leave a choice, the state of rest nearest to this one, (n,), is taken; none: to zero.
+        
+        Raises:
+            ArgumentError: No state rests under this input (an integrator fills), or another shape.
+        """
+    def respond(self, inputs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None) -> numpy.ndarray:
+        """
+        Outputs for a whole record of inputs; what step() gives, to the last bit.
+        
+        Args:
+            inputs: One row per sample, (n_samples, m), at least one row.
+            state: State at the first row, (n,); none: at rest under the first row.
+        
+        Returns:
+            Output at each row, (n_samples, p).
+        
+        Raises:
+            ArgumentError: Another shape, a value that is not finite, or no state of rest.
+        """
+    def step(self, input: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        One period later, with `input` (m,) at its end: the output (p,) there. In C++ real-time safe.
+        """
+    @property
+    def output(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Output at the last sample, (p,).
+        """
+    @property
+    def period_s(self) -> float:
+        """
+        Time between samples in s.
+        """
+    @property
+    def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        State at the last sample, (n,).
         """
 class ModeTable:
     """
@@ -3938,6 +4009,14 @@ def linear_model(parameters: FeedDriveParameters) -> tuple[typing.Annotated[nump
     Raises:
         ArgumentError: The drive is not linear.
     """
+def matrix_exponential(matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    Matrix exponential, balanced, by scaling and squaring.
+    
+    Raises:
+        ArgumentError: Not square or not finite.
+        NumericError: The result exceeds all numbers.
+    """
 def minimal_branches(first: Mode, second_damping: typing.SupportsFloat | typing.SupportsIndex, ratios: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], max_duration_s: typing.SupportsFloat | typing.SupportsIndex, *, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> MinimalBranches:
     """
     All minimal two-mode shapers over the ratio of the frequencies, joined to curves (paper 002, fig. 2 and 3).
@@ -4073,6 +4152,24 @@ def negative_zv(mode: Mode) -> Shaper:
 def plan_speed(path: Path, limits: MotionLimits) -> SpeedProfile:
     """
     Tangential speed profile over a whole path from rest to rest. Raises ArgumentError on a limit that is not > 0.
+    """
+def plant_response(command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], modes: collections.abc.Sequence[collections.abc.Sequence[Mode]], period_s: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Response of base-excited modes to a whole record of set-points, exact for set-points linear in between.
+    
+    What the real-time plant of the core gives sample by sample, to the last bit, at the speed of a batch. At rest at the
+    first row.
+    
+    Args:
+        command_mm: Set-points in mm, shape (n_samples, n_axes), one per period.
+        modes: The modes of each axis; none: the axis follows its command.
+        period_s: Time between samples in s, above 0.
+    
+    Returns:
+        Positions of the table in mm at the same instants, (n_samples, n_axes), in the memory order of the command.
+    
+    Raises:
+        ArgumentError: Not as many lists of modes as axes, a command that is not finite, an invalid mode or period.
     """
 def play_blocks(blocks: Path, path: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: PlaybackOptions) -> PlaybackFigures:
     """

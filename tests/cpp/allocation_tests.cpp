@@ -16,6 +16,7 @@
 #include "shapegcode/motion/look_ahead.hpp"
 #include "shapegcode/motion/rapid.hpp"
 #include "shapegcode/plant/feed_drive_real_time.hpp"
+#include "shapegcode/plant/linear_plant.hpp"
 #include "shapegcode/plant/modal.hpp"
 #include "shapegcode/plant/servo_lag.hpp"
 
@@ -37,6 +38,15 @@ void* allocate(std::size_t size, std::size_t alignment) {
 [[gnu::noinline]] void release(void* memory) noexcept { std::free(memory); }
 
 }  // namespace
+
+// Eigen takes its memory from malloc: the linker leads those calls here.
+extern "C" {
+void* __real_malloc(std::size_t size);   // NOLINT(bugprone-reserved-identifier): the linker's name for it
+void* __wrap_malloc(std::size_t size) {  // NOLINT(bugprone-reserved-identifier)
+  allocations = allocations + 1;
+  return __real_malloc(size);
+}
+}
 
 void* operator new(std::size_t size) { return allocate(size, alignof(std::max_align_t)); }
 void* operator new[](std::size_t size) { return allocate(size, alignof(std::max_align_t)); }
@@ -178,6 +188,18 @@ int main() {
       sink += plant.step(Vector3(0.1 * i, 0.001 * i * i, 0.0)).sum() + plant.peak().sum() + plant.deflection().sum();
     }
     plant.reset_peak();
+    return 5000L;
+  });
+
+  LinearPlant linear({Eigen::MatrixXd::Constant(6, 6, -1.0), Eigen::MatrixXd::Ones(6, 2), Eigen::MatrixXd::Ones(3, 6),
+                      Eigen::MatrixXd::Ones(3, 2)},
+                     1e-3);
+  Eigen::VectorXd input = Eigen::VectorXd::Zero(2);
+  expect_none("LinearPlant::step", [&] {
+    for (int i = 0; i < 5000; ++i) {
+      input[i % 2] = 0.1 * i;
+      sink += linear.step(input).sum() + linear.output().sum();
+    }
     return 5000L;
   });
 

@@ -5,9 +5,10 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <string>
 #include <utility>
 
+#include "identification/fit_common.hpp"
+#include "identification/separable_fit.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -18,8 +19,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int most_modes = 50;
-constexpr int most_rounds = 40;
+constexpr int most_least_squares = 40;
 // Relative changes of phi and of the residual's squares at which a round has changed nothing. The coefficients of poles
 // close to each other are hardly determined, so the residual settles before phi does.
 constexpr double settled_phi = 1e-11;
@@ -48,14 +48,6 @@ void fill_delayed(const VectorXd& x, Index first_delay, Eigen::Ref<MatrixXd> col
     const Index delay = std::min(first_delay + j, x.size());
     columns.col(j).head(delay).setZero();
     columns.col(j).tail(x.size() - delay) = x.head(x.size() - delay);
-  }
-}
-
-void triangulate(MatrixXd& matrix) {
-  const Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(matrix);
-  for (Index j = 0; j < matrix.cols(); ++j) {
-    const Index below = matrix.rows() - j - 1;
-    if (below > 0) matrix.col(j).tail(below).setZero();
   }
 }
 
@@ -153,7 +145,7 @@ class IteratedLeastSquares {
       fill_delayed(input, 0, columns.leftCols(terms_));
       fill_delayed(output, 1, columns.middleCols(terms_, order_));
       columns.rightCols(1) = output;
-      triangulate(columns);
+      identification::triangulate(columns);
       stack.middleRows(static_cast<Index>(r) * kept, kept) = columns.block(eliminated, eliminated, kept, kept);
     }
     // A model with more modes than the data have does not determine all coefficients: take the smallest ones.
@@ -177,7 +169,7 @@ class IteratedLeastSquares {
       for (std::size_t r = 0; r < records_.size(); ++r) {
         MatrixXd columns(inputs[r].rows(), terms_ + 1);
         columns << inputs[r], records_[r].output;
-        triangulate(columns);
+        identification::triangulate(columns);
         stack.middleRows(static_cast<Index>(r) * (terms_ + 1), terms_ + 1) = columns.topRows(terms_ + 1);
       }
       const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(stack.leftCols(terms_));
@@ -201,12 +193,6 @@ class IteratedLeastSquares {
   bool shared_;
 };
 
-void check_modes_asked(int n_modes) {
-  if (n_modes >= 1 && n_modes <= most_modes) return;
-  throw Error(ErrorKind::argument, "model of " + std::to_string(n_modes) + " modes asked for, 1 to " +
-                                       std::to_string(most_modes) + " can be");
-}
-
 VectorXd column_of(std::span<const double> values) {
   return Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(values.size()));
 }
@@ -220,9 +206,9 @@ Arma plain_least_squares(const IteratedLeastSquares& problem) {
 
 /// Starts from the subspace method's poles, and from the plain least squares if that does not settle.
 Arma iterated(const IteratedLeastSquares& problem, const std::vector<Complex>& poles) {
-  Arma arma = problem.from(stable(phi_of(poles)), most_rounds);
+  Arma arma = problem.from(stable(phi_of(poles)), most_least_squares);
   if (!arma.converged) {
-    Arma other = problem.from({}, most_rounds);
+    Arma other = problem.from({}, most_least_squares);
     if (total_squares(other) < total_squares(arma)) arma = std::move(other);
   }
   return arma;
@@ -245,7 +231,7 @@ Arma complete(Arma arma) {
 }  // namespace
 
 Arma arma_driven(std::span<const TapSignals> taps, int n_modes, bool plain) {
-  check_modes_asked(n_modes);
+  identification::check_mode_count(n_modes);
   const Index order = 2 * static_cast<Index>(n_modes);
   check_taps(taps, static_cast<std::size_t>(std::max<Index>(2 * order + 2, 4 * order + 8)));
   std::vector<InputOutput> records;
@@ -255,7 +241,7 @@ Arma arma_driven(std::span<const TapSignals> taps, int n_modes, bool plain) {
 }
 
 Arma arma_decay(Responses responses, int n_modes, bool plain) {
-  check_modes_asked(n_modes);
+  identification::check_mode_count(n_modes);
   const Index order = 2 * static_cast<Index>(n_modes);
   check_responses(responses, static_cast<std::size_t>(4 * order + 8));
   std::vector<InputOutput> records;

@@ -1,5 +1,6 @@
 #include "identification/fit_common.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <sstream>
@@ -32,6 +33,13 @@ void check_modes(const NaturalModes& modes, double period_s) {
       throw Error(ErrorKind::argument, message.str());
     }
   }
+}
+
+void check_mode_count(int n_modes) {
+  constexpr int most = 50;
+  if (n_modes >= 1 && n_modes <= most) return;
+  throw Error(ErrorKind::argument,
+              "model of " + std::to_string(n_modes) + " modes asked for, 1 to " + std::to_string(most) + " can be");
 }
 
 void check_enough(std::size_t samples, std::size_t parameters) {

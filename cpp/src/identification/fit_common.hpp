@@ -11,6 +11,9 @@ namespace shapegcode::identification {
 /// Throws Error(argument) unless there is at least one mode and each has 0 < omega*period < pi and 0 < zeta < 1.
 void check_modes(const NaturalModes& modes, double period_s);
 
+/// Throws Error(argument) unless a model of 1 to 50 modes is asked for.
+void check_mode_count(int n_modes);
+
 /// Throws Error(argument) unless `samples` leave degrees of freedom.
 void check_enough(std::size_t samples, std::size_t parameters);
 

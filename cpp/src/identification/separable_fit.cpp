@@ -30,14 +30,6 @@ struct Linearised {
   bool dependent_columns = false;
 };
 
-void triangulate(MatrixXd& matrix) {
-  const Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(matrix);
-  for (Index j = 0; j < matrix.cols(); ++j) {
-    const Index below = matrix.rows() - j - 1;
-    if (below > 0) matrix.col(j).tail(below).setZero();
-  }
-}
-
 bool has_dependent(const MatrixXd& factor, Index columns) {
   for (Index j = 0; j < columns; ++j) {
     if (!(std::abs(factor(j, j)) > dependent * factor.col(j).head(j + 1).norm())) return true;
@@ -156,6 +148,14 @@ void complete(const SeparableModel& model, const Linearised& at, SeparableFit& f
 }
 
 }  // namespace
+
+void triangulate(MatrixXd& matrix) {
+  const Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(matrix);
+  for (Index j = 0; j < matrix.cols(); ++j) {
+    const Index below = matrix.rows() - j - 1;
+    if (below > 0) matrix.col(j).tail(below).setZero();
+  }
+}
 
 SeparableFit fit_separable(const SeparableModel& model, VectorXd theta, int most_iterations) {
   Linearisation linearisation(model);

@@ -3,12 +3,11 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <string>
 #include <unsupported/Eigen/FFT>
 #include <utility>
 #include <vector>
 
-#include "shapegcode/error.hpp"
+#include "identification/fit_common.hpp"
 #include "shapegcode/identification/arma.hpp"
 
 namespace shapegcode {
@@ -19,7 +18,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int most_modes = 50;
 constexpr Index widest = 160;           // rows of the covariance matrix
 constexpr double faint_power = 1e-6;    // of the strongest spectral line: below this the spectrum shows nothing
 constexpr double decayed = 0.2;         // RMS of the end of a decay over that of all of it
@@ -125,10 +123,7 @@ std::vector<std::vector<Complex>> poles_of(const std::vector<std::vector<double>
 }
 
 std::size_t least_samples(int n_max) {
-  if (n_max < 1 || n_max > most_modes) {
-    throw Error(ErrorKind::argument, "model of " + std::to_string(n_max) + " modes asked for, 1 to " +
-                                         std::to_string(most_modes) + " can be");
-  }
+  identification::check_mode_count(n_max);
   return 8 * static_cast<std::size_t>(n_max) + 8;
 }
 

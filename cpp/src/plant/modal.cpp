@@ -37,14 +37,6 @@ double ModalPlant::State::reachable() const noexcept {
   return std::abs(participation) * std::sqrt(deflection * deflection + quadrature * quadrature);
 }
 
-ModalPlant::Transition ModalPlant::transition(const Mode& mode, double time_s) {
-  const std::complex<double> s = pole(mode);
-  const double decay = std::exp(s.real() * time_s);
-  const double cosine = decay * std::cos(s.imag() * time_s);
-  const double sine = decay * std::sin(s.imag() * time_s) / s.imag();
-  return {cosine - s.real() * sine, sine, -std::norm(s) * sine, cosine + s.real() * sine};
-}
-
 double ModalPlant::largest_between(const Motion& from, const Motion& to, double time_s) noexcept {
   double largest = std::max(std::abs(from.deflection), std::abs(to.deflection));
   if (from.rate * to.rate < 0.0) {
@@ -56,7 +48,7 @@ double ModalPlant::largest_between(const Motion& from, const Motion& to, double 
 }
 
 ModalPlant::Transition ModalPlant::sub_transition(std::size_t axis, const Mode& mode, int substep) const {
-  Transition part = transition(mode, period_s_ * substep / substeps_[axis]);
+  Transition part = mode_transition(mode, period_s_ * substep / substeps_[axis]);
   part.dd *= mode.participation;
   part.dv *= mode.participation;
   part.vd *= mode.participation;
@@ -71,7 +63,7 @@ ModalPlant::Transition ModalPlant::between(const Transition& a, const Transition
 
 ModalPlant::Node ModalPlant::node_of(const Mode& mode, double period_s) {
   const std::complex<double> s = pole(mode);
-  return {transition(mode, period_s), -s.real(), 1.0 / s.imag()};
+  return {mode_transition(mode, period_s), -s.real(), 1.0 / s.imag()};
 }
 
 ModalPlant::ModalPlant(AxisModes modes, double period_s, AxisModeTables tables)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.identification.chart import stabilisation_chart
 from shapegcode.identification.checks import Prepared, prepare
-from shapegcode.identification.model_search import Fit, Search, Starts, search
+from shapegcode.identification.model_search import Fit, Search, Starts, evidence_of, search, starts_of
 from shapegcode.identification.record import Record, RecordError
 from shapegcode.identification.results import Identification, IdentifiedMode
 from shapegcode.identification.support import ACCEPTED_PERCENT, Doubts, estimates_of, refusal_of, rivals_of
@@ -24,6 +24,7 @@ _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which
 _LEAST_SWINGS = 2.0  # of a mode in the record
 _HIGHEST_SHARE = 0.45  # of the sampling rate: the force between samples is known up to there
 _CHART_ORDERS = 20
+_CLEARLY = 6.0  # difference of evidence: odds of twenty to one
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +40,14 @@ class _Taps:
     hold: str
 
     def fit(self, starts: Starts, coloured: bool = False) -> _core.ModalFit:
-        return self._fit(self.responses, starts, coloured)
+        return self._fit(self.responses, starts, coloured, self.force_noise_n)
 
-    def fit_one(self, residuals: Sequence[FloatArray], start: tuple[float, float]) -> _core.ModalFit:
-        return self._fit(residuals, [start], False)
+    def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> _core.ModalFit:
+        return self._fit(self.responses if responses is None else responses, starts, False, 0.0)
 
-    def _fit(self, responses: Sequence[FloatArray], starts: Starts, coloured: bool) -> _core.ModalFit:
+    def _fit(
+        self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, force_noise_n: float
+    ) -> _core.ModalFit:
         omega, zeta = np.array(starts).T
         return _core.fit_modes(
             self.forces,
@@ -54,7 +57,7 @@ class _Taps:
             zeta,
             quantity=self.quantity,
             hold=self.hold,
-            force_noise_n=self.force_noise_n,
+            force_noise_n=force_noise_n,
             coloured_residuals=coloured,
         )
 
@@ -76,8 +79,8 @@ class _Decays:
     def fit(self, starts: Starts, coloured: bool = False) -> _core.DecayFit:
         return self._fit(self.responses, starts, coloured)
 
-    def fit_one(self, residuals: Sequence[FloatArray], start: tuple[float, float]) -> _core.DecayFit:
-        return self._fit(residuals, [start], False)
+    def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> _core.DecayFit:
+        return self._fit(self.responses if responses is None else responses, starts, False)
 
     def _fit(self, responses: Sequence[FloatArray], starts: Starts, coloured: bool) -> _core.DecayFit:
         omega, zeta = np.array(starts).T
@@ -115,15 +118,29 @@ def identify(
     ready = prepare(records) if prepared is None else prepared
     if not ready.records:
         raise RecordError("; ".join(f"{refused.source}: {refused.reason}" for refused in ready.refused))
-    holds = ("band_limited", "linear") if ready.records[0].force_n is not None else ("",)
-    # The better of the two ways in which the force may run between its samples; they differ by (pi f/rate)^2/3.
-    problems = [_problem(ready, band_hz, hold) for hold in holds]
-    found = [(problem, _search(problem, most_modes, modes)) for problem in problems]
-    problem, models = min(found, key=lambda pair: min(pair[1].evidence))
+    problem = _problem(ready, band_hz)
+    models = _search(problem, most_modes, modes)
+    if isinstance(problem, _Taps):
+        problem, models = _better_hold(problem, models, most_modes, modes)
     return _result(ready, problem, models, modes or models.order, accepted_percent)
 
 
-def _problem(ready: Prepared, band_hz: tuple[float, float] | None, hold: str) -> _Taps | _Decays:
+def _better_hold(problem: _Taps, models: Search, most_modes: int, modes: int | None) -> tuple[_Taps, Search]:
+    """The same with another course of the force between its samples, where the data clearly ask for it.
+
+    A recorder with an anti-aliasing filter gives a band-limited force. A simulation may have one that is linear between
+    samples, or single blows; the mass differs by (pi f/rate)^2/3 and more.
+    """
+    best = problem, models
+    for hold in ("linear", "impulse"):
+        other = replace(problem, hold=hold)
+        fits = [other.fit(starts_of(fit)) for fit in models.fits]
+        if min(map(evidence_of, fits), default=np.inf) < min(best[1].evidence) - _CLEARLY:
+            best = other, _search(other, most_modes, modes)
+    return best
+
+
+def _problem(ready: Prepared, band_hz: tuple[float, float] | None) -> _Taps | _Decays:
     first = ready.records[0]
     responses = [record.response for record in ready.records]
     longest_s = max(len(response) for response in responses) * first.period_s
@@ -133,7 +150,7 @@ def _problem(ready: Prepared, band_hz: tuple[float, float] | None, hold: str) ->
             f"band of {band[0]:g} to {band[1]:g} Hz: must ascend and end below half the sampling rate, "
             f"{0.5 / first.period_s:g} Hz"
         )
-    if not hold:
+    if first.force_n is None:
         return _Decays(responses, first.period_s, band)
     forces = [record.force_n for record in ready.records if record.force_n is not None]
     noise = [value for value in ready.force_noise_n if value is not None]
@@ -144,7 +161,7 @@ def _problem(ready: Prepared, band_hz: tuple[float, float] | None, hold: str) ->
         band,
         first.quantity,
         float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0,
-        hold,
+        "band_limited",
     )
 
 
@@ -170,7 +187,7 @@ def _result(
     fit = models.fits[order - 1]
     coloured = abs(fit.residual_autocorrelation) * np.sqrt(fit.samples) > _COLOURED
     if coloured:
-        fit = problem.fit(_starts(fit), coloured=True)
+        fit = problem.fit(starts_of(fit), coloured=True)
         warnings.append(
             f"what the model leaves is no white noise (autocorrelation {fit.residual_autocorrelation:.2f}): the "
             "intervals allow for it; other causes than modes, or a mode that is not linear"
@@ -209,10 +226,6 @@ def _result(
     )
 
 
-def _starts(fit: Fit) -> Starts:
-    return list(zip(map(float, fit.omega_rad_s), map(float, fit.damping_ratio), strict=True))
-
-
 def _chart_orders(problem: _Taps | _Decays) -> int:
     shortest = min(len(response) for response in problem.responses)
     return max(1, min(_CHART_ORDERS, (shortest - 8) // 8))
@@ -223,7 +236,7 @@ def _alone(problem: _Taps | _Decays, fit: Fit) -> list[Fit]:
     if len(problem.responses) < 2:
         return []
     try:
-        fits: list[Fit] = [problem.record(index).fit(_starts(fit)) for index in range(len(problem.responses))]
+        fits: list[Fit] = [problem.record(index).fit(starts_of(fit)) for index in range(len(problem.responses))]
     except _core.ArgumentError:
         return []
     return fits

@@ -1,6 +1,7 @@
 """How many modes the data hold: models of growing order, each started where the last one left something unexplained.
 
-A search knows nothing of taps or decays: a `Problem` fits a number of modes to its records and says what is left.
+A search knows nothing of taps or decays: a `Problem` fits a number of modes to its records, or quickly (without what
+only the last digits need) to them or to what is left of them.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ class Problem(Protocol):
 
     def fit(self, starts: Starts) -> Fit: ...  # noqa: D102
 
-    def fit_one(self, residuals: Sequence[FloatArray], start: tuple[float, float]) -> Fit: ...  # noqa: D102
+    def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> Fit: ...  # noqa: D102
 
     def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]: ...  # noqa: D102
 
@@ -103,10 +104,15 @@ def search(problem: Problem, most_modes: int) -> Search:
         if explained < _LEAST_SHARE * squares:
             break
         fits.append(best)
-        evidence.append(_evidence(best.sum_of_squares, samples, best.parameters, len(fits)))
+        evidence.append(evidence_of(best))
         if len(fits) - int(np.argmin(evidence)) >= _PATIENCE:
             break
     return Search(tuple(fits), tuple(evidence))
+
+
+def evidence_of(fit: Fit) -> float:
+    """Evidence of a fit, as in `Search.evidence`."""
+    return _evidence(fit.sum_of_squares, fit.samples, fit.parameters, len(fit.omega_rad_s))
 
 
 def _evidence(squares: float, samples: int, parameters: int, modes: int) -> float:
@@ -116,12 +122,12 @@ def _evidence(squares: float, samples: int, parameters: int, modes: int) -> floa
 
 def _next_fit(problem: Problem, last: Fit | None, poles: npt.NDArray[np.complex128]) -> Fit | None:
     """The best fit with one mode more than `last`."""
-    so_far = [] if last is None else list(zip(last.omega_rad_s, last.damping_ratio, strict=True))
+    so_far = [] if last is None else starts_of(last)
     fitted = [np.zeros(1)] * len(problem.responses) if last is None else last.fitted
     residuals = [response - model for response, model in zip(problem.responses, fitted, strict=True)]
     candidates: list[Starts] = []
     for omega in _peaks(residuals, problem):
-        alone = [_attempt(partial(problem.fit_one, residuals, (omega, zeta))) for zeta in _START_DAMPING]
+        alone = [_attempt(partial(problem.fit_quickly, [(omega, zeta)], residuals)) for zeta in _START_DAMPING]
         usable = [fit for fit in alone if fit is not None]
         if usable:
             fit = min(usable, key=lambda fit: fit.sum_of_squares)
@@ -129,8 +135,15 @@ def _next_fit(problem: Problem, last: Fit | None, poles: npt.NDArray[np.complex1
     omega, zeta = _core.poles_to_modes(list(poles), problem.period_s)
     if len(omega) == len(so_far) + 1:
         candidates.append(list(zip(map(float, omega), map(float, zeta), strict=True)))
-    fits = [fit for starts in candidates if (fit := _attempt(partial(problem.fit, starts))) is not None]
-    return min(fits, key=lambda fit: fit.sum_of_squares, default=None)
+    fits = [fit for starts in candidates if (fit := _attempt(partial(problem.fit_quickly, starts))) is not None]
+    if not fits:
+        return None
+    return _attempt(partial(problem.fit, starts_of(min(fits, key=lambda fit: fit.sum_of_squares))))
+
+
+def starts_of(fit: Fit) -> Starts:
+    """The modes of a fit, for another one to begin with."""
+    return list(zip(map(float, fit.omega_rad_s), map(float, fit.damping_ratio), strict=True))
 
 
 def _attempt(task: Callable[[], Fit]) -> Fit | None:

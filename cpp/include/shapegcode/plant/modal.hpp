@@ -7,6 +7,7 @@
 
 #include "shapegcode/mode.hpp"
 #include "shapegcode/plant/mode_table.hpp"
+#include "shapegcode/plant/mode_transition.hpp"
 #include "shapegcode/samples.hpp"
 
 namespace shapegcode {
@@ -48,10 +49,7 @@ class ModalPlant {
   [[nodiscard]] Vector3 residual_peak(int n_periods = 5) const;
 
  private:
-  /// (d, d')(t+h) = matrix * (d, d')(t) of a free mode.
-  struct Transition {
-    double dd = 1.0, dv = 0.0, vd = 0.0, vv = 1.0;
-  };
+  using Transition = ModeTransition;
   /// What the motion over a period needs to know of a mode.
   struct Node {
     Transition over_period;
@@ -92,8 +90,7 @@ class ModalPlant {
     double deflection = 0.0;
     double rate = 0.0;
   };
-  [[nodiscard]] static Transition transition(const Mode& mode, double time_s);
-  /// The same for the ends of an axis' sub-steps, times the participation.
+  /// mode_transition() for the ends of an axis' sub-steps, times the participation.
   [[nodiscard]] Transition sub_transition(std::size_t axis, const Mode& mode, int substep) const;
   [[nodiscard]] static Transition between(const Transition& a, const Transition& b, double share) noexcept;
   [[nodiscard]] static Node node_of(const Mode& mode, double period_s);
