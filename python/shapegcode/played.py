@@ -14,9 +14,8 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.controller import controller_model
 from shapegcode.machine import Machine
-from shapegcode.moving_modes import NO_OFFSET, Offset, mode_tables, region_offset
+from shapegcode.moving_modes import NO_OFFSET, Offset, axis_modes, mode_tables, region_offset
 from shapegcode.program import Program
-from shapegcode.verify import axis_modes
 
 __all__ = ["KINDS", "PLANTS", "Chunk", "plant_options", "playing_controller", "stream"]
 
