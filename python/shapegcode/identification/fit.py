@@ -135,7 +135,7 @@ def _better_hold(problem: _Taps, models: Search, most_modes: int, modes: int | N
     for hold in ("linear", "impulse"):
         other = replace(problem, hold=hold)
         fits = [other.fit(starts_of(fit)) for fit in models.fits]
-        if min(map(evidence_of, fits), default=np.inf) < min(best[1].evidence) - _CLEARLY:
+        if min((evidence_of(fit) for fit in fits), default=np.inf) < min(best[1].evidence) - _CLEARLY:
             best = other, _search(other, most_modes, modes)
     return best
 
@@ -198,7 +198,8 @@ def _result(
         record_s=max(len(response) for response in problem.responses) * problem.period_s,
         rivals=rivals_of(order, models.fits),
     )
-    supported, refused = [], []
+    supported: list[IdentifiedMode] = []
+    refused: list[IdentifiedMode] = []
     for estimates in estimates_of(fit, _alone(problem, fit)):
         reason = refusal_of(estimates, doubts)
         mode = IdentifiedMode(

@@ -27,21 +27,7 @@ _PEAKS = 2  # of the residual's spectrum that are tried
 _PATIENCE = 2
 
 
-class Fit(Protocol):
-    """What the search needs of a fit."""
-
-    @property
-    def omega_rad_s(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def damping_ratio(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def sum_of_squares(self) -> float: ...  # noqa: D102
-    @property
-    def samples(self) -> int: ...  # noqa: D102
-    @property
-    def parameters(self) -> int: ...  # noqa: D102
-    @property
-    def fitted(self) -> tuple[FloatArray, ...]: ...  # noqa: D102
+Fit = _core.ModalFit | _core.DecayFit
 
 
 class Problem(Protocol):
@@ -130,11 +116,10 @@ def _next_fit(problem: Problem, last: Fit | None, poles: npt.NDArray[np.complex1
         alone = [_attempt(partial(problem.fit_quickly, [(omega, zeta)], residuals)) for zeta in _START_DAMPING]
         usable = [fit for fit in alone if fit is not None]
         if usable:
-            fit = min(usable, key=lambda fit: fit.sum_of_squares)
-            candidates.append([*so_far, (float(fit.omega_rad_s[0]), float(fit.damping_ratio[0]))])
-    omega, zeta = _core.poles_to_modes(list(poles), problem.period_s)
-    if len(omega) == len(so_far) + 1:
-        candidates.append(list(zip(map(float, omega), map(float, zeta), strict=True)))
+            candidates.append([*so_far, *starts_of(min(usable, key=lambda fit: fit.sum_of_squares))])
+    of_poles = _core.poles_to_modes(list(poles), problem.period_s)
+    if len(of_poles[0]) == len(so_far) + 1:
+        candidates.append([(float(w), float(z)) for w, z in zip(*of_poles, strict=True)])
     fits = [fit for starts in candidates if (fit := _attempt(partial(problem.fit_quickly, starts))) is not None]
     if not fits:
         return None
@@ -143,7 +128,7 @@ def _next_fit(problem: Problem, last: Fit | None, poles: npt.NDArray[np.complex1
 
 def starts_of(fit: Fit) -> Starts:
     """The modes of a fit, for another one to begin with."""
-    return list(zip(map(float, fit.omega_rad_s), map(float, fit.damping_ratio), strict=True))
+    return [(float(omega), float(zeta)) for omega, zeta in zip(fit.omega_rad_s, fit.damping_ratio, strict=True)]
 
 
 def _attempt(task: Callable[[], Fit]) -> Fit | None:

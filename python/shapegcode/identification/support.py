@@ -15,7 +15,7 @@ from shapegcode.identification.results import Estimate
 
 FloatArray = npt.NDArray[np.float64]
 
-#: A damping ratio or stiffness less certain than this is refused: an error of 10 % is then four standard deviations off.
+#: A damping ratio or stiffness less certain than this is refused: 10 % are then four standard deviations off.
 ACCEPTED_PERCENT = 5.0
 _FREQUENCY_PERCENT = 2.0
 _NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode that a shaper could deal with
@@ -63,7 +63,7 @@ class Doubts:
     rivals: Sequence[Fit] = ()
 
 
-def estimates_of(fit: _core.ModalFit | _core.DecayFit, alone: Sequence[Fit]) -> list[Estimates]:
+def estimates_of(fit: Fit, alone: Sequence[Fit]) -> list[Estimates]:
     """Values and 95 % intervals of each mode of a fit.
 
     The intervals are those of the fit's covariance, in logarithms. Where taps differ by more than that explains, their
@@ -178,9 +178,9 @@ def _rival_refusal(mode: Estimates, doubts: Doubts) -> str:
         # A rival that splits the mode in two or lacks it disagrees as much as one can.
         rows = [_logarithms(rival, i) for i in range(len(rival.omega_rad_s))]
         nearest = min(rows, key=lambda row: abs(row.values[0] - np.log(mode.frequency_hz.value)))
-        named = (("frequency", mode.frequency_hz, 0), ("damping ratio", mode.damping_ratio, 1))
+        named = [("frequency", mode.frequency_hz, 0), ("damping ratio", mode.damping_ratio, 1)]
         if mode.stiffness_n_per_m is not None:
-            named = (*named, ("stiffness", mode.stiffness_n_per_m, 4))
+            named.append(("stiffness", mode.stiffness_n_per_m, 4))
         for name, estimate, index in named:
             change = 100.0 * abs(float(np.expm1(nearest.values[index] - np.log(estimate.value))))
             if change > doubts.limit_percent:
