@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 constexpr double dependent = 1e-11;
 // Steps of theta (all logarithms) and predicted gains below which the minimum is reached.
 constexpr double step_floor = 1e-11;
-constexpr double gain_floor = 1e-15;
+constexpr double gain_floor = 1e-12;
 constexpr double exact_fit = 1e-26;  // of the response's sum of squares
 constexpr double largest_step = 0.5;
 

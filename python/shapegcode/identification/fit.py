@@ -24,6 +24,8 @@ _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which
 _LEAST_SWINGS = 2.0  # of a mode in the record
 _HIGHEST_SHARE = 0.45  # of the sampling rate: the force between samples is known up to there
 _CHART_ORDERS = 20
+_STEPS = 60  # of a fit
+_QUICK_STEPS = 15  # of one that only shows where a mode may be
 # Difference of evidence (twice the logarithm of the odds) above which another course of the force is taken, and down to
 # which it may have been.
 _CLEARLY = 30.0
@@ -43,13 +45,13 @@ class _Taps:
     hold: str
 
     def fit(self, starts: Starts, coloured: bool = False) -> _core.ModalFit:
-        return self._fit(self.responses, starts, coloured, self.force_noise_n)
+        return self._fit(self.responses, starts, coloured, self.force_noise_n, _STEPS)
 
     def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> _core.ModalFit:
-        return self._fit(self.responses if responses is None else responses, starts, False, 0.0)
+        return self._fit(self.responses if responses is None else responses, starts, False, 0.0, _QUICK_STEPS)
 
     def _fit(
-        self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, force_noise_n: float
+        self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, force_noise_n: float, steps: int
     ) -> _core.ModalFit:
         omega, zeta = np.array(starts).T
         return _core.fit_modes(
@@ -62,6 +64,7 @@ class _Taps:
             hold=self.hold,
             force_noise_n=force_noise_n,
             coloured_residuals=coloured,
+            most_iterations=steps,
         )
 
     def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
@@ -87,14 +90,16 @@ class _Decays:
     band_hz: tuple[float, float]
 
     def fit(self, starts: Starts, coloured: bool = False) -> _core.DecayFit:
-        return self._fit(self.responses, starts, coloured)
+        return self._fit(self.responses, starts, coloured, _STEPS)
 
     def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> _core.DecayFit:
-        return self._fit(self.responses if responses is None else responses, starts, False)
+        return self._fit(self.responses if responses is None else responses, starts, False, _QUICK_STEPS)
 
-    def _fit(self, responses: Sequence[FloatArray], starts: Starts, coloured: bool) -> _core.DecayFit:
+    def _fit(self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, steps: int) -> _core.DecayFit:
         omega, zeta = np.array(starts).T
-        return _core.fit_decay(list(responses), self.period_s, omega, zeta, coloured_residuals=coloured)
+        return _core.fit_decay(
+            list(responses), self.period_s, omega, zeta, coloured_residuals=coloured, most_iterations=steps
+        )
 
     def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
         return _core.stabilisation_poles(self.responses, most)
