@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.signal import resample_poly
 
 from shapegcode import _core
 from shapegcode.identification.chart import stabilisation_chart
@@ -24,6 +25,7 @@ _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which
 _LEAST_SWINGS = 2.0  # of a mode in the record
 _HIGHEST_SHARE = 0.45  # of the sampling rate: the force between samples is known up to there
 _CHART_ORDERS = 20
+_FINER = 16  # steps of the check by Wilson's method in a sampling period
 _STEPS = 60  # of a fit
 _QUICK_STEPS = 15  # of one that only shows where a mode may be
 # Difference of evidence (twice the logarithm of the odds) above which another course of the force is taken, and down to
@@ -276,13 +278,16 @@ def _alone(problem: _Taps | _Decays, fit: Fit) -> list[Fit]:
 
 
 def _checks(problem: _Taps | _Decays, fit: _core.ModalFit | _core.DecayFit) -> dict[str, float]:
-    """The equivalent mass by paper 003's way, from the first tap, where the model has one mode."""
+    """The equivalent mass by paper 003's way, from the first tap, where the model has one mode.
+
+    Wilson's method shortens the frequency unless its steps are short: force and response are resampled.
+    """
     if isinstance(problem, _Decays) or len(fit.omega_rad_s) != 1:
         return {}
     args = (
-        problem.forces[0],
-        problem.responses[0],
-        problem.period_s,
+        _finer(problem.forces[0], problem.hold),
+        _finer(problem.responses[0], "band_limited"),
+        problem.period_s / _FINER,
         float(fit.omega_rad_s[0]),
         float(fit.damping_ratio[0]),
     )
@@ -293,3 +298,11 @@ def _checks(problem: _Taps | _Decays, fit: _core.ModalFit | _core.DecayFit) -> d
         "mass_bisection_kg": halved.mass_kg,
         "bisection_halvings": float(halved.halvings),
     }
+
+
+def _finer(signal: FloatArray, hold: str) -> FloatArray:
+    """A signal with more samples: straight between its samples, or band-limited."""
+    if hold == "band_limited":
+        return np.asarray(resample_poly(signal, _FINER, 1), dtype=np.float64)
+    places = np.arange(len(signal) * _FINER) / _FINER
+    return np.interp(places, np.arange(len(signal)), signal)

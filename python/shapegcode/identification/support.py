@@ -20,6 +20,8 @@ ACCEPTED_PERCENT = 5.0
 _FREQUENCY_PERCENT = 2.0
 _NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode that a shaper could deal with
 _LEAST_SWINGS = 2.0  # in the record
+#: What has not fallen to this share at the end of the record does not decay: mains hum, a pump, a turning spindle.
+_LASTING = 0.8
 #: A model with one mode more counts as a rival while it fits better by more than chance alone does in one case of 20.
 _RIVAL_PROBABILITY = 0.05
 _SCATTER_PROBABILITY = 0.01  # of taps that differ as much by noise alone
@@ -171,6 +173,12 @@ def refusal_of(mode: Estimates, doubts: Doubts) -> str:
         return (
             f"{frequency.value * doubts.record_s:.1f} swings in the record of {doubts.record_s:.3g} s: "
             f"{_LEAST_SWINGS:g} or more are needed"
+        )
+    lasting = float(np.exp(-2.0 * np.pi * frequency.value * damping.value * doubts.record_s))
+    if lasting > _LASTING:
+        return (
+            f"still at {100.0 * lasting:.0f} % after {doubts.record_s:.3g} s: a steady disturbance (mains, pump, spindle), or "
+            "a record too short for a mode of so little damping"
         )
     if not doubts.band_hz[0] <= frequency.value <= doubts.band_hz[1]:
         return f"outside the band of {doubts.band_hz[0]:.4g} to {doubts.band_hz[1]:.4g} Hz that was searched"
