@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EquivalentMass', 'ExtraInsensitive', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LinearPlant', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PlaybackFigures', 'PlaybackOptions', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_decay', 'fit_modes', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'matrix_exponential', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'time_program', 'wilson_theta', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LinearPlant', 'MetrologyOptions', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'line_sections', 'linear_model', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'time_program', 'wilson_theta', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -1637,6 +1637,375 @@ class ModeTable:
         """
         Positions in mm.
         """
+class FrictionModel:
+    """
+    How a sliding pair resists.
+    
+    Members:
+    
+      viscous : In proportion to the speed alone.
+    
+      stribeck : Coulomb, static and Stribeck, smooth through zero speed.
+    
+      lugre : The same with bristles: presliding, stick, frictional lag.
+    """
+    __members__: typing.ClassVar[dict[str, FrictionModel]]
+    lugre: typing.ClassVar[FrictionModel]
+    stribeck: typing.ClassVar[FrictionModel]
+    viscous: typing.ClassVar[FrictionModel]
+    @typing.overload
+    def __eq__(self, other: FrictionModel) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: FrictionModel) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class FrictionParameters:
+    """
+    Friction of one sliding pair. Immutable.
+    
+    Args:
+        model: See FrictionModel.
+        viscous_n_s_per_m: Viscous friction in N s/m, >= 0.
+        coulomb_n: Sliding friction in N, > 0 unless viscous.
+        static_n: Friction to be overcome from rest in N, >= coulomb_n.
+        stribeck_velocity_m_per_s: Speed in m/s at which static has given way to sliding friction, > 0 unless viscous.
+        smoothing_velocity_m_per_s: Stribeck: sign(v) is tanh(v / this), m/s, > 0.
+        bristle_stiffness_n_per_m: LuGre: force over displacement before sliding in N/m, > 0.
+        bristle_damping_n_s_per_m: LuGre: damping of the bristles in N s/m, >= 0.
+    
+    Raises:
+        ArgumentError: A value outside its range.
+    """
+    def __init__(self, model: FrictionModel = ..., *, viscous_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, coulomb_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, static_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, stribeck_velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, smoothing_velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, bristle_stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, bristle_damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        """
+        ArgumentError if it is not what the class asks for.
+        """
+    @property
+    def bristle_damping_n_s_per_m(self) -> float:
+        """
+        N s/m.
+        """
+    @property
+    def bristle_stiffness_n_per_m(self) -> float:
+        """
+        N/m.
+        """
+    @property
+    def coulomb_n(self) -> float:
+        """
+        N.
+        """
+    @property
+    def model(self) -> FrictionModel:
+        """
+        Model.
+        """
+    @property
+    def smoothing_velocity_m_per_s(self) -> float:
+        """
+        m/s.
+        """
+    @property
+    def static_n(self) -> float:
+        """
+        N.
+        """
+    @property
+    def stribeck_velocity_m_per_s(self) -> float:
+        """
+        m/s.
+        """
+    @property
+    def viscous_n_s_per_m(self) -> float:
+        """
+        N s/m.
+        """
+class PositionFeedback:
+    """
+    What the position loop compares with the set-point.
+    
+    Members:
+    
+      motor : Encoder on the motor (semi-closed loop).
+    
+      table : Linear scale on the table (fully closed loop).
+    """
+    __members__: typing.ClassVar[dict[str, PositionFeedback]]
+    motor: typing.ClassVar[PositionFeedback]
+    table: typing.ClassVar[PositionFeedback]
+    @typing.overload
+    def __eq__(self, other: PositionFeedback) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: PositionFeedback) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class FeedDriveParameters:
+    """
+    Feed drive of one axis, referred to the travel of
+    the table. Immutable.
+    
+    Args:
+        motor_mass_kg: Inertia of motor, coupling and screw in kg, > 0.
+        table_mass_kg: Table with what it carries in kg, > 0.
+        stiffness_n_per_m: Motor to table, axial, in N/m, > 0.
+        damping_n_s_per_m: Beside the stiffness in N s/m, >= 0.
+        position_gain_per_s: Gain of the position loop in 1/s, > 0.
+        velocity_gain_n_s_per_m: Force over speed error in N s/m, > 0.
+        velocity_integral_time_s: Of the speed controller in s; 0: none.
+        velocity_feed_forward_ratio: Share of the set-points' speed that is fed forward, 0 ... 1.
+        acceleration_feed_forward_ratio: Share of acceleration times both masses that is fed forward, 0 ... 1.
+        position_feedback: What the position loop measures; the speed is always taken from the motor.
+        backlash_m: Whole gap between motor and table in m, >= 0.
+        force_limit_n: Of the motor in N; 0: none.
+        table_friction: Friction of the guideways.
+        motor_friction: Friction of bearings, seals and nut.
+        modes: Modes of the structure, excited by the motion of the table.
+    
+    Raises:
+        ArgumentError: A value outside its range.
+    """
+    def __init__(self, *, motor_mass_kg: typing.SupportsFloat | typing.SupportsIndex, table_mass_kg: typing.SupportsFloat | typing.SupportsIndex, stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex, damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex, position_gain_per_s: typing.SupportsFloat | typing.SupportsIndex, velocity_gain_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex, velocity_integral_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.0, velocity_feed_forward_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, acceleration_feed_forward_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, position_feedback: PositionFeedback = ..., backlash_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, force_limit_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, table_friction: FrictionParameters = ..., motor_friction: FrictionParameters = ..., modes: collections.abc.Sequence[Mode] = []) -> None:
+        """
+        ArgumentError if it is not what the class asks for.
+        """
+    @property
+    def acceleration_feed_forward_ratio(self) -> float:
+        """
+        0 ... 1.
+        """
+    @property
+    def backlash_m(self) -> float:
+        """
+        m.
+        """
+    @property
+    def damping_n_s_per_m(self) -> float:
+        """
+        N s/m.
+        """
+    @property
+    def force_limit_n(self) -> float:
+        """
+        N; 0: none.
+        """
+    @property
+    def modes(self) -> list[Mode]:
+        """
+        Of the structure, on the table.
+        """
+    @property
+    def motor_friction(self) -> FrictionParameters:
+        """
+        Of bearings, seals and nut.
+        """
+    @property
+    def motor_mass_kg(self) -> float:
+        """
+        kg.
+        """
+    @property
+    def position_feedback(self) -> PositionFeedback:
+        """
+        What the position loop measures.
+        """
+    @property
+    def position_gain_per_s(self) -> float:
+        """
+        1/s.
+        """
+    @property
+    def stiffness_n_per_m(self) -> float:
+        """
+        N/m.
+        """
+    @property
+    def table_friction(self) -> FrictionParameters:
+        """
+        Of the guideways.
+        """
+    @property
+    def table_mass_kg(self) -> float:
+        """
+        kg.
+        """
+    @property
+    def velocity_feed_forward_ratio(self) -> float:
+        """
+        0 ... 1.
+        """
+    @property
+    def velocity_gain_n_s_per_m(self) -> float:
+        """
+        N s/m.
+        """
+    @property
+    def velocity_integral_time_s(self) -> float:
+        """
+        s; 0: none.
+        """
+class FeedDrive:
+    """
+    Feed drive of one axis, integrated by CVODE.
+    
+    Set-points come once per period and are joined by straight lines.
+    
+    Args:
+        parameters: The drive.
+        period_s: Time between set-points in s.
+        rtol: Relative tolerance of following error, deflections and speeds.
+        atol_mm: Absolute tolerance of lengths in mm; that of speeds is 100 atol_mm per second.
+    
+    Raises:
+        ArgumentError: A value outside its range.
+    """
+    def __copy__(self) -> FeedDrive:
+        ...
+    def __init__(self, parameters: FeedDriveParameters, period_s: typing.SupportsFloat | typing.SupportsIndex, rtol: typing.SupportsFloat | typing.SupportsIndex = 1e-06, atol_mm: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> None:
+        """
+        ArgumentError on a value outside its range.
+        """
+    def play(self, setpoints_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+        """
+        Runs on over many set-points.
+        
+        Args:
+            setpoints_mm: Shape (n,), mm.
+        
+        Returns:
+            (n, 6): response, table and motor in mm, friction on the table, force of the motor and of the spring in N, each
+            at the instant of its set-point.
+        
+        Raises:
+            ArgumentError: Another shape or a value that is not finite.
+            NumericError: The integrator failed; with CVODE's flag and the time.
+        """
+    def reset(self, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        At rest at a position (mm).
+        """
+    def step(self, setpoint_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Next set-point (mm); the response at that instant in mm. NumericError with CVODE's flag and the time.
+        """
+    @property
+    def motor_mm(self) -> float:
+        """
+        Angle of the motor as travel, mm.
+        """
+    @property
+    def parameters(self) -> FeedDriveParameters:
+        """
+        The drive.
+        """
+    @property
+    def response_mm(self) -> float:
+        """
+        Table and modes, mm.
+        """
+    @property
+    def rhs_evaluations(self) -> int:
+        """
+        Evaluations of the equations so far.
+        """
+    @property
+    def steps(self) -> int:
+        """
+        Internal steps so far.
+        """
+    @property
+    def table_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def time_s(self) -> float:
+        """
+        Since reset(), s.
+        """
+class FeedDriveRealTime:
+    """
+    The same with fixed steps and without error control: the real-time form.
+    
+    Args:
+        parameters: The drive.
+        period_s: Time between set-points in s.
+        substeps: Steps in a period, 1 ... 1000.
+    
+    Raises:
+        ArgumentError: A value outside its range.
+    """
+    def __init__(self, parameters: FeedDriveParameters, period_s: typing.SupportsFloat | typing.SupportsIndex, substeps: typing.SupportsInt | typing.SupportsIndex = 4) -> None:
+        """
+        ArgumentError on a value outside its range.
+        """
+    def play(self, setpoints_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+        """
+        Responses (n,) in mm at many set-points (n,) in mm. ArgumentError on another shape.
+        """
+    def reset(self, position_mm: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        At rest at a position (mm).
+        """
+    def step(self, setpoint_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Next set-point (mm); the response at that instant in mm.
+        """
 class Arma:
     """
     ARMA(2n, 2n-1) model: response = B(z)/A(z) force, A = 1 - phi_1/z - ... - phi_2n/z^2n.
@@ -2427,6 +2796,14 @@ class PlaybackOptions:
     def axis_filters(self, arg0: collections.abc.Sequence[Fir]) -> None:
         ...
     @property
+    def drives(self) -> list[FeedDriveParameters]:
+        """
+        Feed drives of X, Y and Z in place of the modes; none: modes alone.
+        """
+    @drives.setter
+    def drives(self, arg0: collections.abc.Sequence[FeedDriveParameters]) -> None:
+        ...
+    @property
     def last_seconds(self) -> float:
         """
         Blocks only: play the last so many seconds; 0: all.
@@ -2481,6 +2858,22 @@ class PlaybackOptions:
         """
     @record_samples.setter
     def record_samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def settling_band_mm(self) -> float:
+        """
+        Of the settling time, mm; 0: none.
+        """
+    @settling_band_mm.setter
+    def settling_band_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def settling_limit_s(self) -> float:
+        """
+        How long behind the stop it is looked for; with drives the residual too, s.
+        """
+    @settling_limit_s.setter
+    def settling_limit_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def starved_blocks(self) -> list[int]:
@@ -2593,9 +2986,453 @@ class PlaybackFigures:
         Deviation of the response from the path.
         """
     @property
+    def settling_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        From that instant until |response - command| stays within the band, (3,), s; inf: not within the limit.
+        """
+    @property
     def starved(self) -> list[StarvedFigures]:
         """
         One per PlaybackOptions.starved_blocks.
+        """
+class SectionKind:
+    """
+    What a section of a path is.
+    
+    Members:
+    
+      line : Lines of one direction.
+    
+      arc : Arcs about one centre.
+    
+      curve : Anything else.
+    """
+    __members__: typing.ClassVar[dict[str, SectionKind]]
+    arc: typing.ClassVar[SectionKind]
+    curve: typing.ClassVar[SectionKind]
+    line: typing.ClassVar[SectionKind]
+    @typing.overload
+    def __eq__(self, other: SectionKind) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: SectionKind) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class PathSection:
+    """
+    A stretch of a path that is measured by itself.
+    """
+    @property
+    def begin_mm(self) -> float:
+        """
+        Distance of its start from the path's start, mm.
+        """
+    @property
+    def end_mm(self) -> float:
+        """
+        Distance of its end from the path's start, mm.
+        """
+    @property
+    def first(self) -> int:
+        """
+        Index of its first segment.
+        """
+    @property
+    def first_line(self) -> int:
+        """
+        Source line of its first segment, from 1.
+        """
+    @property
+    def kind(self) -> SectionKind:
+        """
+        Line, arc or curve.
+        """
+    @property
+    def last(self) -> int:
+        """
+        Index of its last segment.
+        """
+    @property
+    def last_line(self) -> int:
+        """
+        Source line of its last segment.
+        """
+    @property
+    def length_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def stops_at_end(self) -> bool:
+        """
+        The path stops at its end.
+        """
+class CircleFit:
+    """
+    The circle of least squares of radial distance through points.
+    """
+    @property
+    def centre_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+        """
+        (2,), mm.
+        """
+    @property
+    def form_mm(self) -> float:
+        """
+        Largest less smallest radial distance from the circle, mm.
+        """
+    @property
+    def radius_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def rms_mm(self) -> float:
+        """
+        Root mean square of the radial distances, mm.
+        """
+class Roughness:
+    """
+    Figures of a profile after ISO 4287.
+    """
+    @property
+    def cutoff_mm(self) -> float:
+        """
+        Cut-off lambda c, mm.
+        """
+    @property
+    def evaluated_mm(self) -> float:
+        """
+        Length that the figures speak of, mm.
+        """
+    @property
+    def ra_mm(self) -> float:
+        """
+        Arithmetic mean height of the roughness, mm.
+        """
+    @property
+    def rz_mm(self) -> float:
+        """
+        Mean peak-to-valley height over sampling lengths, mm.
+        """
+    @property
+    def wa_mm(self) -> float:
+        """
+        Arithmetic mean height of the waviness, mm.
+        """
+class RestVibration:
+    """
+    What a plant does while its command stands still.
+    """
+    @property
+    def begin_s(self) -> float:
+        """
+        The command stands still from here on, s.
+        """
+    @property
+    def observed_s(self) -> float:
+        """
+        For so long, s.
+        """
+    @property
+    def residual_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Largest |response - command|, (3,), mm.
+        """
+    @property
+    def settling_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Until |response - command| stays within the band, (3,), s; NaN where that was not seen.
+        """
+class WallFigures:
+    """
+    One wall of a section, or the width between both.
+    """
+    @property
+    def band_mm(self) -> float:
+        """
+        Largest less least, mm.
+        """
+    @property
+    def largest_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def least_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def mean_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def stations(self) -> int:
+        """
+        Places at which it could be measured.
+        """
+class ArcFigures:
+    """
+    A circle through what was moved or cut on an arc.
+    """
+    @property
+    def fit(self) -> CircleFit:
+        """
+        Least-squares circle.
+        """
+    @property
+    def mean_radius_mm(self) -> float:
+        """
+        Mean distance from the programmed centre, mm.
+        """
+class SectionFigures:
+    """
+    What was measured in one section.
+    """
+    @property
+    def command(self) -> DeviationStats:
+        """
+        Deviation of the command from the path.
+        """
+    @property
+    def command_arc(self) -> ArcFigures | None:
+        """
+        Circle through the command; arcs of 10 degrees on.
+        """
+    @property
+    def command_orbit_percent(self) -> float | None:
+        """
+        Orbit error; arcs only.
+        """
+    @property
+    def left(self) -> WallFigures:
+        """
+        Left wall from where it should be, positive to the left.
+        """
+    @property
+    def left_roughness(self) -> Roughness | None:
+        """
+        Of the left wall, or None if too short.
+        """
+    @property
+    def left_wall_arc(self) -> ArcFigures | None:
+        """
+        Circle through the left wall; XY plane only.
+        """
+    @property
+    def nominal_centre_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+        """
+        (2,) in the plane of the arc, mm.
+        """
+    @property
+    def nominal_radius_mm(self) -> float:
+        """
+        Programmed, mm; arcs only.
+        """
+    @property
+    def peak_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Largest |response - command| while it moves, (3,), mm.
+        """
+    @property
+    def response(self) -> DeviationStats:
+        """
+        Deviation of the response from the path.
+        """
+    @property
+    def response_arc(self) -> ArcFigures | None:
+        """
+        Circle through the response.
+        """
+    @property
+    def response_orbit_percent(self) -> float | None:
+        """
+        Orbit error; arcs only.
+        """
+    @property
+    def rest(self) -> RestVibration | None:
+        """
+        The stop of the command in it, or None.
+        """
+    @property
+    def right(self) -> WallFigures:
+        """
+        Right wall from where it should be, positive to the left.
+        """
+    @property
+    def right_roughness(self) -> Roughness | None:
+        """
+        Of the right wall, or None if too short.
+        """
+    @property
+    def right_wall_arc(self) -> ArcFigures | None:
+        """
+        Circle through the right wall.
+        """
+    @property
+    def section(self) -> PathSection:
+        """
+        Where.
+        """
+    @property
+    def time_s(self) -> float:
+        """
+        While the command moves in it, s.
+        """
+    @property
+    def turns_left(self) -> bool:
+        """
+        The left wall is the inside one; arcs only.
+        """
+    @property
+    def width(self) -> WallFigures:
+        """
+        Left less right wall, with the tool's diameter.
+        """
+class RunFigures:
+    """
+    Figures of a whole run.
+    """
+    @property
+    def command(self) -> DeviationStats:
+        """
+        Deviation from the path; missed corners count.
+        """
+    @property
+    def duration_s(self) -> float:
+        """
+        Until the command rests for the last time, s.
+        """
+    @property
+    def response(self) -> DeviationStats:
+        """
+        Deviation from the path; missed corners count.
+        """
+    @property
+    def rest(self) -> RestVibration:
+        """
+        The stop at the end.
+        """
+    @property
+    def sections(self) -> list[SectionFigures]:
+        """
+        In the order of the path.
+        """
+class MetrologyOptions:
+    """
+    With what a run is measured.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def band_mm(self) -> float:
+        """
+        Settled is what stays within it, mm.
+        """
+    @band_mm.setter
+    def band_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def cutoff_mm(self) -> float:
+        """
+        Cut-off lambda c, mm; 0: by the section's length.
+        """
+    @cutoff_mm.setter
+    def cutoff_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def lambda_s_mm(self) -> float:
+        """
+        Short-wave cut-off, mm; 0: none.
+        """
+    @lambda_s_mm.setter
+    def lambda_s_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def least_rest_s(self) -> float:
+        """
+        A shorter standstill is no stop, s.
+        """
+    @least_rest_s.setter
+    def least_rest_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def period_s(self) -> float:
+        """
+        Between two samples, s.
+        """
+    @period_s.setter
+    def period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def station_spacing_mm(self) -> float:
+        """
+        Largest, mm.
+        """
+    @station_spacing_mm.setter
+    def station_spacing_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def tool_radius_mm(self) -> float:
+        """
+        Of the disc that is swept, mm.
+        """
+    @tool_radius_mm.setter
+    def tool_radius_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class SectionMetrology:
+    """
+    Measures what a run of samples does to the sections of a path.
+    """
+    def __init__(self, path: Path, sections: collections.abc.Sequence[PathSection], options: MetrologyOptions) -> None:
+        """
+        Raises ArgumentError on a path without length, sections of another path, or an option outside its range.
+        """
+    def feed(self, command_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        The next samples of both, (n, 3), mm. Raises ArgumentError on other shapes or values that are not finite.
+        """
+    def finish(self) -> RunFigures:
+        """
+        Everything measured so far. Raises NumericError if a circle fit does not converge.
+        """
+    def wall_profile(self, section: typing.SupportsInt | typing.SupportsIndex) -> tuple[float, float, numpy.ndarray, numpy.ndarray, numpy.ndarray, numpy.ndarray]:
+        """
+        Distance of the first station from the path's start and spacing, mm; deviation of left and right wall, (n,), mm, positive to the left, NaN where there is no wall; the path's points and left normals seen from above, (n, 2).
+        """
+    @property
+    def station_spacing_mm(self) -> float:
+        """
+        Largest distance of two stations, mm.
         """
 class MotionKind:
     """
@@ -3235,6 +4072,80 @@ class InterpolatedTime:
         """
         Sum of the parts below, s.
         """
+class PlayedChunk:
+    """
+    A stretch of a played motion, one row per period.
+    """
+    def __len__(self) -> int:
+        ...
+    @property
+    def command_mm(self) -> numpy.ndarray:
+        """
+        Set-points behind every filter, (k, 3), mm.
+        """
+    @property
+    def first_sample(self) -> int:
+        """
+        Number of its first sample; time is number * period.
+        """
+    @property
+    def friction_force_n(self) -> numpy.ndarray:
+        """
+        Feed drives: friction of the table, against its motion, (k, 3), N; modes: (0, 0).
+        """
+    @property
+    def kind(self) -> numpy.ndarray:
+        """
+        Value of its BlockKind, (k,).
+        """
+    @property
+    def line(self) -> numpy.ndarray:
+        """
+        Line of the block that is being interpolated, (k,).
+        """
+    @property
+    def motor_force_n(self) -> numpy.ndarray:
+        """
+        Feed drives: force of the motor, (k, 3), N; modes: (0, 0).
+        """
+    @property
+    def motor_mm(self) -> numpy.ndarray:
+        """
+        Feed drives: motor as travel of the table, (k, 3), mm; modes: (0, 0).
+        """
+    @property
+    def response_mm(self) -> numpy.ndarray:
+        """
+        (k, 3), mm.
+        """
+    @property
+    def velocity_mm_per_s(self) -> numpy.ndarray:
+        """
+        Of the command over the period that ends with the row, without the jumps of coordinates, (k, 3), mm/s.
+        """
+class PlayedStream:
+    """
+    A motion played through filters and plant and handed out in pieces.
+    """
+    @staticmethod
+    def of_blocks(blocks: Path, block_end: BlockEnd, override_ratio: typing.SupportsFloat | typing.SupportsIndex, options: PlaybackOptions, rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> PlayedStream:
+        """
+        Blocks at their feed.
+        """
+    @staticmethod
+    def of_path(path: Path, profile: SpeedProfile, options: PlaybackOptions, rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> PlayedStream:
+        """
+        A path under a speed profile; behind its end the set-points rest for rest_s.
+        """
+    @staticmethod
+    def of_program(program: ProgramText, model: ControllerModel, options: PlaybackOptions, region_offsets_mm: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]] = [], rest_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> PlayedStream:
+        """
+        A whole program on one time axis. region_offsets_mm: from the positions of each region to the machine's, for modes that vary with them. Raises ArgumentError on a model that no controller can have.
+        """
+    def read(self, most: typing.SupportsInt | typing.SupportsIndex) -> PlayedChunk:
+        """
+        The next rows, at most so many; none behind the end.
+        """
 def acceleration_filters(model: ControllerModel) -> list[Fir]:
     """
     Filters behind interpolation in order, none, one or two.
@@ -3317,6 +4228,10 @@ def count_slowed_blocks(blocks: Path, corner_speed_difference_mm_per_s: typing.A
     """
     Blocks that a controller with look-ahead would run slower than programmed.
     """
+def csv_rows(word: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], words: collections.abc.Sequence[str], table: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.f_contiguous"]) -> bytes:
+    """
+    Rows of a CSV file: the row's word, (k,), and the numbers of its row in the table, (k, c), each as the shortest text that reads back as the same number. Raises ArgumentError on unequal lengths or a word that does not exist.
+    """
 def equivalent_mass_bisection(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, low_kg: typing.SupportsFloat | typing.SupportsIndex = 0.001, high_kg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.01, most_halvings: typing.SupportsInt | typing.SupportsIndex = 100, quantity: str = 'acceleration', theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, impulse_n_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> EquivalentMass:
     """
     Equivalent mass by bisection: paper 003's steps 1 to 7, the check of the closed form.
@@ -3394,6 +4309,10 @@ def fit_blocks(command: ShapedCommand, breaks: collections.abc.Sequence[typing.S
     """
     Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. Raises ArgumentError on a position outside +-99999.999 mm.
     """
+def fit_circle(points_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> CircleFit:
+    """
+    Geometric least-squares circle through points (n, 2), mm. Raises ArgumentError on fewer than three points or points on a line, NumericError if it does not converge.
+    """
 def fit_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, with_offset: bool = True, coloured_residuals: bool = False, most_iterations: typing.SupportsInt | typing.SupportsIndex = 60) -> DecayFit:
     """
     Least-squares fit of decaying cosines to one or several free decays; omega and zeta are common.
@@ -3447,6 +4366,10 @@ def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.Arr
         ArgumentError: Records as in arma_driven, a start or option outside its range, or too few samples.
     
     Source: spec 8; L. Ljung, System Identification, ch. 7; G. Golub, V. Pereyra 2003.
+    """
+def gaussian_low_pass(profile_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], spacing_mm: typing.SupportsFloat | typing.SupportsIndex, cutoff_mm: typing.SupportsFloat | typing.SupportsIndex) -> numpy.ndarray:
+    """
+    Gaussian filter of ISO 16610-21: what is longer than the cut-off, (n,), mm.
     """
 def grid_polynomial(modes: collections.abc.Sequence[Mode], period_s: typing.SupportsFloat | typing.SupportsIndex) -> Shaper:
     """
@@ -3518,6 +4441,25 @@ def interpolate_program(program: ProgramText, model: ControllerModel) -> Interpo
     """
     The same by full interpolation, every set-point of every step. Raises ArgumentError on a model that no controller can have, or a program of more than 4e9 set-points.
     """
+def line_sections(path: Path, ranges: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]]) -> list[PathSection]:
+    """
+    The parts of a path that come from source lines, pairs of first and last. Raises ArgumentError if a range runs backwards or two overlap.
+    """
+def linear_model(parameters: FeedDriveParameters) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]]:
+    """
+    The drive as x' = A x + B w, y = C x + D w with inputs linear between the set-points.
+    
+    Args:
+        parameters: Without friction other than viscous, backlash and force limit.
+    
+    Returns:
+        A, B, C, D. Input 0 is the set-point; input 1, only with acceleration feed-forward, the speed of the set-points,
+        whose sample is the difference to the one before over the period. The output is the response. Lengths in any one
+        unit, time in s.
+    
+    Raises:
+        ArgumentError: The drive is not linear.
+    """
 def matrix_exponential(matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
     Matrix exponential, balanced, by scaling and squaring.
@@ -3525,6 +4467,10 @@ def matrix_exponential(matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.fl
     Raises:
         ArgumentError: Not square or not finite.
         NumericError: The result exceeds all numbers.
+    """
+def measure_roughness(profile_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], spacing_mm: typing.SupportsFloat | typing.SupportsIndex, cutoff_mm: typing.SupportsFloat | typing.SupportsIndex, lambda_s_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Roughness:
+    """
+    Ra, Rz and Wa of an evenly spaced profile (n,), mm, one cut-off at either end left out. Raises ArgumentError if less than one sampling length remains.
     """
 def minimal_branches(first: Mode, second_damping: typing.SupportsFloat | typing.SupportsIndex, ratios: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], max_duration_s: typing.SupportsFloat | typing.SupportsIndex, *, max_abs_sum: typing.SupportsFloat | typing.SupportsIndex = 10.0) -> MinimalBranches:
     """
@@ -3657,6 +4603,10 @@ def negative_zv(mode: Mode) -> Shaper:
         DesignError: The damping is too high for such a shaper.
     
     Source: Singhose, Singer and Seering 1994; the damped solution: this project.
+    """
+def path_sections(path: Path, short_mm: typing.SupportsFloat | typing.SupportsIndex = 0.5) -> list[PathSection]:
+    """
+    The whole path as runs of lines of one direction and of arcs about one centre; neighbours shorter than `short_mm` become one curve.
     """
 def plan_speed(path: Path, limits: MotionLimits) -> SpeedProfile:
     """

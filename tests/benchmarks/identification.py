@@ -1,8 +1,8 @@
-"""Identification of random structures whose truth is known: errors, coverage of the intervals, honesty of the refusals.
+"""Identification of random structures whose truth is known: errors, coverage of intervals, honesty of refusals.
 
-Run from the root of the repository: ``python tests/benchmarks/identification.py``. Each draw is one tap of 2 s on 1 to 4
-modes (20 to 400 Hz, at least 10 % apart, damping .5 to 5 %, stiffnesses within a decade), simulated by SciPy on a grid
-eight times finer, with white noise on response and force.
+Run from the root of the repository: ``python tests/benchmarks/identification.py``. Each draw is one tap of 2 s on 1 to
+4 modes (20 to 400 Hz, at least 10 % apart, damping .5 to 5 %, stiffnesses within a decade), simulated by SciPy on a
+grid eight times finer, with white noise on response and force.
 """
 
 from __future__ import annotations

@@ -31,6 +31,7 @@ class DecayModel final : public identification::SeparableModel {
   [[nodiscard]] Index common() const override { return 0; }
   [[nodiscard]] Index derivatives() const override { return 2 * modes_; }
   [[nodiscard]] Index nonlinear() const override { return 2 * modes_; }
+  [[nodiscard]] bool local_is_constant() const override { return false; }
 
   void fill(const VectorXd& theta, std::size_t record, MatrixXd& columns) const override {
     const Index n = samples(record);

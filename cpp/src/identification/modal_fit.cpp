@@ -169,6 +169,7 @@ class TapModel final : public identification::SeparableModel {
   [[nodiscard]] Index common() const override { return modes_ + extra(); }
   [[nodiscard]] Index derivatives() const override { return 2 * modes_; }
   [[nodiscard]] Index nonlinear() const override { return 2 * modes_; }
+  [[nodiscard]] bool local_is_constant() const override { return true; }
 
   void fill(const VectorXd& theta, std::size_t record, MatrixXd& columns) const override {
     const TapSignals& tap = taps_[record];

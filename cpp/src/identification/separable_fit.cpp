@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 constexpr double dependent = 1e-11;
 // Steps of theta (all logarithms) and predicted gains below which the minimum is reached.
 constexpr double step_floor = 1e-11;
-constexpr double gain_floor = 1e-15;
+constexpr double gain_floor = 1e-12;
 constexpr double exact_fit = 1e-26;  // of the response's sum of squares
 constexpr double largest_step = 0.5;
 
@@ -63,7 +63,7 @@ class Linearisation {
     for (std::size_t r = 0; r < model_.records(); ++r) {
       columns_[r].resize(model_.samples(r), model_.width());
       model_.fill(theta, r, columns_[r]);
-      triangulate(columns_[r]);
+      triangulate_record(r);
       stack.middleRows(static_cast<Index>(r) * rows, rows) = columns_[r].block(local, local, rows, rows);
     }
     Linearised result;
@@ -79,7 +79,7 @@ class Linearisation {
     joint.leftCols(common) = stack.leftCols(common);
     joint.rightCols(1) = stack.rightCols(1);
     for (std::size_t r = 0; r < model_.records(); ++r) {
-      const MatrixXd& factor = columns_[r];
+      const MatrixXd& factor = columns_[r];  // its upper triangle by now
       VectorXd right = factor.col(factor.cols() - 1).head(local);
       if (common > 0) right -= factor.block(0, local, local, common) * result.common;
       result.dependent_columns = result.dependent_columns || has_dependent(factor, local);
@@ -98,8 +98,34 @@ class Linearisation {
   }
 
  private:
+  /// Local columns that never change are factorised once; what they can follow is then taken out of the others.
+  void triangulate_record(std::size_t r) {
+    MatrixXd& columns = columns_[r];
+    const Index local = model_.local();
+    if (local == 0 || !model_.local_is_constant()) {
+      triangulate(columns);
+      return;
+    }
+    if (bases_.size() <= r) {
+      MatrixXd own = columns.leftCols(local);
+      const Eigen::HouseholderQR<MatrixXd> qr(own);
+      bases_.emplace_back(qr.householderQ() * MatrixXd::Identity(own.rows(), local));
+      factors_.emplace_back(qr.matrixQR().topRows(local).triangularView<Eigen::Upper>());
+    }
+    const Index others = columns.cols() - local;
+    MatrixXd rest = columns.rightCols(others);
+    const MatrixXd followed = bases_[r].transpose() * rest;
+    rest.noalias() -= bases_[r] * followed;
+    triangulate(rest);
+    columns.topLeftCorner(local, local) = factors_[r];
+    columns.topRightCorner(local, others) = followed;
+    columns.block(local, local, others, others) = rest.topRows(others);
+  }
+
   const SeparableModel& model_;
   std::vector<MatrixXd> columns_;
+  std::vector<MatrixXd> bases_;    // per record, orthonormal, of the local columns
+  std::vector<MatrixXd> factors_;  // and their triangular factors
 };
 
 /// The step of theta that minimises |target - factor*step|^2 + damping*|scaled step|^2.

@@ -27,6 +27,8 @@ class SeparableModel {
   [[nodiscard]] virtual Eigen::Index nonlinear() const = 0;
   /// Fills (samples x width()): local | common | derivative columns | response.
   virtual void fill(const Eigen::VectorXd& theta, std::size_t record, Eigen::MatrixXd& columns) const = 0;
+  /// Whether the local columns are the same at every theta.
+  [[nodiscard]] virtual bool local_is_constant() const = 0;
   /// What the derivative columns are multiplied with (derivatives() x nonlinear()) to be d response/d theta.
   [[nodiscard]] virtual Eigen::MatrixXd combine(const Eigen::VectorXd& theta, const Eigen::VectorXd& local_values,
                                                 const Eigen::VectorXd& common_values) const = 0;

@@ -14,7 +14,7 @@ from shapegcode.identification.checks import Prepared, prepare
 from shapegcode.identification.model_search import Fit, Search, Starts, evidence_of, search, starts_of
 from shapegcode.identification.record import Record, RecordError
 from shapegcode.identification.results import Identification, IdentifiedMode
-from shapegcode.identification.support import ACCEPTED_PERCENT, Doubts, estimates_of, refusal_of, rivals_of
+from shapegcode.identification.support import ACCEPTED_PERCENT, Doubts, Rival, estimates_of, refusal_of, rivals_of
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -24,7 +24,12 @@ _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which
 _LEAST_SWINGS = 2.0  # of a mode in the record
 _HIGHEST_SHARE = 0.45  # of the sampling rate: the force between samples is known up to there
 _CHART_ORDERS = 20
-_CLEARLY = 6.0  # difference of evidence: odds of twenty to one
+_STEPS = 60  # of a fit
+_QUICK_STEPS = 15  # of one that only shows where a mode may be
+# Difference of evidence (twice the logarithm of the odds) above which another course of the force is taken, and down to
+# which it may have been.
+_CLEARLY = 30.0
+_POSSIBLY = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +45,13 @@ class _Taps:
     hold: str
 
     def fit(self, starts: Starts, coloured: bool = False) -> _core.ModalFit:
-        return self._fit(self.responses, starts, coloured, self.force_noise_n)
+        return self._fit(self.responses, starts, coloured, self.force_noise_n, _STEPS)
 
     def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> _core.ModalFit:
-        return self._fit(self.responses if responses is None else responses, starts, False, 0.0)
+        return self._fit(self.responses if responses is None else responses, starts, False, 0.0, _QUICK_STEPS)
 
     def _fit(
-        self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, force_noise_n: float
+        self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, force_noise_n: float, steps: int
     ) -> _core.ModalFit:
         omega, zeta = np.array(starts).T
         return _core.fit_modes(
@@ -59,10 +64,18 @@ class _Taps:
             hold=self.hold,
             force_noise_n=force_noise_n,
             coloured_residuals=coloured,
+            most_iterations=steps,
         )
 
     def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
         return _core.stabilisation_poles(self.responses, most, self.forces)
+
+    def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
+        omega, zeta = np.array(candidates).T
+        ranking = _core.rank_modes(
+            self.responses, self.period_s, omega, zeta, kept + 1, self.forces, self.quantity, kept
+        )
+        return [int(index) for index in ranking.chosen]
 
     def record(self, index: int) -> _Taps:
         return replace(self, forces=[self.forces[index]], responses=[self.responses[index]])
@@ -77,17 +90,24 @@ class _Decays:
     band_hz: tuple[float, float]
 
     def fit(self, starts: Starts, coloured: bool = False) -> _core.DecayFit:
-        return self._fit(self.responses, starts, coloured)
+        return self._fit(self.responses, starts, coloured, _STEPS)
 
     def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> _core.DecayFit:
-        return self._fit(self.responses if responses is None else responses, starts, False)
+        return self._fit(self.responses if responses is None else responses, starts, False, _QUICK_STEPS)
 
-    def _fit(self, responses: Sequence[FloatArray], starts: Starts, coloured: bool) -> _core.DecayFit:
+    def _fit(self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, steps: int) -> _core.DecayFit:
         omega, zeta = np.array(starts).T
-        return _core.fit_decay(list(responses), self.period_s, omega, zeta, coloured_residuals=coloured)
+        return _core.fit_decay(
+            list(responses), self.period_s, omega, zeta, coloured_residuals=coloured, most_iterations=steps
+        )
 
     def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
         return _core.stabilisation_poles(self.responses, most)
+
+    def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
+        omega, zeta = np.array(candidates).T
+        ranking = _core.rank_modes(self.responses, self.period_s, omega, zeta, kept + 1, kept=kept)
+        return [int(index) for index in ranking.chosen]
 
     def record(self, index: int) -> _Decays:
         return replace(self, responses=[self.responses[index]])
@@ -120,24 +140,31 @@ def identify(
         raise RecordError("; ".join(f"{refused.source}: {refused.reason}" for refused in ready.refused))
     problem = _problem(ready, band_hz)
     models = _search(problem, most_modes, modes)
-    if isinstance(problem, _Taps):
-        problem, models = _better_hold(problem, models, most_modes, modes)
-    return _result(ready, problem, models, modes or models.order, accepted_percent)
+    rivals: list[Rival] = []
+    if isinstance(problem, _Taps) and models.fits:
+        problem, models, rivals = _held(problem, models, most_modes, modes)
+    return _result(ready, problem, models, modes or models.order, rivals, accepted_percent)
 
 
-def _better_hold(problem: _Taps, models: Search, most_modes: int, modes: int | None) -> tuple[_Taps, Search]:
-    """The same with another course of the force between its samples, where the data clearly ask for it.
+def _held(problem: _Taps, models: Search, most_modes: int, modes: int | None) -> tuple[_Taps, Search, list[Rival]]:
+    """The course of the force between its samples for which the data speak, and what else it may have been.
 
-    A recorder with an anti-aliasing filter gives a band-limited force. A simulation may have one that is linear between
-    samples, or single blows; the mass differs by (pi f/rate)^2/3 and more.
+    A recorder with an anti-aliasing filter gives a band-limited force, which is taken unless the data clearly ask for
+    another one: a simulation may have one that is linear between samples, or single blows. The mass differs by
+    (pi f/rate)^2/3 and more.
     """
     best = problem, models
-    for hold in ("linear", "impulse"):
+    rivals: list[Rival] = []
+    order = modes or max(models.order, 1)
+    for hold, course in (("linear", "straight from sample to sample"), ("impulse", "as a blow at each sample")):
         other = replace(problem, hold=hold)
-        fits = [other.fit(starts_of(fit)) for fit in models.fits]
-        if min(map(evidence_of, fits), default=np.inf) < min(best[1].evidence) - _CLEARLY:
+        fit = other.fit(starts_of(models.fits[order - 1]))
+        lead = evidence_of(models.fits[order - 1]) - evidence_of(fit)
+        if lead > _CLEARLY and evidence_of(fit) < min(best[1].evidence):
             best = other, _search(other, most_modes, modes)
-    return best
+        elif lead > -_POSSIBLY:
+            rivals.append(Rival(fit, f"if the force ran {course}", "sample faster"))
+    return *best, rivals
 
 
 def _problem(ready: Prepared, band_hz: tuple[float, float] | None) -> _Taps | _Decays:
@@ -173,7 +200,12 @@ def _search(problem: _Taps | _Decays, most_modes: int, modes: int | None) -> Sea
 
 
 def _result(
-    ready: Prepared, problem: _Taps | _Decays, models: Search, order: int, accepted_percent: float
+    ready: Prepared,
+    problem: _Taps | _Decays,
+    models: Search,
+    order: int,
+    rivals: Sequence[Rival],
+    accepted_percent: float,
 ) -> Identification:
     warnings = [*ready.warnings, *(f"{refused.source}: not used: {refused.reason}" for refused in ready.refused)]
     evidence = dict(enumerate(models.evidence))
@@ -196,9 +228,10 @@ def _result(
         limit_percent=accepted_percent,
         band_hz=problem.band_hz,
         record_s=max(len(response) for response in problem.responses) * problem.period_s,
-        rivals=rivals_of(order, models.fits),
+        rivals=[*rivals_of(order, models.fits), *rivals],
     )
-    supported, refused = [], []
+    supported: list[IdentifiedMode] = []
+    refused: list[IdentifiedMode] = []
     for estimates in estimates_of(fit, _alone(problem, fit)):
         reason = refusal_of(estimates, doubts)
         mode = IdentifiedMode(

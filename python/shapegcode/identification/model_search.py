@@ -23,25 +23,13 @@ Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
 _LEAST_SHARE = 1e-6
 _START_DAMPING = (0.01, 0.05)
 _PEAKS = 2  # of the residual's spectrum that are tried
+_POOL_ORDERS = 20  # of the stabilisation chart
+_MOST_DAMPING = 0.7  # of a pole to begin with
 # Two models in a row that the data do not ask for end the search: one may only have missed its place.
 _PATIENCE = 2
 
 
-class Fit(Protocol):
-    """What the search needs of a fit."""
-
-    @property
-    def omega_rad_s(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def damping_ratio(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def sum_of_squares(self) -> float: ...  # noqa: D102
-    @property
-    def samples(self) -> int: ...  # noqa: D102
-    @property
-    def parameters(self) -> int: ...  # noqa: D102
-    @property
-    def fitted(self) -> tuple[FloatArray, ...]: ...  # noqa: D102
+Fit = _core.ModalFit | _core.DecayFit
 
 
 class Problem(Protocol):
@@ -59,6 +47,8 @@ class Problem(Protocol):
     def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> Fit: ...  # noqa: D102
 
     def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]: ...  # noqa: D102
+
+    def rank(self, candidates: Starts, kept: int) -> Sequence[int]: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,9 +85,9 @@ def search(problem: Problem, most_modes: int) -> Search:
     samples = sum(len(response) for response in problem.responses)
     evidence = [_evidence(squares, samples, len(problem.responses), 0)]
     fits: list[Fit] = []
-    poles = problem.poles(most_modes)
+    pool = _pool(problem)
     while len(fits) < most_modes:
-        best = _next_fit(problem, fits[-1] if fits else None, poles[len(fits)])
+        best = _next_fit(problem, fits[-1] if fits else None, pool)
         if best is None:
             break
         explained = (fits[-1].sum_of_squares if fits else squares) - best.sum_of_squares
@@ -120,8 +110,22 @@ def _evidence(squares: float, samples: int, parameters: int, modes: int) -> floa
     return float(samples * np.log(max(squares / samples, tiny)) + (parameters + modes) * np.log(samples))
 
 
-def _next_fit(problem: Problem, last: Fit | None, poles: npt.NDArray[np.complex128]) -> Fit | None:
-    """The best fit with one mode more than `last`."""
+def _pool(problem: Problem) -> Starts:
+    """Poles of the stabilisation chart that lie in the band: each mode is among them several times."""
+    low, high = problem.band_hz
+    found: Starts = []
+    shortest = min(len(response) for response in problem.responses)
+    for of_model in problem.poles(max(1, min(_POOL_ORDERS, (shortest - 8) // 8))):
+        omega, zeta = _core.poles_to_modes(list(of_model), problem.period_s)
+        found += [(w, z) for w, z in zip(map(float, omega), map(float, zeta), strict=True) if z < _MOST_DAMPING]
+    return [(w, z) for w, z in found if low <= w / (2.0 * np.pi) <= high]
+
+
+def _next_fit(problem: Problem, last: Fit | None, pool: Starts) -> Fit | None:
+    """The best fit with one mode more than `last`.
+
+    The further mode is begun at the peaks of what `last` leaves, and at the pole of the pool that explains most of it.
+    """
     so_far = [] if last is None else starts_of(last)
     fitted = [np.zeros(1)] * len(problem.responses) if last is None else last.fitted
     residuals = [response - model for response, model in zip(problem.responses, fitted, strict=True)]
@@ -130,11 +134,11 @@ def _next_fit(problem: Problem, last: Fit | None, poles: npt.NDArray[np.complex1
         alone = [_attempt(partial(problem.fit_quickly, [(omega, zeta)], residuals)) for zeta in _START_DAMPING]
         usable = [fit for fit in alone if fit is not None]
         if usable:
-            fit = min(usable, key=lambda fit: fit.sum_of_squares)
-            candidates.append([*so_far, (float(fit.omega_rad_s[0]), float(fit.damping_ratio[0]))])
-    omega, zeta = _core.poles_to_modes(list(poles), problem.period_s)
-    if len(omega) == len(so_far) + 1:
-        candidates.append(list(zip(map(float, omega), map(float, zeta), strict=True)))
+            candidates.append([*so_far, *starts_of(min(usable, key=lambda fit: fit.sum_of_squares))])
+    if pool:
+        chosen = problem.rank([*so_far, *pool], len(so_far))
+        if len(chosen) > len(so_far):
+            candidates.append([*so_far, pool[chosen[len(so_far)] - len(so_far)]])
     fits = [fit for starts in candidates if (fit := _attempt(partial(problem.fit_quickly, starts))) is not None]
     if not fits:
         return None
@@ -143,7 +147,7 @@ def _next_fit(problem: Problem, last: Fit | None, poles: npt.NDArray[np.complex1
 
 def starts_of(fit: Fit) -> Starts:
     """The modes of a fit, for another one to begin with."""
-    return list(zip(map(float, fit.omega_rad_s), map(float, fit.damping_ratio), strict=True))
+    return [(float(omega), float(zeta)) for omega, zeta in zip(fit.omega_rad_s, fit.damping_ratio, strict=True)]
 
 
 def _attempt(task: Callable[[], Fit]) -> Fit | None:

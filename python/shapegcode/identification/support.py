@@ -15,7 +15,7 @@ from shapegcode.identification.results import Estimate
 
 FloatArray = npt.NDArray[np.float64]
 
-#: A damping ratio or stiffness less certain than this is refused: an error of 10 % is then four standard deviations off.
+#: A damping ratio or stiffness less certain than this is refused: 10 % are then four standard deviations off.
 ACCEPTED_PERCENT = 5.0
 _FREQUENCY_PERCENT = 2.0
 _NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode that a shaper could deal with
@@ -47,6 +47,21 @@ class Estimates:
 
 
 @dataclass(frozen=True, eq=False)
+class Rival:
+    """Another model that the data do not clearly refuse.
+
+    Attributes:
+        fit: of the same records.
+        condition: under which it would be the right one.
+        remedy: what would decide.
+    """
+
+    fit: Fit
+    condition: str
+    remedy: str
+
+
+@dataclass(frozen=True, eq=False)
 class Doubts:
     """What a mode must stand up to.
 
@@ -54,16 +69,16 @@ class Doubts:
         limit_percent: least certainty of damping ratio and stiffness.
         band_hz: frequencies that were searched.
         record_s: length of the longest record.
-        rivals: fits of nearly the same evidence.
+        rivals: models of nearly the same evidence.
     """
 
     limit_percent: float
     band_hz: tuple[float, float]
     record_s: float
-    rivals: Sequence[Fit] = ()
+    rivals: Sequence[Rival] = ()
 
 
-def estimates_of(fit: _core.ModalFit | _core.DecayFit, alone: Sequence[Fit]) -> list[Estimates]:
+def estimates_of(fit: Fit, alone: Sequence[Fit]) -> list[Estimates]:
     """Values and 95 % intervals of each mode of a fit.
 
     The intervals are those of the fit's covariance, in logarithms. Where taps differ by more than that explains, their
@@ -132,7 +147,7 @@ def _scatter(taps: Sequence[_Logarithms]) -> FloatArray:
     return np.where(more, half, 0.0)
 
 
-def rivals_of(order: int, fits: Sequence[Fit]) -> list[Fit]:
+def rivals_of(order: int, fits: Sequence[Fit]) -> list[Rival]:
     """Models beside the chosen one that the data do not clearly refuse.
 
     That is the one with a mode more, if chance alone would seldom make it fit so much better.
@@ -142,7 +157,9 @@ def rivals_of(order: int, fits: Sequence[Fit]) -> list[Fit]:
         return []
     larger = fits[order]
     gain = chosen.samples * np.log(chosen.sum_of_squares / max(larger.sum_of_squares, np.finfo(float).tiny))
-    return [larger] if gain > stats.chi2.ppf(1.0 - _RIVAL_PROBABILITY, larger.parameters - chosen.parameters) else []
+    if gain <= stats.chi2.ppf(1.0 - _RIVAL_PROBABILITY, larger.parameters - chosen.parameters):
+        return []
+    return [Rival(larger, "with one mode more in the model", "more taps or less noise")]
 
 
 def refusal_of(mode: Estimates, doubts: Doubts) -> str:
@@ -176,16 +193,16 @@ def refusal_of(mode: Estimates, doubts: Doubts) -> str:
 def _rival_refusal(mode: Estimates, doubts: Doubts) -> str:
     for rival in doubts.rivals:
         # A rival that splits the mode in two or lacks it disagrees as much as one can.
-        rows = [_logarithms(rival, i) for i in range(len(rival.omega_rad_s))]
+        rows = [_logarithms(rival.fit, i) for i in range(len(rival.fit.omega_rad_s))]
         nearest = min(rows, key=lambda row: abs(row.values[0] - np.log(mode.frequency_hz.value)))
-        named = (("frequency", mode.frequency_hz, 0), ("damping ratio", mode.damping_ratio, 1))
+        named = [("frequency", mode.frequency_hz, 0), ("damping ratio", mode.damping_ratio, 1)]
         if mode.stiffness_n_per_m is not None:
-            named = (*named, ("stiffness", mode.stiffness_n_per_m, 4))
+            named.append(("stiffness", mode.stiffness_n_per_m, 4))
         for name, estimate, index in named:
             change = 100.0 * abs(float(np.expm1(nearest.values[index] - np.log(estimate.value))))
             if change > doubts.limit_percent:
                 return (
-                    f"{name} would change by {change:.0f} % with one mode more in the model, which the data cannot "
-                    f"decide (limit {doubts.limit_percent:g} %): more taps or less noise"
+                    f"{name} would change by {change:.0f} % {rival.condition}, which the data cannot decide "
+                    f"(limit {doubts.limit_percent:g} %): {rival.remedy}"
                 )
     return ""
