@@ -214,7 +214,9 @@ def _windowed(
             f"{where}: the pulse has {width} samples above a tenth of its peak: below {LEAST_PULSE} its momentum, and "
             "so the mass, is uncertain; sample faster or take a softer tip"
         )
-    strongest = refuse_short(record, response[hit.first :], noise or 0.0, band_hz, warnings)
+    strongest = refuse_short(
+        record, response[hit.first if hit.end - hit.first > LEAST_PULSE else hit.end :], noise or 0.0, band_hz, warnings
+    )
     reached = excited_hz(force, record.period_s)
     wanted = band_hz or strongest
     if reached < wanted:

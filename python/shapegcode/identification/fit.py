@@ -15,7 +15,14 @@ from shapegcode.identification.checks import Prepared, prepare
 from shapegcode.identification.model_search import Fit, Search, Starts, evidence_of, search, starts_of
 from shapegcode.identification.record import Record, RecordError
 from shapegcode.identification.results import Identification, IdentifiedMode
-from shapegcode.identification.support import ACCEPTED_PERCENT, Doubts, estimates_of, refusal_of, rivals_of
+from shapegcode.identification.support import (
+    ACCEPTED_PERCENT,
+    Doubts,
+    estimates_of,
+    is_background,
+    refusal_of,
+    rivals_of,
+)
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -238,6 +245,8 @@ def _result(
     supported: list[IdentifiedMode] = []
     refused: list[IdentifiedMode] = []
     for estimates in estimates_of(fit, _alone(problem, fit), others, aliased):
+        if is_background(estimates, doubts):
+            continue
         reason = refusal_of(estimates, doubts)
         mode = IdentifiedMode(
             estimates.frequency_hz,
@@ -278,9 +287,11 @@ def _aliased(problem: _Taps) -> Callable[[float], float]:
 
     Without an anti-aliasing filter the spectrum does not end before half the rate: what it still has there, beyond
     noise, tells how much came from above. A pulse with kinks, a half sine, falls with the square of the frequency: what
-    folds down to the lower frequencies from both sides of the rate is some two thirds of what is left at half of it.
+    folds down to the lower frequencies from both sides of the rate is some two thirds of what is left at half of it. A
+    force without any noise that runs straight from sample to sample is no recording: it holds nothing else.
     """
-    if problem.hold == "impulse":
+    is_simulated = problem.force_noise_n == 0.0 and problem.hold != "band_limited"
+    if problem.hold == "impulse" or is_simulated:
         return _never_aliased
     pulse = np.trim_zeros(problem.forces[0])
     spectrum = np.abs(np.fft.rfft(pulse, _SPECTRUM))

@@ -185,11 +185,15 @@ def rivals_of(order: int, fits: Sequence[Fit]) -> list[Rival]:
     return [Rival(larger, "with one mode more in the model", "more taps or less noise")]
 
 
+def is_background(mode: Estimates, doubts: Doubts) -> bool:
+    """Whether a part of the model is drift or lies outside the band: it helps the fit, and is no mode to speak of."""
+    low, high = doubts.band_hz
+    return mode.damping_ratio.value > _NO_VIBRATION or not low <= mode.frequency_hz.value <= high
+
+
 def refusal_of(mode: Estimates, doubts: Doubts) -> str:
     """Why the data do not support a mode; empty if they do."""
     frequency, damping, stiffness = mode.frequency_hz, mode.damping_ratio, mode.stiffness_n_per_m
-    if damping.value > _NO_VIBRATION:
-        return f"damping ratio {damping.value:.2f}: drift or background, no vibration (limit {_NO_VIBRATION:g})"
     if frequency.value * doubts.record_s < _LEAST_SWINGS:
         return (
             f"{frequency.value * doubts.record_s:.1f} swings in the record of {doubts.record_s:.3g} s: "
@@ -201,8 +205,6 @@ def refusal_of(mode: Estimates, doubts: Doubts) -> str:
             f"still at {100.0 * lasting:.0f} % after {doubts.record_s:.3g} s: a steady disturbance (mains, pump, "
             "spindle), or a record too short for a mode of so little damping"
         )
-    if not doubts.band_hz[0] <= frequency.value <= doubts.band_hz[1]:
-        return f"outside the band of {doubts.band_hz[0]:.4g} to {doubts.band_hz[1]:.4g} Hz that was searched"
     limits = (
         ("frequency", frequency, min(_FREQUENCY_PERCENT, doubts.limit_percent)),
         ("damping ratio", damping, doubts.limit_percent),
