@@ -147,6 +147,26 @@ def test_unknown_units_stay_unknown() -> None:
     assert read_label("force [V]").unknown_unit == "V"
 
 
+@pytest.mark.parametrize("unit", ["V", "mV", "pC", "lb", "kgf", "counts", "%FS", "% FS"])
+def test_a_unit_that_is_not_converted_is_no_part_of_a_name(unit: str, tmp_path: Path) -> None:
+    for name in ("force", "acc_x", "Hammer"):
+        for sign in ("_", " ", "/"):
+            assert read_label(f"{name}{sign}{unit}").unknown_unit == unit
+    with pytest.raises(RecordError, match=rf"the unit '{unit}' is not known.*--force-scale, --response-scale"):
+        read(tmp_path, f"time_s,force_{unit},acc_x_m/s^2\n" + rows())
+    record = only(read(tmp_path, f"time_s,force_{unit},acc_x_m/s^2\n" + rows(), force_scale=2.0))
+    np.testing.assert_array_equal(record.force_n, 2.0 * FORCE)
+    assert not record.warnings
+
+
+def test_names_that_look_like_units_stay_names(tmp_path: Path) -> None:
+    for name in ("x_v", "acc_a", "force hammer", "acc 2", "sensor a", "acc_x", "v"):
+        assert not read_label(name).unknown_unit
+    assert read_label("x_v").measures == "velocity"
+    assert (read_label("x_V").measures, read_label("x_V").unknown_unit) == ("response", "V")
+    assert only(read(tmp_path, "time_s,force_N,acc_x_m/s^2\n" + rows())).axis == "x"
+
+
 def test_without_units_si_is_taken_and_said(tmp_path: Path) -> None:
     record = only(read(tmp_path, "t,f,a\n" + rows()))
     np.testing.assert_array_equal(record.response, RESPONSE)
