@@ -338,6 +338,30 @@ BAD: dict[str, tuple[str | bytes, dict[str, Any], str]] = {
 }
 
 
+def test_points_for_thousands(tmp_path: Path) -> None:
+    values = [f"{k:,}".replace(",", ".") + f",{k % 7}" for k in range(990, 1000 + COUNT)][-COUNT:]
+    values[3], values[5] = "-1.234.567,25", "+1.000,5e-2"
+    lines = [f"{k};{value};{k},5" for k, value in enumerate(values)]
+    record = only(read(tmp_path, "t_ms;f_N;a_g\n" + "\n".join(lines) + "\n"))
+    expected = [k + k % 7 / 10 for k in range(1000, 1000 + COUNT)]
+    expected[3], expected[5] = -1234567.25, 10.005
+    np.testing.assert_allclose(record.force_n, expected, rtol=1e-15)
+    for bad in ("1.26,5", "1.2655,1", "12.345.6,1", "1234.567,8"):
+        with pytest.raises(RecordError, match=rf":5: column 2 \(f_N\) '{bad}' is not a finite number"):
+            read(tmp_path, "t_ms;f_N;a_g\n" + "\n".join(lines).replace(values[3], bad) + "\n")
+
+
+def test_times_of_the_day(tmp_path: Path) -> None:
+    lines = [f"10:15:00,{500 * k:06d};{k},0;{k},5" for k in range(COUNT)]
+    text = "Zeit;Kraft [N];Beschleunigung Y [m/s²]\n" + "\n".join(lines) + "\n"
+    with pytest.raises(RecordError, match=r":2: column 1 \(Zeit\) '10:15:00,000000' is a time of the day.*--period"):
+        read(tmp_path, text)
+    record = only(read(tmp_path, text, period_s=5e-4))
+    assert (record.period_s, record.start_s, record.axis) == (5e-4, 0.0, "y")
+    np.testing.assert_array_equal(record.response, np.arange(COUNT) + 0.5)
+    assert any("the stated period of 0.0005 s is taken" in text for text in record.warnings)
+
+
 @pytest.mark.parametrize("name", BAD)
 def test_bad_text_is_refused_with_line_and_cell(name: str, tmp_path: Path) -> None:
     content, options, message = BAD[name]
