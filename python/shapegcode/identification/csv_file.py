@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapegcode.identification.read import ReadOptions, stated_unit
+from shapegcode.identification.read_options import ReadOptions, stated_unit
 from shapegcode.identification.record import FloatArray, Quantity, Record, RecordError
 from shapegcode.identification.sampling import UnevenTimeError, even_period
 from shapegcode.identification.text_layout import (

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.shaping.band import NARROW_PERCENT, ModeBand, parse_mode_band
 from shapegcode.shaping.choice import Recommendation, choose
+from shapegcode.shaping.options import DesignOptions
 from shapegcode.shaping.ranking import SAME
-from shapegcode.shaping.registry import DesignOptions
 from shapegcode.shaping.robust_search import Task, shortest_below
 from shapegcode.shaping.taps import parse_taps
 
