@@ -338,7 +338,9 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
     reader = _Reader(path, layout, options)
     if layout.skipped:
         lines = "line" if layout.skipped == 1 else "lines"
-        reader.warnings.append(f"{layout.skipped} {lines} before the header in line {layout.header_line} left out")
+        reader.warnings.append(
+            f"note: {path}: {layout.skipped} {lines} before the header in line {layout.header_line} left out"
+        )
     time = reader.time()
     force = reader.force()
     taken = {column.index for column in (time, force) if column is not None}
@@ -346,7 +348,7 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
     body = _Body(path, data, layout)
     if time is not None and options.period_s is not None and is_clock_time(body.first_cell(time.index)):
         reader.warnings.append(
-            f"{time.label.text!r} holds times of the day, which are not read: the stated period of "
+            f"note: {path}: {time.label.text!r} holds times of the day, which are not read: the stated period of "
             f"{options.period_s:.6g} s is taken"
         )
         time = None
