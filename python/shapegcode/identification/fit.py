@@ -227,15 +227,16 @@ def _result(
             f"what the model leaves is no white noise (autocorrelation {fit.residual_autocorrelation:.2f}): the "
             "intervals allow for it; other causes than modes, or a mode that is not linear"
         )
+    aliased = _aliased(problem) if isinstance(problem, _Taps) else _never_aliased
     doubts = Doubts(
         limit_percent=accepted_percent,
         band_hz=problem.band_hz,
         record_s=max(len(response) for response in problem.responses) * problem.period_s,
         rivals=rivals_of(order, models.fits),
+        aliased=aliased,
     )
     supported: list[IdentifiedMode] = []
     refused: list[IdentifiedMode] = []
-    aliased = _aliased(problem) if isinstance(problem, _Taps) else _never_aliased
     for estimates in estimates_of(fit, _alone(problem, fit), others, aliased):
         reason = refusal_of(estimates, doubts)
         mode = IdentifiedMode(

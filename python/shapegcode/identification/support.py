@@ -74,12 +74,14 @@ class Doubts:
         band_hz: frequencies that were searched.
         record_s: length of the longest record.
         rivals: models of nearly the same evidence.
+        aliased: see `estimates_of`.
     """
 
     limit_percent: float
     band_hz: tuple[float, float]
     record_s: float
     rivals: Sequence[Rival] = ()
+    aliased: Callable[[float], float] = lambda _hz: 0.0
 
 
 def estimates_of(
@@ -208,6 +210,13 @@ def refusal_of(mode: Estimates, doubts: Doubts) -> str:
     )
     for name, estimate, limit in limits:
         if estimate is not None and not estimate.uncertainty_percent <= limit:
+            folded = 100.0 * doubts.aliased(frequency.value)
+            if name == "stiffness" and folded > 0.5 * limit:
+                return (
+                    f"{name} is known to {estimate.uncertainty_percent:.2g} % only (limit {limit:g} %): the pulse has "
+                    "few samples, and without an anti-aliasing filter they do not tell its force at this frequency; "
+                    "sample faster or take a softer tip"
+                )
             known = f"to {estimate.uncertainty_percent:.2g} % only"
             if estimate.uncertainty_percent > _NOT_AT_ALL_PERCENT:
                 known = "not at all"
