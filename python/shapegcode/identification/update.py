@@ -27,6 +27,8 @@ SAME_MODE = 0.1
 _MEASURED = "half of the 95 % interval"
 _DIGITS = 7
 _NO_PAIR = 1e3
+_SHARE_DIGITS = 4
+_SUM_SLACK = 1e-3  # of the participations: rounding
 _KEYS = (
     "frequency_hz",
     "damping_ratio",
@@ -89,7 +91,8 @@ def update_modes(
     A mode whose frequency is within 10 % of one in the file takes its table: values and uncertainties change where
     they stand, participation, `frequency_over` and every comment line stay, and so does an uncertainty of the
     frequency that somebody stated wider than it was measured. Other tables of the axis' modes go, other modes get a
-    table of their own. Putting the same modes in twice gives the same text.
+    table of their own, whose participation is its share of the residues. Putting the same modes in twice
+    gives the same text.
 
     Args:
         text: of the machine file.
@@ -157,8 +160,10 @@ class _Edit:
                 self.notes.append(f"removed {toml(gone['frequency_hz'])} Hz, which was not found: {toml(gone)}")
         fresh = [mode for number, mode in enumerate(modes) if number not in taken]
         if fresh:
-            self.notes += _shares(modes)
-            self._insert(lines, sorted(kept), [self._table(mode) for mode in fresh])
+            shares, meaning = _shares(modes)
+            share_of = dict(zip(map(id, modes), shares, strict=True))
+            self._insert(lines, sorted(kept), [self._table(mode, share_of[id(mode)], meaning) for mode in fresh])
+        self._tell_sum(modes)
         return "".join(lines)
 
     def check(self, text: str) -> None:
@@ -258,16 +263,26 @@ class _Edit:
         values["source"] = self.source, ""
         return {key: values[key] for key in _KEYS if key in values}
 
-    def _table(self, mode: IdentifiedMode) -> str:
+    def _table(self, mode: IdentifiedMode, share: float, meaning: str) -> str:
         """The lines of a new table."""
-        values = self._values(mode) | {"participation": (1.0, "not measured")}
+        values = self._values(mode) | {"participation": (share, f"{meaning}, not measured")}
         self.expected.append({key: value for key, (value, _) in values.items()})
         self.notes.append(
-            f"{toml(values['frequency_hz'][0])} Hz is new: participation 1, as a tap does not tell how much of the "
-            "axis' motion goes into it"
+            f"{toml(values['frequency_hz'][0])} Hz is new: participation {share:g} ({meaning}), as a tap does not tell "
+            "how much of the axis' motion goes into it"
         )
         lines = [f"[[{self.name}]]", *(_line(key, value, remark) for key, (value, remark) in values.items())]
         return "".join(line + self.newline for line in lines)
+
+    def _tell_sum(self, modes: Sequence[IdentifiedMode]) -> None:
+        """Warn of modes that together would move further than the axis does."""
+        total = sum(float(mode.get("participation", 1.0)) for mode in self.expected)
+        if total > 1.0 + _SUM_SLACK:
+            shares = ", ".join(f"{share:g}" for share in _shares(modes)[0])
+            self.notes.append(
+                f"warning: the participations of the {self.axis.upper()} axis sum to {total:.4g}: those of all modes "
+                f"of one point sum to 1 when the axis moves; by the shares of the modes found they would be {shares}"
+            )
 
     def _insert(self, lines: list[str], kept: list[int], tables: list[str]) -> None:
         """Put new tables behind the last one that stays, or where the first one was, or where the axis ends."""
@@ -296,14 +311,20 @@ class _Edit:
         return self._end(heads[0]) - 1 if heads else len(self.parts) - 1
 
 
-def _shares(modes: Sequence[IdentifiedMode]) -> list[str]:
-    """What participations would follow from the masses."""
+def _shares(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
+    """Participations that sum to 1, and what they are: shares of the residues 1/m, or of the number of modes.
+
+    Those of one point under a motion of its base do so, sum of phi_i Gamma_i = 1, for mode shapes that span the motion.
+    """
     masses = [mode.mass_kg.value for mode in modes if mode.mass_kg is not None]
-    if len(masses) < 2 or len(masses) < len(modes):
-        return []
+    if len(masses) < len(modes):
+        return [_share(1.0 / len(modes))] * len(modes), "equal shares"
     total = sum(1.0 / mass for mass in masses)
-    shares = ", ".join(f"{1.0 / mass / total:.2f}" for mass in masses)
-    return [f"if the mass that the axis moves sits at the tapped point, the participations are {shares}"]
+    return [_share(1.0 / mass / total) for mass in masses], "share of the residues 1/m"
+
+
+def _share(value: float) -> float:
+    return float(f"{value:.{_SHARE_DIGITS}g}")
 
 
 def _matches(modes: Sequence[IdentifiedMode], old_hz: Sequence[float]) -> dict[int, int]:
