@@ -31,6 +31,7 @@ _MOST_SAMPLES = 100_000_000  # set-points of a region: a minute or two of comput
 _CHUNK_SAMPLES = 65_536
 _LONGEST_REST_S = 10.0  # that a vibration is waited for behind a stop
 _LEAST_REST_S = 0.25
+_MILLIONTH = math.log(1e6)
 _MOST_PROFILE_STATIONS = 200_000  # kept of each program for pictures
 _SAME_PLACE_MM = 0.005
 _SHORT_MM = 0.5
@@ -349,8 +350,12 @@ def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
 
 
 def _samples(job: _Job, machine: Machine, plant: str, shaped: bool) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Command and response of a region, and what follows the stop until the vibration has decayed."""
-    rest_s = min(max(vibration_memory_s(machine), _LEAST_REST_S), _LONGEST_REST_S)
+    """Command and response of a region, and what follows the stop until vibration and servo lag have decayed."""
+    memory_s = max(vibration_memory_s(machine), _LEAST_REST_S)
+    if plant != "modal":
+        # The position loop takes the lag off as exp(-gain t): to a millionth, as the vibration.
+        memory_s = max(memory_s, _MILLIONTH / min(machine.controller.position_gain_per_s.as_tuple()))
+    rest_s = min(memory_s, _LONGEST_REST_S)
     model = playing_controller(machine, shaped=shaped)
     options = plant_options(machine, plant, offset=region_offset(job.played, machine))
     options.axis_filters = _core.acceleration_filters(model)

@@ -37,6 +37,12 @@ void DeviationStats::add(double deviation_mm) noexcept {
 
 void DeviationStats::include_missed(double distance_mm) noexcept { max_abs_mm = std::max(max_abs_mm, distance_mm); }
 
+void DeviationStats::include_extremes(const DeviationStats& others) noexcept {
+  max_abs_mm = std::max(max_abs_mm, others.max_abs_mm);
+  most_positive_mm = std::max(most_positive_mm, others.most_positive_mm);
+  most_negative_mm = std::min(most_negative_mm, others.most_negative_mm);
+}
+
 double DeviationStats::rms_mm() const noexcept {
   return count == 0 ? 0.0 : std::sqrt(sum_of_squares_mm2 / static_cast<double>(count));
 }

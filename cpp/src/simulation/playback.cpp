@@ -18,6 +18,11 @@ namespace {
 
 constexpr double recorded_decay_s = 0.25;
 
+// A drive rests when no axis has moved by more than this in so long; one that never does is left after the limit.
+constexpr double resting_mm = 1e-6;
+constexpr double resting_s = 0.05;
+constexpr double longest_lag_s = 10.0;
+
 // What the trackers are given where no contour is measured: they refuse a path without segments.
 const Path& a_point() {
   static const Path point({make_line(Vector3::Zero(), Vector3::Zero(), 0.0)});
@@ -107,6 +112,7 @@ class Recorder {
       }
       figures_.command.count = figures_.response.count;
       figures_.command.include_missed(command_reach_.largest_mm());
+      follow_lag();
       figures_.response.include_missed(response_reach_.largest_mm());
     }
     // A picture of the decay needs what comes after the stop.
@@ -136,6 +142,32 @@ class Recorder {
   }
 
  private:
+  // A drive stands short of the path's end by its lag when the command gets there, and is measured until it has
+  // arrived. Extremes count; the RMS stays that of the time in which the command moves.
+  void follow_lag() {
+    if (plant_.drives().empty()) {
+      return;
+    }
+    detail::AxisPlant plant = plant_;
+    DeviationStats arriving;
+    const double resting_periods = whole_periods(resting_s / options_.period_s);
+    const double most_periods = whole_periods(longest_lag_s / options_.period_s);
+    double rested = 0.0;
+    Vector3 stood = last_;
+    for (double k = 1.0; k <= most_periods && rested < resting_periods; ++k) {
+      const Vector3 response = plant.step(last_);
+      arriving.add(response_tracker_.step(response));
+      response_reach_.step(response, response_tracker_.s_mm());
+      if ((response - stood).cwiseAbs().maxCoeff() > resting_mm) {
+        stood = response;
+        rested = 0.0;
+      } else {
+        ++rested;
+      }
+    }
+    figures_.response.include_extremes(arriving);
+  }
+
   void record(const Vector3& command, const Vector3& response) {
     if (commands_.size() < options_.record_samples) {
       commands_.push_back(command);

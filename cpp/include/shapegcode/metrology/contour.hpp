@@ -19,6 +19,8 @@ struct DeviationStats {
   void add(double deviation_mm) noexcept;
   /// A distance by which the track missed a corner of the path (CornerReach): counts in the largest magnitude alone.
   void include_missed(double distance_mm) noexcept;
+  /// The extremes of others, of samples that do not count in the root mean square.
+  void include_extremes(const DeviationStats& others) noexcept;
   /// Root mean square; 0 without samples.
   [[nodiscard]] double rms_mm() const noexcept;
 };
