@@ -2828,6 +2828,14 @@ class PlaybackOptions:
     def measure_contour(self, arg0: bool) -> None:
         ...
     @property
+    def measure_response_orbit(self) -> bool:
+        """
+        Orbit errors of the response too, where the contour is measured.
+        """
+    @measure_response_orbit.setter
+    def measure_response_orbit(self, arg0: bool) -> None:
+        ...
+    @property
     def mode_tables(self) -> typing.Annotated[list[list[ModeTable]], "FixedSize(3)"]:
         """
         How the modes of X, Y and Z vary with position, one table per mode; none: constant modes.
@@ -2984,6 +2992,11 @@ class PlaybackFigures:
     def response(self) -> DeviationStats:
         """
         Deviation of the response from the path.
+        """
+    @property
+    def response_orbit_error_percent(self) -> list[float]:
+        """
+        The same of the response, where asked for.
         """
     @property
     def settling_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:

@@ -59,7 +59,8 @@ class Simulation:
         regions: in order; their arrays hold at most `record_samples` samples.
         report: `cycle_time_s`, `cutting_time_s`, `plant`, `residual_vibration_um`, `peak_vibration_um`,
             `settling_time_s` (None: not settled within `settling_limit_s`, or no band), `settling_band_um`,
-            `contour_error_um` (command, response), `orbit_error_percent`, `regions`, `warnings`.
+            `contour_error_um` (command, response), `orbit_error_percent` (command) and `response_orbit_error_percent`, one per
+            arc, `regions`, `warnings`.
     """
 
     machine: Machine
@@ -139,6 +140,7 @@ def simulate(
             "response": deviation_um(figures.response for figures in played),
         },
         "orbit_error_percent": [error for figures in played for error in figures.orbit_error_percent],
+        "response_orbit_error_percent": [error for figures in played for error in figures.response_orbit_error_percent],
         "regions": [
             {
                 "lines": [run.first_line, run.last_line],
@@ -160,6 +162,7 @@ def _play(
     options = plant_options(machine, plant, offset=offset)
     options.axis_filters = _core.acceleration_filters(model)
     options.record_samples = record_samples
+    options.measure_response_orbit = True
     options.settling_band_mm = machine.tolerance.residual_floor_um * 1e-3
     options.settling_limit_s = _rest_s(machine, plant)
     if model.motion == _core.MotionKind.look_ahead:

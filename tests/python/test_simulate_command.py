@@ -361,6 +361,21 @@ def test_contour_error_of_a_drive_is_that_of_its_track() -> None:
     assert from_corner > 10 * end
 
 
+def test_orbit_error_of_the_response_is_the_area_of_its_track() -> None:
+    machine = machine_with()
+    text = "%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\nG01 X20. F12000.\nG03 X40. Y20. R20.\nG01 Y40.\nM30\n%\n"
+    report = sg.simulate(sg.Program.from_text(text, machine), machine).report
+    x, y = streamed(text, machine).response_mm[:, :2].T
+    angle = np.arctan2(y - 20.0, x - 20.0)
+    gap = np.abs(20.0**2 - (x - 20.0) ** 2 - (y - 20.0) ** 2)
+    fine = np.linspace(-np.pi / 2, 0.0, 100_001)
+    on_arc = (angle > -np.pi / 2 - 0.1) & (angle < 0.1) & (x >= 19.0)
+    area = np.mean(np.interp(fine, angle[on_arc], gap[on_arc])) * (np.pi / 2) / 2
+    assert report["response_orbit_error_percent"] == [pytest.approx(100 * area / (np.pi * 100.0), rel=0.01)]
+    assert report["response_orbit_error_percent"][0] > 0.02
+    assert report["orbit_error_percent"][0] < 1e-9
+
+
 # ---- pictures, memory --------------------------------------------------------------------------------------
 
 
