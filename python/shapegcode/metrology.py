@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from shapegcode.machine import Machine
 from shapegcode.metrology_report import measurement_report
 from shapegcode.moving_modes import machine_warnings, region_offset, region_range_warnings
 from shapegcode.played import plant_options, playing_controller
-from shapegcode.program import Program
+from shapegcode.program import Program, given_program
 from shapegcode.verify import vibration_memory_s
 
 __all__ = ["MeasuredProgram", "MeasuredRegion", "Measurement", "WallProfile", "measure", "measure_run"]
@@ -145,12 +146,12 @@ class Measurement:
 
 
 def measure(
-    programs: Program | Sequence[Program],
+    programs: Program | str | Path | Sequence[Program | str | Path],
     machine: Machine,
     tool_diameter_mm: float,
     *,
     plant: str = "modal",
-    against: Program | None = None,
+    against: Program | str | Path | None = None,
     lines: Sequence[tuple[int, int]] | None = None,
     band_um: float = 1.0,
     station_spacing_mm: float = 0.05,
@@ -163,7 +164,7 @@ def measure(
     A program that shapegcode wrote is played block by block at its feed, any other with the controller's own motion.
 
     Args:
-        programs: what to measure.
+        programs: what to measure: one or several, or their files.
         machine: controller and modes.
         tool_diameter_mm: of the disc that is swept along the response.
         plant: "modal" or "feed-drive", see `sg.stream`.
@@ -180,11 +181,13 @@ def measure(
     Raises:
         ArgumentError: no program, a value outside its range, lines that hold no cut, or a program that does not cut
             the regions of the one it is measured against.
-        ProgramError: a region takes longer than can be computed.
+        ProgramError: a program cannot be read, or a region takes longer than can be computed.
+        OSError: a file cannot be read.
         MachineError: the machine has no feed drives.
         NumericError: the integrator of a feed drive fails.
     """
-    several = [programs] if isinstance(programs, Program) else list(programs)
+    given = [programs] if isinstance(programs, Program | str | Path) else list(programs)
+    several = [given_program(each, machine) for each in given]
     if not several:
         raise _core.ArgumentError("no program to measure")
     for name, value in (("tool diameter", tool_diameter_mm), ("station spacing", station_spacing_mm)):
@@ -200,7 +203,9 @@ def measure(
         if not (math.isfinite(value) and value >= 0.0):
             raise _core.ArgumentError(f"{name} is {value:g} mm, must be at least 0")
     shaped = [written_by_shapegcode(program) for program in several]
-    if against is None and len(several) > 1 and not shaped[0] and all(shaped[1:]):
+    if against is not None:
+        against = given_program(against, machine)
+    elif len(several) > 1 and not shaped[0] and all(shaped[1:]):
         against = several[0]
     options = _core.MetrologyOptions()
     options.period_s = machine.controller.interpolation_period_s
