@@ -14,6 +14,8 @@ __all__ = ["Feature", "demo_table", "features", "measurement_tables", "next_step
 
 _MOST_SECTIONS = 12
 _SIDES = ("left", "right")
+_HEIGHTS = ("above", "below")
+_SHOWN_UM = 0.005  # less is shown as 0.00
 
 Section = Mapping[str, Any]
 
@@ -108,12 +110,12 @@ def features(sections: Sequence[Section], limit_um: float | None, band_um: float
         yield from _arc_rows(sections)
     yield from _walls(sections)
     yield from _roughness(sections)
-    yield Feature("peak vibration X / Y µm", "", _each(sections, lambda s: _axes(s["peak_vibration_um"], 2)))
+    yield Feature("peak vibration X / Y / Z µm", "", _each(sections, lambda s: _axes(s["peak_vibration_um"], 2)))
     if any(section["residual_vibration_um"] is not None for section in sections):
         yield Feature(
-            "residual at the stop X / Y µm", "", _each(sections, lambda s: _axes(s["residual_vibration_um"], 2))
+            "residual at the stop X / Y / Z µm", "", _each(sections, lambda s: _axes(s["residual_vibration_um"], 2))
         )
-        yield Feature(f"settled to {band_um:g} µm X / Y ms", "", _each(sections, _settling))
+        yield Feature(f"settled to {band_um:g} µm X / Y / Z ms", "", _each(sections, _settling))
 
 
 def demo_table(result: Mapping[str, Any], feed_mm_per_s: float) -> Table:
@@ -157,7 +159,7 @@ def demo_table(result: Mapping[str, Any], feed_mm_per_s: float) -> Table:
             ),
         )
     ends = [row["sections"][2] for row in rows]
-    table.add_row("residual X / Y µm", *_each(ends, lambda s: _axes(s["residual_vibration_um"], 2)))
+    table.add_row("residual X / Y / Z µm", *_each(ends, lambda s: _axes(s["residual_vibration_um"], 2)))
     table.add_row("time s", *(f"{row['time_s']:.3f}" for row in rows))
     return table
 
@@ -187,17 +189,23 @@ def _each(sections: Sequence[Section], text: Any) -> tuple[str, ...]:
 
 
 def _contour(sections: Sequence[Section], limit_um: float | None) -> Iterator[Feature]:
-    def sides(who: str) -> tuple[str, ...]:
-        return _each(
-            sections,
-            lambda s: _pair([s["contour_error_um"][who][side] for side in _SIDES], 2),
-        )
+    def sides(who: str, which: Sequence[str]) -> tuple[str, ...]:
+        return _each(sections, lambda s: _pair([s["contour_error_um"][who][side] for side in which], 2))
+
+    def any_of(who: str, which: Sequence[str]) -> bool:
+        return any(s["contour_error_um"][who][side] >= _SHOWN_UM for s in sections for side in which)
 
     largest = [section["contour_error_um"]["response"]["max"] for section in sections]
     out = tuple(limit_um is not None and value > limit_um for value in largest)
-    yield Feature("contour left / right µm", "0", sides("response"), "" if limit_um is None else f"{limit_um:g}", out)
+    limit = "" if limit_um is None else f"{limit_um:g}"
+    yield Feature("contour error µm", "0", tuple(f"{value:.2f}" for value in largest), limit, out)
+    yield Feature("  left / right µm", "", sides("response", _SIDES))
+    if any_of("response", _HEIGHTS):
+        yield Feature("  above / below µm", "", sides("response", _HEIGHTS))
     yield Feature("  RMS µm", "", _each(sections, lambda s: f"{s['contour_error_um']['response']['rms']:.2f}"))
-    yield Feature("contour of the command µm", "0", sides("command"))
+    yield Feature("command left / right µm", "0", sides("command", _SIDES))
+    if any_of("command", _HEIGHTS):
+        yield Feature("command above / below µm", "0", sides("command", _HEIGHTS))
 
 
 def _arc_rows(sections: Sequence[Section]) -> Iterator[Feature]:
@@ -271,11 +279,11 @@ def _settling(section: Section) -> str:
     if times is None:
         return "–"
     late = section["observed_rest_s"] * 1e3
-    return " / ".join(f"> {late:.0f}" if times[axis] is None else f"{times[axis] * 1e3:.0f}" for axis in "xy")
+    return " / ".join(f"> {late:.0f}" if times[axis] is None else f"{times[axis] * 1e3:.0f}" for axis in "xyz")
 
 
 def _axes(values: Mapping[str, float] | None, decimals: int) -> str:
-    return "–" if values is None else f"{values['x']:.{decimals}f} / {values['y']:.{decimals}f}"
+    return "–" if values is None else " / ".join(f"{values[axis]:.{decimals}f}" for axis in "xyz")
 
 
 def _pair(values: Sequence[float | None], decimals: int) -> str:

@@ -72,7 +72,7 @@ def test_table_like_a_measuring_report(folder: Path, capsys: pytest.CaptureFixtu
     said = capsys.readouterr().out
     for text in (
         "2 arc R20, line 6", "inside wall mm (µm off)", "18.500", "cut-width band left / right µm",
-        "Ra left / right µm", "settled to 1 µm X / Y ms", "next: ",
+        "Ra left / right µm", "settled to 1 µm X / Y / Z ms", "next: ",
         "part.nc: played with the controller's own motion, measured against its own path",
         "shaped.nc: played block by block, as a shaped program, measured against the path of part.nc",
     ):  # fmt: skip
@@ -82,6 +82,28 @@ def test_table_like_a_measuring_report(folder: Path, capsys: pytest.CaptureFixtu
     picture = (folder / "plots" / "measure-part.svg").read_text()
     assert "deviations magnified" in picture
     assert "shaped.nc" in picture
+
+
+def test_deviations_along_z_are_above_and_below(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # A mode of Z alone, a cut along X and a ramp: what Z does is neither left nor right.
+    (folder / "ramp.nc").write_text("%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X10.F3000\nX20.Z-5.\nX30.\nM30\n%\n")
+    modes = [{"frequency_hz": 30.0, "damping_ratio": 0.02}]
+    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
+    data["axes"]["z"]["modes"] = modes
+    data["axes"]["x"]["modes"] = []
+    (folder / "z.toml").write_text(sg.Machine.from_data(data, "z").to_toml())
+    words = ["measure", "ramp.nc", "-m", "z.toml", "--tool-diameter", "3mm", "--set", "tolerance.contour_um=500"]
+    assert main([*words, "--json", "z.json"]) == 0
+    said = capsys.readouterr().out
+    assert "above / below µm" in said
+    assert "peak vibration X / Y / Z µm" in said
+    last = json.loads((folder / "z.json").read_text())["programs"][0]["sections"][2]
+    contour = last["contour_error_um"]["response"]
+    assert (contour["left"], contour["right"]) == (0.0, 0.0)
+    # On a level line the deviation is what Z swings.
+    assert contour["max"] == pytest.approx(max(contour["above"], contour["below"]))
+    assert contour["max"] == pytest.approx(last["peak_vibration_um"]["z"], rel=0.05)
+    assert last["peak_vibration_um"]["z"] > 1.0
 
 
 def test_a_shaped_program_alone_says_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
