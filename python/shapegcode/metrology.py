@@ -104,11 +104,6 @@ class MeasuredProgram:
         """Largest distance of the response from the path, µm."""
         return max((region.figures.response.max_abs_mm for region in self.regions), default=0.0) * 1e3
 
-    @property
-    def judged(self) -> bool:
-        """Whether its path is the programmed one: a shaped program's own path leaves that on purpose."""
-        return not self.shaped or self.against != self.source
-
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
@@ -135,10 +130,20 @@ class Measurement:
     programs: tuple[MeasuredProgram, ...]
 
     @property
+    def judged(self) -> tuple[MeasuredProgram, ...]:
+        """The programs that are held against the tolerance.
+
+        Shaped programs beside the programmed path; what they are compared with only stands beside them. Without such a
+        program the others. A shaped program's own path is not the programmed one: it is not judged against that.
+        """
+        shaped = tuple(each for each in self.programs if each.shaped and each.against != each.source)
+        return shaped or tuple(each for each in self.programs if not each.shaped)
+
+    @property
     def within_tolerance(self) -> bool:
         """Whether the response of every program that is judged stays within `tolerance.contour_um` of the path."""
         limit = self.machine.tolerance.contour_um
-        return all(each.contour_error_um <= limit for each in self.programs if each.judged)
+        return all(each.contour_error_um <= limit for each in self.judged)
 
     def report(self) -> dict[str, Any]:
         """Everything as the JSON of ``shapegcode measure --json`` (docs/metrology.md)."""

@@ -38,7 +38,7 @@ def _program(program: MeasuredProgram, measurement: Measurement) -> dict[str, An
         "shaped": program.shaped,
         "measured_against": program.against,
         "within_tolerance": program.contour_error_um <= measurement.machine.tolerance.contour_um
-        if program.judged
+        if program in measurement.judged
         else None,
         "cutting_time_s": sum(each.duration_s for each in figures),
         "contour_error_um": {

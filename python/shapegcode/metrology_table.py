@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.table import Table
 
-__all__ = ["Feature", "demo_table", "features", "measurement_tables", "next_step", "section_name"]
+__all__ = ["Feature", "demo_table", "features", "measurement_tables", "next_step", "section_name", "verdicts"]
 
 _MOST_SECTIONS = 12
 _SIDES = ("left", "right")
@@ -167,15 +167,49 @@ def demo_table(result: Mapping[str, Any], feed_mm_per_s: float) -> Table:
 def next_step(report: Mapping[str, Any]) -> str:
     """The one thing to do next, in one sentence."""
     programs = report["programs"]
-    if not report["within_tolerance"]:
-        missed = next((each for each in programs if each["shaped"] and each["within_tolerance"] is False), None)
-        if missed is not None:
-            return f"convert again with a smaller --contour-tolerance: {Path(missed['program']).name} leaves the path"
+    if not report["within_tolerance"] and report["plant"] == "feed-drive":
+        return (
+            "the lag of the servo loops takes the table off the path: more feed-forward or position gain, or less feed; "
+            "--plant modal shows what vibration alone does"
+        )
+    missed = next((each for each in programs if each["shaped"] and each["within_tolerance"] is False), None)
+    if missed is not None:
+        return f"convert again with a smaller --contour-tolerance: {Path(missed['program']).name} leaves the path"
     if not any(program["shaped"] for program in programs):
         return "shapegcode convert shapes the program; measure both to see what it gains"
-    if any(program["within_tolerance"] is None for program in programs):
+    if any(program["shaped"] and program["within_tolerance"] is None for program in programs):
         return "measure it --against the original program: its own path is not the programmed one"
-    return "--plots DIR draws the part with its deviations magnified"
+    if "plots" not in report:
+        return "--plots DIR draws the part with its deviations magnified"
+    return "--lines A-B measures the cut of these lines alone, --json FILE keeps every figure"
+
+
+def verdicts(report: Mapping[str, Any]) -> list[str]:
+    """One sentence for each program that is held against the tolerance: what it keeps or by how much it does not."""
+    limit = report["tolerance_um"]["contour"]
+    said = []
+    for program in report["programs"]:
+        if program["within_tolerance"] is None:
+            continue
+        name, largest = Path(program["program"]).name, program["contour_error_um"]["response"]["max"]
+        within = f"leaves the path by {largest:.2f} µm at most"
+        if program["within_tolerance"]:
+            said.append(f"{name}: within tolerance: {within}, limit {limit:g} µm (tolerance.contour_um)")
+            continue
+        said.append(
+            f"{name}: OUT OF TOLERANCE by {largest - limit:.2f} µm: {within}, limit {limit:g} µm "
+            f"(tolerance.contour_um), {_worst_place(program)}"
+        )
+    return said
+
+
+def _worst_place(program: Mapping[str, Any]) -> str:
+    sections = program["sections"]
+    worst = [section["contour_error_um"]["response"]["max"] for section in sections]
+    index = worst.index(max(worst))
+    if worst[index] < program["contour_error_um"]["response"]["max"]:
+        return "at a corner that it rounds off"
+    return f"in section {section_name(sections[index], index)}"
 
 
 def _names(programs: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -64,16 +64,22 @@ def test_exit_code_says_whether_the_tolerance_is_kept(folder: Path, capsys: pyte
     assert measured(capsys, "part.nc", code=1)["within_tolerance"] is False  # 42 um of 20
     assert measured(capsys, "part.nc", "--set", "tolerance.contour_um=50")["within_tolerance"] is True
     assert measured(capsys, "shaped.nc", "--against", "part.nc")["within_tolerance"] is True
+    # The original beside a shaped program is there to compare with.
+    report = measured(capsys, "part.nc", "shaped.nc")
+    assert [each["within_tolerance"] for each in report["programs"]] == [None, True]
+    report = measured(capsys, "part.nc", "shaped.nc", "--set", "tolerance.contour_um=2", code=1)
+    assert [each["within_tolerance"] for each in report["programs"]] == [None, False]
 
 
 def test_table_like_a_measuring_report(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["measure", "part.nc", "shaped.nc", "-m", "vx500", "--tool-diameter", "3mm", "--plots", "plots"]
-    assert main(words) == 1
+    assert main(words) == 0
     said = capsys.readouterr().out
     for text in (
         "2 arc R20, line 6", "inside wall mm (µm off)", "18.500", "cut-width band left / right µm",
         "Ra left / right µm", "settled to 1 µm X / Y / Z ms", "next: ",
-        "part.nc: played with the controller's own motion, measured against its own path",
+        "part.nc: played with the controller's own motion, measured against its own path, to compare the shaped with",
+        "shaped.nc: within tolerance: leaves the path by", "pictures: plots/measure-*",
         "shaped.nc: played block by block, as a shaped program, measured against the path of part.nc",
     ):  # fmt: skip
         assert text in said, text
@@ -104,6 +110,21 @@ def test_deviations_along_z_are_above_and_below(folder: Path, capsys: pytest.Cap
     assert contour["max"] == pytest.approx(max(contour["above"], contour["below"]))
     assert contour["max"] == pytest.approx(last["peak_vibration_um"]["z"], rel=0.05)
     assert last["peak_vibration_um"]["z"] > 1.0
+
+
+def test_exit_code_1_is_explained(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["measure", "part.nc", "-m", "vx500", "--tool-diameter", "3mm"]
+    assert main([*words, "--json", "m.json"]) == 1
+    largest = json.loads((folder / "m.json").read_text())["programs"][0]["contour_error_um"]["response"]["max"]
+    said = capsys.readouterr().out
+    assert f"part.nc: OUT OF TOLERANCE by {largest - 20.0:.2f} µm: leaves the path by {largest:.2f} µm" in said
+    assert "limit 20 µm (tolerance.contour_um), in section 2 arc R20, line 6" in said
+    assert main([*words, "shaped.nc", "--plant", "feed-drive"]) == 1
+    said = capsys.readouterr().out
+    assert "shaped.nc: OUT OF TOLERANCE" in said
+    assert "part.nc: OUT OF TOLERANCE" not in said
+    assert "next: the lag of the servo loops" in said
+    assert "convert again" not in said
 
 
 def test_a_shaped_program_alone_says_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
