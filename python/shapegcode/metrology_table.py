@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from shapegcode.metrology_summary import summary_table
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -39,19 +41,29 @@ class Feature:
     out: tuple[bool, ...] = ()
 
 
-def measurement_tables(report: Mapping[str, Any]) -> list[Table]:
-    """One table for the programs that are measured against the same path, which stand side by side in it."""
+def measurement_tables(report: Mapping[str, Any], *, every_section: bool = False) -> list[Table]:
+    """A summary and a table of sections for the programs that are measured against the same path, side by side.
+
+    Args:
+        report: the JSON of a measurement.
+        every_section: show all sections; False: of many the worst ones.
+    """
     paths = dict.fromkeys(program["measured_against"] for program in report["programs"])
     groups = [[each for each in report["programs"] if each["measured_against"] == path] for path in paths]
-    return [_table(programs, report) for programs in groups]
+    tables = []
+    for programs in groups:
+        if any(program["sections"] for program in programs):
+            tables.append(summary_table(programs, _names(programs), report))
+        tables.append(_table(programs, report, every_section=every_section))
+    return tables
 
 
-def _table(programs: Sequence[Mapping[str, Any]], report: Mapping[str, Any]) -> Table:
-    """One block of rows per section, one column per program; of many sections the worst ones."""
+def _table(programs: Sequence[Mapping[str, Any]], report: Mapping[str, Any], *, every_section: bool) -> Table:
+    """One block of rows per section, one column per program."""
     from rich.table import Table
     from rich.text import Text
 
-    shown, left_out = _shown_sections(programs)
+    shown, left_out = _shown_sections(programs, None if every_section else _MOST_SECTIONS)
     machine, diameter = report["machine"], report["tool_diameter_mm"]
     table = Table(title=f"measured on {machine} with a tool of {diameter:g} mm diameter", pad_edge=False)
     table.add_column("section", overflow="fold")
@@ -75,18 +87,18 @@ def _table(programs: Sequence[Mapping[str, Any]], report: Mapping[str, Any]) -> 
                 end_section=number + 1 == len(rows),
             )  # fmt: skip
     if left_out:
-        table.caption = f"{left_out} more sections: --json lists them"
+        table.caption = f"{left_out} more sections, whose contour error is less: --all shows them, --json lists them"
     return table
 
 
-def _shown_sections(programs: Sequence[Mapping[str, Any]]) -> tuple[list[int], int]:
+def _shown_sections(programs: Sequence[Mapping[str, Any]], most: int | None) -> tuple[list[int], int]:
     """Indices of the sections that a table shows, in order, and how many are left out."""
     count = len(programs[0]["sections"])
     worst = [
         max(program["sections"][index]["contour_error_um"]["response"]["max"] for program in programs)
         for index in range(count)
     ]
-    shown = sorted(sorted(range(count), key=lambda index: -worst[index])[:_MOST_SECTIONS])
+    shown = sorted(sorted(range(count), key=lambda index: -worst[index])[:most])
     return shown, count - len(shown)
 
 
@@ -169,8 +181,8 @@ def next_step(report: Mapping[str, Any]) -> str:
     programs = report["programs"]
     if not report["within_tolerance"] and report["plant"] == "feed-drive":
         return (
-            "the lag of the servo loops takes the table off the path: more feed-forward or position gain, or less feed; "
-            "--plant modal shows what vibration alone does"
+            "the lag of the servo loops takes the table off the path: more feed-forward or position gain, or less "
+            "feed; --plant modal shows what vibration alone does"
         )
     missed = next((each for each in programs if each["shaped"] and each["within_tolerance"] is False), None)
     if missed is not None:

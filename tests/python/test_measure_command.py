@@ -119,12 +119,46 @@ def test_exit_code_1_is_explained(folder: Path, capsys: pytest.CaptureFixture[st
     said = capsys.readouterr().out
     assert f"part.nc: OUT OF TOLERANCE by {largest - 20.0:.2f} µm: leaves the path by {largest:.2f} µm" in said
     assert "limit 20 µm (tolerance.contour_um), in section 2 arc R20, line 6" in said
-    assert main([*words, "shaped.nc", "--plant", "feed-drive"]) == 1
+    assert main(["measure", "part.nc", "shaped.nc", *words[2:], "--plant", "feed-drive"]) == 1
     said = capsys.readouterr().out
     assert "shaped.nc: OUT OF TOLERANCE" in said
     assert "part.nc: OUT OF TOLERANCE" not in said
     assert "next: the lag of the servo loops" in said
     assert "convert again" not in said
+
+
+def test_summary_has_the_worst_of_each_figure_and_its_place(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    words = ["measure", "part.nc", "shaped.nc", "-m", "vx500", "--tool-diameter", "3mm", "--json", "m.json"]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert said.index("worst figures") < said.index("measured on")
+    rows = {row.split("│")[1].strip(): row for row in said.splitlines() if row.startswith("│")}
+    for column, program in enumerate(json.loads((folder / "m.json").read_text())["programs"], start=2):
+        sections = program["sections"]
+        for name, key in (
+            ("peak vibration X µm", "peak_vibration_um"),
+            ("residual at the stop Y µm", "residual_vibration_um"),
+        ):
+            axis = name.split()[-2].lower()
+            values = [-1.0 if each[key] is None else each[key][axis] for each in sections]
+            worst = values.index(max(values))
+            cell = f"{values[worst]:.2f} ({worst + 1}, line {worst + 5})"
+            assert rows[name].split("│")[column].strip() == cell
+
+
+def test_many_sections_are_shown_with_all(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    zigzag = "".join(f"X{5 * number}. Y{5 * (number % 2)}.\n" for number in range(1, 16))
+    (folder / "zigzag.nc").write_text(f"%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1F3000\n{zigzag}M30\n%\n")
+    words = ["measure", "zigzag.nc", "-m", "vx500", "--tool-diameter", "3mm", "--set", "tolerance.contour_um=500"]
+    assert main(words) == 0
+    few = capsys.readouterr().out
+    assert "3 more sections" in few
+    assert few.count("length mm, time s") == 12
+    assert main([*words, "--all"]) == 0
+    assert capsys.readouterr().out.count("length mm, time s") == 15
 
 
 def test_a_shaped_program_alone_says_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -76,6 +76,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--lambda-s", metavar="LENGTH", type=micrometres, default=0.0, help="short-wave cut-off (default: none)"
     )
+    parser.add_argument(
+        "--all", action="store_true", help="show every section (default: the 12 with the largest contour error)"
+    )
     add_plots_argument(parser, "write pictures of part, walls and width (PNG and SVG) into this folder")
     add_json_argument(parser)
 
@@ -124,7 +127,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json is not None:
         write_json(report, args.json)
     console = output_console(args.json)
-    for table in measurement_tables(report):
+    for table in measurement_tables(report, every_section=args.all):
         console.print(table)
     for program in report["programs"]:
         console.print(_said(program), markup=False, soft_wrap=True)
