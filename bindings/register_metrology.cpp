@@ -143,6 +143,12 @@ void register_figures(py::module_& module) {
       .def_readonly("fit", &ArcFigures::fit, "Least-squares circle.")
       .def_readonly("mean_radius_mm", &ArcFigures::mean_radius_mm, "Mean distance from the programmed centre, mm.");
 
+  py::class_<SideFigures>(module, "SideFigures", "Largest distance from the path on each side of it.")
+      .def_readonly("left_mm", &SideFigures::left_mm, "mm.")
+      .def_readonly("right_mm", &SideFigures::right_mm, "mm.")
+      .def_readonly("above_mm", &SideFigures::above_mm, "More along Z than across the path, mm.")
+      .def_readonly("below_mm", &SideFigures::below_mm, "Likewise, mm.");
+
   py::class_<SectionFigures>(module, "SectionFigures", "What was measured in one section.")
       .def_readonly("section", &SectionFigures::section, "Where.")
       .def_readonly("time_s", &SectionFigures::time_s, "While the command moves in it, s.")
@@ -150,6 +156,8 @@ void register_figures(py::module_& module) {
       .def_readonly("rest", &SectionFigures::rest, "The stop of the command in it, or None.")
       .def_readonly("command", &SectionFigures::command, "Deviation of the command from the path.")
       .def_readonly("response", &SectionFigures::response, "Deviation of the response from the path.")
+      .def_readonly("command_sides", &SectionFigures::command_sides, "The same by sides.")
+      .def_readonly("response_sides", &SectionFigures::response_sides, "The same by sides.")
       .def_readonly("command_orbit_percent", &SectionFigures::command_orbit_percent, "Orbit error; arcs only.")
       .def_readonly("response_orbit_percent", &SectionFigures::response_orbit_percent, "Orbit error; arcs only.")
       .def_readonly("nominal_radius_mm", &SectionFigures::nominal_radius_mm, "Programmed, mm; arcs only.")
@@ -170,7 +178,9 @@ void register_figures(py::module_& module) {
       .def_readonly("duration_s", &RunFigures::duration_s, "Until the command rests for the last time, s.")
       .def_readonly("rest", &RunFigures::rest, "The stop at the end.")
       .def_readonly("command", &RunFigures::command, "Deviation from the path; missed corners count.")
-      .def_readonly("response", &RunFigures::response, "Deviation from the path; missed corners count.");
+      .def_readonly("response", &RunFigures::response, "Deviation from the path; missed corners count.")
+      .def_readonly("command_sides", &RunFigures::command_sides, "By sides, without missed corners.")
+      .def_readonly("response_sides", &RunFigures::response_sides, "By sides, without missed corners.");
 }
 
 }  // namespace

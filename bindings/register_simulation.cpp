@@ -58,6 +58,8 @@ void register_simulation(py::module_& module) {
                      "Blocks only: play the last so many seconds; 0: all.")
       .def_readwrite("starved_blocks", &PlaybackOptions::starved_blocks,
                      "Blocks only: what if the block buffer ran empty behind one of these blocks (ascending)?")
+      .def_readwrite("measure_response_orbit", &PlaybackOptions::measure_response_orbit,
+                     "Orbit errors of the response too, where the contour is measured.")
       .def_readwrite("starved_s", &PlaybackOptions::starved_s, "How long the set-points then wait, s.")
       .def_readwrite("starved_memory_s", &PlaybackOptions::starved_memory_s,
                      "How much of the run behind such a wait is looked at, s; 0: all.")
@@ -84,6 +86,8 @@ void register_simulation(py::module_& module) {
       .def_readonly("command", &PlaybackFigures::command, "Deviation of the command from the path.")
       .def_readonly("response", &PlaybackFigures::response, "Deviation of the response from the path.")
       .def_readonly("orbit_error_percent", &PlaybackFigures::orbit_error_percent, "Per arc of the path.")
+      .def_readonly("response_orbit_error_percent", &PlaybackFigures::response_orbit_error_percent,
+                    "The same of the response, where asked for.")
       .def_readonly("end_mm", &PlaybackFigures::end_mm, "Last set-point, (3,), mm.")
       .def_readonly("starved", &PlaybackFigures::starved, "One per PlaybackOptions.starved_blocks.")
       .def_property_readonly(

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LinearPlant', 'MetrologyOptions', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'line_sections', 'linear_model', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'time_program', 'wilson_theta', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LinearPlant', 'MetrologyOptions', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'line_sections', 'linear_model', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'time_program', 'wilson_theta', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -2828,6 +2828,14 @@ class PlaybackOptions:
     def measure_contour(self, arg0: bool) -> None:
         ...
     @property
+    def measure_response_orbit(self) -> bool:
+        """
+        Orbit errors of the response too, where the contour is measured.
+        """
+    @measure_response_orbit.setter
+    def measure_response_orbit(self, arg0: bool) -> None:
+        ...
+    @property
     def mode_tables(self) -> typing.Annotated[list[list[ModeTable]], "FixedSize(3)"]:
         """
         How the modes of X, Y and Z vary with position, one table per mode; none: constant modes.
@@ -2984,6 +2992,11 @@ class PlaybackFigures:
     def response(self) -> DeviationStats:
         """
         Deviation of the response from the path.
+        """
+    @property
+    def response_orbit_error_percent(self) -> list[float]:
+        """
+        The same of the response, where asked for.
         """
     @property
     def settling_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
@@ -3214,6 +3227,30 @@ class ArcFigures:
         """
         Mean distance from the programmed centre, mm.
         """
+class SideFigures:
+    """
+    Largest distance from the path on each side of it.
+    """
+    @property
+    def above_mm(self) -> float:
+        """
+        More along Z than across the path, mm.
+        """
+    @property
+    def below_mm(self) -> float:
+        """
+        Likewise, mm.
+        """
+    @property
+    def left_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def right_mm(self) -> float:
+        """
+        mm.
+        """
 class SectionFigures:
     """
     What was measured in one section.
@@ -3232,6 +3269,11 @@ class SectionFigures:
     def command_orbit_percent(self) -> float | None:
         """
         Orbit error; arcs only.
+        """
+    @property
+    def command_sides(self) -> SideFigures:
+        """
+        The same by sides.
         """
     @property
     def left(self) -> WallFigures:
@@ -3277,6 +3319,11 @@ class SectionFigures:
     def response_orbit_percent(self) -> float | None:
         """
         Orbit error; arcs only.
+        """
+    @property
+    def response_sides(self) -> SideFigures:
+        """
+        The same by sides.
         """
     @property
     def rest(self) -> RestVibration | None:
@@ -3328,6 +3375,11 @@ class RunFigures:
         Deviation from the path; missed corners count.
         """
     @property
+    def command_sides(self) -> SideFigures:
+        """
+        By sides, without missed corners.
+        """
+    @property
     def duration_s(self) -> float:
         """
         Until the command rests for the last time, s.
@@ -3336,6 +3388,11 @@ class RunFigures:
     def response(self) -> DeviationStats:
         """
         Deviation from the path; missed corners count.
+        """
+    @property
+    def response_sides(self) -> SideFigures:
+        """
+        By sides, without missed corners.
         """
     @property
     def rest(self) -> RestVibration:

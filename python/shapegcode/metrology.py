@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from shapegcode.machine import Machine
 from shapegcode.metrology_report import measurement_report
 from shapegcode.moving_modes import machine_warnings, region_offset, region_range_warnings
 from shapegcode.played import plant_options, playing_controller
-from shapegcode.program import Program
+from shapegcode.program import Program, given_program
 from shapegcode.verify import vibration_memory_s
 
 __all__ = ["MeasuredProgram", "MeasuredRegion", "Measurement", "WallProfile", "measure", "measure_run"]
@@ -31,6 +32,7 @@ _MOST_SAMPLES = 100_000_000  # set-points of a region: a minute or two of comput
 _CHUNK_SAMPLES = 65_536
 _LONGEST_REST_S = 10.0  # that a vibration is waited for behind a stop
 _LEAST_REST_S = 0.25
+_MILLIONTH = math.log(1e6)
 _MOST_PROFILE_STATIONS = 200_000  # kept of each program for pictures
 _SAME_PLACE_MM = 0.005
 _SHORT_MM = 0.5
@@ -102,11 +104,6 @@ class MeasuredProgram:
         """Largest distance of the response from the path, µm."""
         return max((region.figures.response.max_abs_mm for region in self.regions), default=0.0) * 1e3
 
-    @property
-    def judged(self) -> bool:
-        """Whether its path is the programmed one: a shaped program's own path leaves that on purpose."""
-        return not self.shaped or self.against != self.source
-
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
@@ -133,10 +130,20 @@ class Measurement:
     programs: tuple[MeasuredProgram, ...]
 
     @property
+    def judged(self) -> tuple[MeasuredProgram, ...]:
+        """The programs that are held against the tolerance.
+
+        Shaped programs beside the programmed path; what they are compared with only stands beside them. Without such a
+        program the others. A shaped program's own path is not the programmed one: it is not judged against that.
+        """
+        shaped = tuple(each for each in self.programs if each.shaped and each.against != each.source)
+        return shaped or tuple(each for each in self.programs if not each.shaped)
+
+    @property
     def within_tolerance(self) -> bool:
         """Whether the response of every program that is judged stays within `tolerance.contour_um` of the path."""
         limit = self.machine.tolerance.contour_um
-        return all(each.contour_error_um <= limit for each in self.programs if each.judged)
+        return all(each.contour_error_um <= limit for each in self.judged)
 
     def report(self) -> dict[str, Any]:
         """Everything as the JSON of ``shapegcode measure --json`` (docs/metrology.md)."""
@@ -144,12 +151,12 @@ class Measurement:
 
 
 def measure(
-    programs: Program | Sequence[Program],
+    programs: Program | str | Path | Sequence[Program | str | Path],
     machine: Machine,
     tool_diameter_mm: float,
     *,
     plant: str = "modal",
-    against: Program | None = None,
+    against: Program | str | Path | None = None,
     lines: Sequence[tuple[int, int]] | None = None,
     band_um: float = 1.0,
     station_spacing_mm: float = 0.05,
@@ -162,7 +169,7 @@ def measure(
     A program that shapegcode wrote is played block by block at its feed, any other with the controller's own motion.
 
     Args:
-        programs: what to measure.
+        programs: what to measure: one or several, or their files.
         machine: controller and modes.
         tool_diameter_mm: of the disc that is swept along the response.
         plant: "modal" or "feed-drive", see `sg.stream`.
@@ -179,11 +186,13 @@ def measure(
     Raises:
         ArgumentError: no program, a value outside its range, lines that hold no cut, or a program that does not cut
             the regions of the one it is measured against.
-        ProgramError: a region takes longer than can be computed.
+        ProgramError: a program cannot be read, or a region takes longer than can be computed.
+        OSError: a file cannot be read.
         MachineError: the machine has no feed drives.
         NumericError: the integrator of a feed drive fails.
     """
-    several = [programs] if isinstance(programs, Program) else list(programs)
+    given = [programs] if isinstance(programs, Program | str | Path) else list(programs)
+    several = [given_program(each, machine) for each in given]
     if not several:
         raise _core.ArgumentError("no program to measure")
     for name, value in (("tool diameter", tool_diameter_mm), ("station spacing", station_spacing_mm)):
@@ -199,7 +208,9 @@ def measure(
         if not (math.isfinite(value) and value >= 0.0):
             raise _core.ArgumentError(f"{name} is {value:g} mm, must be at least 0")
     shaped = [written_by_shapegcode(program) for program in several]
-    if against is None and len(several) > 1 and not shaped[0] and all(shaped[1:]):
+    if against is not None:
+        against = given_program(against, machine)
+    elif len(several) > 1 and not shaped[0] and all(shaped[1:]):
         against = several[0]
     options = _core.MetrologyOptions()
     options.period_s = machine.controller.interpolation_period_s
@@ -349,8 +360,12 @@ def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
 
 
 def _samples(job: _Job, machine: Machine, plant: str, shaped: bool) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Command and response of a region, and what follows the stop until the vibration has decayed."""
-    rest_s = min(max(vibration_memory_s(machine), _LEAST_REST_S), _LONGEST_REST_S)
+    """Command and response of a region, and what follows the stop until vibration and servo lag have decayed."""
+    memory_s = max(vibration_memory_s(machine), _LEAST_REST_S)
+    if plant != "modal":
+        # The position loop takes the lag off as exp(-gain t): to a millionth, as the vibration.
+        memory_s = max(memory_s, _MILLIONTH / min(machine.controller.position_gain_per_s.as_tuple()))
+    rest_s = min(memory_s, _LONGEST_REST_S)
     model = playing_controller(machine, shaped=shaped)
     options = plant_options(machine, plant, offset=region_offset(job.played, machine))
     options.axis_filters = _core.acceleration_filters(model)

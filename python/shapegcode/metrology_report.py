@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from shapegcode import _core
@@ -37,12 +38,12 @@ def _program(program: MeasuredProgram, measurement: Measurement) -> dict[str, An
         "shaped": program.shaped,
         "measured_against": program.against,
         "within_tolerance": program.contour_error_um <= measurement.machine.tolerance.contour_um
-        if program.judged
+        if program in measurement.judged
         else None,
         "cutting_time_s": sum(each.duration_s for each in figures),
         "contour_error_um": {
-            "command": deviation_um(each.command for each in figures),
-            "response": deviation_um(each.response for each in figures),
+            "command": _deviation([each.command for each in figures], [each.command_sides for each in figures]),
+            "response": _deviation([each.response for each in figures], [each.response_sides for each in figures]),
         },
         "residual_vibration_um": largest_um(each.rest.residual_mm for each in figures),
         "sections": [
@@ -70,8 +71,8 @@ def section_report(figures: _core.SectionFigures, tool_diameter_mm: float) -> di
         else {axis: _number(value) for axis, value in zip("xyz", rest.settling_s, strict=True)},
         "observed_rest_s": None if rest is None else rest.observed_s,
         "contour_error_um": {
-            "command": deviation_um([figures.command]),
-            "response": deviation_um([figures.response]),
+            "command": _deviation([figures.command], [figures.command_sides]),
+            "response": _deviation([figures.response], [figures.response_sides]),
         },
         "arc": _arc(figures, tool_diameter_mm) if section.kind == _core.SectionKind.arc else None,
         "wall_deviation_um": {"left": _wall(figures.left), "right": _wall(figures.right)},
@@ -90,6 +91,17 @@ def section_report(figures: _core.SectionFigures, tool_diameter_mm: float) -> di
         },
         "roughness": {"left": _roughness(figures.left_roughness), "right": _roughness(figures.right_roughness)},
     }
+
+
+def _deviation(stats: Sequence[_core.DeviationStats], sides: Sequence[_core.SideFigures]) -> dict[str, float]:
+    """Largest and RMS deviation, and the largest on each side: a vertical one is above or below, not left or right."""
+    by_side = {
+        "left": [each.left_mm for each in sides],
+        "right": [each.right_mm for each in sides],
+        "above": [each.above_mm for each in sides],
+        "below": [each.below_mm for each in sides],
+    }
+    return {**deviation_um(stats), **{side: max(values, default=0.0) * 1e3 for side, values in by_side.items()}}
 
 
 def _wall(wall: _core.WallFigures) -> dict[str, float | int | None]:

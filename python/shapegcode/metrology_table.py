@@ -7,13 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from shapegcode.metrology_summary import summary_table
+
 if TYPE_CHECKING:
     from rich.table import Table
 
-__all__ = ["Feature", "demo_table", "features", "measurement_tables", "next_step", "section_name"]
+__all__ = ["Feature", "demo_table", "features", "measurement_tables", "next_step", "section_name", "verdicts"]
 
 _MOST_SECTIONS = 12
 _SIDES = ("left", "right")
+_HEIGHTS = ("above", "below")
+_SHOWN_UM = 0.005  # less is shown as 0.00
 
 Section = Mapping[str, Any]
 
@@ -37,19 +41,29 @@ class Feature:
     out: tuple[bool, ...] = ()
 
 
-def measurement_tables(report: Mapping[str, Any]) -> list[Table]:
-    """One table for the programs that are measured against the same path, which stand side by side in it."""
+def measurement_tables(report: Mapping[str, Any], *, every_section: bool = False) -> list[Table]:
+    """A summary and a table of sections for the programs that are measured against the same path, side by side.
+
+    Args:
+        report: the JSON of a measurement.
+        every_section: show all sections; False: of many the worst ones.
+    """
     paths = dict.fromkeys(program["measured_against"] for program in report["programs"])
     groups = [[each for each in report["programs"] if each["measured_against"] == path] for path in paths]
-    return [_table(programs, report) for programs in groups]
+    tables = []
+    for programs in groups:
+        if any(program["sections"] for program in programs):
+            tables.append(summary_table(programs, _names(programs), report))
+        tables.append(_table(programs, report, every_section=every_section))
+    return tables
 
 
-def _table(programs: Sequence[Mapping[str, Any]], report: Mapping[str, Any]) -> Table:
-    """One block of rows per section, one column per program; of many sections the worst ones."""
+def _table(programs: Sequence[Mapping[str, Any]], report: Mapping[str, Any], *, every_section: bool) -> Table:
+    """One block of rows per section, one column per program."""
     from rich.table import Table
     from rich.text import Text
 
-    shown, left_out = _shown_sections(programs)
+    shown, left_out = _shown_sections(programs, None if every_section else _MOST_SECTIONS)
     machine, diameter = report["machine"], report["tool_diameter_mm"]
     table = Table(title=f"measured on {machine} with a tool of {diameter:g} mm diameter", pad_edge=False)
     table.add_column("section", overflow="fold")
@@ -73,18 +87,18 @@ def _table(programs: Sequence[Mapping[str, Any]], report: Mapping[str, Any]) -> 
                 end_section=number + 1 == len(rows),
             )  # fmt: skip
     if left_out:
-        table.caption = f"{left_out} more sections: --json lists them"
+        table.caption = f"{left_out} more sections, whose contour error is less: --all shows them, --json lists them"
     return table
 
 
-def _shown_sections(programs: Sequence[Mapping[str, Any]]) -> tuple[list[int], int]:
+def _shown_sections(programs: Sequence[Mapping[str, Any]], most: int | None) -> tuple[list[int], int]:
     """Indices of the sections that a table shows, in order, and how many are left out."""
     count = len(programs[0]["sections"])
     worst = [
         max(program["sections"][index]["contour_error_um"]["response"]["max"] for program in programs)
         for index in range(count)
     ]
-    shown = sorted(sorted(range(count), key=lambda index: -worst[index])[:_MOST_SECTIONS])
+    shown = sorted(sorted(range(count), key=lambda index: -worst[index])[:most])
     return shown, count - len(shown)
 
 
@@ -108,12 +122,12 @@ def features(sections: Sequence[Section], limit_um: float | None, band_um: float
         yield from _arc_rows(sections)
     yield from _walls(sections)
     yield from _roughness(sections)
-    yield Feature("peak vibration X / Y µm", "", _each(sections, lambda s: _axes(s["peak_vibration_um"], 2)))
+    yield Feature("peak vibration X / Y / Z µm", "", _each(sections, lambda s: _axes(s["peak_vibration_um"], 2)))
     if any(section["residual_vibration_um"] is not None for section in sections):
         yield Feature(
-            "residual at the stop X / Y µm", "", _each(sections, lambda s: _axes(s["residual_vibration_um"], 2))
+            "residual at the stop X / Y / Z µm", "", _each(sections, lambda s: _axes(s["residual_vibration_um"], 2))
         )
-        yield Feature(f"settled to {band_um:g} µm X / Y ms", "", _each(sections, _settling))
+        yield Feature(f"settled to {band_um:g} µm X / Y / Z ms", "", _each(sections, _settling))
 
 
 def demo_table(result: Mapping[str, Any], feed_mm_per_s: float) -> Table:
@@ -157,7 +171,7 @@ def demo_table(result: Mapping[str, Any], feed_mm_per_s: float) -> Table:
             ),
         )
     ends = [row["sections"][2] for row in rows]
-    table.add_row("residual X / Y µm", *_each(ends, lambda s: _axes(s["residual_vibration_um"], 2)))
+    table.add_row("residual X / Y / Z µm", *_each(ends, lambda s: _axes(s["residual_vibration_um"], 2)))
     table.add_row("time s", *(f"{row['time_s']:.3f}" for row in rows))
     return table
 
@@ -165,15 +179,49 @@ def demo_table(result: Mapping[str, Any], feed_mm_per_s: float) -> Table:
 def next_step(report: Mapping[str, Any]) -> str:
     """The one thing to do next, in one sentence."""
     programs = report["programs"]
-    if not report["within_tolerance"]:
-        missed = next((each for each in programs if each["shaped"] and each["within_tolerance"] is False), None)
-        if missed is not None:
-            return f"convert again with a smaller --contour-tolerance: {Path(missed['program']).name} leaves the path"
+    if not report["within_tolerance"] and report["plant"] == "feed-drive":
+        return (
+            "the lag of the servo loops takes the table off the path: more feed-forward or position gain, or less "
+            "feed; --plant modal shows what vibration alone does"
+        )
+    missed = next((each for each in programs if each["shaped"] and each["within_tolerance"] is False), None)
+    if missed is not None:
+        return f"convert again with a smaller --contour-tolerance: {Path(missed['program']).name} leaves the path"
     if not any(program["shaped"] for program in programs):
         return "shapegcode convert shapes the program; measure both to see what it gains"
-    if any(program["within_tolerance"] is None for program in programs):
+    if any(program["shaped"] and program["within_tolerance"] is None for program in programs):
         return "measure it --against the original program: its own path is not the programmed one"
-    return "--plots DIR draws the part with its deviations magnified"
+    if "plots" not in report:
+        return "--plots DIR draws the part with its deviations magnified"
+    return "--lines A-B measures the cut of these lines alone, --json FILE keeps every figure"
+
+
+def verdicts(report: Mapping[str, Any]) -> list[str]:
+    """One sentence for each program that is held against the tolerance: what it keeps or by how much it does not."""
+    limit = report["tolerance_um"]["contour"]
+    said = []
+    for program in report["programs"]:
+        if program["within_tolerance"] is None:
+            continue
+        name, largest = Path(program["program"]).name, program["contour_error_um"]["response"]["max"]
+        within = f"leaves the path by {largest:.2f} µm at most"
+        if program["within_tolerance"]:
+            said.append(f"{name}: within tolerance: {within}, limit {limit:g} µm (tolerance.contour_um)")
+            continue
+        said.append(
+            f"{name}: OUT OF TOLERANCE by {largest - limit:.2f} µm: {within}, limit {limit:g} µm "
+            f"(tolerance.contour_um), {_worst_place(program)}"
+        )
+    return said
+
+
+def _worst_place(program: Mapping[str, Any]) -> str:
+    sections = program["sections"]
+    worst = [section["contour_error_um"]["response"]["max"] for section in sections]
+    index = worst.index(max(worst))
+    if worst[index] < program["contour_error_um"]["response"]["max"]:
+        return "at a corner that it rounds off"
+    return f"in section {section_name(sections[index], index)}"
 
 
 def _names(programs: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -187,17 +235,23 @@ def _each(sections: Sequence[Section], text: Any) -> tuple[str, ...]:
 
 
 def _contour(sections: Sequence[Section], limit_um: float | None) -> Iterator[Feature]:
-    def sides(who: str) -> tuple[str, ...]:
-        return _each(
-            sections,
-            lambda s: _pair([s["contour_error_um"][who][side] for side in _SIDES], 2),
-        )
+    def sides(who: str, which: Sequence[str]) -> tuple[str, ...]:
+        return _each(sections, lambda s: _pair([s["contour_error_um"][who][side] for side in which], 2))
+
+    def any_of(who: str, which: Sequence[str]) -> bool:
+        return any(s["contour_error_um"][who][side] >= _SHOWN_UM for s in sections for side in which)
 
     largest = [section["contour_error_um"]["response"]["max"] for section in sections]
     out = tuple(limit_um is not None and value > limit_um for value in largest)
-    yield Feature("contour left / right µm", "0", sides("response"), "" if limit_um is None else f"{limit_um:g}", out)
+    limit = "" if limit_um is None else f"{limit_um:g}"
+    yield Feature("contour error µm", "0", tuple(f"{value:.2f}" for value in largest), limit, out)
+    yield Feature("  left / right µm", "", sides("response", _SIDES))
+    if any_of("response", _HEIGHTS):
+        yield Feature("  above / below µm", "", sides("response", _HEIGHTS))
     yield Feature("  RMS µm", "", _each(sections, lambda s: f"{s['contour_error_um']['response']['rms']:.2f}"))
-    yield Feature("contour of the command µm", "0", sides("command"))
+    yield Feature("command left / right µm", "0", sides("command", _SIDES))
+    if any_of("command", _HEIGHTS):
+        yield Feature("command above / below µm", "0", sides("command", _HEIGHTS))
 
 
 def _arc_rows(sections: Sequence[Section]) -> Iterator[Feature]:
@@ -271,11 +325,11 @@ def _settling(section: Section) -> str:
     if times is None:
         return "–"
     late = section["observed_rest_s"] * 1e3
-    return " / ".join(f"> {late:.0f}" if times[axis] is None else f"{times[axis] * 1e3:.0f}" for axis in "xy")
+    return " / ".join(f"> {late:.0f}" if times[axis] is None else f"{times[axis] * 1e3:.0f}" for axis in "xyz")
 
 
 def _axes(values: Mapping[str, float] | None, decimals: int) -> str:
-    return "–" if values is None else f"{values['x']:.{decimals}f} / {values['y']:.{decimals}f}"
+    return "–" if values is None else " / ".join(f"{values[axis]:.{decimals}f}" for axis in "xyz")
 
 
 def _pair(values: Sequence[float | None], decimals: int) -> str:

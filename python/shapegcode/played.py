@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,7 @@ from shapegcode import _core
 from shapegcode.controller import controller_model
 from shapegcode.machine import Machine
 from shapegcode.moving_modes import NO_OFFSET, Offset, axis_modes, mode_tables, region_offset
-from shapegcode.program import Program
+from shapegcode.program import Program, given_program
 
 __all__ = ["KINDS", "PLANTS", "Chunk", "plant_options", "playing_controller", "stream"]
 
@@ -99,7 +100,7 @@ class Chunk:
 
 
 def stream(
-    program: Program,
+    program: Program | str | Path,
     machine: Machine,
     *,
     plant: str = "modal",
@@ -114,7 +115,7 @@ def stream(
     without motion (work offset, tool length, an axis whose position was not known), command and response jump.
 
     Args:
-        program: what to play.
+        program: what to play, or its file.
         machine: controller and plant.
         plant: "modal" or "feed-drive".
         shaped: the program was emitted by shapegcode, see `simulate`.
@@ -123,12 +124,14 @@ def stream(
         chunk_samples: rows of a piece, at most.
 
     Raises:
+        ProgramError, OSError: the file cannot be read.
         ArgumentError: a plant, lines or a size that do not exist, or a value that no controller can have.
         MachineError: the machine has no feed drives.
         NumericError: while pieces are given: the integrator of a feed drive fails.
     """
     if chunk_samples < 1:
         raise _core.ArgumentError(f"chunk_samples = {chunk_samples}: must be 1 or more")
+    program = given_program(program, machine)
     if lines is not None:
         _check_lines(program, lines)
     model = playing_controller(machine, shaped=shaped)

@@ -285,3 +285,12 @@ def _absolute_centre_hint(text: bytes, options: _core.ReaderOptions) -> str:
         return ""
     kind = "absolute" if options.absolute_arc_centres else "incremental"
     return f'; with {kind} I J K the whole program reads: set input.arc_centre = "{kind}"'
+
+
+def given_program(program: Program | str | Path, machine: Machine) -> Program:
+    """A program as it is, or read from its file as the controller of `machine` would.
+
+    Raises:
+        ProgramError, OSError: see :meth:`Program.read`.
+    """
+    return program if isinstance(program, Program) else Program.read(program, machine)

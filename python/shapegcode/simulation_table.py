@@ -38,8 +38,10 @@ def simulation_table(report: Mapping[str, Any]) -> Table:
         deviation = report["contour_error_um"][key]
         table.add_row(f"{name}, largest", f"{deviation['max']:.2f}", "µm")
         table.add_row(f"{name}, RMS", f"{deviation['rms']:.2f}", "µm", end_section=key == "response")
-    if report["orbit_error_percent"]:
-        table.add_row("orbit error, largest", f"{max(report['orbit_error_percent']):.4f}", "%")
+    orbits = {"command": "orbit_error_percent", "table (response)": "response_orbit_error_percent"}
+    for whose, key in orbits.items():
+        if report[key]:
+            table.add_row(f"orbit error of the {whose}, largest", f"{max(report[key]):.4f}", "%")
     return table
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.moving_modes import NO_OFFSET, Offset, machine_warnings, region_offset, region_range_warnings
 from shapegcode.played import plant_options, playing_controller
-from shapegcode.program import Program
+from shapegcode.program import Program, given_program
 from shapegcode.verify import deviation_um, largest_um, other_time_s, vibration_memory_s, xyz
 
 FloatArray = npt.NDArray[np.float64]
@@ -59,7 +60,8 @@ class Simulation:
         regions: in order; their arrays hold at most `record_samples` samples.
         report: `cycle_time_s`, `cutting_time_s`, `plant`, `residual_vibration_um`, `peak_vibration_um`,
             `settling_time_s` (None: not settled within `settling_limit_s`, or no band), `settling_band_um`,
-            `contour_error_um` (command, response), `orbit_error_percent`, `regions`, `warnings`.
+            `contour_error_um` (command, response), `orbit_error_percent` (command) and
+            `response_orbit_error_percent`, one per arc, `regions`, `warnings`.
     """
 
     machine: Machine
@@ -74,7 +76,7 @@ class Simulation:
 
 
 def simulate(
-    program: Program,
+    program: Program | str | Path,
     machine: Machine,
     *,
     plant: str = "modal",
@@ -87,7 +89,7 @@ def simulate(
     `stream` plays the whole program in one.
 
     Args:
-        program: what to play.
+        program: what to play, or its file.
         machine: controller and plant.
         plant: "modal" for the modes behind an ideal servo, "feed-drive" for `axes.*.drive`; what is said of vibration
             then holds the lag of the servo loop.
@@ -97,11 +99,13 @@ def simulate(
         on_progress: called with regions done and regions in all.
 
     Raises:
-        ProgramError: a region takes longer than can be computed.
+        ProgramError: the program cannot be read, or a region takes longer than can be computed.
+        OSError: its file cannot be read.
         ArgumentError: there is no such plant, or a limit of the machine is not usable.
         MachineError: the machine has no feed drives.
         NumericError: the integrator of a feed drive fails.
     """
+    program = given_program(program, machine)
     program.refuse_endless(_MOST_SAMPLES * machine.controller.interpolation_period_s)
     runs = []
     for done, region in enumerate(program.regions, start=1):
@@ -139,6 +143,7 @@ def simulate(
             "response": deviation_um(figures.response for figures in played),
         },
         "orbit_error_percent": [error for figures in played for error in figures.orbit_error_percent],
+        "response_orbit_error_percent": [error for figures in played for error in figures.response_orbit_error_percent],
         "regions": [
             {
                 "lines": [run.first_line, run.last_line],
@@ -160,6 +165,7 @@ def _play(
     options = plant_options(machine, plant, offset=offset)
     options.axis_filters = _core.acceleration_filters(model)
     options.record_samples = record_samples
+    options.measure_response_orbit = True
     options.settling_band_mm = machine.tolerance.residual_floor_um * 1e-3
     options.settling_limit_s = _rest_s(machine, plant)
     if model.motion == _core.MotionKind.look_ahead:

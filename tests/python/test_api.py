@@ -57,6 +57,19 @@ def test_read_convert_simulate(tmp_path: Path) -> None:
         assert after[k] == pytest.approx(reported[axis], rel=0.1, abs=0.02)
 
 
+@pytest.mark.parametrize("kind", [str, Path])
+def test_a_file_name_does_for_a_program(tmp_path: Path, kind: type[str] | type[Path]) -> None:
+    machine = sg.Machine.load("vx500")
+    (tmp_path / "part.nc").write_text(GOOD)
+    file = kind(tmp_path / "part.nc")
+    program = sg.Program.read(file, machine)
+    assert sg.simulate(file, machine).report == sg.simulate(program, machine).report
+    assert sg.measure([file], machine, 3.0).report() == sg.measure(program, machine, 3.0).report()
+    assert sg.measure(file, machine, 3.0, against=file).programs[0].against == str(file)
+    streamed, other = (next(sg.stream(each, machine)) for each in (file, program))
+    assert np.array_equal(streamed.response_mm, other.response_mm)
+
+
 def test_figures_only_keeps_no_samples() -> None:
     machine = sg.Machine.load("vx500")
     simulation = sg.simulate(sg.Program.from_text(GOOD, machine), machine, record_samples=0)

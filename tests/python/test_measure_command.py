@@ -64,16 +64,22 @@ def test_exit_code_says_whether_the_tolerance_is_kept(folder: Path, capsys: pyte
     assert measured(capsys, "part.nc", code=1)["within_tolerance"] is False  # 42 um of 20
     assert measured(capsys, "part.nc", "--set", "tolerance.contour_um=50")["within_tolerance"] is True
     assert measured(capsys, "shaped.nc", "--against", "part.nc")["within_tolerance"] is True
+    # The original beside a shaped program is there to compare with.
+    report = measured(capsys, "part.nc", "shaped.nc")
+    assert [each["within_tolerance"] for each in report["programs"]] == [None, True]
+    report = measured(capsys, "part.nc", "shaped.nc", "--set", "tolerance.contour_um=2", code=1)
+    assert [each["within_tolerance"] for each in report["programs"]] == [None, False]
 
 
 def test_table_like_a_measuring_report(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["measure", "part.nc", "shaped.nc", "-m", "vx500", "--tool-diameter", "3mm", "--plots", "plots"]
-    assert main(words) == 1
+    assert main(words) == 0
     said = capsys.readouterr().out
     for text in (
         "2 arc R20, line 6", "inside wall mm (µm off)", "18.500", "cut-width band left / right µm",
-        "Ra left / right µm", "settled to 1 µm X / Y ms", "next: ",
-        "part.nc: played with the controller's own motion, measured against its own path",
+        "Ra left / right µm", "settled to 1 µm X / Y / Z ms", "next: ",
+        "part.nc: played with the controller's own motion, measured against its own path, to compare the shaped with",
+        "shaped.nc: within tolerance: leaves the path by", "pictures: plots/measure-*",
         "shaped.nc: played block by block, as a shaped program, measured against the path of part.nc",
     ):  # fmt: skip
         assert text in said, text
@@ -82,6 +88,77 @@ def test_table_like_a_measuring_report(folder: Path, capsys: pytest.CaptureFixtu
     picture = (folder / "plots" / "measure-part.svg").read_text()
     assert "deviations magnified" in picture
     assert "shaped.nc" in picture
+
+
+def test_deviations_along_z_are_above_and_below(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # A mode of Z alone, a cut along X and a ramp: what Z does is neither left nor right.
+    (folder / "ramp.nc").write_text("%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X10.F3000\nX20.Z-5.\nX30.\nM30\n%\n")
+    modes = [{"frequency_hz": 30.0, "damping_ratio": 0.02}]
+    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
+    data["axes"]["z"]["modes"] = modes
+    data["axes"]["x"]["modes"] = []
+    (folder / "z.toml").write_text(sg.Machine.from_data(data, "z").to_toml())
+    words = ["measure", "ramp.nc", "-m", "z.toml", "--tool-diameter", "3mm", "--set", "tolerance.contour_um=500"]
+    assert main([*words, "--json", "z.json"]) == 0
+    said = capsys.readouterr().out
+    assert "above / below µm" in said
+    assert "peak vibration X / Y / Z µm" in said
+    last = json.loads((folder / "z.json").read_text())["programs"][0]["sections"][2]
+    contour = last["contour_error_um"]["response"]
+    assert (contour["left"], contour["right"]) == (0.0, 0.0)
+    # On a level line the deviation is what Z swings.
+    assert contour["max"] == pytest.approx(max(contour["above"], contour["below"]))
+    assert contour["max"] == pytest.approx(last["peak_vibration_um"]["z"], rel=0.05)
+    assert last["peak_vibration_um"]["z"] > 1.0
+
+
+def test_exit_code_1_is_explained(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["measure", "part.nc", "-m", "vx500", "--tool-diameter", "3mm"]
+    assert main([*words, "--json", "m.json"]) == 1
+    largest = json.loads((folder / "m.json").read_text())["programs"][0]["contour_error_um"]["response"]["max"]
+    said = capsys.readouterr().out
+    assert f"part.nc: OUT OF TOLERANCE by {largest - 20.0:.2f} µm: leaves the path by {largest:.2f} µm" in said
+    assert "limit 20 µm (tolerance.contour_um), in section 2 arc R20, line 6" in said
+    assert main(["measure", "part.nc", "shaped.nc", *words[2:], "--plant", "feed-drive"]) == 1
+    said = capsys.readouterr().out
+    assert "shaped.nc: OUT OF TOLERANCE" in said
+    assert "part.nc: OUT OF TOLERANCE" not in said
+    assert "next: the lag of the servo loops" in said
+    assert "convert again" not in said
+
+
+def test_summary_has_the_worst_of_each_figure_and_its_place(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    words = ["measure", "part.nc", "shaped.nc", "-m", "vx500", "--tool-diameter", "3mm", "--json", "m.json"]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert said.index("worst figures") < said.index("measured on")
+    rows = {row.split("│")[1].strip(): row for row in said.splitlines() if row.startswith("│")}
+    for column, program in enumerate(json.loads((folder / "m.json").read_text())["programs"], start=2):
+        sections = program["sections"]
+        for name, key in (
+            ("peak vibration X µm", "peak_vibration_um"),
+            ("residual at the stop Y µm", "residual_vibration_um"),
+        ):
+            axis = name.split()[-2].lower()
+            values = [-1.0 if each[key] is None else each[key][axis] for each in sections]
+            worst = values.index(max(values))
+            cell = f"{values[worst]:.2f} ({worst + 1}, line {worst + 5})"
+            assert rows[name].split("│")[column].strip() == cell
+
+
+def test_many_sections_are_shown_with_all(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    zigzag = "".join(f"X{5 * number}. Y{5 * (number % 2)}.\n" for number in range(1, 16))
+    (folder / "zigzag.nc").write_text(f"%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1F3000\n{zigzag}M30\n%\n")
+    words = ["measure", "zigzag.nc", "-m", "vx500", "--tool-diameter", "3mm", "--set", "tolerance.contour_um=500"]
+    assert main(words) == 0
+    few = capsys.readouterr().out
+    assert "3 more sections" in few
+    assert few.count("length mm, time s") == 12
+    assert main([*words, "--all"]) == 0
+    assert capsys.readouterr().out.count("length mm, time s") == 15
 
 
 def test_a_shaped_program_alone_says_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -46,6 +46,7 @@ M30
 %
 """
 SHORT = "%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\nG01 X2. Y.5 F1500.\nG00 X0.\nM30\n%\n"
+CORNER = "%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\nG01 X30. F6000.\nY20.\nG04 X2.\nM30\n%\n"
 DRIVE = {
     "motor_inertia_kg_m2": 0.004,
     "screw_lead_mm": 10.0,
@@ -332,6 +333,47 @@ def test_settling_time_is_that_of_a_long_rest() -> None:
     data = machine.model_dump(exclude_none=True)
     data["tolerance"]["residual_floor_um"] = 0.0
     assert sg.simulate(program, sg.Machine.from_data(data, "no band")).report["settling_time_s"]["x"] is None
+
+
+def test_lag_along_the_path_is_no_contour_error() -> None:
+    # Without friction a drive on a straight line stays on it and arrives, however far it lags behind at the stop.
+    linear = DRIVE | {"friction_model": "viscous"}
+    machine = machine_with(linear, controller={"position_gain_per_s": dict.fromkeys("xyz", 5.0)})
+    text = "%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\nG01 X30. F6000.\nM30\n%\n"
+    program = sg.Program.from_text(text, machine)
+    simulation = sg.simulate(program, machine, plant="feed-drive")
+    assert simulation.report["residual_vibration_um"]["x"] > 5000.0
+    assert simulation.report["contour_error_um"]["response"]["max"] < 0.1  # of overshoot: none
+    measured = sg.measure(program, machine, 10.0, plant="feed-drive")
+    assert measured.programs[0].contour_error_um < 0.1
+
+
+def test_contour_error_of_a_drive_is_that_of_its_track() -> None:
+    machine = machine_with(DRIVE)
+    program = sg.Program.from_text(CORNER, machine)
+    contour = sg.simulate(program, machine, plant="feed-drive").report["contour_error_um"]["response"]
+    x, y = streamed(CORNER, machine, plant="feed-drive").response_mm[:, :2].T
+    # Brute force: distance of every sample from the two legs, and of the corner from the track.
+    from_legs = np.minimum(np.hypot(np.maximum(x - 30.0, 0.0), y), np.hypot(x - 30.0, np.maximum(-y, 0.0)))
+    from_corner = np.min(np.hypot(x - 30.0, y))
+    end = np.min(np.hypot(x - 30.0, y - 20.0))
+    assert contour["max"] == pytest.approx(1e3 * max(from_legs.max(), from_corner, end), abs=2.0)
+    assert from_corner > 10 * end
+
+
+def test_orbit_error_of_the_response_is_the_area_of_its_track() -> None:
+    machine = machine_with()
+    text = "%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\nG01 X20. F12000.\nG03 X40. Y20. R20.\nG01 Y40.\nM30\n%\n"
+    report = sg.simulate(sg.Program.from_text(text, machine), machine).report
+    x, y = streamed(text, machine).response_mm[:, :2].T
+    angle = np.arctan2(y - 20.0, x - 20.0)
+    gap = np.abs(20.0**2 - (x - 20.0) ** 2 - (y - 20.0) ** 2)
+    fine = np.linspace(-np.pi / 2, 0.0, 100_001)
+    on_arc = (angle > -np.pi / 2 - 0.1) & (angle < 0.1) & (x >= 19.0)
+    area = np.mean(np.interp(fine, angle[on_arc], gap[on_arc])) * (np.pi / 2) / 2
+    assert report["response_orbit_error_percent"] == [pytest.approx(100 * area / (np.pi * 100.0), rel=0.01)]
+    assert report["response_orbit_error_percent"][0] > 0.02
+    assert report["orbit_error_percent"][0] < 1e-9
 
 
 # ---- pictures, memory --------------------------------------------------------------------------------------

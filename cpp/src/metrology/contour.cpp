@@ -37,6 +37,12 @@ void DeviationStats::add(double deviation_mm) noexcept {
 
 void DeviationStats::include_missed(double distance_mm) noexcept { max_abs_mm = std::max(max_abs_mm, distance_mm); }
 
+void DeviationStats::include_extremes(const DeviationStats& others) noexcept {
+  max_abs_mm = std::max(max_abs_mm, others.max_abs_mm);
+  most_positive_mm = std::max(most_positive_mm, others.most_positive_mm);
+  most_negative_mm = std::min(most_negative_mm, others.most_negative_mm);
+}
+
 double DeviationStats::rms_mm() const noexcept {
   return count == 0 ? 0.0 : std::sqrt(sum_of_squares_mm2 / static_cast<double>(count));
 }
@@ -222,7 +228,8 @@ ContourTracker::Found ContourTracker::search(const Vector3& p, double move, cons
   return best;
 }
 
-double ContourTracker::sign(const Found& found, double distance) const noexcept {
+// 1 left, -1 right; 0 where the deviation or the travel is along Z only.
+double ContourTracker::lateral_side(const Found& found, double distance) const noexcept {
   const Piece& piece = geometry_->pieces[found.piece];
   const double from_start = found.foot.along;
   Vector3 travel = geometry_->arc_of[found.piece] < 0 ? piece.direction : found.foot.tangent;
@@ -238,8 +245,15 @@ double ContourTracker::sign(const Found& found, double distance) const noexcept 
   const double negligible = negligible_share * distance;
   const bool has_side = travel_xy2 > negligible_share * negligible_share * travel.squaredNorm() &&
                         lateral * lateral > negligible * negligible * travel_xy2;
-  if (has_side) return lateral < 0.0 ? -1.0 : 1.0;
-  return offset[2] < 0.0 ? -1.0 : 1.0;
+  if (!has_side) return 0.0;
+  return lateral < 0.0 ? -1.0 : 1.0;
+}
+
+PathSide ContourTracker::side() const noexcept {
+  // As much along Z as across it is the border.
+  if (2.0 * height_ * height_ > deviation_ * deviation_) return height_ > 0.0 ? PathSide::above : PathSide::below;
+  if (lateral_ == 0.0) return PathSide::none;
+  return lateral_ > 0.0 ? PathSide::left : PathSide::right;
 }
 
 double ContourTracker::step(const Vector3& p) noexcept {
@@ -272,7 +286,10 @@ double ContourTracker::step(const Vector3& p) noexcept {
   furthest_ = jumped ? s_ : std::clamp(furthest_, s_, s_ + longest_retreat_mm);
   deviation_ = distance;
   last_ = p;
-  return distance == 0.0 ? 0.0 : sign(found, distance) * distance;
+  height_ = found.foot.offset[2];
+  lateral_ = distance == 0.0 ? 0.0 : lateral_side(found, distance);
+  if (lateral_ != 0.0) return lateral_ * distance;
+  return height_ < 0.0 ? -distance : distance;
 }
 
 }  // namespace shapegcode

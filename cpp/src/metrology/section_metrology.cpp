@@ -92,11 +92,28 @@ std::optional<ArcFigures> arc_through(const std::vector<Vector2d>& points, const
 
 }  // namespace
 
+void SideFigures::add(PathSide side, double distance_mm) noexcept {
+  const auto take = [distance_mm](double& largest_mm) { largest_mm = std::max(largest_mm, distance_mm); };
+  switch (side) {
+    case PathSide::left:
+      return take(left_mm);
+    case PathSide::right:
+      return take(right_mm);
+    case PathSide::above:
+      return take(above_mm);
+    case PathSide::below:
+      return take(below_mm);
+    case PathSide::none:
+      return;
+  }
+}
+
 double SectionMetrology::Follower::step(const Vector3& p, bool moves) noexcept {
   const double deviation = tracker.step(p);
   reach.step(p, tracker.s_mm());
   orbit.step(p, tracker.segment());
   add_deviation(whole, deviation, moves);
+  sides.add(tracker.side(), std::abs(deviation));
   return deviation;
 }
 
@@ -157,6 +174,7 @@ void SectionMetrology::step(const Vector3& command, const Vector3& response) noe
   const double command_deviation = command_.step(command, moves);
   if (Running* running = running_at(command_.tracker.segment()); running != nullptr) {
     add_deviation(running->command, command_deviation, moves);
+    running->command_sides.add(command_.tracker.side(), std::abs(command_deviation));
     if (moves) {
       running->time_s += options_.period_s;
       running->peak = running->peak.cwiseMax(peak);
@@ -165,6 +183,7 @@ void SectionMetrology::step(const Vector3& command, const Vector3& response) noe
   const double response_deviation = response_.step(response, moves);
   if (Running* running = running_at(response_.tracker.segment()); running != nullptr) {
     add_deviation(running->response, response_deviation, moves);
+    running->response_sides.add(response_.tracker.side(), std::abs(response_deviation));
   }
   if (count_ == 0) {
     walls_.sweep(response, response, response_.tracker.s_mm(), response_.tracker.s_mm(), response_deviation);
@@ -261,6 +280,8 @@ SectionFigures SectionMetrology::figures_of(std::size_t section) const {
   figures.rest = running.rest;
   figures.command = running.command;
   figures.response = running.response;
+  figures.command_sides = running.command_sides;
+  figures.response_sides = running.response_sides;
   const SweptWalls::Profile walls = walls_.profile(section);
   figures.left = wall_figures(walls.left);
   figures.right = wall_figures(walls.right);
@@ -312,6 +333,8 @@ RunFigures SectionMetrology::finish() const {
   run.command.include_missed(command_.reach.largest_mm());
   run.response = response_.whole;
   run.response.include_missed(response_.reach.largest_mm());
+  run.command_sides = command_.sides;
+  run.response_sides = response_.sides;
   const std::int32_t last = section_of_[command_.tracker.segment()];
   if (last >= 0 && has_moved_) {
     // The stop at the end is the one that a part is left with: it counts even if one before was worse.

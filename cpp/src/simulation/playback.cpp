@@ -18,6 +18,11 @@ namespace {
 
 constexpr double recorded_decay_s = 0.25;
 
+// A drive rests when no axis has moved by more than this in so long; one that never does is left after the limit.
+constexpr double resting_mm = 1e-6;
+constexpr double resting_s = 0.05;
+constexpr double longest_lag_s = 10.0;
+
 // What the trackers are given where no contour is measured: they refuse a path without segments.
 const Path& a_point() {
   static const Path point({make_line(Vector3::Zero(), Vector3::Zero(), 0.0)});
@@ -38,9 +43,11 @@ class Recorder {
         plant_(options),
         tracks_contour_(options.measure_contour && path.length_mm() > 0.0),
         tracks_command_(tracks_contour_ && options.measure_command && !command_on_path),
+        tracks_response_orbit_(tracks_contour_ && options.measure_response_orbit),
         command_tracker_(tracks_contour_ ? tracker_of(path, options) : ContourTracker(a_point())),
         response_tracker_(command_tracker_),
         orbit_(tracks_contour_ ? path : a_point()),
+        response_orbit_(tracks_response_orbit_ ? path : a_point()),
         command_reach_(tracks_contour_ ? path : a_point()),
         response_reach_(command_reach_) {}
 
@@ -80,8 +87,7 @@ class Recorder {
       command_reach_.step(command, command_tracker_.s_mm());
     }
     if (tracks_contour_) {
-      figures_.response.add(response_tracker_.step(response));
-      response_reach_.step(response, response_tracker_.s_mm());
+      figures_.response.add(follow(response));
     }
     record(command, response);
     ++count_;
@@ -107,7 +113,11 @@ class Recorder {
       }
       figures_.command.count = figures_.response.count;
       figures_.command.include_missed(command_reach_.largest_mm());
+      follow_lag();
       figures_.response.include_missed(response_reach_.largest_mm());
+      if (tracks_response_orbit_) {
+        figures_.response_orbit_error_percent = response_orbit_.percent();
+      }
     }
     // A picture of the decay needs what comes after the stop.
     const auto decay = static_cast<std::size_t>(recorded_decay_s / options_.period_s);
@@ -136,6 +146,41 @@ class Recorder {
   }
 
  private:
+  // Deviation of the response from the path, with all that hangs on where its foot is.
+  double follow(const Vector3& response) {
+    const double deviation = response_tracker_.step(response);
+    response_reach_.step(response, response_tracker_.s_mm());
+    if (tracks_response_orbit_) {
+      response_orbit_.step(response, response_tracker_.segment());
+    }
+    return deviation;
+  }
+
+  // A drive stands short of the path's end by its lag when the command gets there, and is measured until it has
+  // arrived. Extremes count; the RMS stays that of the time in which the command moves.
+  void follow_lag() {
+    if (plant_.drives().empty()) {
+      return;
+    }
+    detail::AxisPlant plant = plant_;
+    DeviationStats arriving;
+    const double resting_periods = whole_periods(resting_s / options_.period_s);
+    const double most_periods = whole_periods(longest_lag_s / options_.period_s);
+    double rested = 0.0;
+    Vector3 stood = last_;
+    for (double k = 1.0; k <= most_periods && rested < resting_periods; ++k) {
+      const Vector3 response = plant.step(last_);
+      arriving.add(follow(response));
+      if ((response - stood).cwiseAbs().maxCoeff() > resting_mm) {
+        stood = response;
+        rested = 0.0;
+      } else {
+        ++rested;
+      }
+    }
+    figures_.response.include_extremes(arriving);
+  }
+
   void record(const Vector3& command, const Vector3& response) {
     if (commands_.size() < options_.record_samples) {
       commands_.push_back(command);
@@ -159,9 +204,11 @@ class Recorder {
   detail::AxisPlant at_rest_plant_ = plant_;
   bool tracks_contour_;
   bool tracks_command_;
+  bool tracks_response_orbit_;
   ContourTracker command_tracker_;
   ContourTracker response_tracker_;
   OrbitError orbit_;
+  OrbitError response_orbit_;
   CornerReach command_reach_;
   CornerReach response_reach_;
   PlaybackFigures figures_;

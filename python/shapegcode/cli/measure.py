@@ -25,7 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Plays programs on the machine's model and measures the response like a part: per section of the path "
         "vibration and settling time, contour error, fitted radius, the walls that the tool leaves, their roughness "
         "and waviness. Programs written by shapegcode are measured against the first one if that is not. "
-        "Exit code 0; 1: the response of a program leaves the path by more than tolerance.contour_um; 2: bad input."
+        "Exit code 0; 1: the response of a program leaves the path by more than tolerance.contour_um (of shaped "
+        "programs beside their original the shaped ones count alone); 2: bad input."
     )
     parser.epilog = "example: shapegcode measure part.nc shaped.nc -m vx500 --tool-diameter 3mm --plots plots"
     parser.add_argument("inputs", metavar="PROGRAM", nargs="+", help="CNC program; several stand side by side")
@@ -75,6 +76,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--lambda-s", metavar="LENGTH", type=micrometres, default=0.0, help="short-wave cut-off (default: none)"
     )
+    parser.add_argument(
+        "--all", action="store_true", help="show every section (default: the 12 with the largest contour error)"
+    )
     add_plots_argument(parser, "write pictures of part, walls and width (PNG and SVG) into this folder")
     add_json_argument(parser)
 
@@ -89,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
     from shapegcode.metrology import measure
-    from shapegcode.metrology_table import measurement_tables, next_step
+    from shapegcode.metrology_table import measurement_tables, next_step, verdicts
     from shapegcode.program import Program
     from shapegcode.report import warning_table
 
@@ -123,13 +127,18 @@ def run(args: argparse.Namespace) -> int:
     if args.json is not None:
         write_json(report, args.json)
     console = output_console(args.json)
-    for table in measurement_tables(report):
+    for table in measurement_tables(report, every_section=args.all):
         console.print(table)
     for program in report["programs"]:
         console.print(_said(program), markup=False, soft_wrap=True)
     warnings = list(dict.fromkeys(warning for program in report["programs"] for warning in program["warnings"]))
     if warnings:
         console.print(warning_table(warnings))
+    if args.plots is not None:
+        drawn = f"{args.plots}/measure-*" if report["plots"] else "none, as no walls were measured"
+        console.print(f"pictures: {drawn}", markup=False, soft_wrap=True)
+    for verdict in verdicts(report):
+        console.print(verdict, markup=False, soft_wrap=True)
     console.print(f"next: {next_step(report)}", markup=False)
     return ExitCode.OK if measurement.within_tolerance else ExitCode.OUT_OF_TOLERANCE
 
@@ -138,5 +147,8 @@ def _said(program: dict[str, object]) -> str:
     name, against = program["program"], program["measured_against"]
     how = "block by block, as a shaped program" if program["shaped"] else "with the controller's own motion"
     path = "its own path" if against == name else f"the path of {against}"
-    judged = "" if program["within_tolerance"] is not None else ", which is not the programmed one: not judged"
+    judged = ""
+    if program["within_tolerance"] is None:
+        judged = ", which is not the programmed one" if program["shaped"] else ", to compare the shaped with"
+        judged += ": not judged"
     return f"{name}: played {how}, measured against {path}{judged}"

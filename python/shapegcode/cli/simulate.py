@@ -128,7 +128,8 @@ def run(args: argparse.Namespace) -> int:
     if report["warnings"]:
         console.print(warning_table(report["warnings"]))
     if shaped:
-        console.print("played block by block at its feed, as a shaped program", markup=False)
+        console.print("played block by block at its feed, as a shaped program, against its own path", markup=False)
+        console.print("next: shapegcode measure ORIGINAL SHAPED measures it against the programmed path", markup=False)
     else:
         console.print("next: shapegcode convert shapes this program and shows what it gains", markup=False)
     return ExitCode.OK

@@ -19,8 +19,19 @@ struct DeviationStats {
   void add(double deviation_mm) noexcept;
   /// A distance by which the track missed a corner of the path (CornerReach): counts in the largest magnitude alone.
   void include_missed(double distance_mm) noexcept;
+  /// The extremes of others, of samples that do not count in the root mean square.
+  void include_extremes(const DeviationStats& others) noexcept;
   /// Root mean square; 0 without samples.
   [[nodiscard]] double rms_mm() const noexcept;
+};
+
+/// Where a point lies beside the path, seen along the direction of travel.
+enum class PathSide : std::uint8_t {
+  none,  ///< on the path, or beside a travel along Z only
+  left,
+  right,
+  above,  ///< the deviation is more along Z than across it
+  below,
 };
 
 /// True distance of a moving point to the programmed path (not the tracking error in time), following the path
@@ -40,6 +51,8 @@ class ContourTracker {
   double step(const Vector3& p) noexcept;
   /// Segment index of the last foot point.
   [[nodiscard]] std::size_t segment() const noexcept { return cursor_; }
+  /// Side on which the last sample lies.
+  [[nodiscard]] PathSide side() const noexcept;
   /// Distance of the last foot point from the path's start in mm.
   [[nodiscard]] double s_mm() const noexcept { return s_; }
 
@@ -78,7 +91,7 @@ class ContourTracker {
   [[nodiscard]] Foot foot_on_arc(std::size_t piece, const Vector3& p, const Window& window) const noexcept;
   [[nodiscard]] static Foot arc_point_foot(const Arc& arc, double u, const Vector3& p) noexcept;
   [[nodiscard]] Found search(const Vector3& p, double move, const Window& window) const noexcept;
-  [[nodiscard]] double sign(const Found& found, double distance) const noexcept;
+  [[nodiscard]] double lateral_side(const Found& found, double distance) const noexcept;
   [[nodiscard]] Vector3 start_tangent(std::size_t piece) const noexcept;
   [[nodiscard]] Vector3 end_tangent(std::size_t piece) const noexcept;
 
@@ -96,6 +109,8 @@ class ContourTracker {
   double s_ = 0.0;
   double furthest_ = 0.0;      // largest s_ of late: a point that moves back from there may be on the return leg
   double deviation_ = 0.0;     // unsigned, of the last sample
+  double lateral_ = 0.0;       // of the last sample: 1 left, -1 right, 0 neither
+  double height_ = 0.0;        // of the last sample above its foot
   std::uint32_t growing_ = 0;  // samples since the deviation began to grow
 };
 

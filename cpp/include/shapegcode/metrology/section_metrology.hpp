@@ -43,6 +43,16 @@ struct ArcFigures {
   double mean_radius_mm = 0.0;  ///< mean distance from the programmed centre
 };
 
+/// Largest distance from the path on each side of it, mm. A deviation counts on one side alone: above or below where it
+/// is more along Z than across it, else left or right; beside a travel along Z only on none.
+struct SideFigures {
+  double left_mm = 0.0;
+  double right_mm = 0.0;
+  double above_mm = 0.0;
+  double below_mm = 0.0;
+  void add(PathSide side, double distance_mm) noexcept;
+};
+
 /// What was measured in one section.
 struct SectionFigures {
   PathSection section;
@@ -51,6 +61,8 @@ struct SectionFigures {
   std::optional<RestVibration> rest;  ///< the worst stop of the command in it (largest residual)
   DeviationStats command;             ///< signed, from the path; RMS while the command moves
   DeviationStats response;
+  SideFigures command_sides;
+  SideFigures response_sides;
   std::optional<double> command_orbit_percent;  ///< arcs only; see OrbitError
   std::optional<double> response_orbit_percent;
   double nominal_radius_mm = 0.0;                               ///< arcs only
@@ -74,6 +86,8 @@ struct RunFigures {
   RestVibration rest;       ///< the stop at the end
   DeviationStats command;   ///< as PlaybackFigures has them: corners that were missed count
   DeviationStats response;
+  SideFigures command_sides;
+  SideFigures response_sides;
 };
 
 /// Measures what a run of samples does to the sections of a path, sample by sample. Memory is bounded by the path and
@@ -103,6 +117,7 @@ class SectionMetrology {
     Vector3 peak = Vector3::Zero();
     std::optional<RestVibration> rest;
     DeviationStats command, response;
+    SideFigures command_sides, response_sides;
   };
   /// An arc section's stations in the plane of the arc.
   struct ArcTrack {
@@ -120,6 +135,7 @@ class SectionMetrology {
     CornerReach reach;
     OrbitError orbit;
     DeviationStats whole;
+    SideFigures sides;
     Vector3 last = Vector3::Zero();
     double last_foot = 0.0;
     /// Deviation of the next point from the path; `moves`: the command does.

@@ -26,8 +26,9 @@ struct PlaybackOptions {
   std::vector<FeedDriveParameters> drives;
   /// A tracker of the path at its start, whose geometry several runs share; null: each run makes its own.
   std::shared_ptr<const ContourTracker> tracker;
-  bool measure_contour = true;  ///< deviation of command and response and orbit errors
-  bool measure_command = true;  ///< false: the response alone; no figures of the command, no orbit errors
+  bool measure_contour = true;          ///< deviation of command and response and orbit errors
+  bool measure_command = true;          ///< false: the response alone; no figures of the command, no orbit errors
+  bool measure_response_orbit = false;  ///< orbit errors of the response too, where the contour is measured
   /// Blocks only: play no more than the last so many seconds (0: all). Enough for the residual where older vibration
   /// has decayed; peak and contour figures then speak of that part alone.
   double last_seconds = 0.0;
@@ -65,7 +66,8 @@ struct PlaybackFigures {
   Vector3 peak_acceleration_mm_per_s2 = Vector3::Zero();  ///< of the command, second difference
   DeviationStats command;
   DeviationStats response;
-  std::vector<double> orbit_error_percent;  ///< per arc of the path, of the command
+  std::vector<double> orbit_error_percent;           ///< per arc of the path, of the command
+  std::vector<double> response_orbit_error_percent;  ///< the same of the response, where asked for
   Vector3 end_mm = Vector3::Zero();
   std::vector<StarvedFigures> starved;  ///< one per PlaybackOptions::starved_blocks
   Samples recorded_command;
