@@ -287,3 +287,11 @@ def test_files(tmp_path: Path) -> None:
         update_modes(VX500, "x", [tap(46.0)], source="s").text
     )
     assert file.read_text(encoding="utf-8") == VX500
+
+
+def test_a_mode_that_the_test_shows_but_does_not_support_stays() -> None:
+    update = update_modes(VX500, "x", [tap(118.0)], source="tap.csv", refused=[tap(46.99, refusal="too uncertain")])
+    modes = tomllib.loads(update.text)["axes"]["x"]["modes"]
+    assert [mode["frequency_hz"] for mode in modes] == [46.0, 118.0]
+    assert modes[0] == tomllib.loads(VX500)["axes"]["x"]["modes"][0]
+    assert any(note.startswith("kept 46.0 Hz as it is") for note in update.notes)

@@ -240,7 +240,7 @@ def _updated(args: argparse.Namespace, test: TapTest) -> MachineUpdate | None:
 
     if test.axis is None:
         raise ArgumentError(f"{args.files[0]} does not say along which axis it was measured: add --axis x, y or z")
-    return update_machine_file(args.update, test.axis, test.modes, source=test.source)
+    return update_machine_file(args.update, test.axis, test.modes, source=test.source, refused=test.refused)
 
 
 def _next_step(args: argparse.Namespace, test: TapTest) -> str:

@@ -55,7 +55,14 @@ class MachineUpdate:
     notes: tuple[str, ...]
 
 
-def update_machine_file(path: str | Path, axis: str, modes: Sequence[IdentifiedMode], *, source: str) -> MachineUpdate:
+def update_machine_file(
+    path: str | Path,
+    axis: str,
+    modes: Sequence[IdentifiedMode],
+    *,
+    source: str,
+    refused: Sequence[IdentifiedMode] = (),
+) -> MachineUpdate:
     """Read a machine file and put identified modes into it; see `update_modes`. The file itself is not touched.
 
     Raises:
@@ -64,7 +71,8 @@ def update_machine_file(path: str | Path, axis: str, modes: Sequence[IdentifiedM
         OSError: it cannot be read.
     """
     check_updatable(path)
-    return update_modes(Path(path).read_bytes().decode("utf-8"), axis, modes, source=source, file=str(path))
+    text = Path(path).read_bytes().decode("utf-8")
+    return update_modes(text, axis, modes, source=source, refused=refused, file=str(path))
 
 
 def check_updatable(path: str | Path) -> None:
@@ -84,21 +92,28 @@ def check_updatable(path: str | Path) -> None:
 
 
 def update_modes(
-    text: str, axis: str, modes: Sequence[IdentifiedMode], *, source: str, file: str = "<text>"
+    text: str,
+    axis: str,
+    modes: Sequence[IdentifiedMode],
+    *,
+    source: str,
+    refused: Sequence[IdentifiedMode] = (),
+    file: str = "<text>",
 ) -> MachineUpdate:
     """The text of a machine file with the modes of one axis replaced by identified ones.
 
     A mode whose frequency is within 10 % of one in the file takes its table: values and uncertainties change where
     they stand, participation, `frequency_over` and every comment line stay, and so does an uncertainty of the
-    frequency that somebody stated wider than it was measured. Other tables of the axis' modes go, other modes get a
-    table of their own, whose participation is its share of the residues. Putting the same modes in twice
-    gives the same text.
+    frequency that somebody stated wider than it was measured. A mode of the file that the test shows, but does not
+    support, stays as it is. Other tables of the axis' modes go, other modes get a table of their own, whose
+    participation is its share of the residues. Putting the same modes in twice gives the same text.
 
     Args:
         text: of the machine file.
         axis: "x", "y" or "z".
         modes: what the data support.
         source: where they come from.
+        refused: modes that the data show without supporting their values.
         file: name for messages.
 
     Raises:
@@ -115,7 +130,7 @@ def update_modes(
     mark = "\ufeff" if text.startswith("\ufeff") else ""
     body = text.removeprefix(mark)
     edit = _Edit(chunks(body), tomllib.loads(body), axis, source, file)
-    new = mark + edit.apply(modes)
+    new = mark + edit.apply(modes, refused)
     edit.check(new.removeprefix(mark))
     return MachineUpdate(new, Machine.from_toml(new.removeprefix(mark), file), tuple(edit.notes))
 
@@ -144,14 +159,21 @@ class _Edit:
                 f"[[{self.name}]], then they can be updated"
             )
 
-    def apply(self, modes: Sequence[IdentifiedMode]) -> str:
+    def apply(self, modes: Sequence[IdentifiedMode], refused: Sequence[IdentifiedMode]) -> str:
         """The text with the modes in it."""
         taken = _matches(modes, [each["frequency_hz"] for each in self.old])
         lines = [part.text for part in self.parts]
         kept = {old: mode for mode, old in taken.items()}
+        seen = {
+            old: refused[mode] for mode, old in _matches(refused, [each["frequency_hz"] for each in self.old]).items()
+        }
         for number, (begin, end) in enumerate(self.blocks):
             if number in kept:
                 self._change(lines, begin, end, self.old[number], modes[kept[number]])
+            elif number in seen:
+                old_hz, new_hz = toml(self.old[number]["frequency_hz"]), seen[number].frequency_hz.value
+                self.expected.append(self.old[number])
+                self.notes.append(f"kept {old_hz} Hz as it is: the test shows it at {new_hz:.6g} Hz, not well enough")
             else:
                 lines[begin:end] = [""] * (end - begin)
                 if end < len(self.parts) and self.parts[end].kind == "blank":
@@ -162,7 +184,9 @@ class _Edit:
         if fresh:
             shares, meaning = _shares(modes)
             share_of = dict(zip(map(id, modes), shares, strict=True))
-            self._insert(lines, sorted(kept), [self._table(mode, share_of[id(mode)], meaning) for mode in fresh])
+            self._insert(
+                lines, sorted({*kept, *seen}), [self._table(mode, share_of[id(mode)], meaning) for mode in fresh]
+            )
         self._tell_sum(modes)
         return "".join(lines)
 
@@ -329,7 +353,7 @@ def _share(value: float) -> float:
 
 def _matches(modes: Sequence[IdentifiedMode], old_hz: Sequence[float]) -> dict[int, int]:
     """Number of the old mode by that of the new: as many pairs within 10 % as there can be, the nearest ones."""
-    if not old_hz:
+    if not old_hz or not modes:
         return {}
     new_hz = np.array([mode.frequency_hz.value for mode in modes])
     distance = np.abs(new_hz[:, None] / np.asarray(old_hz) - 1.0)
