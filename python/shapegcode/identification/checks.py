@@ -137,7 +137,7 @@ def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> _Usable:
     assert force is not None
     if not np.ptp(force) > 0.0:
         raise RecordError(
-            f"zero force: every sample is {force[0]:g} N; needed is the hammer's signal, or take it as a free decay "
+            f"zero force: every sample is {force[0]:zg} N; needed is the hammer's signal, or take it as a free decay "
             "(--ignore-force)"
         )
     for name, values in (("force", force), (f"response ({record.quantity})", record.response)):
