@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,12 @@ from shapegcode import _core
 from shapegcode.converter import convert
 from shapegcode.demos import ideal_command, path_program
 from shapegcode.machine import Machine
-from shapegcode.metrology import MeasuredRegion, measure, measure_run
+from shapegcode.metrology import MeasuredRegion, Measurement, measure, measure_run
 from shapegcode.metrology_report import section_report
 from shapegcode.program import Program
 from shapegcode.verify import playback_options
 
-__all__ = ["metrology_demo"]
+__all__ = ["MetrologyDemo", "metrology_demo"]
 
 _TOOL_DIAMETER_MM = 3.0
 _FEEDS_MM_PER_S = (100, 200)
@@ -51,13 +52,28 @@ _REMARK = (
 )
 
 
-def metrology_demo() -> dict[str, Any]:
+@dataclass(frozen=True, eq=False)
+class MetrologyDemo:
+    """What `demo metrology` shows.
+
+    Attributes:
+        report: the JSON of ``shapegcode demo metrology``.
+        drawn: the case of the pictures: the programs of the highest feed side by side.
+    """
+
+    report: dict[str, Any]
+    drawn: Measurement
+
+
+def metrology_demo() -> MetrologyDemo:
     """Unshaped, shaped with 40 % and 1 % reduction, and contour-preserving, at both feeds; and the paper's shaper."""
     machine = _machine("off")
     rows: list[dict[str, Any]] = []
+    measurements: list[Measurement] = []
     for feed in _FEEDS_MM_PER_S:
         original = path_program(feed, machine)
-        for name, ratio, region in _cases(feed, original, machine):
+        measurements.append(_measured(original, machine))
+        for name, ratio, region in _cases(feed, original, machine, measurements[-1]):
             sections = [section_report(each, _TOOL_DIAMETER_MM) for each in region.figures.sections]
             measured = _PAPER_RADII_MM.get((feed, name.removesuffix(", paper's shaper")))
             rows.append(
@@ -72,7 +88,7 @@ def metrology_demo() -> dict[str, Any]:
                     else {"inside_radius_mm": dict(zip(_SPECIMENS, measured, strict=True))},
                 }
             )
-    return {
+    report = {
         "machine": machine.name,
         "tool_diameter_mm": _TOOL_DIAMETER_MM,
         "cases": rows,
@@ -82,6 +98,7 @@ def metrology_demo() -> dict[str, Any]:
         },
         "remark": _REMARK,
     }
+    return MetrologyDemo(report, measurements[-1])
 
 
 def _machine(contour: str) -> Machine:
@@ -91,13 +108,21 @@ def _machine(contour: str) -> Machine:
     return Machine.from_data(data, "vx500")
 
 
-def _cases(feed: float, original: Program, machine: Machine) -> Iterator[tuple[str, float, MeasuredRegion]]:
-    """Name, feed ratio on the arc and what was measured in the region of line, arc and line."""
+def _measured(original: Program, machine: Machine) -> Measurement:
+    """The program and its conversions side by side, called as the paper's cases."""
     emitted = [
         convert(original, _machine(contour), arc_feed_ratio=ratio).emitted for ratio, contour in _SHAPED.values()
     ]
     played = measure([original, *emitted], machine, _TOOL_DIAMETER_MM, against=original)
-    unshaped, *shaped = (program.regions[-1] for program in played.programs)
+    named = zip(played.programs, ("unshaped", *_SHAPED), strict=True)
+    return replace(played, programs=tuple(replace(program, source=name) for program, name in named))
+
+
+def _cases(
+    feed: float, original: Program, machine: Machine, measurement: Measurement
+) -> Iterator[tuple[str, float, MeasuredRegion]]:
+    """Name, feed ratio on the arc and what was measured in the region of line, arc and line."""
+    unshaped, *shaped = (program.regions[-1] for program in measurement.programs)
     yield "unshaped", 1.0, unshaped
     for name, (ratio, contour) in _SHAPED.items():
         if contour == "off":

@@ -139,7 +139,8 @@ def demo_table(result: Mapping[str, Any], feed_mm_per_s: float) -> Table:
     table = Table(title=f"Paper 000 at {feed_mm_per_s:g} mm/s, tool of {result['tool_diameter_mm']:g} mm, as cut")
     table.add_column("figure", overflow="fold")
     for row in rows:
-        table.add_column(row["program"], justify="right", overflow="fold")
+        heading = row["program"].replace("-", " ")
+        table.add_column(heading, justify="right", overflow="fold", min_width=max(map(len, heading.split())))
     inside = [arc["arc"]["inside_wall"] for arc in arcs]
     table.add_row(
         f"inside radius mm (nominal {inside[0]['nominal_radius_mm']:g})",

@@ -221,9 +221,18 @@ def test_a_tool_is_needed(folder: Path, capsys: pytest.CaptureFixture[str]) -> N
 
 def test_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "240")
-    assert main(["demo", "metrology", "--json", str(tmp_path / "demo.json")]) == 0
+    folder = tmp_path / "pictures"
+    assert main(["demo", "metrology", "--plots", str(folder), "--json", str(tmp_path / "demo.json")]) == 0
+    written = {file.name for file in folder.iterdir()}
+    assert written == {f"measure-{name}.{suffix}" for name in ("part", "walls") for suffix in ("png", "svg")}
+    assert "contour-preserving" in (folder / "measure-part.svg").read_text()
     said = capsys.readouterr().out
-    for text in ("Paper 000 at 100 mm/s", "18.350, 18.373", "contour-preserving", "not material and depth of cut"):
+    for text in ("Paper 000 at 100 mm/s", "18.350, 18.373", "contour preserving", "not material and depth of cut"):
         assert text in said, text
     cases = json.loads((tmp_path / "demo.json").read_text())["cases"]
     assert {(row["feed_mm_per_s"], row["program"]) for row in cases} >= {(100, "unshaped"), (200, "shaped 40 %")}
+
+
+def test_demo_without_pictures_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["demo", "path", "--plots", str(tmp_path)]) == 2
+    assert "demo path has no pictures" in capsys.readouterr().err

@@ -8,6 +8,8 @@ from shapegcode.cli.console import add_json_argument
 
 __all__ = ["add_arguments", "run"]
 
+_FOLDER = "demo-output"
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -25,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plots",
         metavar="DIR",
-        default="demo-output",
-        help="folder for the pictures of `shaper` and `tap` (PNG and SVG; default: %(default)s)",
+        default=None,
+        help=f"folder for the pictures of `shaper`, `metrology` and `tap` (PNG and SVG; default: {_FOLDER})",
     )
     add_json_argument(parser)
 
@@ -35,14 +37,16 @@ def run(args: argparse.Namespace) -> int:
     """Run one demonstration.
 
     Raises:
+        ArgumentError: pictures of a demonstration that has none.
         OSError: the JSON file or a picture cannot be written.
     """
-    if args.name == "shaper":
-        return _shaper(args.json, args.plots)
-    if args.name == "metrology":
-        return _metrology(args.json)
-    if args.name == "tap":
-        return _tap(args.json, args.plots)
+    drawing = {"shaper": _shaper, "metrology": _metrology, "tap": _tap}
+    if args.name in drawing:
+        return drawing[args.name](args.json, args.plots or _FOLDER)
+    if args.plots is not None:
+        from shapegcode._core import ArgumentError
+
+        raise ArgumentError(f"--plots: demo {args.name} has no pictures")
     return _cycle_time(args.json) if args.name == "cycle-time" else _path(args.json)
 
 
@@ -189,20 +193,24 @@ def _cycle_time(json_target: str | None) -> int:
     return ExitCode.OK if result["agrees"] else ExitCode.OUT_OF_TOLERANCE
 
 
-def _metrology(json_target: str | None) -> int:
+def _metrology(json_target: str | None, folder: str) -> int:
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
     from shapegcode.metrology_demo import metrology_demo
+    from shapegcode.metrology_picture import write_measurement_pictures
     from shapegcode.metrology_table import demo_table
 
     with progress("paper 000", json_target) as bar:
         bar.wait()
-        result = metrology_demo()
+        demo = metrology_demo()
+        pictures = write_measurement_pictures(demo.drawn, folder)
+    result = demo.report
     if json_target is not None:
-        write_json(result, json_target)
+        write_json({**result, "pictures": pictures}, json_target)
     console = output_console(json_target)
     for feed in sorted({row["feed_mm_per_s"] for row in result["cases"]}):
         console.print(demo_table(result, feed))
     console.print(result["remark"], markup=False)
+    console.print(f"pictures (highest feed): {folder}/measure-*", markup=False)
     console.print("next: shapegcode measure YOUR.NC SHAPED.NC -m YOUR_MACHINE.toml --tool-diameter 3mm", markup=False)
     return ExitCode.OK
