@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from shapegcode import _core
 from shapegcode.machine import Axis, Machine, MachineError, Problem
 from shapegcode.machine_drive import Drive
@@ -11,6 +13,7 @@ from shapegcode.machine_drive import Drive
 _UM = 1e-6  # m
 _N_PER_UM = 1e6  # N/m
 _MM = 1e-3  # m
+_GROWING_PER_S = 1e-3  # real part of a pole above which a loop grows
 
 
 def drive_parameters(machine: Machine) -> list[_core.FeedDriveParameters]:
@@ -23,7 +26,7 @@ def drive_parameters(machine: Machine) -> list[_core.FeedDriveParameters]:
         machine: with a table ``[axes.x.drive]``, and so for y and z.
 
     Raises:
-        MachineError: an axis has no such table.
+        MachineError: an axis has no such table, or its loop is unstable.
     """
     missing = [
         Problem(f"axes.{name}.drive", "", "required for a simulation with feed drives, but missing")
@@ -34,10 +37,47 @@ def drive_parameters(machine: Machine) -> list[_core.FeedDriveParameters]:
         raise MachineError(machine.name, tuple(missing))
     gains = machine.controller.position_gain_per_s.as_tuple()
     ratios = machine.controller.feed_forward_ratio.as_tuple()
-    return [
+    parameters = [
         _of_axis(axis, axis.drive, gain, ratio)
         for axis, gain, ratio in zip(machine.axes.as_tuple(), gains, ratios, strict=True)
         if axis.drive is not None
+    ]
+    unstable = [
+        problem
+        for name, drive, gain in zip("xyz", parameters, gains, strict=True)
+        for problem in _instability(name, drive, gain)
+    ]
+    if unstable:
+        raise MachineError(machine.name, tuple(unstable))
+    return parameters
+
+
+def _instability(name: str, drive: _core.FeedDriveParameters, gain_per_s: float) -> list[Problem]:
+    """What says that the loop of an axis grows by itself, dry friction, backlash and force limit left out."""
+    linear = _core.FeedDriveParameters(
+        motor_mass_kg=drive.motor_mass_kg,
+        table_mass_kg=drive.table_mass_kg,
+        stiffness_n_per_m=drive.stiffness_n_per_m,
+        damping_n_s_per_m=drive.damping_n_s_per_m,
+        position_gain_per_s=drive.position_gain_per_s,
+        velocity_gain_n_s_per_m=drive.velocity_gain_n_s_per_m,
+        velocity_integral_time_s=drive.velocity_integral_time_s,
+        position_feedback=drive.position_feedback,
+        table_friction=_core.FrictionParameters(viscous_n_s_per_m=drive.table_friction.viscous_n_s_per_m),
+        motor_friction=drive.motor_friction,
+    )
+    poles = np.linalg.eigvals(np.array(_core.linear_model(linear)[0]))
+    worst = poles[np.argmax(poles.real)]
+    if worst.real <= _GROWING_PER_S:
+        return []
+    return [
+        Problem(
+            f"axes.{name}.drive",
+            "",
+            f"the loop is unstable: it grows by a factor e in {1.0 / worst.real:.3g} s at "
+            f"{abs(worst.imag) / (2.0 * math.pi):.4g} Hz; lower controller.position_gain_per_s ({gain_per_s:g}), raise "
+            "velocity_bandwidth_hz or velocity_integral_time_s",
+        )
     ]
 
 

@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +18,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.converter import written_by_shapegcode
 from shapegcode.machine import Machine
-from shapegcode.metrology_report import measurement_report
+from shapegcode.metrology_report import MeasuredProgram, MeasuredRegion, Measurement, WallProfile
 from shapegcode.moving_modes import machine_warnings, region_offset, region_range_warnings
 from shapegcode.played import plant_options, playing_controller
 from shapegcode.program import Program, given_program
@@ -40,114 +39,6 @@ _LAST_LINE = 2**32 - 1
 _LARGEST_TOOL_MM = 1000.0
 _LEAST_SPACING_MM = 1e-3
 _BLOCKS_PER_CURVE = 2.5  # a shaped program's own blocks are shorter than this many block periods at its feed
-
-
-@dataclass(frozen=True, eq=False)
-class WallProfile:
-    """The walls of a section.
-
-    Attributes:
-        distance_mm: of the stations from the region's start, (n,).
-        left_um: deviation of the left wall from what the programmed path cuts, positive to the left, (n,); NaN where
-            there is no wall.
-        right_um: of the right wall, likewise.
-        point_mm: of the programmed path there, seen from above, (n, 2).
-        normal: unit vectors to the left of the path, (n, 2); zero where it has no horizontal direction.
-    """
-
-    distance_mm: FloatArray
-    left_um: FloatArray
-    right_um: FloatArray
-    point_mm: FloatArray
-    normal: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredRegion:
-    """One cutting region of a program, measured.
-
-    Attributes:
-        lines: of the program whose path it is measured against, first and last, from 1.
-        path: that path.
-        figures: what the core measured.
-        walls: one per section; None where so many stations are not kept.
-        station_spacing_mm: largest distance between two stations.
-    """
-
-    lines: tuple[int, int]
-    path: _core.Path
-    figures: _core.RunFigures
-    walls: tuple[WallProfile | None, ...]
-    station_spacing_mm: float
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredProgram:
-    """One program, measured.
-
-    Attributes:
-        source: its name.
-        shaped: played as one that shapegcode wrote: block by block at its feed.
-        against: name of the program whose path it is measured against; the same as `source` for its own path.
-        regions: in order.
-        warnings: about the program and the machine.
-    """
-
-    source: str
-    shaped: bool
-    against: str
-    regions: tuple[MeasuredRegion, ...]
-    warnings: tuple[str, ...]
-
-    @property
-    def contour_error_um(self) -> float:
-        """Largest distance of the response from the path, µm."""
-        return max((region.figures.response.max_abs_mm for region in self.regions), default=0.0) * 1e3
-
-
-@dataclass(frozen=True, eq=False)
-class Measurement:
-    """Programs measured side by side.
-
-    Attributes:
-        machine: that they were played on.
-        plant: "modal" or "feed-drive".
-        tool_diameter_mm: of the disc.
-        band_um: settled is what stays within it.
-        station_spacing_mm: largest distance between two places at which walls were measured.
-        cutoff_mm: cut-off of the roughness; None: by the length of each section.
-        lambda_s_mm: short-wave cut-off; 0: none.
-        programs: in the order in which they were given.
-    """
-
-    machine: Machine
-    plant: str
-    tool_diameter_mm: float
-    band_um: float
-    station_spacing_mm: float
-    cutoff_mm: float | None
-    lambda_s_mm: float
-    programs: tuple[MeasuredProgram, ...]
-
-    @property
-    def judged(self) -> tuple[MeasuredProgram, ...]:
-        """The programs that are held against the tolerance.
-
-        Shaped programs beside the programmed path; what they are compared with only stands beside them. Without such a
-        program the others. A shaped program's own path is not the programmed one: it is not judged against that.
-        """
-        shaped = tuple(each for each in self.programs if each.shaped and each.against != each.source)
-        return shaped or tuple(each for each in self.programs if not each.shaped)
-
-    @property
-    def within_tolerance(self) -> bool:
-        """Whether the response of every program that is judged stays within `tolerance.contour_um` of the path."""
-        limit = self.machine.tolerance.contour_um
-        return all(each.contour_error_um <= limit for each in self.judged)
-
-    def report(self) -> dict[str, Any]:
-        """Everything as the JSON of ``shapegcode measure --json`` (docs/metrology.md)."""
-        return measurement_report(self)
 
 
 def measure(
@@ -184,8 +75,8 @@ def measure(
         on_progress: called with regions done and regions in all.
 
     Raises:
-        ArgumentError: no program, a value outside its range, lines that hold no cut, or a program that does not cut
-            the regions of the one it is measured against.
+        ArgumentError: no program, one without cuts, a value outside its range, lines that hold no cut, or a program
+            that does not cut the regions of the one it is measured against.
         ProgramError: a program cannot be read, or a region takes longer than can be computed.
         OSError: a file cannot be read.
         MachineError: the machine has no feed drives.
@@ -212,6 +103,9 @@ def measure(
         against = given_program(against, machine)
     elif len(several) > 1 and not shaped[0] and all(shaped[1:]):
         against = several[0]
+    for program in several if against is None else [against]:
+        if not program.regions:
+            raise _core.ArgumentError(f"{program.source}: no cutting move, so there is nothing to measure")
     options = _core.MetrologyOptions()
     options.period_s = machine.controller.interpolation_period_s
     options.tool_radius_mm = tool_diameter_mm / 2.0

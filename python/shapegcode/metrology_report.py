@@ -1,18 +1,130 @@
-"""A measurement as a plain dictionary: the JSON of ``shapegcode measure``. Units are in the names."""
+"""What virtual metrology found, and all of it as a plain dictionary: the JSON of ``shapegcode measure``."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.machine import Machine
 from shapegcode.verify import deviation_um, largest_um, xyz
 
-if TYPE_CHECKING:
-    from shapegcode.metrology import MeasuredProgram, Measurement
+__all__ = ["MeasuredProgram", "MeasuredRegion", "Measurement", "WallProfile", "measurement_report", "section_report"]
 
-__all__ = ["measurement_report", "section_report"]
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class WallProfile:
+    """The walls of a section.
+
+    Attributes:
+        distance_mm: of the stations from the region's start, (n,).
+        left_um: deviation of the left wall from what the programmed path cuts, positive to the left, (n,); NaN where
+            there is no wall.
+        right_um: of the right wall, likewise.
+        point_mm: of the programmed path there, seen from above, (n, 2).
+        normal: unit vectors to the left of the path, (n, 2); zero where it has no horizontal direction.
+    """
+
+    distance_mm: FloatArray
+    left_um: FloatArray
+    right_um: FloatArray
+    point_mm: FloatArray
+    normal: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRegion:
+    """One cutting region of a program, measured.
+
+    Attributes:
+        lines: of the program whose path it is measured against, first and last, from 1.
+        path: that path.
+        figures: what the core measured.
+        walls: one per section; None where so many stations are not kept.
+        station_spacing_mm: largest distance between two stations.
+    """
+
+    lines: tuple[int, int]
+    path: _core.Path
+    figures: _core.RunFigures
+    walls: tuple[WallProfile | None, ...]
+    station_spacing_mm: float
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredProgram:
+    """One program, measured.
+
+    Attributes:
+        source: its name.
+        shaped: played as one that shapegcode wrote: block by block at its feed.
+        against: name of the program whose path it is measured against; the same as `source` for its own path.
+        regions: in order.
+        warnings: about the program and the machine.
+    """
+
+    source: str
+    shaped: bool
+    against: str
+    regions: tuple[MeasuredRegion, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def contour_error_um(self) -> float:
+        """Largest distance of the response from the path, µm."""
+        return max((region.figures.response.max_abs_mm for region in self.regions), default=0.0) * 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """Programs measured side by side.
+
+    Attributes:
+        machine: that they were played on.
+        plant: "modal" or "feed-drive".
+        tool_diameter_mm: of the disc.
+        band_um: settled is what stays within it.
+        station_spacing_mm: largest distance between two places at which walls were measured.
+        cutoff_mm: cut-off of the roughness; None: by the length of each section.
+        lambda_s_mm: short-wave cut-off; 0: none.
+        programs: in the order in which they were given.
+    """
+
+    machine: Machine
+    plant: str
+    tool_diameter_mm: float
+    band_um: float
+    station_spacing_mm: float
+    cutoff_mm: float | None
+    lambda_s_mm: float
+    programs: tuple[MeasuredProgram, ...]
+
+    @property
+    def judged(self) -> tuple[MeasuredProgram, ...]:
+        """The programs that are held against the tolerance.
+
+        Shaped programs beside the programmed path; what they are compared with only stands beside them. Without such a
+        program the others. A shaped program's own path is not the programmed one: it is not judged against that.
+        """
+        shaped = tuple(each for each in self.programs if each.shaped and each.against != each.source)
+        return shaped or tuple(each for each in self.programs if not each.shaped)
+
+    @property
+    def within_tolerance(self) -> bool:
+        """Whether the response of every program that is judged stays within `tolerance.contour_um` of the path."""
+        limit = self.machine.tolerance.contour_um
+        return all(each.contour_error_um <= limit for each in self.judged)
+
+    def report(self) -> dict[str, Any]:
+        """Everything as the JSON of ``shapegcode measure --json`` (docs/metrology.md)."""
+        return measurement_report(self)
 
 
 def measurement_report(measurement: Measurement) -> dict[str, Any]:

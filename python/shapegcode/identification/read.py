@@ -24,6 +24,8 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
     """
     path = Path(path)
     options = options or ReadOptions()
+    if path.exists() and not path.is_file():
+        raise RecordError(f"{path}: not a regular file")
     with path.open("rb") as file:
         head = file.read(_BYTES_TO_KNOW)
     if not head.strip():

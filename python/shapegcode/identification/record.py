@@ -45,6 +45,11 @@ class Record:
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if not (np.isfinite(self.period_s) and self.period_s > 0.0):
+            raise RecordError(f"{self.source}: period of {self.period_s:g} s: must be finite and above 0")
+        _check_samples(self.source, "response", self.response)
+        if self.force_n is not None:
+            _check_samples(self.source, "force", self.force_n)
         if self.force_n is not None and len(self.force_n) != len(self.response):
             raise RecordError(
                 f"{self.source}: {len(self.force_n)} samples of force and {len(self.response)} of response: "
@@ -55,3 +60,14 @@ class Record:
     def time_s(self) -> FloatArray:
         """Instants of the samples, (n,)."""
         return np.asarray(self.start_s + self.period_s * np.arange(len(self.response)), dtype=np.float64)
+
+
+def _check_samples(source: str, what: str, values: FloatArray) -> None:
+    array = np.asarray(values)
+    if array.ndim != 1 or array.dtype.kind not in "fiu" or not array.size:
+        raise RecordError(
+            f"{source}: the {what} is of shape {array.shape} and type {array.dtype}: needed is one row of real numbers"
+        )
+    bad = np.flatnonzero(~np.isfinite(array))
+    if bad.size:
+        raise RecordError(f"{source}: sample {bad[0]} of the {what} is {array[bad[0]]}: must be finite")

@@ -79,7 +79,7 @@ def check_updatable(path: str | Path) -> None:
     """Tell before the work what would make `update_machine_file` fail whatever the modes.
 
     Raises:
-        ArgumentError: a built-in machine.
+        ArgumentError: a built-in machine, or no regular file.
         MachineError: the file is bad.
         OSError: it cannot be read.
     """
@@ -88,6 +88,8 @@ def check_updatable(path: str | Path) -> None:
             f"{path} is a built-in machine, which stays as it is: shapegcode machine init {path} -o mine.toml makes a "
             "file of it that can be updated"
         )
+    if Path(path).exists() and not Path(path).is_file():
+        raise ArgumentError(f"{path}: not a regular file")
     Machine.load(path)
 
 
