@@ -18,8 +18,8 @@ ifneq ($(shell command -v ccache),)
 export CMAKE_CXX_COMPILER_LAUNCHER := ccache
 endif
 
-BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libsundials-dev python3-dev python3-venv
-TEST_PACKAGES := $(BUILD_PACKAGES) doctest-dev clang-format clang-tidy
+BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libsundials-dev python3-dev python3-venv doctest-dev
+TEST_PACKAGES := $(BUILD_PACKAGES) clang-format clang-tidy
 FUZZ_PACKAGES := $(BUILD_PACKAGES) clang-14 libclang-rt-14-dev libomp-14-dev
 FUZZ_SECONDS ?= 600
 FUZZ_FLAGS := -timeout=5 -rss_limit_mb=2048 -max_len=2000 -dict=tests/fuzz/gcode.dict
@@ -129,10 +129,16 @@ test-packages:
 	$(PIP) install -r <($(PYTHON) tests/tools/requirements.py dev)
 	touch $@
 
-# The build folder stays, so that a change costs only what depends on it.
+# The build folders stay, so that a change costs only what depends on it, and the core is the one that the C++ tests
+# link: it is compiled once. A plain `pip install .` compiles its own.
 .venv/.package: .venv/.runtime $(PACKAGE_INPUTS)
+	cmake --preset release
+	cmake --build --preset release --target shapegcode_core
+	rm -rf build/core
+	cmake --install build/release --prefix build/core --component development
 	$(PIP) install --no-build-isolation --no-deps --config-settings=build-dir=build/wheel \
-	  --config-settings=cmake.define.SHAPEGCODE_WARNINGS_AS_ERRORS=ON .
+	  --config-settings=cmake.define.SHAPEGCODE_WARNINGS_AS_ERRORS=ON \
+	  --config-settings=cmake.define.SHAPEGCODE_INSTALLED_CORE=$(CURDIR)/build/core .
 	touch $@
 
 dev: .venv/.dev

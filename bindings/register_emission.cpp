@@ -39,7 +39,7 @@ void register_emission(py::module_& module) {
       .def(
           "end_with_arc",
           [](FitOptions& self, bool clockwise, int normal, double radius_mm) {
-            self.last_kind = clockwise ? BlockKind::clockwise : BlockKind::counter_clockwise;
+            self.last_kind = clockwise ? FittedKind::clockwise : FittedKind::counter_clockwise;
             self.last_normal = static_cast<std::uint8_t>(normal);
             self.last_radius_mm = radius_mm;
           },

@@ -63,9 +63,6 @@ if TYPE_CHECKING:
         minimal_two_mode as minimal_two_mode,
     )
     from shapegcode._core import (
-        plant_response as plant_response,
-    )
-    from shapegcode._core import (
         zv as zv,
     )
     from shapegcode.block_grid import choose_grid as choose_grid
@@ -80,6 +77,7 @@ if TYPE_CHECKING:
     from shapegcode.identification.record import RecordError as RecordError
     from shapegcode.identification.results import Identification as Identification
     from shapegcode.identification.tap_test import identify as identify
+    from shapegcode.linear_response import plant_response as plant_response
     from shapegcode.machine import Machine as Machine
     from shapegcode.machine import MachineError as MachineError
     from shapegcode.metrology import Measurement as Measurement
@@ -111,7 +109,7 @@ _HOME = {
         (
             "ArgumentError", "DesignError", "Fir", "FirStream", "LinearPlant", "Mode", "NumericError", "Path",
             "ProgramError", "Segment", "ShapegcodeError", "Shaper", "__version__", "convolved_zv", "grid_polynomial",
-            "minimal_two_mode", "plant_response", "zv",
+            "minimal_two_mode", "zv",
         ),
         "_core",
     ),
@@ -126,6 +124,7 @@ _HOME = {
     "ReadOptions": "identification.read",
     **dict.fromkeys(("Record", "RecordError"), "identification.record"),
     "identify": "identification.tap_test",
+    "plant_response": "linear_response",
     **dict.fromkeys(
         ("ModeBand", "Recommendation", "choose_block_period", "choose_shaper", "shortest_non_negative"), "shaping"
     ),

@@ -329,11 +329,11 @@ def _series() -> tuple[list[dict[str, Any]], dict[str, Any]]:
     slow_hz, fast_hz, dynamic_share = _chain()
     rows = [
         _row(
-            "5", "end mill under 100 N", "18 um", f"{mill_um:.2f} um", False,
+            "5", "end mill under 100 N", "18 µm", f"{mill_um:.2f} µm", False,
             f"{_SLIP}: 100 N on its own k = 5.07e7 N/m",
         ),
         _row(
-            "5", "collet under 100 N", "0.7 um", f"{collet_um:.3f} um", False,
+            "5", "collet under 100 N", "0.7 µm", f"{collet_um:.3f} µm", False,
             f"{_SLIP}: 100 N on its own k = 1.07e9 N/m",
         ),
         _row(

@@ -53,14 +53,14 @@ inline Vector3 to_mm(const Position& p, double increment) {
 /// A block as a controller sees it: from its words alone.
 struct Played {
   Vector3 start, end;
-  BlockKind kind;
+  FittedKind kind;
   int normal = 2;
   Vector3 centre = Vector3::Zero();
   double radius = 0.0, sweep = 0.0, length = 0.0;
 
   [[nodiscard]] Vector3 at(double fraction) const {
     Vector3 p = start + fraction * (end - start);
-    if (kind == BlockKind::line) return p;
+    if (kind == FittedKind::line) return p;
     const int a = (normal + 1) % 3;
     const int b = (normal + 2) % 3;
     const double turn = sweep * fraction;
@@ -77,11 +77,11 @@ inline Played as_played(const Position& from, const FittedBlock& block, double i
   Played played{to_mm(from, increment), to_mm(block.end, increment), block.kind, block.normal};
   const Vector3 move = played.end - played.start;
   played.length = move.norm();
-  if (block.kind == BlockKind::line) return played;
+  if (block.kind == FittedKind::line) return played;
   const int a = (played.normal + 1) % 3;
   const int b = (played.normal + 2) % 3;
   const double chord = std::hypot(move[a], move[b]);
-  const double sense = block.kind == BlockKind::counter_clockwise ? 1.0 : -1.0;
+  const double sense = block.kind == FittedKind::counter_clockwise ? 1.0 : -1.0;
   played.radius = static_cast<double>(block.radius) * increment;
   const double height = std::sqrt(std::max(0.0, played.radius * played.radius - 0.25 * chord * chord));
   played.centre = played.start;
@@ -137,14 +137,14 @@ inline Findings judge(const Command& command, const std::vector<FittedBlock>& bl
     Eigen::Index moving = first;
     const Position begin = rounded(command, first, options.increment_mm);
     while (moving < last && rounded(command, moving, options.increment_mm) == begin) ++moving;
-    const double slack = options.merge_tolerance_increments + (block.kind == BlockKind::line ? 1e-3 : 0.251);
+    const double slack = options.merge_tolerance_increments + (block.kind == FittedKind::line ? 1e-3 : 0.251);
     for (Eigen::Index k = first + 1; k < last && moving < last; ++k) {
       const Vector3 p = played.at(static_cast<double>(k - first) / static_cast<double>(last - first));
       const Vector3 off = (p - command.grid.row(k).transpose()).cwiseAbs() / options.increment_mm;
       if (off.maxCoeff() > slack) ++found.out_of_tolerance;
       found.inside_error = std::max(found.inside_error, off.maxCoeff());
     }
-    if (block.kind != BlockKind::line) {
+    if (block.kind != FittedKind::line) {
       ++found.arcs;
       if (!(std::abs(played.sweep) < pi / 2)) ++found.bad_sweep;
     }

@@ -11,11 +11,11 @@
 #include "shapegcode/error.hpp"
 
 using namespace shapegcode::tests;
-using shapegcode::BlockKind;
 using shapegcode::Error;
 using shapegcode::fit_blocks;
 using shapegcode::FitOptions;
 using shapegcode::FittedBlock;
+using shapegcode::FittedKind;
 using shapegcode::Vector3;
 
 TEST_CASE("block fit: a steady line is one block, F exact") {
@@ -27,7 +27,7 @@ TEST_CASE("block fit: a steady line is one block, F exact") {
   CHECK(blocks[0].feed == 36000);
   CHECK(blocks[0].periods == 1000);
   CHECK(blocks[0].first_period == 0);
-  CHECK(blocks[0].kind == BlockKind::line);
+  CHECK(blocks[0].kind == FittedKind::line);
 }
 
 TEST_CASE("block fit: first blocks of a ramp by hand") {
@@ -203,8 +203,9 @@ TEST_CASE("block fit: steady arcs in three planes and both senses are few blocks
           Position from = rounded(command, 0, options.increment_mm);
           for (const FittedBlock& block : blocks) {
             const Played played = as_played(from, block, options.increment_mm);
-            const BlockKind expected = sense > 0.0 ? BlockKind::counter_clockwise : BlockKind::clockwise;
-            if (block.kind != BlockKind::line && (block.kind != expected || int{block.normal} != normal)) ++wrong_sense;
+            const FittedKind expected = sense > 0.0 ? FittedKind::counter_clockwise : FittedKind::clockwise;
+            if (block.kind != FittedKind::line && (block.kind != expected || int{block.normal} != normal))
+              ++wrong_sense;
             for (int i = 0; i <= 20; ++i) {
               Vector3 p = played.at(i / 20.0) - centre;
               p[normal] = 0.0;
@@ -264,10 +265,10 @@ TEST_CASE("block fit: pieces below the chord limit are lines, straight ones too"
       2);
   FitOptions options;
   options.arc_min_chord_mm = 0.5;
-  for (const FittedBlock& block : fit(small, options)) CHECK(block.kind == BlockKind::line);
+  for (const FittedBlock& block : fit(small, options)) CHECK(block.kind == FittedKind::line);
   const Command straight = sampled(
       100, [](double k) { return Vector3(0.3 * k, 0.1 * k, 0.0); }, 2);
-  for (const FittedBlock& block : fit(straight)) CHECK(block.kind == BlockKind::line);
+  for (const FittedBlock& block : fit(straight)) CHECK(block.kind == FittedKind::line);
 }
 
 TEST_CASE("block fit: R has no more digits than a word can have") {
@@ -285,7 +286,7 @@ TEST_CASE("block fit: R has no more digits than a word can have") {
       int arcs = 0;
       for (const FittedBlock& block : fit(flat, options)) {
         CHECK(block.radius <= 99999999);
-        arcs += block.kind == BlockKind::line ? 0 : 1;
+        arcs += block.kind == FittedKind::line ? 0 : 1;
       }
       CHECK((arcs > 0) == (radius / increment < 1e8));
     }
@@ -318,13 +319,13 @@ TEST_CASE("block fit: the last block is an arc where the original ended with one
   const Command command = sampled(110, at, 2);
   FitOptions options;
   const auto plain = fit(command, options);
-  REQUIRE(plain.back().kind == BlockKind::line);
-  options.last_kind = BlockKind::counter_clockwise;
+  REQUIRE(plain.back().kind == FittedKind::line);
+  options.last_kind = FittedKind::counter_clockwise;
   options.last_normal = 2;
   options.last_radius_mm = 20.0;
   const auto blocks = fit(command, options);
   REQUIRE(!blocks.empty());
-  CHECK(blocks.back().kind == BlockKind::counter_clockwise);
+  CHECK(blocks.back().kind == FittedKind::counter_clockwise);
   CHECK(blocks.back().radius == 20000);
   CHECK(blocks.back().end == Position{0, 20000, 0});
   const Findings found = judge(command, blocks, options);

@@ -12,9 +12,9 @@
 #include "shapegcode/emission/block_writer.hpp"
 #include "shapegcode/gcode/interpreter.hpp"
 
-using shapegcode::BlockKind;
 using shapegcode::BlockMark;
 using shapegcode::FittedBlock;
+using shapegcode::FittedKind;
 using shapegcode::Program;
 using shapegcode::read_program;
 using shapegcode::Segment;
@@ -29,10 +29,10 @@ namespace {
 using Position = std::array<std::int64_t, 3>;
 
 FittedBlock line(Position end, std::int64_t feed, std::uint32_t first = 0, std::uint32_t periods = 1) {
-  return {end, 0, feed, first, periods, BlockKind::line, 2};
+  return {end, 0, feed, first, periods, FittedKind::line, 2};
 }
 
-FittedBlock arc(Position end, std::int64_t radius, std::int64_t feed, BlockKind kind, std::uint8_t normal) {
+FittedBlock arc(Position end, std::int64_t radius, std::int64_t feed, FittedKind kind, std::uint8_t normal) {
   return {end, radius, feed, 0, 1, kind, normal};
 }
 
@@ -60,12 +60,12 @@ TEST_CASE("block writer: a feed below ten keeps a digit behind the point") {
 TEST_CASE("block writer: arcs in their plane, G codes where they change") {
   const std::vector<FittedBlock> blocks = {
       line({20000, 0, 0}, 60000),
-      arc({20300, 2, 0}, 20002, 37770, BlockKind::counter_clockwise, 2),
-      arc({20600, 9, 0}, 19998, 37770, BlockKind::counter_clockwise, 2),
-      arc({20900, 0, 0}, 20000, 37770, BlockKind::clockwise, 2),
+      arc({20300, 2, 0}, 20002, 37770, FittedKind::counter_clockwise, 2),
+      arc({20600, 9, 0}, 19998, 37770, FittedKind::counter_clockwise, 2),
+      arc({20900, 0, 0}, 20000, 37770, FittedKind::clockwise, 2),
       line({21000, 0, 0}, 37770),
-      arc({21000, 500, 500}, 500, 37770, BlockKind::clockwise, 0),
-      arc({21500, 500, 1000}, 500, 37770, BlockKind::clockwise, 1),
+      arc({21000, 500, 500}, 500, 37770, FittedKind::clockwise, 0),
+      arc({21500, 500, 1000}, 500, 37770, FittedKind::clockwise, 1),
       line({22000, 500, 1000}, 37770),
   };
   const WrittenBlocks written = write_blocks(blocks, {0, 0, 0}, {}, WriterOptions{});
@@ -93,7 +93,7 @@ TEST_CASE("block writer: incremental words are differences of the rounded positi
   WriterOptions options;
   options.incremental = true;
   const std::vector<FittedBlock> blocks = {line({1012, 5, 0}, 1480), line({1050, 5, 0}, 1480),
-                                           arc({1100, 0, 0}, 300, 1480, BlockKind::clockwise, 2)};
+                                           arc({1100, 0, 0}, 300, 1480, FittedKind::clockwise, 2)};
   CHECK(write_blocks(blocks, {1000, 5, 0}, {}, options).text == "X.012F148.\nX.038\nG02X.05Y-.005R.3\n");
 }
 
@@ -179,14 +179,14 @@ TEST_CASE("block writer: what is written is read back to the increment, in G90 a
         }
         block.feed = pick(generator) < 5 && i > 0 ? blocks.back().feed : feed(generator);
         if (pick(generator) < 4) {
-          block.kind = pick(generator) < 5 ? BlockKind::clockwise : BlockKind::counter_clockwise;
+          block.kind = pick(generator) < 5 ? FittedKind::clockwise : FittedKind::counter_clockwise;
           block.normal = static_cast<std::uint8_t>(pick(generator) % 3);
           const auto a = static_cast<std::size_t>((block.normal + 1) % 3);
           const auto b = static_cast<std::size_t>((block.normal + 2) % 3);
           const double chord =
               std::hypot(static_cast<double>(block.end[a] - at[a]), static_cast<double>(block.end[b] - at[b]));
           block.radius = static_cast<std::int64_t>(std::ceil(chord)) + 100;
-          if (chord < 50.0) block.kind = BlockKind::line;
+          if (chord < 50.0) block.kind = FittedKind::line;
         }
         blocks.push_back(block);
         at = block.end;
@@ -219,10 +219,10 @@ TEST_CASE("block writer: what is written is read back to the increment, in G90 a
           if (std::abs(segment.end_mm[static_cast<Eigen::Index>(k)] - expected) > 1e-7) ++wrong;
         }
         if (std::abs(segment.feed_mm_per_s - static_cast<double>(block.feed) * 0.1 * unit / 60.0) > 1e-9) ++wrong;
-        if ((segment.kind == SegmentKind::arc) != (block.kind != BlockKind::line)) ++wrong;
-        if (block.kind != BlockKind::line) {
+        if ((segment.kind == SegmentKind::arc) != (block.kind != FittedKind::line)) ++wrong;
+        if (block.kind != FittedKind::line) {
           if (std::abs(segment.start_radius_mm - static_cast<double>(block.radius) * increment) > 1e-6) ++wrong;
-          if ((segment.sweep_rad > 0.0) != (block.kind == BlockKind::counter_clockwise)) ++wrong;
+          if ((segment.sweep_rad > 0.0) != (block.kind == FittedKind::counter_clockwise)) ++wrong;
           if (segment.normal != block.normal || std::abs(segment.sweep_rad) > std::numbers::pi / 2) ++wrong;
         }
       }

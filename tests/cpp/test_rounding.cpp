@@ -16,11 +16,11 @@
 #include "shapegcode/error.hpp"
 
 using namespace shapegcode::tests;
-using shapegcode::BlockKind;
 using shapegcode::Error;
 using shapegcode::fit_blocks;
 using shapegcode::FitOptions;
 using shapegcode::FittedBlock;
+using shapegcode::FittedKind;
 using shapegcode::ModalRounder;
 using shapegcode::Mode;
 using shapegcode::RoundingEnd;

@@ -91,7 +91,7 @@ def test_differences_are_said(demo: TapDemo) -> None:
     assert demo.report["agrees"]
     assert COLLET.frequency_hz == pytest.approx(1353.0, abs=0.5)
     assert demo.report["collet"]["damping_ratio"] == pytest.approx({"equation": 0.63, "list": 0.063}, rel=1e-2)
-    assert rows(demo)["end mill under 100 N"]["paper"] == "18 um"
+    assert rows(demo)["end mill under 100 N"]["paper"] == "18 µm"
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

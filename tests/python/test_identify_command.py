@@ -120,7 +120,7 @@ def test_taps_to_machine_file(capsys: pytest.CaptureFixture[str], taps: list[str
     evidence = {int(order): value for order, value in result["evidence"].items()}
     assert min(evidence, key=evidence.__getitem__) == 2
     assert result["machine_file"]["path"] == str(mine)
-    assert "participations are 0.33, 0.67" in " ".join(result["machine_file"]["notes"])
+    assert "would be 0.33" in " ".join(result["machine_file"]["notes"])
 
     machine = sg.Machine.load(mine)
     assert machine.axes.y == sg.Machine.load("vx500").axes.y
@@ -158,7 +158,7 @@ def test_the_same_again_changes_nothing(taps: list[str], mine: Path) -> None:
 def test_what_people_see(capsys: pytest.CaptureFixture[str], taps: list[str]) -> None:
     assert main(["identify", *taps]) == 0
     out = capsys.readouterr().out
-    for said in ("used: 3 taps, X axis", "frequency Hz", "damping %", "m kg", "c N s/m", "k N/um", "model: 2 modes"):
+    for said in ("used: 3 taps, X axis", "frequency Hz", "damping %", "m kg", "c N s/m", "k N/µm", "model: 2 modes"):
         assert said in out
     assert f"next: shapegcode identify {' '.join(taps)} --update mine.toml" in out
 
@@ -170,7 +170,7 @@ def test_one_mode_has_the_check_of_the_paper(capsys: pytest.CaptureFixture[str],
     for name in ("mass_closed_form_kg", "mass_bisection_kg"):
         assert result["checks"][name] == pytest.approx(120.0, rel=0.02)
     assert main(["identify", str(tmp_path / "one.csv")]) == 0
-    assert "check: mass closed form kg" in capsys.readouterr().out
+    assert "check: equivalent mass by paper 003's method: closed form 1" in capsys.readouterr().out
 
 
 def test_a_decay_gives_modes_without_mass(
@@ -334,3 +334,19 @@ def test_from_python(taps: list[str]) -> None:
     assert slow.mass_kg.value == pytest.approx(120.0, rel=0.02)
     with pytest.raises(sg.RecordError, match="zero force"):
         sg.identify([sg.Record("memory", PERIOD_S, record.response, force_n=np.zeros(2048))])
+
+
+def test_a_result_prints_as_a_line_per_mode(taps: list[str]) -> None:
+    found = sg.identify(taps)
+    lines = repr(found).splitlines()
+    assert len(lines) <= 2 + len(found.modes)
+    assert re.match(r"  frequency 4[56]\.\d+ ± 0\.\d+ Hz, damping .* %, m 1\d\d.* kg, c .* N s/m, k .* N/µm$", lines[1])
+    assert all(type(end) is float for mode in found.modes for end in vars(mode.frequency_hz).values())
+
+
+def test_a_refusal_is_said_once(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = write_tap(tmp_path / "noisy.csv", TWO[:1], snr_db=-5.0)
+    assert main(["identify", str(file)]) == 2
+    captured = capsys.readouterr()
+    assert "known to" in captured.out
+    assert captured.err == "shapegcode: no mode is supported by the data: the table says why\n"

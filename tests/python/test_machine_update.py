@@ -6,7 +6,9 @@ import difflib
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
+import scipy.linalg
 
 from shapegcode._core import ArgumentError
 from shapegcode.identification.results import Estimate, IdentifiedMode
@@ -147,12 +149,35 @@ def test_tables_that_were_not_found_go_and_say_so() -> None:
 
 def test_as_many_pairs_as_there_can_be_and_the_nearest() -> None:
     two = update_modes(VX500, "x", [tap(46.0), tap(50.0)], source="s").text.replace(
-        "participation = 1.0  # not measured", "participation = 0.3"
+        "participation = 0.5  # share of the residues 1/m, not measured", "participation = 0.3"
     )
     moved = update_modes(two, "x", [tap(52.0), tap(48.2)], source="s").machine.axes.x.modes
     assert [(mode.frequency_hz, mode.participation) for mode in moved] == [(48.2, 1.0), (52.0, 0.3)]
     close = update_modes(two, "x", [tap(50.5)], source="s").machine.axes.x.modes
     assert [(mode.frequency_hz, mode.participation) for mode in close] == [(50.5, 0.3)]
+
+
+def test_new_modes_share_the_motion_of_the_axis() -> None:
+    # Two bodies on a moving base, m1 = 3 kg tapped, m2 = 1 kg light: eigenvectors normalised by the mass matrix.
+    mass, stiffness = np.diag([3.0, 1.0]), np.array([[5e5, -2e5], [-2e5, 2e5]])
+    squares, shapes = scipy.linalg.eigh(stiffness, mass)
+    gamma = shapes.T @ mass @ np.ones(2)
+    assert shapes[0] @ gamma == pytest.approx(1.0)  # what the warning says
+    masses = 1.0 / shapes[0] ** 2
+    taps = [tap(float(np.sqrt(w) / 6.2831853), mass=float(m)) for w, m in zip(squares, masses, strict=True)]
+    fresh = update_modes(VX500, "y", taps, source="s")
+    shares = [mode.participation for mode in fresh.machine.axes.y.modes]
+    assert sum(shares) == pytest.approx(1.0, abs=1e-3)
+    assert shares == pytest.approx((1.0 / masses) / np.sum(1.0 / masses), rel=1e-3)
+    assert not [note for note in fresh.notes if note.startswith("warning")]
+    assert "share of the residues 1/m, not measured" in fresh.text
+    decay = update_modes(VX500, "y", [tap(f, mass=None) for f in (80.0, 100.0, 170.0)], source="s")
+    assert [mode.participation for mode in decay.machine.axes.y.modes] == [0.3333] * 3
+    # one that stays as stated, with 1, and a new one: more than the axis moves
+    more = update_modes(VX500, "x", [tap(46.0, mass=120.0), tap(131.0, mass=60.0)], source="s")
+    assert [mode.participation for mode in more.machine.axes.x.modes] == [1.0, 0.6667]
+    assert "X axis sum to 1.667" in more.notes[-1]
+    assert "would be 0.3333, 0.6667" in more.notes[-1]
 
 
 def test_a_decay_takes_the_mass_away() -> None:
@@ -228,7 +253,7 @@ def test_a_file_written_by_hand() -> None:
     come = update.text.splitlines()
     assert [line for line in kept if line not in come] == []
     assert "  frequency_hz = 41.0  # 95 %: 40.9795 ... 41.0205" in come
-    assert [(mode.frequency_hz, mode.participation) for mode in update.machine.axes.y.modes] == [(41, 0.5), (90, 1)]
+    assert [(mode.frequency_hz, mode.participation) for mode in update.machine.axes.y.modes] == [(41, 0.5), (90, 0.5)]
     assert come.index("[[axes.y.modes]]") < come.index("# about the end")
     with pytest.raises(ArgumentError, match=r"write the axis as a table \[axes\.x\]"):
         update_modes(HAND, "x", [tap(41.0)], source="s")
@@ -262,3 +287,11 @@ def test_files(tmp_path: Path) -> None:
         update_modes(VX500, "x", [tap(46.0)], source="s").text
     )
     assert file.read_text(encoding="utf-8") == VX500
+
+
+def test_a_mode_that_the_test_shows_but_does_not_support_stays() -> None:
+    update = update_modes(VX500, "x", [tap(118.0)], source="tap.csv", refused=[tap(46.99, refusal="too uncertain")])
+    modes = tomllib.loads(update.text)["axes"]["x"]["modes"]
+    assert [mode["frequency_hz"] for mode in modes] == [46.0, 118.0]
+    assert modes[0] == tomllib.loads(VX500)["axes"]["x"]["modes"][0]
+    assert any(note.startswith("kept 46.0 Hz as it is") for note in update.notes)

@@ -68,3 +68,18 @@ def test_refusals() -> None:
     ):
         with pytest.raises(sg.ArgumentError, match=named):
             sg.plant_response(command, modes, period)
+
+
+def test_modes_of_a_machine_file() -> None:
+    machine = sg.Machine.load("vx500")
+    command = np.cumsum(record(300), axis=0)
+    expected = sg.plant_response(command, [[sg.Mode(46.0, 0.02)], [sg.Mode(131.0, 0.02)]], PERIOD)
+    assert np.array_equal(sg.plant_response(command, machine, PERIOD), expected)
+    assert np.array_equal(sg.plant_response(command, [machine.axes.x.modes, machine.axes.y.modes], PERIOD), expected)
+    assert sg.plant_response(np.zeros((5, 3)), machine, PERIOD).shape == (5, 3)
+    for wrong in (machine.axes.x.modes, [[(46.0, 0.02)], []], 46.0, "vx500"):
+        with pytest.raises(sg.ArgumentError, match=r"modes.* must be a machine or a list of modes for each axis"):
+            sg.plant_response(command, wrong, PERIOD)  # type: ignore[arg-type]
+    assert sg.plant_response(np.zeros((5, 1)), machine, PERIOD).shape == (5, 1)
+    with pytest.raises(sg.ArgumentError):
+        sg.plant_response(np.zeros((5, 4)), machine, PERIOD)

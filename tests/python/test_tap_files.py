@@ -110,7 +110,9 @@ def test_every_dialect_reads_the_same(name: str, tmp_path: Path) -> None:
 
 
 def test_a_preamble_is_counted(tmp_path: Path) -> None:
-    assert "4 lines before the header in line 5 left out" in only(read(tmp_path, DIALECTS["logger"])).warnings
+    (note,) = only(read(tmp_path, DIALECTS["logger"])).warnings
+    assert note.startswith("note: ")
+    assert note.endswith(".csv: 4 lines before the header in line 5 left out")
     assert not only(read(tmp_path, DIALECTS["plain"])).warnings
 
 
@@ -145,6 +147,26 @@ def test_labels(text: str, measures: str | None, axis: str | None, factor: float
 def test_unknown_units_stay_unknown() -> None:
     assert [find_unit(text) for text in ("V", "mN", "furlong", "", "m/s³", "Hz")] == [None] * 6
     assert read_label("force [V]").unknown_unit == "V"
+
+
+@pytest.mark.parametrize("unit", ["V", "mV", "pC", "lb", "kgf", "counts", "%FS", "% FS"])
+def test_a_unit_that_is_not_converted_is_no_part_of_a_name(unit: str, tmp_path: Path) -> None:
+    for name in ("force", "acc_x", "Hammer"):
+        for sign in ("_", " ", "/"):
+            assert read_label(f"{name}{sign}{unit}").unknown_unit == unit
+    with pytest.raises(RecordError, match=rf"the unit '{unit}' is not known.*--force-scale, --response-scale"):
+        read(tmp_path, f"time_s,force_{unit},acc_x_m/s^2\n" + rows())
+    record = only(read(tmp_path, f"time_s,force_{unit},acc_x_m/s^2\n" + rows(), force_scale=2.0))
+    np.testing.assert_array_equal(record.force_n, 2.0 * FORCE)
+    assert not record.warnings
+
+
+def test_names_that_look_like_units_stay_names(tmp_path: Path) -> None:
+    for name in ("x_v", "acc_a", "force hammer", "acc 2", "sensor a", "acc_x", "v"):
+        assert not read_label(name).unknown_unit
+    assert read_label("x_v").measures == "velocity"
+    assert (read_label("x_V").measures, read_label("x_V").unknown_unit) == ("response", "V")
+    assert only(read(tmp_path, "time_s,force_N,acc_x_m/s^2\n" + rows())).axis == "x"
 
 
 def test_without_units_si_is_taken_and_said(tmp_path: Path) -> None:
@@ -316,6 +338,30 @@ BAD: dict[str, tuple[str | bytes, dict[str, Any], str]] = {
         r":2: column 1: 'measured on Monday' is not a",
     ),
 }
+
+
+def test_points_for_thousands(tmp_path: Path) -> None:
+    values = [f"{k:,}".replace(",", ".") + f",{k % 7}" for k in range(990, 1000 + COUNT)][-COUNT:]
+    values[3], values[5] = "-1.234.567,25", "+1.000,5e-2"
+    lines = [f"{k};{value};{k},5" for k, value in enumerate(values)]
+    record = only(read(tmp_path, "t_ms;f_N;a_g\n" + "\n".join(lines) + "\n"))
+    expected = [k + k % 7 / 10 for k in range(1000, 1000 + COUNT)]
+    expected[3], expected[5] = -1234567.25, 10.005
+    np.testing.assert_allclose(record.force_n, expected, rtol=1e-15)
+    for bad in ("1.26,5", "1.2655,1", "12.345.6,1", "1234.567,8"):
+        with pytest.raises(RecordError, match=rf":5: column 2 \(f_N\) '{bad}' is not a finite number"):
+            read(tmp_path, "t_ms;f_N;a_g\n" + "\n".join(lines).replace(values[3], bad) + "\n")
+
+
+def test_times_of_the_day(tmp_path: Path) -> None:
+    lines = [f"10:15:00,{500 * k:06d};{k},0;{k},5" for k in range(COUNT)]
+    text = "Zeit;Kraft [N];Beschleunigung Y [m/s²]\n" + "\n".join(lines) + "\n"
+    with pytest.raises(RecordError, match=r":2: column 1 \(Zeit\) '10:15:00,000000' is a time of the day.*--period"):
+        read(tmp_path, text)
+    record = only(read(tmp_path, text, period_s=5e-4))
+    assert (record.period_s, record.start_s, record.axis) == (5e-4, 0.0, "y")
+    np.testing.assert_array_equal(record.response, np.arange(COUNT) + 0.5)
+    assert any("the stated period of 0.0005 s is taken" in text for text in record.warnings)
 
 
 @pytest.mark.parametrize("name", BAD)

@@ -73,7 +73,7 @@ class Fitter {
   // Makes the last line an arc where the original ends with one. A line that does not move in the arc's plane (the end
   // of a steep helix) gets one increment of way in it from its predecessor.
   void end_with_arc(std::vector<FittedBlock>& blocks) const {
-    if (options_.last_kind == BlockKind::line || blocks.empty()) {
+    if (options_.last_kind == FittedKind::line || blocks.empty()) {
       return;
     }
     FittedBlock& last = blocks.back();
@@ -117,7 +117,7 @@ class Fitter {
       // All blocks from there to the last but one stay one increment behind; lines only, so that no arc changes its
       // shape.
       for (std::size_t k = i; k + 1 < blocks.size(); ++k) {
-        if (blocks[k].kind != BlockKind::line) {
+        if (blocks[k].kind != FittedKind::line) {
           return false;
         }
       }
@@ -151,7 +151,7 @@ class Fitter {
   }
 
   [[nodiscard]] Candidate line_to(const Position& end, double length, std::uint32_t k, std::uint32_t covered) const {
-    Candidate line{{end, 0, 0, k, covered + lent_, BlockKind::line, 2}, covered};
+    Candidate line{{end, 0, 0, k, covered + lent_, FittedKind::line, 2}, covered};
     shape_.set_feed(line.block, length);
     return line;
   }
@@ -185,7 +185,7 @@ class Fitter {
       if (end != position_ && (inside || !best)) {
         const double length = (shape_.to_mm(end) - shape_.to_mm(position_)).norm();
         if (const auto f = shape_.feed(length, j - k + lent_)) {
-          best = Candidate{{end, 0, *f, k, j - k + lent_, BlockKind::line, 2}, j - k};
+          best = Candidate{{end, 0, *f, k, j - k + lent_, FittedKind::line, 2}, j - k};
         } else if (!best) {
           best = line_to(end, length, k, j - k);
         }

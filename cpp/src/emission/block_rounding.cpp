@@ -167,7 +167,7 @@ class BlockRounder {
     const FittedBlock& block = blocks_[first_ + n];
     auto& excitation = bulge_excitation_[axis];
     const ModalRounder& rounder = rounders_[axis];
-    if (block.kind == BlockKind::line || axis == block.normal) {
+    if (block.kind == FittedKind::line || axis == block.normal) {
       for (std::uint32_t i = 0; i < block.periods; ++i) {
         rounder.advance(excitation, 0.0);
       }
@@ -204,7 +204,7 @@ class BlockRounder {
     const double move = static_cast<double>(nearest_[n][axis] - from[axis]);
     std::optional<ChordArc> arc;
     Eigen::Index row = 0;
-    if (block.kind != BlockKind::line && axis != block.normal) {
+    if (block.kind != FittedKind::line && axis != block.normal) {
       FittedBlock nearest = block;
       nearest.end = nearest_[n];
       arc = shape_.arc_of(from, nearest);
@@ -303,7 +303,7 @@ class BlockRounder {
         continue;
       }
       bool fits = false;
-      if (block.kind == BlockKind::line) {
+      if (block.kind == FittedKind::line) {
         const auto feed = shape_.feed((shape_.to_mm(block.end) - shape_.to_mm(from)).norm(), block.periods);
         fits = feed.has_value();
         shaped_[n].feed = feed.value_or(block.feed);

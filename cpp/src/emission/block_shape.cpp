@@ -129,7 +129,7 @@ ChordArc BlockShape::arc_of(const BlockPosition& from, const FittedBlock& block)
   arc.radius = static_cast<double>(block.radius) * options_.increment_mm;
   arc.sweep = 2.0 * std::asin(0.5 * arc.chord / arc.radius);
   // Counter-clockwise turns left, so its path bulges to the right of the chord.
-  arc.bulge_side = block.kind == BlockKind::counter_clockwise ? -1.0 : 1.0;
+  arc.bulge_side = block.kind == FittedKind::counter_clockwise ? -1.0 : 1.0;
   return arc;
 }
 
@@ -170,7 +170,7 @@ std::optional<FittedBlock> BlockShape::arc(const BlockPosition& from, const Bloc
   if (!f && m > 1) {
     return std::nullopt;
   }
-  const BlockKind kind = arc->bulge_side < 0.0 ? BlockKind::counter_clockwise : BlockKind::clockwise;
+  const FittedKind kind = arc->bulge_side < 0.0 ? FittedKind::counter_clockwise : FittedKind::clockwise;
   return FittedBlock{end,
                      std::llround(arc->radius / options_.increment_mm),
                      f ? *f : nearest_feed(length, periods),

@@ -45,12 +45,12 @@ WrittenBlocks write_blocks(std::span<const FittedBlock> blocks, std::array<std::
     if (options.exact_stop_at_end && &block == &blocks.back()) {
       text += "G09";
     }
-    if (block.kind != BlockKind::line && plane != plane_code(block.normal)) {
+    if (block.kind != FittedKind::line && plane != plane_code(block.normal)) {
       plane = plane_code(block.normal);
       text += 'G';
       text += std::to_string(plane);
     }
-    const int code = block.kind == BlockKind::line ? 1 : block.kind == BlockKind::clockwise ? 2 : 3;
+    const int code = block.kind == FittedKind::line ? 1 : block.kind == FittedKind::clockwise ? 2 : 3;
     if (code != motion) {
       motion = code;
       text += "G0";
@@ -63,7 +63,7 @@ WrittenBlocks write_blocks(std::span<const FittedBlock> blocks, std::array<std::
                        options.position_decimals);
       }
     }
-    if (block.kind != BlockKind::line) {
+    if (block.kind != FittedKind::line) {
       text += 'R';
       append_decimal(text, block.radius, options.position_decimals);
     }

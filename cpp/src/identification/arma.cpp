@@ -9,6 +9,7 @@
 
 #include "identification/fit_common.hpp"
 #include "identification/separable_fit.hpp"
+#include "linear_algebra.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -56,7 +57,7 @@ std::vector<Complex> roots(const VectorXd& phi) {
   MatrixXd companion = MatrixXd::Zero(n, n);
   companion.row(0) = phi.transpose();
   companion.diagonal(-1).setOnes();
-  const Eigen::VectorXcd values = companion.eigenvalues();
+  const Eigen::VectorXcd values = linear_algebra::eigenvalues(companion);
   return {values.begin(), values.end()};
 }
 
@@ -150,8 +151,7 @@ class IteratedLeastSquares {
     }
     // A model with more modes than the data have does not determine all coefficients: take the smallest ones.
     const Index unknowns = kept - 1;
-    const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(stack.leftCols(unknowns));
-    return VectorXd(solver.solve(stack.col(unknowns))).tail(order_);
+    return linear_algebra::least_norm_solution(stack.leftCols(unknowns), stack.col(unknowns)).tail(order_);
   }
 
   Arma with_numerators(const VectorXd& phi) const {
@@ -172,14 +172,13 @@ class IteratedLeastSquares {
         identification::triangulate(columns);
         stack.middleRows(static_cast<Index>(r) * (terms_ + 1), terms_ + 1) = columns.topRows(terms_ + 1);
       }
-      const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(stack.leftCols(terms_));
-      arma.numerator.row(0) = VectorXd(solver.solve(stack.col(terms_))).transpose();
+      arma.numerator.row(0) =
+          linear_algebra::least_norm_solution(stack.leftCols(terms_), stack.col(terms_)).transpose();
     }
     for (std::size_t r = 0; r < records_.size(); ++r) {
       const Index row = shared_ ? 0 : static_cast<Index>(r);
       if (!shared_) {
-        const Eigen::ColPivHouseholderQR<MatrixXd> solver(inputs[r]);
-        arma.numerator.row(row) = VectorXd(solver.solve(records_[r].output)).transpose();
+        arma.numerator.row(row) = linear_algebra::least_squares(inputs[r], records_[r].output).transpose();
       }
       const VectorXd residual = records_[r].output - inputs[r] * arma.numerator.row(row).transpose();
       arma.residual_rms.push_back(std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size())));

@@ -332,12 +332,16 @@ MatrixXd covariance_of(const ModalFit& fit, const identification::SeparableFit& 
   return change * logarithmic * change.transpose();
 }
 
-/// Takes the rows of expected force errors, which lie behind the samples, out of what is told of the fit.
+/// Takes the rows of expected force errors, which lie behind the samples, out of what is told of the samples.
 void drop_expectations(identification::SeparableFit& fit, std::span<const TapSignals> taps) {
+  fit.expectations = MatrixXd::Zero(fit.inverse_gram.rows(), fit.inverse_gram.cols());
   for (std::size_t r = 0; r < taps.size(); ++r) {
     const auto n = static_cast<Index>(taps[r].response.size());
+    const MatrixXd expected = fit.jacobian[r].bottomRows(fit.jacobian[r].rows() - n);
+    fit.expectations.noalias() += expected.transpose() * expected;
     fit.fitted[r].conservativeResize(n);
     fit.residual[r].conservativeResize(n);
+    fit.jacobian[r].conservativeResize(n, Eigen::NoChange);
   }
 }
 

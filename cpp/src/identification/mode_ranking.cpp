@@ -9,6 +9,7 @@
 
 #include "identification/fit_common.hpp"
 #include "identification/one_pole.hpp"
+#include "linear_algebra.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/identification/modal_fit.hpp"
 
@@ -42,11 +43,11 @@ Products products_of(MatrixXd columns, const VectorXd& response) {
 /// What candidate `c` (columns c*group ...) takes off the squares; 0 if it is a combination of those taken out.
 double gain_of(const Products& products, Index c, Index group) {
   const MatrixXd own = products.gram.block(c * group, c * group, group, group);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(own);
-  const VectorXd parts = solver.eigenvectors().transpose() * products.with_response.segment(c * group, group);
+  const auto [sizes, directions] = linear_algebra::symmetric_eigen(own);
+  const VectorXd parts = directions.transpose() * products.with_response.segment(c * group, group);
   double gain = 0.0;
   for (Index i = 0; i < group; ++i) {
-    const double size = solver.eigenvalues()[i];
+    const double size = sizes[i];
     if (size > least_own_share) gain += parts[i] * parts[i] / size;
   }
   return gain;

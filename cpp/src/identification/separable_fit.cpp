@@ -265,6 +265,7 @@ MatrixXd coloured_covariance(const SeparableFit& fit, double degrees_of_freedom)
     const double weight = taper * product / degrees_of_freedom;
     middle += lag == 0 ? (weight * columns).eval() : (weight * (columns + columns.transpose())).eval();
   }
+  if (fit.expectations.size() > 0) middle += fit.sum_of_squares / degrees_of_freedom * fit.expectations;
   return fit.inverse_gram * middle * fit.inverse_gram;
 }
 

@@ -53,6 +53,8 @@ struct SeparableFit {
   Eigen::MatrixXd inverse_gram;
   /// Per record the columns of J for (common, theta), what local parameters can follow taken out.
   std::vector<Eigen::MatrixXd> jacobian;
+  /// J'J of rows that are expectations, not samples, where the model has such; else of size 0.
+  Eigen::MatrixXd expectations;
   std::vector<Eigen::VectorXd> fitted;
   std::vector<Eigen::VectorXd> residual;
   double sum_of_squares = 0.0;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "identification/fit_common.hpp"
+#include "linear_algebra.hpp"
 #include "shapegcode/identification/arma.hpp"
 
 namespace shapegcode {
@@ -102,9 +103,9 @@ std::vector<std::vector<Complex>> poles_of(const std::vector<std::vector<double>
   // At most a half of the samples are delays: the rest is what is averaged over.
   const Index width = std::min(widest, std::max(most + 2, length / 2));
   const Index stride = std::min(stride_of(decays), std::max<Index>(length / 2 / width, 1));
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(covariance_of(decays, width, stride));
-  // Ascending in the solver: the signal's directions are the last ones.
-  const MatrixXd signal = solver.eigenvectors().rightCols(most).rowwise().reverse();
+  // Ascending: the signal's directions are the last ones.
+  const MatrixXd directions = linear_algebra::symmetric_eigen(covariance_of(decays, width, stride)).vectors;
+  const MatrixXd signal = directions.rightCols(most).rowwise().reverse();
   const MatrixXd product = signal.topRows(width - 1).transpose() * signal.bottomRows(width - 1);
   std::vector<std::vector<Complex>> poles;
   for (Index n = 2; n <= most; n += 2) {
@@ -114,7 +115,7 @@ std::vector<std::vector<Complex>> poles_of(const std::vector<std::vector<double>
     const double remaining = std::max(1.0 - last.squaredNorm(), 1e-12);
     const MatrixXd shift = corner + last * (last.transpose() * corner) / remaining;
     std::vector<Complex> found;
-    for (const Complex& value : Eigen::VectorXcd(shift.eigenvalues())) {
+    for (const Complex& value : linear_algebra::eigenvalues(shift)) {
       found.push_back(stride == 1 ? value : std::pow(value, 1.0 / static_cast<double>(stride)));
     }
     poles.push_back(std::move(found));

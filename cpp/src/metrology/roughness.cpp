@@ -1,13 +1,13 @@
 #include "shapegcode/metrology/roughness.hpp"
 
 #include <Eigen/Core>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
 #include <string>
 
+#include "linear_algebra.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -20,7 +20,7 @@ constexpr double rounding_share = 1e-9;  // of a length that is a whole number o
 
 std::vector<double> less_fit(std::span<const double> profile, const Eigen::MatrixXd& basis) {
   const Eigen::Map<const Eigen::VectorXd> values(profile.data(), static_cast<Eigen::Index>(profile.size()));
-  const Eigen::VectorXd rest = values - basis * basis.colPivHouseholderQr().solve(values);
+  const Eigen::VectorXd rest = values - basis * linear_algebra::least_squares(basis, values);
   return {rest.begin(), rest.end()};
 }
 

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 
+#include "linear_algebra.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -186,7 +186,7 @@ void LinearPlant::reset_at_rest(const VectorXd& input, const VectorXd& near) {
   equations = largest.cwiseInverse().asDiagonal() * equations;
   const VectorXd from = near.cwiseQuotient(factor);
   const VectorXd missing = -(equations * from + (plant_.b * input).cwiseQuotient(largest));
-  const VectorXd away = equations.completeOrthogonalDecomposition().solve(missing);
+  const VectorXd away = linear_algebra::least_norm_solution(equations, missing);
   const VectorXd terms = equations.cwiseAbs() * (from.cwiseAbs() + away.cwiseAbs()) +
                          (plant_.b.cwiseAbs() * input.cwiseAbs()).cwiseQuotient(largest);
   Index worst = 0;

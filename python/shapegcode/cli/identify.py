@@ -21,6 +21,8 @@ __all__ = ["add_arguments", "run"]
 
 _MOST_MODES = 8  # as tap_test.MOST_MODES, which would have to be imported with all that is slow
 
+_SEEN = "no mode is supported by the data: the table says why"
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -153,7 +155,7 @@ def _identify(args: argparse.Namespace) -> int:
     from shapegcode.identification.tap_test import tap_test
 
     _check_targets(args)
-    with progress("identifying modes", args.json) as bar:
+    with progress(_work(args.files), args.json) as bar:
         bar.wait()
         test = tap_test(
             args.files,
@@ -180,10 +182,15 @@ def _identify(args: argparse.Namespace) -> int:
             console.print(f"{args.update}: {note}", markup=False, soft_wrap=True)
     console.print(f"next: {_next_step(args, test)}", markup=False, soft_wrap=True)
     if not test.modes:
-        reason = test.reason.replace("\n", "\nshapegcode: ")
+        shown = args.json != "-" and bool(test.refused)
+        reason = _SEEN if shown else test.reason.replace("\n", "\nshapegcode: ")
         print(f"shapegcode: {reason}", file=sys.stderr)
         return ExitCode.BAD_INPUT
     return ExitCode.OUT_OF_TOLERANCE if test.refused else ExitCode.OK
+
+
+def _work(files: list[str]) -> str:
+    return f"fitting {files[0]}" if len(files) == 1 else f"fitting {len(files)} files"
 
 
 def _check_targets(args: argparse.Namespace) -> None:
@@ -233,7 +240,7 @@ def _updated(args: argparse.Namespace, test: TapTest) -> MachineUpdate | None:
 
     if test.axis is None:
         raise ArgumentError(f"{args.files[0]} does not say along which axis it was measured: add --axis x, y or z")
-    return update_machine_file(args.update, test.axis, test.modes, source=test.source)
+    return update_machine_file(args.update, test.axis, test.modes, source=test.source, refused=test.refused)
 
 
 def _next_step(args: argparse.Namespace, test: TapTest) -> str:

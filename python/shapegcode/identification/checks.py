@@ -137,7 +137,7 @@ def _tap(record: Record, band_hz: float | None, warnings: list[str]) -> _Usable:
     assert force is not None
     if not np.ptp(force) > 0.0:
         raise RecordError(
-            f"zero force: every sample is {force[0]:g} N; needed is the hammer's signal, or take it as a free decay "
+            f"zero force: every sample is {force[0]:zg} N; needed is the hammer's signal, or take it as a free decay "
             "(--ignore-force)"
         )
     for name, values in (("force", force), (f"response ({record.quantity})", record.response)):
@@ -214,7 +214,9 @@ def _windowed(
             f"{where}: the pulse has {width} samples above a tenth of its peak: below {LEAST_PULSE} its momentum, and "
             "so the mass, is uncertain; sample faster or take a softer tip"
         )
-    strongest = refuse_short(record, response[hit.first :], noise or 0.0, band_hz, warnings)
+    strongest = refuse_short(
+        record, response[hit.first if hit.end - hit.first > LEAST_PULSE else hit.end :], noise or 0.0, band_hz, warnings
+    )
     reached = excited_hz(force, record.period_s)
     wanted = band_hz or strongest
     if reached < wanted:

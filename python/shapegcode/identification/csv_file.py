@@ -11,10 +11,19 @@ from pathlib import Path
 
 import numpy as np
 
-from shapegcode.identification.read import ReadOptions, stated_unit
+from shapegcode.identification.read_options import ReadOptions, stated_unit
 from shapegcode.identification.record import FloatArray, Quantity, Record, RecordError
 from shapegcode.identification.sampling import UnevenTimeError, even_period
-from shapegcode.identification.text_layout import Layout, cells_of, find_layout, is_number
+from shapegcode.identification.text_layout import (
+    Layout,
+    cells_of,
+    find_layout,
+    has_thousands,
+    is_clock_time,
+    is_number,
+    utf8_text,
+    without_thousands,
+)
 from shapegcode.identification.units import Label, read_label, units_of
 
 __all__ = ["read_csv"]
@@ -25,7 +34,6 @@ _RESPONSES = ("acceleration", "velocity", "displacement")
 _FEWEST_ROWS = 16
 #: Faults are looked for in pieces of this size.
 _PIECE_BYTES = 4_000_000
-_TEXT_BYTES = frozenset(range(32, 256)) | {9, 10, 12, 13}
 
 
 @dataclass(frozen=True)
@@ -34,27 +42,6 @@ class _Column:
     label: Label
     factor: float
     quantity: Quantity = "acceleration"
-
-
-def _utf8(path: Path) -> bytes:
-    """The text as ASCII-compatible bytes with line feeds.
-
-    Raises:
-        RecordError: it is not text.
-    """
-    data = path.read_bytes()
-    if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
-        data = data.decode("utf-16", errors="replace").encode("utf-8")
-    data = data.removeprefix(b"\xef\xbb\xbf")
-    strange = sorted(set(data[:65536]) - _TEXT_BYTES)
-    if strange:
-        raise RecordError(
-            f"{path}: a binary file (byte 0x{strange[0]:02x} at {data.index(bytes([strange[0]]))}); needed is text "
-            "with columns, UFF (dataset 58) or WAV"
-        )
-    if b"\n" not in data[:65536] and b"\r" in data[:65536]:
-        data = data.replace(b"\r", b"\n")
-    return data
 
 
 def _chosen(path: Path, layout: Layout, wanted: str, option: str, labels: list[Label]) -> int:
@@ -207,19 +194,24 @@ class _Reader:
 class _Body:
     """The rows of numbers of a file."""
 
-    def __init__(self, path: Path, data: bytes, layout: Layout, used: list[int]) -> None:
-        self.path, self.layout, self.used = path, layout, used
+    def __init__(self, path: Path, data: bytes, layout: Layout) -> None:
+        self.path, self.layout = path, layout
+        self.used: list[int] = []
         offset = 0
         for _ in range(layout.first_row - 1):
             offset = data.index(b"\n", offset) + 1
         self.data = data[offset:]
 
-    def numbers(self) -> FloatArray:
-        """The columns that are used, shape (rows, columns used).
+    def numbers(self, used: list[int]) -> FloatArray:
+        """Some columns, shape (rows, columns used).
+
+        Args:
+            used: their indices.
 
         Raises:
             RecordError: a cell is not a finite number; with line, column and text.
         """
+        self.used = used
         try:
             table = self._table(self.data)
         except (ValueError, IndexError) as error:
@@ -238,7 +230,7 @@ class _Body:
 
     def _table(self, data: bytes) -> FloatArray:
         if self.layout.decimal_comma:
-            data = data.replace(b",", b".")
+            data = without_thousands(data).replace(b",", b".")
         return np.loadtxt(
             io.TextIOWrapper(io.BytesIO(data), encoding="latin-1"),
             delimiter=None if self.layout.delimiter == " " else self.layout.delimiter,
@@ -267,6 +259,12 @@ class _Body:
             if text.strip():
                 yield number, text
 
+    def first_cell(self, index: int) -> str:
+        """The cell of a column in the first row; empty where there is none."""
+        _, text = next((line for piece in self._pieces() for line in self._lines(*piece)), (0, ""))
+        cells = cells_of(text, self.layout.delimiter)
+        return cells[index] if index < len(cells) else ""
+
     def line_of(self, row: int) -> int:
         """Line number of a row."""
         lines = (number for piece in self._pieces() for number, _ in self._lines(*piece))
@@ -294,7 +292,14 @@ class _Body:
                         f"must have it; the line is {text.strip()[:80]!r}"
                     )
                 cell = cells[index]
-                finite = is_number(cell, comma) and math.isfinite(float(cell.replace(",", ".")))
+                plain = without_thousands(cell.encode()).decode().replace(",", ".") if comma else cell
+                finite = is_number(cell, comma) and math.isfinite(float(plain))
+                if is_clock_time(cell):
+                    raise RecordError(
+                        f"{self.path}:{number}: column {index + 1}{name} {cell!r} is a time of the day, which is not "
+                        "read: state the time between two samples (--period, for example --period 0.1ms), or export "
+                        "seconds"
+                    )
                 if not finite:
                     kind = "is empty" if not cell else f"{cell!r} is not a finite number"
                     dialect = "comma" if comma else "point"
@@ -309,7 +314,7 @@ class _Body:
         for number, text in (line for piece in pieces for line in self._lines(*piece)):
             cells = cells_of(text, self.layout.delimiter)
             for index in self.used:
-                if "." in cells[index]:
+                if "." in cells[index] and not has_thousands(cells[index]):
                     raise RecordError(
                         f"{self.path}:{number}: column {index + 1}: {cells[index]!r} has a decimal point, other cells "
                         "have decimal commas: must be the same throughout, without separators of thousands"
@@ -326,21 +331,29 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
         RecordError: what was found and what is needed, with line and text of the cell.
         OSError: the file cannot be read.
     """
-    data = _utf8(path)
+    data = utf8_text(path)
     named = (options.time_column, *options.response_columns)
     by_number = bool(options.response_columns) and all(name is None or name.strip().isdigit() for name in named)
     layout = find_layout(path, data, by_number)
     reader = _Reader(path, layout, options)
     if layout.skipped:
         lines = "line" if layout.skipped == 1 else "lines"
-        reader.warnings.append(f"{layout.skipped} {lines} before the header in line {layout.header_line} left out")
+        reader.warnings.append(
+            f"note: {path}: {layout.skipped} {lines} before the header in line {layout.header_line} left out"
+        )
     time = reader.time()
     force = reader.force()
     taken = {column.index for column in (time, force) if column is not None}
     responses = reader.responses(taken)
+    body = _Body(path, data, layout)
+    if time is not None and options.period_s is not None and is_clock_time(body.first_cell(time.index)):
+        reader.warnings.append(
+            f"note: {path}: {time.label.text!r} holds times of the day, which are not read: the stated period of "
+            f"{options.period_s:.6g} s is taken"
+        )
+        time = None
     columns = [column for column in (time, force, *responses) if column is not None]
-    body = _Body(path, data, layout, [column.index for column in columns])
-    table = body.numbers()
+    table = body.numbers([column.index for column in columns])
     stated = options.period_s if options.period_s is not None else layout.period_s
     start_s = 0.0
     if time is None:

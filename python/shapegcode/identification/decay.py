@@ -170,7 +170,7 @@ def find_decay(record: Record, start_s: float | None = None) -> Record:
             f"{record.source}: start at {start_s:g} s: must be within the record, {record.start_s:g} to {last_s:g} s"
         )
     if not np.ptp(response) > 0.0:
-        raise RecordError(f"{record.source}: every sample is {response[0]:g}: no vibration; is the sensor connected?")
+        raise RecordError(f"{record.source}: every sample is {response[0]:zg}: no vibration; is the sensor connected?")
     frequency = _fast_frequency_hz(response, record.period_s)
     if frequency == 0.0:
         raise RecordError(f"{record.source}: {len(response)} samples and no vibration with three periods or more")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.signal import resample_poly
 
 from shapegcode import _core
 from shapegcode.identification.chart import stabilisation_chart
@@ -14,7 +15,14 @@ from shapegcode.identification.checks import Prepared, prepare
 from shapegcode.identification.model_search import Fit, Search, Starts, evidence_of, search, starts_of
 from shapegcode.identification.record import Record, RecordError
 from shapegcode.identification.results import Identification, IdentifiedMode
-from shapegcode.identification.support import ACCEPTED_PERCENT, Doubts, Rival, estimates_of, refusal_of, rivals_of
+from shapegcode.identification.support import (
+    ACCEPTED_PERCENT,
+    Doubts,
+    estimates_of,
+    is_background,
+    refusal_of,
+    rivals_of,
+)
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -24,12 +32,12 @@ _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which
 _LEAST_SWINGS = 2.0  # of a mode in the record
 _HIGHEST_SHARE = 0.45  # of the sampling rate: the force between samples is known up to there
 _CHART_ORDERS = 20
+_SPECTRUM = 4096  # points of the force's transform
+_FOLDED = 2.0 / 3.0
+_FINER = 16  # steps of the check by Wilson's method in a sampling period
 _STEPS = 60  # of a fit
 _QUICK_STEPS = 15  # of one that only shows where a mode may be
-# Difference of evidence (twice the logarithm of the odds) above which another course of the force is taken, and down to
-# which it may have been.
-_CLEARLY = 30.0
-_POSSIBLY = 10.0
+_POSSIBLY = 30.0  # by so much (twice the logarithm of the odds) another course of the force may be less evident
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,31 +148,33 @@ def identify(
         raise RecordError("; ".join(f"{refused.source}: {refused.reason}" for refused in ready.refused))
     problem = _problem(ready, band_hz)
     models = _search(problem, most_modes, modes)
-    rivals: list[Rival] = []
+    others: list[Fit] = []
     if isinstance(problem, _Taps) and models.fits:
-        problem, models, rivals = _held(problem, models, most_modes, modes)
-    return _result(ready, problem, models, modes or models.order, rivals, accepted_percent)
+        problem, models, others = _held(problem, models, most_modes, modes)
+    return _result(ready, problem, models, modes or models.order, others, accepted_percent)
 
 
-def _held(problem: _Taps, models: Search, most_modes: int, modes: int | None) -> tuple[_Taps, Search, list[Rival]]:
-    """The course of the force between its samples for which the data speak, and what else it may have been.
+def _held(problem: _Taps, models: Search, most_modes: int, modes: int | None) -> tuple[_Taps, Search, list[Fit]]:
+    """The course of the force between its samples for which the data speak, and fits of what else it may have been.
 
-    A recorder with an anti-aliasing filter gives a band-limited force, which is taken unless the data clearly ask for
-    another one: a simulation may have one that is linear between samples, or single blows. The mass differs by
-    (pi f/rate)^2/3 and more.
+    A recorder with an anti-aliasing filter gives a band-limited force; a simulation may have one that is linear between
+    samples, or single blows. The mass differs by (pi f/rate)^2/3 and more.
     """
-    best = problem, models
-    rivals: list[Rival] = []
+    courses = [(problem, models)]
     order = modes or max(models.order, 1)
-    for hold, course in (("linear", "straight from sample to sample"), ("impulse", "as a blow at each sample")):
+    for hold in ("linear", "impulse"):
         other = replace(problem, hold=hold)
         fit = other.fit(starts_of(models.fits[order - 1]))
+        # The search is worth its time only where it may win: a wrong course asks for modes of its own.
         lead = evidence_of(models.fits[order - 1]) - evidence_of(fit)
-        if lead > _CLEARLY and evidence_of(fit) < min(best[1].evidence):
-            best = other, _search(other, most_modes, modes)
-        elif lead > -_POSSIBLY:
-            rivals.append(Rival(fit, f"if the force ran {course}", "sample faster"))
-    return *best, rivals
+        searched = _search(other, most_modes, modes) if lead > 0.0 else Search((fit,), (evidence_of(fit),))
+        courses.append((other, searched))
+    best = min(courses, key=lambda course: min(course[1].evidence))
+    least = min(best[1].evidence)
+    starts = starts_of(best[1].fits[(modes or max(best[1].order, 1)) - 1])
+    possible = [other for other, searched in courses if min(searched.evidence) < least + _POSSIBLY]
+    others: list[Fit] = [other.fit(starts) for other in possible if other is not best[0]]
+    return *best, others
 
 
 def _problem(ready: Prepared, band_hz: tuple[float, float] | None) -> _Taps | _Decays:
@@ -204,7 +214,7 @@ def _result(
     problem: _Taps | _Decays,
     models: Search,
     order: int,
-    rivals: Sequence[Rival],
+    others: Sequence[Fit],
     accepted_percent: float,
 ) -> Identification:
     warnings = [*ready.warnings, *(f"{refused.source}: not used: {refused.reason}" for refused in ready.refused)]
@@ -224,15 +234,19 @@ def _result(
             f"what the model leaves is no white noise (autocorrelation {fit.residual_autocorrelation:.2f}): the "
             "intervals allow for it; other causes than modes, or a mode that is not linear"
         )
+    aliased = _aliased(problem) if isinstance(problem, _Taps) else _never_aliased
     doubts = Doubts(
         limit_percent=accepted_percent,
         band_hz=problem.band_hz,
         record_s=max(len(response) for response in problem.responses) * problem.period_s,
-        rivals=[*rivals_of(order, models.fits), *rivals],
+        rivals=rivals_of(order, models.fits),
+        aliased=aliased,
     )
     supported: list[IdentifiedMode] = []
     refused: list[IdentifiedMode] = []
-    for estimates in estimates_of(fit, _alone(problem, fit)):
+    for estimates in estimates_of(fit, _alone(problem, fit), others, aliased):
+        if is_background(estimates, doubts):
+            continue
         reason = refusal_of(estimates, doubts)
         mode = IdentifiedMode(
             estimates.frequency_hz,
@@ -264,6 +278,35 @@ def _chart_orders(problem: _Taps | _Decays) -> int:
     return max(1, min(_CHART_ORDERS, (shortest - 8) // 8))
 
 
+def _never_aliased(_frequency_hz: float) -> float:
+    return 0.0
+
+
+def _aliased(problem: _Taps) -> Callable[[float], float]:
+    """Share of the force's spectrum at a frequency that may have been folded down from above half the sampling rate.
+
+    Without an anti-aliasing filter the spectrum does not end before half the rate: what it still has there, beyond
+    noise, tells how much came from above. A pulse with kinks, a half sine, falls with the square of the frequency: what
+    folds down to the lower frequencies from both sides of the rate is some two thirds of what is left at half of it. A
+    force without any noise that runs straight from sample to sample is no recording: it holds nothing else.
+    """
+    is_simulated = problem.force_noise_n == 0.0 and problem.hold != "band_limited"
+    if problem.hold == "impulse" or is_simulated:
+        return _never_aliased
+    pulse = np.trim_zeros(problem.forces[0])
+    spectrum = np.abs(np.fft.rfft(pulse, _SPECTRUM))
+    share = np.fft.rfftfreq(_SPECTRUM)
+    highest = float(np.sqrt(np.mean(spectrum[share > _HIGHEST_SHARE] ** 2)))
+    noise = problem.force_noise_n * np.sqrt(len(pulse))
+    folded = _FOLDED * np.sqrt(max(highest**2 - 2.0 * noise**2, 0.0))
+
+    def at(frequency_hz: float) -> float:
+        here = float(np.interp(frequency_hz * problem.period_s, share, spectrum))
+        return folded / here if here > 0.0 else np.inf
+
+    return at
+
+
 def _alone(problem: _Taps | _Decays, fit: Fit) -> list[Fit]:
     """The same modes fitted to each record by itself; none if there is but one, or a record does not hold them."""
     if len(problem.responses) < 2:
@@ -276,13 +319,16 @@ def _alone(problem: _Taps | _Decays, fit: Fit) -> list[Fit]:
 
 
 def _checks(problem: _Taps | _Decays, fit: _core.ModalFit | _core.DecayFit) -> dict[str, float]:
-    """The equivalent mass by paper 003's way, from the first tap, where the model has one mode."""
-    if isinstance(problem, _Decays) or len(fit.omega_rad_s) != 1:
+    """The equivalent mass by paper 003's way, from the first tap, where the model has one mode.
+
+    Wilson's method shortens the frequency unless its steps are short: force and response are resampled.
+    """
+    if isinstance(problem, _Decays) or len(fit.omega_rad_s) != 1 or problem.hold == "impulse":
         return {}
     args = (
-        problem.forces[0],
-        problem.responses[0],
-        problem.period_s,
+        _finer(problem.forces[0], problem.hold),
+        _finer(problem.responses[0], "band_limited"),
+        problem.period_s / _FINER,
         float(fit.omega_rad_s[0]),
         float(fit.damping_ratio[0]),
     )
@@ -293,3 +339,11 @@ def _checks(problem: _Taps | _Decays, fit: _core.ModalFit | _core.DecayFit) -> d
         "mass_bisection_kg": halved.mass_kg,
         "bisection_halvings": float(halved.halvings),
     }
+
+
+def _finer(signal: FloatArray, hold: str) -> FloatArray:
+    """A signal with more samples: straight between its samples, or band-limited."""
+    if hold == "band_limited":
+        return np.asarray(resample_poly(signal, _FINER, 1), dtype=np.float64)
+    places = np.arange(len(signal) * _FINER) / _FINER
+    return np.interp(places, np.arange(len(signal)), signal)

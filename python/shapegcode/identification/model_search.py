@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -23,6 +24,7 @@ Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
 _LEAST_SHARE = 1e-6
 _START_DAMPING = (0.01, 0.05)
 _PEAKS = 2  # of the residual's spectrum that are tried
+_TWINS = 0.25  # of the half width of a resonance
 _POOL_ORDERS = 20  # of the stabilisation chart
 _MOST_DAMPING = 0.7  # of a pole to begin with
 # Two models in a row that the data do not ask for end the search: one may only have missed its place.
@@ -140,9 +142,16 @@ def _next_fit(problem: Problem, last: Fit | None, pool: Starts) -> Fit | None:
         if len(chosen) > len(so_far):
             candidates.append([*so_far, pool[chosen[len(so_far)] - len(so_far)]])
     fits = [fit for starts in candidates if (fit := _attempt(partial(problem.fit_quickly, starts))) is not None]
+    fits = [fit for fit in fits if not _has_twins(fit)]
     if not fits:
         return None
     return _attempt(partial(problem.fit, starts_of(min(fits, key=lambda fit: fit.sum_of_squares))))
+
+
+def _has_twins(fit: Fit) -> bool:
+    """Whether two modes lie within a fraction of their width: one mode, drawn twice to mend what is no mode."""
+    modes = sorted(starts_of(fit))
+    return any(w2 - w1 < _TWINS * w1 * max(z1, z2) for (w1, z1), (w2, z2) in pairwise(modes))
 
 
 def starts_of(fit: Fit) -> Starts:

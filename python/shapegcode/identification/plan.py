@@ -21,6 +21,8 @@ _USUAL_HZ = (20.0, 200.0)
 _USUAL_DAMPING = 0.02
 #: Modes are looked for up to this multiple of the highest one known.
 _LOOK_ABOVE = 2.0
+#: ... and up to here in any case: a mode that the machine file does not state is found only where it is looked for.
+_LOOK_LEAST_HZ = 500.0
 #: Samples in the pulse of the hammer: a half sine of ten is known to a percent.
 _PULSE_SAMPLES = 10
 #: The record lasts until the slowest mode has fallen to this share.
@@ -80,7 +82,7 @@ def recording_for(modes: tuple[tuple[float, float], ...]) -> Recording:
         modes: (frequency in Hz, damping ratio) of those known; empty: the usual range of machining centres.
     """
     known = modes or tuple((frequency, _USUAL_DAMPING) for frequency in _USUAL_HZ)
-    highest = (_LOOK_ABOVE if modes else 1.0) * max(frequency for frequency, _ in known)
+    highest = max(_LOOK_LEAST_HZ, _LOOK_ABOVE * max(frequency for frequency, _ in known))
     pulse = EXCITED_HALF_SINE / highest
     limit, tip = next((limit, name) for limit, name in _TIPS if highest <= limit)
     shortest = EXCITED_HALF_SINE / (limit if math.isfinite(limit) else highest)
@@ -278,15 +280,16 @@ def tap_plan(machine: Machine | None = None) -> str:
         rows = [("X Y Z", recording_for(()))]
         title = "TAP TEST OF A MACHINING CENTRE"
         about = (
-            f"No machine file is given: rates and lengths are for modes from {usual}, where the motion of its axes "
-            "excites a machining centre. With -m MACHINE they follow from its modes."
+            f"No machine file is given: lengths are for modes from {usual}, where the motion of its axes excites a "
+            f"machining centre, rates for modes up to {_LOOK_LEAST_HZ:g} Hz. With -m MACHINE they follow from its "
+            "modes."
         )
     else:
         rows = [(name, recording_for(_modes(axis))) for name, axis in zip(_AXES, machine.axes.as_tuple(), strict=True)]
         title = f"TAP TEST OF {machine.name}"
         about = (
-            "Rates and lengths follow from the modes of the machine file; an axis without modes is looked at from "
-            f"{usual}."
+            f"Lengths follow from the modes of the machine file (an axis without modes: {usual}); every axis is looked "
+            f"at up to {_LOOK_LEAST_HZ:g} Hz or more, as there may be modes that the file does not state."
         )
     hardest = max((how for _, how in rows), key=lambda how: how.highest_hz)
     dwell = max(_LONG_STOP_S, 2.0 * max(how.duration_s for _, how in rows))

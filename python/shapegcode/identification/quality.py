@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from shapegcode.identification.record import FloatArray, Record, RecordError
 from shapegcode.identification.spectra import decay_spectrum
@@ -17,6 +18,10 @@ _CLIPPED_RUN = 3
 _CLIPPED_STEP = 1e-4
 #: At a smooth peak the curve has fallen by four resolutions where it is twice as far from the top as the run's ends.
 _SMOOTH_FALL = 6.0
+#: A lobe is flat if more than this share of what lies above half of it lies above 95 %, in so many samples at least.
+_NEARLY_TOP = 0.95
+_FLAT_SHARE = 0.5
+_FLAT_RUN = 5
 #: Where the force's spectrum has fallen to this share (-20 dB), noise counts tenfold.
 _EXCITED = 0.1
 #: A half sine falls to that share at this many over its duration: cos(pi x) / (1 - 4 x²) = 0.1 in size.
@@ -43,6 +48,8 @@ def is_clipped(values: FloatArray) -> bool:
     largest = float(np.max(np.abs(centred)))
     if largest == 0.0:
         return False
+    if any(_is_flat_topped(signal) for signal in (centred, -centred) if np.max(signal) >= 0.5 * largest):
+        return True
     steps = np.abs(np.diff(values))
     steps = steps[steps > 0.0]
     step = max(_CLIPPED_STEP * float(np.ptp(values)), float(np.min(steps)))
@@ -59,6 +66,26 @@ def is_clipped(values: FloatArray) -> bool:
             if sides and top - min(float(signal[k]) for k in sides) > _SMOOTH_FALL * step:
                 return True
     return False
+
+
+def _is_flat_topped(signal: FloatArray) -> bool:
+    """Whether the highest lobe is cut off though noise or a filter behind hide it.
+
+    Of a smooth peak the part above 95 % is .3 of the part above half of it; of one cut at 85 % it is .5.
+    """
+    top = float(np.max(signal))
+    crest = int(np.argmax(signal))
+    high, half = (_run_around(signal > share * top, crest) for share in (_NEARLY_TOP, 0.5))
+    return high >= _FLAT_RUN and high > _FLAT_SHARE * half
+
+
+def _run_around(inside: npt.NDArray[np.bool_], at: int) -> int:
+    """Length of the run of True that holds a place."""
+    outside = np.flatnonzero(~inside)
+    place = int(np.searchsorted(outside, at))
+    before = int(outside[place - 1]) if place > 0 else -1
+    after = int(outside[place]) if place < len(outside) else len(inside)
+    return after - before - 1
 
 
 def excited_hz(force_n: FloatArray, period_s: float) -> float:

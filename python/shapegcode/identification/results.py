@@ -26,6 +26,11 @@ class Estimate:
     low: float
     high: float
 
+    def __post_init__(self) -> None:
+        """Numbers of Python, whatever they come as."""
+        for name in ("value", "low", "high"):
+            object.__setattr__(self, name, float(getattr(self, name)))
+
     @property
     def uncertainty_percent(self) -> float:
         """Larger half of the interval, in percent of the value."""
@@ -88,7 +93,7 @@ class ChartPole:
     stable_damping: bool
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Identification:
     """Modes found in one or several records of the same point.
 
@@ -117,3 +122,14 @@ class Identification:
     used: tuple[tuple[int, int], ...]
     checks: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """One line per mode; what else there is stays in the attributes."""
+        from shapegcode.identification.tap_table import mode_line
+
+        count = f"{self.order} mode{'' if self.order == 1 else 's'}"
+        lines = [f"Identification: model of {count}, {self.fit_percent:.1f} % of the response"]
+        lines += [f"  {mode_line(mode)}" for mode in (*self.modes, *self.refused)]
+        if self.warnings:
+            lines.append(f"  {len(self.warnings)} warning{'' if len(self.warnings) == 1 else 's'}: see .warnings")
+        return "\n".join(lines)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +18,14 @@ FloatArray = npt.NDArray[np.float64]
 #: A damping ratio or stiffness less certain than this is refused: 10 % are then four standard deviations off.
 ACCEPTED_PERCENT = 5.0
 _FREQUENCY_PERCENT = 2.0
+_NOT_AT_ALL_PERCENT = 1000.0
 _NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode that a shaper could deal with
 _LEAST_SWINGS = 2.0  # in the record
+#: What has not fallen to this share at the end of the record does not decay: mains hum, a pump, a turning spindle.
+_LASTING = 0.8
 #: A model with one mode more counts as a rival while it fits better by more than chance alone does in one case of 20.
 _RIVAL_PROBABILITY = 0.05
+_UNKNOWN = 7.0  # half width of a logarithm that says nothing: a factor of a thousand
 _SCATTER_PROBABILITY = 0.01  # of taps that differ as much by noise alone
 
 
@@ -70,35 +74,47 @@ class Doubts:
         band_hz: frequencies that were searched.
         record_s: length of the longest record.
         rivals: models of nearly the same evidence.
+        aliased: see `estimates_of`.
     """
 
     limit_percent: float
     band_hz: tuple[float, float]
     record_s: float
     rivals: Sequence[Rival] = ()
+    aliased: Callable[[float], float] = lambda _hz: 0.0
 
 
-def estimates_of(fit: Fit, alone: Sequence[Fit]) -> list[Estimates]:
+def estimates_of(
+    fit: Fit, alone: Sequence[Fit], others: Sequence[Fit] = (), aliased: Callable[[float], float] = lambda _hz: 0.0
+) -> list[Estimates]:
     """Values and 95 % intervals of each mode of a fit.
 
     The intervals are those of the fit's covariance, in logarithms. Where taps differ by more than that explains, their
-    scatter takes its place.
+    scatter takes its place. What the force does between its samples is not known to the covariance: the intervals
+    reach as far as those of the other courses that the data allow, and by what may have been folded into its spectrum.
 
     Args:
         fit: of all records together.
         alone: of each record by itself, its modes in the same order; fewer than two: no scatter.
+        others: the same modes under other courses of the force between its samples.
+        aliased: share of the force's spectrum at a frequency in Hz that may come from above half the sampling rate.
     """
     freedom = max(fit.samples - fit.parameters, 1)
     quantile = float(stats.t.ppf(0.975, freedom))
     rows = [_logarithms(fit, mode) for mode in range(len(fit.omega_rad_s))]
     found = []
     for mode, row in enumerate(rows):
-        spread = quantile * np.sqrt(np.diag(row.covariance))
+        spread = _half_widths(row, quantile)
+        if len(row.values) > 2:
+            spread[2:] = np.hypot(spread[2:], aliased(float(np.exp(row.values[0]))))
+        for other in others:
+            apart = _logarithms(other, mode)
+            spread = np.maximum(spread, np.abs(apart.values - row.values) + _half_widths(apart, quantile))
         if len(alone) > 1:
             spread = np.maximum(spread, _scatter([_logarithms(one, mode) for one in alone]))
         values = [
             Estimate(value, value * float(np.exp(-half)), value * float(np.exp(half)))
-            for value, half in zip(np.exp(row.values), spread, strict=True)
+            for value, half in zip(np.exp(row.values), np.minimum(spread, _UNKNOWN), strict=True)
         ]
         if len(values) == 2:
             found.append(Estimates(values[0], values[1], None, None, None))
@@ -136,6 +152,13 @@ def _logarithms(fit: Fit, mode: int) -> _Logarithms:
     return _Logarithms(np.array(values), covariance, residue < 0.0)
 
 
+def _half_widths(row: _Logarithms, quantile: float) -> FloatArray:
+    """Half widths of the intervals; where the fit has no usable covariance, as wide as can be."""
+    variance = np.diag(row.covariance)
+    usable = np.isfinite(variance) & (variance >= 0.0)
+    return np.where(usable, quantile * np.sqrt(np.where(usable, variance, 0.0)), _UNKNOWN)
+
+
 def _scatter(taps: Sequence[_Logarithms]) -> FloatArray:
     """Half widths from the scatter of single taps; 0 where noise explains it."""
     values = np.array([tap.values for tap in taps])
@@ -162,18 +185,26 @@ def rivals_of(order: int, fits: Sequence[Fit]) -> list[Rival]:
     return [Rival(larger, "with one mode more in the model", "more taps or less noise")]
 
 
+def is_background(mode: Estimates, doubts: Doubts) -> bool:
+    """Whether a part of the model is drift or lies outside the band: it helps the fit, and is no mode to speak of."""
+    low, high = doubts.band_hz
+    return mode.damping_ratio.value > _NO_VIBRATION or not low <= mode.frequency_hz.value <= high
+
+
 def refusal_of(mode: Estimates, doubts: Doubts) -> str:
     """Why the data do not support a mode; empty if they do."""
     frequency, damping, stiffness = mode.frequency_hz, mode.damping_ratio, mode.stiffness_n_per_m
-    if damping.value > _NO_VIBRATION:
-        return f"damping ratio {damping.value:.2f}: drift or background, no vibration (limit {_NO_VIBRATION:g})"
     if frequency.value * doubts.record_s < _LEAST_SWINGS:
         return (
             f"{frequency.value * doubts.record_s:.1f} swings in the record of {doubts.record_s:.3g} s: "
             f"{_LEAST_SWINGS:g} or more are needed"
         )
-    if not doubts.band_hz[0] <= frequency.value <= doubts.band_hz[1]:
-        return f"outside the band of {doubts.band_hz[0]:.4g} to {doubts.band_hz[1]:.4g} Hz that was searched"
+    lasting = float(np.exp(-2.0 * np.pi * frequency.value * damping.value * doubts.record_s))
+    if lasting > _LASTING:
+        return (
+            f"still at {100.0 * lasting:.0f} % after {doubts.record_s:.3g} s: a steady disturbance (mains, pump, "
+            "spindle), or a record too short for a mode of so little damping"
+        )
     limits = (
         ("frequency", frequency, min(_FREQUENCY_PERCENT, doubts.limit_percent)),
         ("damping ratio", damping, doubts.limit_percent),
@@ -181,10 +212,17 @@ def refusal_of(mode: Estimates, doubts: Doubts) -> str:
     )
     for name, estimate, limit in limits:
         if estimate is not None and not estimate.uncertainty_percent <= limit:
-            return (
-                f"{name} known to {estimate.uncertainty_percent:.2g} % only (limit {limit:g} %): more taps, a longer "
-                "record or less noise"
-            )
+            folded = 100.0 * doubts.aliased(frequency.value)
+            if name == "stiffness" and folded > 0.5 * limit:
+                return (
+                    f"{name} is known to {estimate.uncertainty_percent:.2g} % only (limit {limit:g} %): the pulse has "
+                    "few samples, and without an anti-aliasing filter they do not tell its force at this frequency; "
+                    "sample faster or take a softer tip"
+                )
+            known = f"to {estimate.uncertainty_percent:.2g} % only"
+            if estimate.uncertainty_percent > _NOT_AT_ALL_PERCENT:
+                known = "not at all"
+            return f"{name} is known {known} (limit {limit:g} %): more taps, a longer record or less noise"
     if mode.opposed:
         return "moves against the push of the hammer: hammer and sensor are not at the same point, so no mass follows"
     return _rival_refusal(mode, doubts)

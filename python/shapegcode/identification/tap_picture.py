@@ -30,6 +30,12 @@ __all__ = [
 _MOST_TRACES = 3
 _SEEN = 0.02
 _ROOM = 2.5
+_FILE_TIME = "time in the file in s"
+_FAINT = 0.35  # opacity of poles that are not stable
+_LEAST_SHOWN = 1e-5  # of the largest value, on a logarithmic axis
+_CLEAR = 3.0  # times the noise: down to here the model's envelope is the mode's
+_BELOW_NOISE = 0.3
+_BEYOND_NOISE = 1.25  # of the decay's duration, so that the noise is seen
 _MOST_ENVELOPES = 4
 _MEASURED, _FITTED = canvas.GREY, canvas.COLOURS[0]
 
@@ -75,16 +81,16 @@ def plot_traces(file: str | Path, test: TapTest) -> None:
     rows = 1 if test.is_decay else 2
     figure = canvas.figure(4.0 + 3.6 * len(shown), 2.6 + 2.2 * rows)
     for column, (record, (begin, end), fitted) in zip(canvas.panels(figure, rows, len(shown)), shown, strict=True):
-        time_s = record.time_s - record.start_s
+        time_s = record.time_s if test.is_decay else record.time_s - record.start_s
         if record.force_n is not None:
             column[0].plot(time_s, record.force_n, color="black", linewidth=1.0)
             column[0].set_ylabel("force in N")
         panel = column[-1]
         panel.plot(time_s, record.response, color=_MEASURED, linewidth=2.2, label="measured")
         panel.plot(time_s[begin:end], fitted, "--", color=_FITTED, linewidth=1.1, label="model")
-        panel.set_xlim(0.0, time_s[begin + _last_seen(np.asarray(fitted))])
+        panel.set_xlim(time_s[0], time_s[begin + _last_seen(np.asarray(fitted))])
         panel.set_ylabel(_quantity(record))
-        panel.set_xlabel("time in s")
+        panel.set_xlabel(_FILE_TIME if test.is_decay else "time in s")
         column[0].set_title(Path(record.source).name, fontsize=9, loc="right")
         canvas.legend_above(panel)
     many = f", {len(shown)} of {len(test.records)} records" if len(test.records) > len(shown) else ""
@@ -162,7 +168,7 @@ def plot_stabilisation(file: str | Path, test: TapTest) -> None:
         ]
         panel.plot(
             [pole.frequency_hz for pole in poles], [pole.order for pole in poles], marker, linestyle="none",
-            markeredgecolor=edge, markerfacecolor=face, label=label,
+            markeredgecolor=edge, markerfacecolor=face, label=label, alpha=1.0 if stable == 2 else _FAINT,
         )  # fmt: skip
     panel.plot([], [], color="#c8c8c8", linewidth=1.0, label="spectrum")
     panel.axhline(found.order, color="black", linewidth=0.8, linestyle="--", label=f"chosen: {found.order}")
@@ -181,6 +187,9 @@ def plot_stabilisation(file: str | Path, test: TapTest) -> None:
 def plot_decay(file: str | Path, test: TapTest) -> None:
     """Envelope of each mode's band of the first record while it decays, measured and of the model.
 
+    The model is drawn down to the noise, which is what it leaves of the response in the band. Below it the curve would
+    show how the band's filter rings.
+
     Raises:
         ValueError: a wrong ending, or no mode.
         OSError: the file cannot be written.
@@ -194,15 +203,23 @@ def plot_decay(file: str | Path, test: TapTest) -> None:
     record, model = (replace(each, response=each.response[begin:], force_n=None) for each in (record, model))
     figure = canvas.figure(9.0, 1.4 + 2.0 * len(frequencies))
     column = canvas.panels(figure, len(frequencies), 1)[0]
-    pairs = zip(mode_envelopes(record, frequencies), mode_envelopes(model, frequencies), strict=True)
-    for panel, (measured, fitted), frequency in zip(column, pairs, frequencies, strict=True):
-        time_s = measured.time_s - measured.time_s[0]
-        panel.semilogy(time_s, measured.envelope, color=_MEASURED, linewidth=2.2, label="measured")
-        panel.semilogy(time_s, fitted.envelope, "--", color=_FITTED, linewidth=1.1, label="model")
+    left = replace(record, response=record.response - model.response)
+    bands = (mode_envelopes(each, frequencies) for each in (record, model, left))
+    time_s = record.time_s if test.is_decay else record.time_s - record.time_s[0]
+    longest = 1
+    for panel, frequency, measured, fitted, rest in zip(column, frequencies, *bands, strict=True):
         top = float(measured.envelope.max())
-        panel.set_ylim(max(0.3 * float(np.median(measured.envelope[-len(time_s) // 10 :])), 1e-5 * top), 2.0 * top)
+        noise = max(float(np.median(rest.envelope)), _LEAST_SHOWN * top)
+        end = _first_below(fitted.envelope, _CLEAR * noise)
+        longest = max(longest, end)
+        panel.semilogy(time_s, measured.envelope, color=_MEASURED, linewidth=2.2, label="measured")
+        panel.semilogy(time_s[:end], fitted.envelope[:end], "--", color=_FITTED, linewidth=1.1, label="model")
+        panel.axhline(noise, color="black", linewidth=0.8, linestyle=":", label="noise in the band")
+        panel.set_ylim(_BELOW_NOISE * noise, 2.0 * top)
         panel.set_ylabel(f"{frequency:.4g} Hz, {UNITS[record.quantity]}")
-    column[-1].set_xlabel("time since the start of the decay in s" if test.is_decay else "time since the hit in s")
+    for panel in column:
+        panel.set_xlim(time_s[0], time_s[min(round(_BEYOND_NOISE * longest), len(time_s) - 1)])
+    column[-1].set_xlabel(_FILE_TIME if test.is_decay else "time since the hit in s")
     canvas.legend_above(column[0])
     name = f": {Path(record.source).name}" if len(test.records) > 1 else ""
     canvas.heading(figure, f"Decay: envelope of the {record.quantity} in the band of each mode{name}", "")
@@ -220,10 +237,12 @@ def plot_spectrum(file: str | Path, test: TapTest) -> None:
     seen = _seen(spectrum.frequency_hz, test, [peak.frequency_hz for peak in spectrum.peaks])
     figure = canvas.figure(9.0, 4.5)
     panel = canvas.panels(figure, 1, 1)[0][0]
-    panel.plot(spectrum.frequency_hz[seen], spectrum.amplitude[seen], color=canvas.COLOURS[1], linewidth=1.2)
+    amplitude = spectrum.amplitude[seen]
+    top = float(amplitude.max())
+    panel.semilogy(spectrum.frequency_hz[seen], amplitude, color=canvas.COLOURS[1], linewidth=1.2)
     panel.set_xlabel("frequency in Hz")
     panel.set_ylabel(_quantity(test.records[0]))
-    panel.set_ylim(0.0, 1.15 * float(spectrum.amplitude[seen].max()))
+    panel.set_ylim(max(_BELOW_NOISE * float(np.median(amplitude)), _LEAST_SHOWN * top), 3.0 * top)
     for peak in spectrum.peaks:
         if peak.frequency_hz <= spectrum.frequency_hz[seen][-1]:
             panel.annotate(
@@ -250,6 +269,7 @@ def _fitted_part(test: TapTest) -> list[Record]:
             record,
             response=record.response[begin:end],
             force_n=None if record.force_n is None else record.force_n[begin:end],
+            start_s=record.start_s + begin * record.period_s,
         )
         for record, (begin, end) in zip(test.records, _found(test).used, strict=True)
     ]
@@ -300,6 +320,13 @@ def _mark_modes(column: list[Axes], found: Identification) -> None:
 
 def _after_hit(record: Record) -> int:
     return 0 if record.force_n is None else int(np.argmax(np.abs(record.force_n)))
+
+
+def _first_below(envelope: FloatArray, level: float) -> int:
+    """The first sample behind the largest that lies below a level, or the number of samples."""
+    peak = int(np.argmax(envelope))
+    below = np.flatnonzero(envelope[peak:] < level)
+    return peak + int(below[0]) if len(below) else len(envelope)
 
 
 def _last_seen(fitted: FloatArray) -> int:

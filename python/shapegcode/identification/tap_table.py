@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from shapegcode.identification.results import Estimate, IdentifiedMode
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from shapegcode.identification.tap_test import TapTest
 
-__all__ = ["modes_table", "plus_minus", "print_tap_test", "refusals_table", "with_interval"]
+__all__ = ["mode_line", "modes_table", "plus_minus", "print_tap_test", "refusals_table", "with_interval"]
 
 _SKEWED = 1.2
 
@@ -24,7 +24,7 @@ _COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("damping %", "damping_ratio", 100.0),
     ("m kg", "mass_kg", 1.0),
     ("c N s/m", "damping_n_s_per_m", 1.0),
-    ("k N/um", "stiffness_n_per_m", 1e-6),
+    ("k N/µm", "stiffness_n_per_m", 1e-6),
 )
 
 
@@ -51,9 +51,30 @@ def print_tap_test(test: TapTest, console: Console) -> None:
         modes = "mode" if found.order == 1 else "modes"
         say(f"model: {found.order} {modes}, {found.fit_percent:.1f} % of the response")
         if found.checks:
-            say("check: " + ", ".join(f"{name.replace('_', ' ')} {value:.5g}" for name, value in found.checks.items()))
+            say(f"check: {_check_line(found.checks)}")
     for warning in test.warnings:
-        say(f"warning: {warning}")
+        say(warning if warning.startswith("note: ") else f"warning: {warning}")
+
+
+def mode_line(mode: IdentifiedMode) -> str:
+    """A mode in one line: each value with half of its 95 % interval, or why the data do not support it."""
+    if mode.refusal:
+        return f"{mode.frequency_hz.value:.4g} Hz not supported: {mode.refusal}"
+    parts = (
+        f"{heading.partition(' ')[0]} {_cell(estimate, factor)} {heading.partition(' ')[2]}"
+        for heading, name, factor in _COLUMNS
+        if (estimate := getattr(mode, name)) is not None
+    )
+    return ", ".join(parts)
+
+
+def _check_line(checks: Mapping[str, float]) -> str:
+    """The mass by paper 003's method, in words."""
+    halvings = int(checks["bisection_halvings"])
+    return (
+        f"equivalent mass by paper 003's method: closed form {checks['mass_closed_form_kg']:.4g} kg, bisection "
+        f"{checks['mass_bisection_kg']:.4g} kg after {halvings} halving{'' if halvings == 1 else 's'}"
+    )
 
 
 def modes_table(modes: Sequence[IdentifiedMode]) -> Table:
@@ -92,14 +113,14 @@ def with_interval(estimate: Estimate, factor: float = 1.0) -> str:
         return f"{value:.4g} ({low:.4g} ... {high:.4g})"
     if max(above, below) > _SKEWED * min(above, below):
         decimals = _decimals(min(above, below))
-        return f"{value:.{decimals}f} ({low:.{decimals}f} ... {high:.{decimals}f})"
+        return f"{value:z.{decimals}f} ({low:z.{decimals}f} ... {high:z.{decimals}f})"
     return plus_minus(value, max(above, below))
 
 
 def plus_minus(value: float, half: float) -> str:
     """A value and half its interval, to two digits of the latter."""
     decimals = _decimals(half)
-    return f"{value:.{decimals}f} ± {half:.{decimals}f}"
+    return f"{value:z.{decimals}f} ± {half:.{decimals}f}"
 
 
 def _decimals(half: float) -> int:

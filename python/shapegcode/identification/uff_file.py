@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from shapegcode.identification.read import ReadOptions, stated_unit
+from shapegcode.identification.read_options import ReadOptions, stated_unit
 from shapegcode.identification.record import FloatArray, Quantity, Record, RecordError
 from shapegcode.identification.sampling import UnevenTimeError, even_period
 from shapegcode.identification.units import find_unit, read_label, units_of

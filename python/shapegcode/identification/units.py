@@ -50,6 +50,14 @@ _SPELLINGS = {
     "ms-1": "m/s",
     "mms-1": "mm/s",
 }
+#: Units of raw signals and of quantities that are not converted: behind a name they must not pass for a part of it.
+_FOREIGN = frozenset(
+    {"v", "mv", "µv", "uv", "kv", "volt", "volts", "pc", "nc", "coulomb", "ma"}
+    | {"count", "counts", "cts", "digit", "digits", "lsb", "adc", "%", "%fs", "fs", "db"}
+    | {"lb", "lbs", "kgf", "kp", "dan", "mn", "cn"}
+    | {"inch", "mil", "mils", "in/s", "in/s2", "ips", "ft/s", "ft/s2", "mg", "nm"}
+)
+_FOREIGN_TIMES = frozenset({"ns", "h", "hour", "hours", "tick", "ticks", "sample", "samples"})
 
 
 @dataclass(frozen=True)
@@ -141,10 +149,23 @@ def _split_unit(text: str) -> tuple[str, Unit | None, str]:
         head, tail = text[: split.start()], text[split.end() :]
         if head and (unit := find_unit(tail)):
             return re.sub(r" in$", "", head), unit, ""
+    for split in re.finditer(r"[_ ,/.:-]+", text):
+        head, tail = text[: split.start()], text[split.end() :]
+        if _is_foreign(head, tail.strip()):
+            return head, None, tail.strip()
     head, found, tail = text.partition("/")
     if found and head and _words(tail) != [tail.strip().lower()]:
         return head, None, tail.strip()
     return text, None, ""
+
+
+def _is_foreign(head: str, tail: str) -> bool:
+    """Whether a name is followed by a unit that is not converted, such as V: of "x_v" that is the velocity."""
+    measures, _ = _meaning(_words(head))
+    plain = re.sub(r"[\s^]", "", tail.lower()).replace("²", "2").replace("μ", "µ")
+    if measures == "time":
+        return plain in _FOREIGN_TIMES or plain in _FOREIGN
+    return measures is not None and plain in _FOREIGN and (measures != "response" or plain not in _NAMES or tail == "V")
 
 
 def _words(text: str) -> list[str]:

@@ -27,6 +27,8 @@ SAME_MODE = 0.1
 _MEASURED = "half of the 95 % interval"
 _DIGITS = 7
 _NO_PAIR = 1e3
+_SHARE_DIGITS = 4
+_SUM_SLACK = 1e-3  # of the participations: rounding
 _KEYS = (
     "frequency_hz",
     "damping_ratio",
@@ -53,7 +55,14 @@ class MachineUpdate:
     notes: tuple[str, ...]
 
 
-def update_machine_file(path: str | Path, axis: str, modes: Sequence[IdentifiedMode], *, source: str) -> MachineUpdate:
+def update_machine_file(
+    path: str | Path,
+    axis: str,
+    modes: Sequence[IdentifiedMode],
+    *,
+    source: str,
+    refused: Sequence[IdentifiedMode] = (),
+) -> MachineUpdate:
     """Read a machine file and put identified modes into it; see `update_modes`. The file itself is not touched.
 
     Raises:
@@ -62,7 +71,8 @@ def update_machine_file(path: str | Path, axis: str, modes: Sequence[IdentifiedM
         OSError: it cannot be read.
     """
     check_updatable(path)
-    return update_modes(Path(path).read_bytes().decode("utf-8"), axis, modes, source=source, file=str(path))
+    text = Path(path).read_bytes().decode("utf-8")
+    return update_modes(text, axis, modes, source=source, refused=refused, file=str(path))
 
 
 def check_updatable(path: str | Path) -> None:
@@ -82,20 +92,28 @@ def check_updatable(path: str | Path) -> None:
 
 
 def update_modes(
-    text: str, axis: str, modes: Sequence[IdentifiedMode], *, source: str, file: str = "<text>"
+    text: str,
+    axis: str,
+    modes: Sequence[IdentifiedMode],
+    *,
+    source: str,
+    refused: Sequence[IdentifiedMode] = (),
+    file: str = "<text>",
 ) -> MachineUpdate:
     """The text of a machine file with the modes of one axis replaced by identified ones.
 
     A mode whose frequency is within 10 % of one in the file takes its table: values and uncertainties change where
     they stand, participation, `frequency_over` and every comment line stay, and so does an uncertainty of the
-    frequency that somebody stated wider than it was measured. Other tables of the axis' modes go, other modes get a
-    table of their own. Putting the same modes in twice gives the same text.
+    frequency that somebody stated wider than it was measured. A mode of the file that the test shows, but does not
+    support, stays as it is. Other tables of the axis' modes go, other modes get a table of their own, whose
+    participation is its share of the residues. Putting the same modes in twice gives the same text.
 
     Args:
         text: of the machine file.
         axis: "x", "y" or "z".
         modes: what the data support.
         source: where they come from.
+        refused: modes that the data show without supporting their values.
         file: name for messages.
 
     Raises:
@@ -112,7 +130,7 @@ def update_modes(
     mark = "\ufeff" if text.startswith("\ufeff") else ""
     body = text.removeprefix(mark)
     edit = _Edit(chunks(body), tomllib.loads(body), axis, source, file)
-    new = mark + edit.apply(modes)
+    new = mark + edit.apply(modes, refused)
     edit.check(new.removeprefix(mark))
     return MachineUpdate(new, Machine.from_toml(new.removeprefix(mark), file), tuple(edit.notes))
 
@@ -141,14 +159,21 @@ class _Edit:
                 f"[[{self.name}]], then they can be updated"
             )
 
-    def apply(self, modes: Sequence[IdentifiedMode]) -> str:
+    def apply(self, modes: Sequence[IdentifiedMode], refused: Sequence[IdentifiedMode]) -> str:
         """The text with the modes in it."""
         taken = _matches(modes, [each["frequency_hz"] for each in self.old])
         lines = [part.text for part in self.parts]
         kept = {old: mode for mode, old in taken.items()}
+        seen = {
+            old: refused[mode] for mode, old in _matches(refused, [each["frequency_hz"] for each in self.old]).items()
+        }
         for number, (begin, end) in enumerate(self.blocks):
             if number in kept:
                 self._change(lines, begin, end, self.old[number], modes[kept[number]])
+            elif number in seen:
+                old_hz, new_hz = toml(self.old[number]["frequency_hz"]), seen[number].frequency_hz.value
+                self.expected.append(self.old[number])
+                self.notes.append(f"kept {old_hz} Hz as it is: the test shows it at {new_hz:.6g} Hz, not well enough")
             else:
                 lines[begin:end] = [""] * (end - begin)
                 if end < len(self.parts) and self.parts[end].kind == "blank":
@@ -157,8 +182,12 @@ class _Edit:
                 self.notes.append(f"removed {toml(gone['frequency_hz'])} Hz, which was not found: {toml(gone)}")
         fresh = [mode for number, mode in enumerate(modes) if number not in taken]
         if fresh:
-            self.notes += _shares(modes)
-            self._insert(lines, sorted(kept), [self._table(mode) for mode in fresh])
+            shares, meaning = _shares(modes)
+            share_of = dict(zip(map(id, modes), shares, strict=True))
+            self._insert(
+                lines, sorted({*kept, *seen}), [self._table(mode, share_of[id(mode)], meaning) for mode in fresh]
+            )
+        self._tell_sum(modes)
         return "".join(lines)
 
     def check(self, text: str) -> None:
@@ -258,16 +287,26 @@ class _Edit:
         values["source"] = self.source, ""
         return {key: values[key] for key in _KEYS if key in values}
 
-    def _table(self, mode: IdentifiedMode) -> str:
+    def _table(self, mode: IdentifiedMode, share: float, meaning: str) -> str:
         """The lines of a new table."""
-        values = self._values(mode) | {"participation": (1.0, "not measured")}
+        values = self._values(mode) | {"participation": (share, f"{meaning}, not measured")}
         self.expected.append({key: value for key, (value, _) in values.items()})
         self.notes.append(
-            f"{toml(values['frequency_hz'][0])} Hz is new: participation 1, as a tap does not tell how much of the "
-            "axis' motion goes into it"
+            f"{toml(values['frequency_hz'][0])} Hz is new: participation {share:g} ({meaning}), as a tap does not tell "
+            "how much of the axis' motion goes into it"
         )
         lines = [f"[[{self.name}]]", *(_line(key, value, remark) for key, (value, remark) in values.items())]
         return "".join(line + self.newline for line in lines)
+
+    def _tell_sum(self, modes: Sequence[IdentifiedMode]) -> None:
+        """Warn of modes that together would move further than the axis does."""
+        total = sum(float(mode.get("participation", 1.0)) for mode in self.expected)
+        if total > 1.0 + _SUM_SLACK:
+            shares = ", ".join(f"{share:g}" for share in _shares(modes)[0])
+            self.notes.append(
+                f"warning: the participations of the {self.axis.upper()} axis sum to {total:.4g}: those of all modes "
+                f"of one point sum to 1 when the axis moves; by the shares of the modes found they would be {shares}"
+            )
 
     def _insert(self, lines: list[str], kept: list[int], tables: list[str]) -> None:
         """Put new tables behind the last one that stays, or where the first one was, or where the axis ends."""
@@ -296,19 +335,25 @@ class _Edit:
         return self._end(heads[0]) - 1 if heads else len(self.parts) - 1
 
 
-def _shares(modes: Sequence[IdentifiedMode]) -> list[str]:
-    """What participations would follow from the masses."""
+def _shares(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
+    """Participations that sum to 1, and what they are: shares of the residues 1/m, or of the number of modes.
+
+    Those of one point under a motion of its base do so, sum of phi_i Gamma_i = 1, for mode shapes that span the motion.
+    """
     masses = [mode.mass_kg.value for mode in modes if mode.mass_kg is not None]
-    if len(masses) < 2 or len(masses) < len(modes):
-        return []
+    if len(masses) < len(modes):
+        return [_share(1.0 / len(modes))] * len(modes), "equal shares"
     total = sum(1.0 / mass for mass in masses)
-    shares = ", ".join(f"{1.0 / mass / total:.2f}" for mass in masses)
-    return [f"if the mass that the axis moves sits at the tapped point, the participations are {shares}"]
+    return [_share(1.0 / mass / total) for mass in masses], "share of the residues 1/m"
+
+
+def _share(value: float) -> float:
+    return float(f"{value:.{_SHARE_DIGITS}g}")
 
 
 def _matches(modes: Sequence[IdentifiedMode], old_hz: Sequence[float]) -> dict[int, int]:
     """Number of the old mode by that of the new: as many pairs within 10 % as there can be, the nearest ones."""
-    if not old_hz:
+    if not old_hz or not modes:
         return {}
     new_hz = np.array([mode.frequency_hz.value for mode in modes])
     distance = np.abs(new_hz[:, None] / np.asarray(old_hz) - 1.0)

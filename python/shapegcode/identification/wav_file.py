@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.io import wavfile
 
-from shapegcode.identification.read import ReadOptions
+from shapegcode.identification.read_options import ReadOptions
 from shapegcode.identification.record import FloatArray, Record, RecordError
 from shapegcode.identification.sampling import STATED_RATE_TOLERANCE
 

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 from shapegcode._core import ArgumentError, Mode
 
-__all__ = ["ModeBand", "parse_mode_band"]
+__all__ = ["NARROW_PERCENT", "ModeBand", "parse_mode_band"]
+
+NARROW_PERCENT = 0.2
+"""A band of a mode of a machine is designed for if it is wider than this, either way."""
 
 _SLOWEST_HZ = 0.1  # the swing of a load on 25 m of rope; no machine tool has a slower mode
 _FASTEST_HZ = 10_000.0  # as in a machine file

@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
-from shapegcode.shaping.band import ModeBand, parse_mode_band
+from shapegcode.shaping.band import NARROW_PERCENT, ModeBand, parse_mode_band
 from shapegcode.shaping.choice import Recommendation, choose
+from shapegcode.shaping.options import DesignOptions
 from shapegcode.shaping.ranking import SAME
-from shapegcode.shaping.registry import DesignOptions
 from shapegcode.shaping.robust_search import Task, shortest_below
 from shapegcode.shaping.taps import parse_taps
 
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
 __all__ = ["NARROW_PERCENT", "candidate_periods", "check_block_period", "choose_shaper", "machine_bands"]
-
-NARROW_PERCENT = 0.2
-"""A band of a mode of a machine is designed for if it is wider than this, either way."""
 
 _ASSUMED_TICK_S = 0.001  # interpolation period where no machine states one
 _LONGEST_BLOCK_PERIOD_S = 0.02

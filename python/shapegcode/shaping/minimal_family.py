@@ -9,7 +9,7 @@ from shapegcode._core import DesignError, MinimalShapers, Mode, Shaper, convolve
 from shapegcode.shaping.band import ModeBand
 
 if TYPE_CHECKING:
-    from shapegcode.shaping.registry import DesignOptions
+    from shapegcode.shaping.options import DesignOptions
 
 __all__ = ["solve_minimal"]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from shapegcode._core import ArgumentError, DesignError, Shaper, grid_polynomial
 from shapegcode.shaping import family_solvers as solvers
-from shapegcode.shaping.band import ModeBand
+from shapegcode.shaping.band import NARROW_PERCENT, ModeBand
 from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.minimal_family import solve_minimal
@@ -54,7 +54,10 @@ def _shortest_non_negative(bands: Sequence[ModeBand], options: DesignOptions) ->
 
 def _robust(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
     if not any(band.uncertainty for band in bands):
-        raise DesignError("no mode states a band: a robust design is the non-negative one")
+        raise DesignError(
+            f"no mode states a band to design for (of those in a machine file, up to {NARROW_PERCENT:g} % are taken as "
+            "exact): a robust design is the non-negative one"
+        )
     found = minimax_robust(
         bands, options.grid_period_s, vibration_limit=options.vibration_limit, max_duration_s=options.max_duration_s,
         hints=False,

@@ -11,7 +11,7 @@
 
 namespace shapegcode {
 
-enum class BlockKind : std::uint8_t { line, clockwise, counter_clockwise };
+enum class FittedKind : std::uint8_t { line, clockwise, counter_clockwise };
 
 /// One block to be written, in whole least increments: what is rounded once is never rounded again.
 struct FittedBlock {
@@ -20,7 +20,7 @@ struct FittedBlock {
   std::int64_t feed = 0;                       ///< F in units of 10^-feed_decimals per minute
   std::uint32_t first_period = 0;              ///< index of the block period in which it begins
   std::uint32_t periods = 0;                   ///< whole block periods that it lasts
-  BlockKind kind = BlockKind::line;
+  FittedKind kind = FittedKind::line;
   std::uint8_t normal = 2;  ///< arcs: axis across the plane
 };
 
@@ -35,7 +35,7 @@ struct FitOptions {
   double arc_min_chord_mm = 0.02;           ///< shorter pieces are lines
   /// What the last block must be, so that the modal motion code behind it is the original's: a control refuses G02 or
   /// G03 alone. An arc that takes the place of a line there has `last_radius_mm` in the plane across `last_normal`.
-  BlockKind last_kind = BlockKind::line;
+  FittedKind last_kind = FittedKind::line;
   std::uint8_t last_normal = 2;
   double last_radius_mm = 0.0;
   double max_sweep_rad = 1.3962634;  ///< 80 degrees: no piece can be mistaken for the long way round

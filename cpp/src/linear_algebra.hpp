@@ -1,0 +1,26 @@
+#pragma once
+
+#include <Eigen/Dense>
+
+// Decompositions of plain matrices, each compiled once: where several sources instantiate one, most of the time of
+// compiling them goes into it. The results are those of the Eigen class of the same name.
+
+namespace shapegcode::linear_algebra {
+
+/// The solution of least norm of a least-squares problem (complete orthogonal decomposition).
+[[nodiscard]] Eigen::VectorXd least_norm_solution(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
+
+/// The solution of a least-squares problem (column-pivoting QR).
+[[nodiscard]] Eigen::VectorXd least_squares(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
+
+/// The eigenvalues of a real square matrix, in no order.
+[[nodiscard]] Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& matrix);
+
+/// Of a symmetric matrix, whose lower triangle is read: values ascending, and their orthonormal vectors as columns.
+struct SymmetricEigen {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd vectors;
+};
+[[nodiscard]] SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& matrix);
+
+}  // namespace shapegcode::linear_algebra
