@@ -15,6 +15,7 @@ using shapegcode::DeviationStats;
 using shapegcode::make_arc;
 using shapegcode::make_line;
 using shapegcode::Path;
+using shapegcode::PathSide;
 using shapegcode::Segment;
 using shapegcode::Vector3;
 
@@ -301,4 +302,35 @@ TEST_CASE("contour: pieces without length do no harm") {
   CHECK(tracker.step({10.1, -0.1, 0}) == doctest::Approx(-0.1 * std::sqrt(2.0)));
   for (double y = 0.0; y <= 10.0; y += 0.1) tracker.step({10.1, y, 0});
   CHECK(tracker.step({10.1, 10.0, 0}) == doctest::Approx(-0.1));
+}
+
+TEST_CASE("side of a deviation: vertical ones are neither left nor right") {
+  struct Row {
+    double left, up;
+    PathSide side;
+  };
+  const std::vector<Row> rows = {{0.02, 0.0, PathSide::left},     {-0.02, 0.01, PathSide::right},
+                                 {0.01, 0.02, PathSide::above},   {-0.01, -0.02, PathSide::below},
+                                 {1e-5, -0.02, PathSide::below},  {0.0, 0.02, PathSide::above},
+                                 {0.02, -0.0199, PathSide::left}, {0.0, 0.0, PathSide::none}};
+  const Path line = polyline({{0, 0, 0}, {10, 10, 0}});
+  const Path arc(std::vector<Segment>{make_arc({10, 0, 0}, {0, 10, 0}, {0, 0, 0}, pi / 2, 2, 100.0)});
+  for (const Path* path : {&line, &arc}) {
+    for (const Row& row : rows) {
+      ContourTracker tracker(*path);
+      std::size_t cursor = 0;
+      for (double s = 0.0; s < 5.0; s += 0.1) tracker.step(beside(*path, s, row.left, row.up, cursor));
+      CAPTURE(row.left);
+      CAPTURE(row.up);
+      // On the arc the foot of a point on it is off by rounding: that is beside the path, however little.
+      if (row.side != PathSide::none || path == &line) CHECK(tracker.side() == row.side);
+    }
+  }
+  // Beside a plunge there is no left and no right; below its end there is a below.
+  ContourTracker plunge(polyline({{0, 0, 5}, {0, 0, 0}}));
+  plunge.step({0.01, 0.0, 4.9});
+  CHECK(plunge.side() == PathSide::none);
+  for (double z = 4.8; z > -0.05; z -= 0.1) plunge.step({0.0, 0.0, z});
+  plunge.step({0.0, 0.0, -0.03});
+  CHECK(plunge.side() == PathSide::below);
 }
