@@ -71,7 +71,10 @@ def test_exit_code_says_whether_the_tolerance_is_kept(folder: Path, capsys: pyte
     assert [each["within_tolerance"] for each in report["programs"]] == [None, False]
 
 
-def test_table_like_a_measuring_report(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_table_like_a_measuring_report(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "120")
     words = ["measure", "part.nc", "shaped.nc", "-m", "vx500", "--tool-diameter", "3mm", "--plots", "plots"]
     assert main(words) == 0
     said = capsys.readouterr().out
@@ -90,7 +93,10 @@ def test_table_like_a_measuring_report(folder: Path, capsys: pytest.CaptureFixtu
     assert "shaped.nc" in picture
 
 
-def test_deviations_along_z_are_above_and_below(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_deviations_along_z_are_above_and_below(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "120")
     # A mode of Z alone, a cut along X and a ramp: what Z does is neither left nor right.
     (folder / "ramp.nc").write_text("%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X10.F3000\nX20.Z-5.\nX30.\nM30\n%\n")
     modes = [{"frequency_hz": 30.0, "damping_ratio": 0.02}]
