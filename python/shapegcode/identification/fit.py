@@ -37,7 +37,7 @@ _FOLDED = 2.0 / 3.0
 _FINER = 16  # steps of the check by Wilson's method in a sampling period
 _STEPS = 60  # of a fit
 _QUICK_STEPS = 15  # of one that only shows where a mode may be
-_POSSIBLY = 30.0  # by so much (twice the logarithm of the odds) another course of the force may be less evident
+_POSSIBLY = 15.0  # by so much (twice the logarithm of the odds) another course of the force may be less evident
 
 
 @dataclass(frozen=True, eq=False)
