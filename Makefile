@@ -81,6 +81,10 @@ lint: test-packages dev
 bench: package dev
 	tests/tools/fetch_rs274.sh
 	$(BIN)/python tests/benchmarks/run.py
+	$(BIN)/python tests/benchmarks/linear_plants.py
+	$(BIN)/python tests/benchmarks/feed_drives.py
+	$(BIN)/python tests/benchmarks/identification.py
+	$(BIN)/python tests/benchmarks/simulate_program.py
 
 # New inputs go to build/, so that the kept corpus grows only by `fuzz-merge`, which adds what covers more.
 fuzz: build/fuzz/tests/fuzz/fuzz_reader
