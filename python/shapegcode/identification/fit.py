@@ -164,15 +164,17 @@ def _held(problem: _Taps, models: Search, most_modes: int, modes: int | None) ->
     order = modes or max(models.order, 1)
     for hold in ("linear", "impulse"):
         other = replace(problem, hold=hold)
-        fit = other.fit(starts_of(models.fits[order - 1]))
+        fits = tuple(other.fit(starts_of(fit)) for fit in models.fits[:order])
+        evidence = tuple(evidence_of(fit) for fit in fits)
         # The search is worth its time only where it may win: a wrong course asks for modes of its own.
-        lead = evidence_of(models.fits[order - 1]) - evidence_of(fit)
-        searched = _search(other, most_modes, modes) if lead > 0.0 else Search((fit,), (evidence_of(fit),))
-        courses.append((other, searched))
+        may_win = min(evidence) < min(models.evidence)
+        courses.append((other, _search(other, most_modes, modes) if may_win else Search(fits, evidence)))
     best = min(courses, key=lambda course: min(course[1].evidence))
     least = min(best[1].evidence)
     starts = starts_of(best[1].fits[(modes or max(best[1].order, 1)) - 1])
-    possible = [other for other, searched in courses if min(searched.evidence) < least + _POSSIBLY]
+    # A record that begins within the pulse does not tell half of the momentum from the whole.
+    begun = any(force[0] != 0.0 for force in problem.forces) and best[0].hold != "impulse"
+    possible = [other for other, searched in courses if begun or min(searched.evidence) < least + _POSSIBLY]
     others: list[Fit] = [other.fit(starts) for other in possible if other is not best[0]]
     return *best, others
 

@@ -25,6 +25,7 @@ _LEAST_SHARE = 1e-6
 _START_DAMPING = (0.01, 0.05)
 _PEAKS = 2  # of the residual's spectrum that are tried
 _TWINS = 0.25  # of the half width of a resonance
+_APART = np.pi  # rad: two modes must come half a turn apart in the record
 _POOL_ORDERS = 20  # of the stabilisation chart
 _MOST_DAMPING = 0.7  # of a pole to begin with
 # Two models in a row that the data do not ask for end the search: one may only have missed its place.
@@ -142,16 +143,23 @@ def _next_fit(problem: Problem, last: Fit | None, pool: Starts) -> Fit | None:
         if len(chosen) > len(so_far):
             candidates.append([*so_far, pool[chosen[len(so_far)] - len(so_far)]])
     fits = [fit for starts in candidates if (fit := _attempt(partial(problem.fit_quickly, starts))) is not None]
-    fits = [fit for fit in fits if not _has_twins(fit)]
-    if not fits:
-        return None
-    return _attempt(partial(problem.fit, starts_of(min(fits, key=lambda fit: fit.sum_of_squares))))
+    longest_s = max(len(response) for response in problem.responses) * problem.period_s
+    # The full fit may still run into twins: then the next best start has its turn.
+    for quick in sorted(fits, key=lambda fit: fit.sum_of_squares):
+        if not _has_twins(quick, longest_s):
+            fit = _attempt(partial(problem.fit, starts_of(quick)))
+            if fit is not None and not _has_twins(fit, longest_s):
+                return fit
+    return None
 
 
-def _has_twins(fit: Fit) -> bool:
-    """Whether two modes lie within a fraction of their width: one mode, drawn twice to mend what is no mode."""
+def _has_twins(fit: Fit, record_s: float) -> bool:
+    """Whether two modes lie within a fraction of their width, or of what the record tells apart.
+
+    That is one mode, drawn twice to mend what is no mode: drift, hum, a delay between the channels.
+    """
     modes = sorted(starts_of(fit))
-    return any(w2 - w1 < _TWINS * w1 * max(z1, z2) for (w1, z1), (w2, z2) in pairwise(modes))
+    return any(w2 - w1 < max(_TWINS * w1 * max(z1, z2), _APART / record_s) for (w1, z1), (w2, z2) in pairwise(modes))
 
 
 def starts_of(fit: Fit) -> Starts:
