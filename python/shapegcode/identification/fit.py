@@ -12,11 +12,12 @@ from scipy.signal import resample_poly
 from shapegcode import _core
 from shapegcode.identification.chart import stabilisation_chart
 from shapegcode.identification.checks import Prepared, prepare
-from shapegcode.identification.model_search import Fit, Search, Starts, evidence_of, search, starts_of
+from shapegcode.identification.model_search import Fit, Search, Starts, chart_poles, evidence_of, search, starts_of
 from shapegcode.identification.record import Record, RecordError
 from shapegcode.identification.results import Identification, IdentifiedMode
 from shapegcode.identification.support import (
     ACCEPTED_PERCENT,
+    LEAST_SWINGS,
     Doubts,
     estimates_of,
     is_background,
@@ -29,9 +30,7 @@ FloatArray = npt.NDArray[np.float64]
 __all__ = ["ACCEPTED_PERCENT", "identify"]
 
 _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which they are not taken for white
-_LEAST_SWINGS = 2.0  # of a mode in the record
 _HIGHEST_SHARE = 0.45  # of the sampling rate: the force between samples is known up to there
-_CHART_ORDERS = 20
 _SPECTRUM = 4096  # points of the force's transform
 _FOLDED = 2.0 / 3.0
 _FINER = 16  # steps of the check by Wilson's method in a sampling period
@@ -183,7 +182,7 @@ def _problem(ready: Prepared, band_hz: tuple[float, float] | None) -> _Taps | _D
     first = ready.records[0]
     responses = [record.response for record in ready.records]
     longest_s = max(len(response) for response in responses) * first.period_s
-    band = band_hz or (_LEAST_SWINGS / longest_s, _HIGHEST_SHARE / first.period_s)
+    band = band_hz or (LEAST_SWINGS / longest_s, _HIGHEST_SHARE / first.period_s)
     if not 0.0 <= band[0] < band[1] <= 0.5 / first.period_s:
         raise RecordError(
             f"band of {band[0]:g} to {band[1]:g} Hz: must ascend and end below half the sampling rate, "
@@ -221,7 +220,7 @@ def _result(
 ) -> Identification:
     warnings = [*ready.warnings, *(f"{refused.source}: not used: {refused.reason}" for refused in ready.refused)]
     evidence = dict(enumerate(models.evidence))
-    chart = stabilisation_chart(problem.poles(_chart_orders(problem)), problem.period_s)
+    chart = stabilisation_chart(chart_poles(problem), problem.period_s)
     squares = sum(float(np.sum(response**2)) for response in problem.responses)
     used = tuple((0, len(response)) for response in problem.responses)
     if order == 0:
@@ -273,11 +272,6 @@ def _result(
         checks=_checks(problem, fit),
         warnings=tuple(warnings),
     )
-
-
-def _chart_orders(problem: _Taps | _Decays) -> int:
-    shortest = min(len(response) for response in problem.responses)
-    return max(1, min(_CHART_ORDERS, (shortest - 8) // 8))
 
 
 def _never_aliased(_frequency_hz: float) -> float:

@@ -26,7 +26,7 @@ _START_DAMPING = (0.01, 0.05)
 _PEAKS = 2  # of the residual's spectrum that are tried
 _TWINS = 0.25  # of the half width of a resonance
 _APART = np.pi  # rad: two modes must come half a turn apart in the record
-_POOL_ORDERS = 20  # of the stabilisation chart
+_CHART_ORDERS = 20  # of the stabilisation chart
 _MOST_DAMPING = 0.7  # of a pole to begin with
 # Two models in a row that the data do not ask for end the search: one may only have missed its place.
 _PATIENCE = 2
@@ -113,12 +113,17 @@ def _evidence(squares: float, samples: int, parameters: int, modes: int) -> floa
     return float(samples * np.log(max(squares / samples, tiny)) + (parameters + modes) * np.log(samples))
 
 
+def chart_poles(problem: Problem) -> Sequence[npt.NDArray[np.complex128]]:
+    """Poles of the models of a stabilisation chart, by number of modes from 1."""
+    shortest = min(len(response) for response in problem.responses)
+    return problem.poles(max(1, min(_CHART_ORDERS, (shortest - 8) // 8)))
+
+
 def _pool(problem: Problem) -> Starts:
     """Poles of the stabilisation chart that lie in the band: each mode is among them several times."""
     low, high = problem.band_hz
     found: Starts = []
-    shortest = min(len(response) for response in problem.responses)
-    for of_model in problem.poles(max(1, min(_POOL_ORDERS, (shortest - 8) // 8))):
+    for of_model in chart_poles(problem):
         omega, zeta = _core.poles_to_modes(list(of_model), problem.period_s)
         found += [(w, z) for w, z in zip(map(float, omega), map(float, zeta), strict=True) if z < _MOST_DAMPING]
     return [(w, z) for w, z in found if low <= w / (2.0 * np.pi) <= high]

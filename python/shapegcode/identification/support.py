@@ -20,7 +20,8 @@ ACCEPTED_PERCENT = 5.0
 _FREQUENCY_PERCENT = 2.0
 _NOT_AT_ALL_PERCENT = 1000.0
 _NO_VIBRATION = 0.5  # damping ratio above which it is drift, not a mode that a shaper could deal with
-_LEAST_SWINGS = 2.0  # in the record
+#: Swings of a mode in the record: fewer do not tell its frequency.
+LEAST_SWINGS = 2.0
 #: What has not fallen to this share at the end of the record does not decay: mains hum, a pump, a turning spindle.
 _LASTING = 0.8
 #: A model with one mode more counts as a rival while it fits better by more than chance alone does in one case of 20.
@@ -194,10 +195,10 @@ def is_background(mode: Estimates, doubts: Doubts) -> bool:
 def refusal_of(mode: Estimates, doubts: Doubts) -> str:
     """Why the data do not support a mode; empty if they do."""
     frequency, damping, stiffness = mode.frequency_hz, mode.damping_ratio, mode.stiffness_n_per_m
-    if frequency.value * doubts.record_s < _LEAST_SWINGS:
+    if frequency.value * doubts.record_s < LEAST_SWINGS:
         return (
             f"{frequency.value * doubts.record_s:.1f} swings in the record of {doubts.record_s:.3g} s: "
-            f"{_LEAST_SWINGS:g} or more are needed"
+            f"{LEAST_SWINGS:g} or more are needed"
         )
     lasting = float(np.exp(-2.0 * np.pi * frequency.value * damping.value * doubts.record_s))
     if lasting > _LASTING:
