@@ -23,4 +23,7 @@ PYBIND11_MODULE(_core, module) {
   register_metrology(module);
   register_timing(module);
   register_played_stream(module);
+  register_engagement(module);
+  register_milling(module);
+  register_feed_schedule(module);
 }
