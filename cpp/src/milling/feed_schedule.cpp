@@ -87,7 +87,8 @@ FeedStations with_ramps(const FeedStations& stations, const FeedScheduleOptions&
 }
 
 double rounded_down(double feed, const FeedScheduleOptions& options) {
-  const double whole = std::floor(feed / options.resolution_mm_per_min + 1e-9) * options.resolution_mm_per_min;
+  // Divided by its inverse: 2067 / 10 is the nearest number to 206.7, 2067 * .1 is not.
+  const double whole = std::floor(feed / options.resolution_mm_per_min + 1e-9) / (1.0 / options.resolution_mm_per_min);
   return whole > 0.0 ? whole : feed;
 }
 
