@@ -108,7 +108,7 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Motion, divi
     teeth_per_min = tool.tool.flutes * surveyed.spindle_rev_per_min
     path = region.path
     segment = np.asarray(track.segment)
-    programmed = np.array([path[i].feed_mm_per_s * 60.0 for i in range(len(path))])
+    programmed = path.segment_feeds_mm_per_s * 60.0
     lowest = max((tool.limits.feed_per_tooth_min_mm or 0.0) * teeth_per_min, machine.controller.minimum_feed_mm_per_min)
     kept = _kept_segments(surveyed, programmed, lowest, tool)
     limit, holds = _limits_along(surveyed, programmed[segment], lowest, machine, margin)
@@ -195,8 +195,6 @@ def _stretches_that_keep(
 ) -> list[_core.FeedStretch]:
     """Plan, travel, and slow down earlier or more where the travel is still too fast."""
     control = machine.feed_control
-    ends = np.cumsum([path[i].length_mm for i in range(len(path))])
-    ends[-1] = path.length_mm
     kept = np.where(frozen, programmed, 0.0)
     planned = limit.copy()
     reach = np.full(len(stations), motion.reach_s + window_s)
@@ -205,7 +203,7 @@ def _stretches_that_keep(
     for attempt in range(_ATTEMPTS):
         feeds = _core.look_ahead_on_load(stations, planned, reach)
         stretches = _core.schedule_feed(
-            ends, kept, divisible, stations, feeds, control.interval_mm,
+            path.segment_ends_mm, kept, divisible, stations, feeds, control.interval_mm,
             np.inf if control.max_change_mm_per_min is None else control.max_change_mm_per_min, feed_unit,
         )  # fmt: skip
         travelled = motion.travel(_core.with_feeds(path, stretches), stations, window_s)

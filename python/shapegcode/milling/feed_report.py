@@ -206,8 +206,7 @@ def _feeds(surveyed: Survey, plans: Sequence[FeedPlan | None]) -> dict[str, floa
     feeds: list[float] = []
     for part, plan in zip(surveyed.regions, plans, strict=True):
         if plan is None:
-            path = part.region.path
-            feeds += [path[i].feed_mm_per_s * 60.0 for i in range(len(path))]
+            feeds += (part.region.path.segment_feeds_mm_per_s * 60.0).tolist()
         else:
             feeds += [stretch.feed_mm_per_min for stretch in plan.stretches]
     return {"min": min(feeds), "max": max(feeds)} if feeds else {"min": 0.0, "max": 0.0}
@@ -229,11 +228,11 @@ def _misses(part: SurveyedRegion, plan: FeedPlan | None, load: RegionLoad | None
 
 def _kept_blocks(place: Any, part: SurveyedRegion, plan: FeedPlan) -> Iterator[str]:
     """One sentence per run of blocks that are left alone for one reason."""
-    path = part.region.path
-    for reason, run in groupby(range(len(path)), key=lambda i: plan.kept[i]):
+    lines = part.region.path.segment_lines
+    for reason, run in groupby(range(len(lines)), key=lambda i: plan.kept[i]):
         indices = list(run)
         if reason:
-            first, last = path[indices[0]].line, path[indices[-1]].line
+            first, last = int(lines[indices[0]]), int(lines[indices[-1]])
             where = "" if first == last else f" to line {last}"
             yield f"{place(first)}{where}: left as it was: {reason}"
 
@@ -242,7 +241,7 @@ def _limits(part: SurveyedRegion, plan: FeedPlan | None) -> Iterator[dict[str, A
     """Ranges of lines, each with its feeds and what holds them."""
     path = part.region.path
     if plan is None:
-        feeds = [path[i].feed_mm_per_s * 60.0 for i in range(len(path))]
+        feeds = (path.segment_feeds_mm_per_s * 60.0).tolist()
         yield _range(part.region.first_line, part.region.last_line, feeds, KEPT, part.kept)
         return
     track = part.track
@@ -256,10 +255,11 @@ def _limits(part: SurveyedRegion, plan: FeedPlan | None) -> Iterator[dict[str, A
         tightest = int(np.argmin(plan.limit_mm_per_min[inside])) if ends[i] > starts[i] else 0
         holds.append(str(plan.holds[inside][tightest]) if ends[i] > starts[i] else KEPT)
     written = _feeds_of_segments(plan, path)
+    lines = path.segment_lines
     for (hold, reason), run in groupby(range(len(path)), key=lambda i: (holds[i], plan.kept[i])):
         indices = list(run)
         feeds = [feed for i in indices for feed in written[i]]
-        yield _range(path[indices[0]].line, path[indices[-1]].line, feeds, hold, reason)
+        yield _range(int(lines[indices[0]]), int(lines[indices[-1]]), feeds, hold, reason)
 
 
 def _range(first: int, last: int, feeds: list[float], hold: str, reason: str) -> dict[str, Any]:
@@ -275,7 +275,7 @@ def _feeds_of_segments(plan: FeedPlan, path: _core.Path) -> list[list[float]]:
     """The feeds that stand in each segment."""
     ends = np.array([stretch.end_mm for stretch in plan.stretches])
     feeds = [stretch.feed_mm_per_min for stretch in plan.stretches]
-    borders = np.concatenate(([0.0], np.cumsum([path[i].length_mm for i in range(len(path))])))
+    borders = np.concatenate(([0.0], path.segment_ends_mm))
     first = np.searchsorted(ends, borders[:-1] + 1e-6, side="right")
     last = np.searchsorted(ends, borders[1:] - 1e-6)
     most = len(feeds) - 1

@@ -110,7 +110,6 @@ def survey(
 
 def _why_not_swept(region: _core.Region, program: Program) -> str:
     """Why what the tool meets on a region cannot be told; empty if it can."""
-    path = region.path
     first = program.regions[0].exit
     if (region.exit.coordinate_system, region.exit.coordinate_number) != (
         first.coordinate_system,
@@ -119,7 +118,7 @@ def _why_not_swept(region: _core.Region, program: Program) -> str:
         return "it is cut in other work coordinates than the first cutting move, in whose the stock lies"
     if region.incremental:
         return "its place is not known"
-    if any(path[i].kind == _core.SegmentKind.arc and path[i].normal != 2 for i in range(len(path))):
+    if not region.path.arcs_in_xy:
         return "it holds arcs that are not in the XY plane (G17)"
     return ""
 
