@@ -14,6 +14,7 @@ from shapegcode.cli.options import (
     add_program_argument,
     load_machine,
     micrometres,
+    output_file,
     positive,
     ratio,
     refuse_same_file,
@@ -130,18 +131,13 @@ def run(args: argparse.Namespace) -> int:
         ArgumentError: a bad file name, or a budget that no choice fits.
         OSError: a file cannot be read or written.
     """
-    from shapegcode._core import ArgumentError
     from shapegcode.budget import Budget
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, print_before_after, progress, write_bytes, write_json
     from shapegcode.compensation import read_for_conversion
     from shapegcode.converter import convert
 
-    if args.output == "-":
-        raise ArgumentError("-o - : the program needs a file of its own; --json - writes the report to standard output")
-    output = Path(args.output)
-    if not output.name or output.is_dir():
-        raise ArgumentError(f"-o {args.output}: the output must be a file, not a folder")
+    output = output_file(args.output)
     limits = (args.max_bytes, args.baud, args.max_blocks_per_second)
     budget = None if limits == (None, None, None) else Budget(*limits)
     machine = load_machine(args)

@@ -21,6 +21,10 @@ _LOWERING = 3  # attempts that only slow down earlier, before feeds are lowered 
 _TOO_FAST = 1e-6  # relative
 _DEEPER_PLUNGE = 0.01  # of the tool's end in material: a ramp cuts with its end
 _AIR_MM2 = 1e-9
+_LIMIT_NAMES = np.array(
+    [name for _, name in sorted((limit.value, name) for name, limit in _core.FeedLimit.__members__.items())],
+    dtype="<U16",
+)
 
 PROGRAMMED, AIR, KEPT, MINIMUM = "programmed", "air", "kept", "minimum"
 """What holds a feed where no limit does: the program, no material, a block that is left alone, the least chip."""
@@ -145,9 +149,11 @@ def _limits_along(
     raised = tool.limits.feed_per_tooth_max_mm is not None or tool.feed.max_feed_mm_per_min is not None
     ceiling = np.full(len(programmed), fastest) if raised else np.minimum(programmed, fastest)
     force = milling_force(tool, surveyed)
-    found = _core.largest_feeds(force, track, limits_of(tool, machine, margin), 1e-3 * lowest, float(ceiling.max()))
-    bound = np.asarray(found.feed_mm_per_min)
-    holds = np.where(bound < ceiling, np.asarray(found.limit_names), PROGRAMMED).astype("<U16")
+    # Searched to far below the least feed: what needs less than that is told apart from what just reaches it.
+    bound, limit, _ = _core.largest_feeds(
+        force, track, limits_of(tool, machine, margin), 1e-3 * lowest, float(ceiling.max())
+    )
+    holds = np.where(bound < ceiling, _LIMIT_NAMES[limit], PROGRAMMED)
     feeds = np.minimum(bound, ceiling)
     low = feeds < lowest
     feeds[low] = np.minimum(lowest, ceiling[low])

@@ -95,15 +95,11 @@ def scaled_stations(stations_mm: Vector, path: _core.Path) -> Vector:
 
 def _load(part: SurveyedRegion, force: _core.MillingForce, travelled: Travelled) -> Load:
     assert part.tool is not None and part.track is not None
-    figures = _core.track_forces(force, part.track, travelled.feed_mm_per_min, tool_beam(part.tool))
+    figures = force.figures_of(part.track, travelled.feed_mm_per_min, tool_beam(part.tool))
     return Load(
         travelled.feed_mm_per_min,
         travelled.time_s,
-        np.asarray(figures.mean_resultant_n),
-        np.asarray(figures.peak_resultant_n),
-        np.asarray(figures.peak_torque_nm),
-        np.asarray(figures.mean_power_w),
-        np.asarray(figures.peak_deflection_um),
+        **{name: figures[name] for name, *_ in _LIMITED},
     )
 
 
