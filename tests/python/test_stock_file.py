@@ -328,7 +328,8 @@ def test_a_path_that_crosses_itself_is_refused() -> None:
     [
         ("", "s.toml: must have exactly one of the tables box, polygon, allowance, program: has none of them"),
         (
-            "[box]\nx_mm = [0, 1]\ny_mm = [0, 1]\nz_mm = [0, 1]\n[polygon]\npoints_mm = [[0,0],[1,0],[1,1]]\nz_mm = [0,1]\n",
+            "[box]\nx_mm = [0, 1]\ny_mm = [0, 1]\nz_mm = [0, 1]\n"
+            "[polygon]\npoints_mm = [[0, 0], [1, 0], [1, 1]]\nz_mm = [0, 1]\n",
             "s.toml: must have exactly one of the tables box, polygon, allowance, program: has box and polygon",
         ),
         (

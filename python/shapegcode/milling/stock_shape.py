@@ -84,7 +84,10 @@ def _polygon(stock: Stock, polygon: Polygon, key: str) -> list[StockPiece]:
         if not hole.is_valid or hole.area == 0:
             reason = shapely.is_valid_reason(hole)
             raise stock.error(f"{key}.holes_mm.{number}", "", f"must go round an area: {reason}")
-    return _pieces(outline.difference(shapely.union_all(holes)), polygon.z_mm)
+    pieces = _pieces(outline.difference(shapely.union_all(holes)), polygon.z_mm)
+    if not pieces:
+        raise stock.error(f"{key}.holes_mm", "", "must leave something of the polygon")
+    return pieces
 
 
 def _pieces(area: Area | MultiPolygon, z_mm: tuple[float, float]) -> list[StockPiece]:
@@ -92,8 +95,8 @@ def _pieces(area: Area | MultiPolygon, z_mm: tuple[float, float]) -> list[StockP
 
     pieces = []
     for part in shapely.get_parts(area):
-        if part.geom_type != "Polygon" or part.is_empty:
-            continue  # a line in which two shapes touch
+        if part.geom_type != "Polygon" or part.area < _SAME_MM * _SAME_MM:
+            continue  # where two shapes touch, up to rounding
         ordered = shapely.orient_polygons(part)
         rings = (ordered.exterior, *ordered.interiors)
         pieces.append(StockPiece(tuple(np.asarray(ring.coords)[:-1] for ring in rings), *z_mm))
