@@ -11,11 +11,11 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.milling.feed_plan import KEPT, FeedPlan, limits_of, milling_force, tool_beam
+from shapegcode.milling.feed_plan import KEPT, MINIMUM, FeedPlan, limits_of, milling_force, tool_beam
 from shapegcode.milling.survey import Survey, SurveyedRegion
 from shapegcode.milling.travel import Motion, Travelled, Vector
 
-__all__ = ["Load", "RegionLoad", "feed_report", "region_load", "scaled_stations"]
+__all__ = ["Load", "RegionLoad", "feed_report", "load_of", "region_load", "scaled_stations"]
 
 _SLACK = 1e-3  # of a limit: what its own search and the rounding of a figure may be off by
 _AIR_N = 1e-9
@@ -77,25 +77,24 @@ def region_load(
         return None
     stations = np.asarray(part.track.s_mm)
     window_s = 60.0 / (part.tool.tool.flutes * part.spindle_rev_per_min)
-    force = milling_force(part.tool, part)
-    original = before.travel(part.region.path, stations, window_s)
-    was = _load(part, force, original)
+    was = load_of(part, before.travel(part.region.path, stations, window_s))
     if plan is None and before is after:
         return RegionLoad(stations, was, was)
     travelled = after.travel(written, scaled_stations(stations, written), window_s)
-    return RegionLoad(stations, was, _load(part, force, travelled))
+    return RegionLoad(stations, was, load_of(part, travelled))
 
 
 def scaled_stations(stations_mm: Vector, path: _core.Path) -> Vector:
     """The stations on the same path as read back, whose blocks end on the least increment."""
-    scaled = stations_mm * (path.length_mm / stations_mm[-1])
+    scaled: Vector = stations_mm * (path.length_mm / stations_mm[-1])
     scaled[-1] = path.length_mm
     return scaled
 
 
-def _load(part: SurveyedRegion, force: _core.MillingForce, travelled: Travelled) -> Load:
+def load_of(part: SurveyedRegion, travelled: Travelled) -> Load:
+    """Load along a region that is travelled so."""
     assert part.tool is not None and part.track is not None
-    figures = force.figures_of(part.track, travelled.feed_mm_per_min, tool_beam(part.tool))
+    figures = milling_force(part.tool, part).figures_of(part.track, travelled.feed_mm_per_min, tool_beam(part.tool))
     return Load(
         travelled.feed_mm_per_min,
         travelled.time_s,
@@ -114,8 +113,10 @@ def feed_report(
     program = surveyed.program
     warnings = [*program.warnings, *surveyed.warnings]
     regions: list[dict[str, Any]] = []
+    excess = 0.0
     for part, plan, load in zip(surveyed.regions, plans, loads, strict=True):
-        misses = _misses(part, plan, load, machine)
+        misses, beyond = _misses(part, plan, load, machine)
+        excess = max(excess, beyond)
         place = f"{program.place(part.region.first_line)}: {program.lines(part.region)}"
         if part.kept:
             warnings.append(f"{place} keep their feeds: {part.kept}")
@@ -152,6 +153,7 @@ def feed_report(
         },
         "limits": limits,
         "regions": regions,
+        "excess_ratio": excess,
         "within_limits": not any(region["misses"] for region in regions),
         "warnings": warnings,
     }
@@ -212,18 +214,26 @@ def _feeds(surveyed: Survey, plans: Sequence[FeedPlan | None]) -> dict[str, floa
     return {"min": min(feeds), "max": max(feeds)} if feeds else {"min": 0.0, "max": 0.0}
 
 
-def _misses(part: SurveyedRegion, plan: FeedPlan | None, load: RegionLoad | None, machine: Machine) -> list[str]:
-    """Limits that the region does not keep behind the schedule, in words."""
-    if load is None or part.tool is None:
-        return []
+def _misses(
+    part: SurveyedRegion, plan: FeedPlan | None, load: RegionLoad | None, machine: Machine
+) -> tuple[list[str], float]:
+    """Limits that the region does not keep behind the schedule, in words, and the largest share that is too much.
+
+    The share counts where a lower feed could help: not where feeds stay, or are the least already.
+    """
+    if load is None or part.tool is None or part.track is None:
+        return [], 0.0
     limits = limits_of(part.tool, machine, 0.0)
-    misses = []
+    helped = np.zeros(len(load.s_mm), dtype=bool) if plan is None else ~np.isin(plan.holds, (KEPT, MINIMUM))
+    misses, excess = [], 0.0
     for column, name, words, unit in _LIMITED:
         limit = getattr(limits, name)
-        largest = float(getattr(load.after, column).max(initial=0.0))
-        if np.isfinite(limit) and largest > limit * (1.0 + _SLACK):
-            misses.append(f"{words} {largest:.4g} {unit}, limit {limit:.4g} {unit}")
-    return misses
+        values = getattr(load.after, column)
+        if not np.isfinite(limit) or not (values > limit * (1.0 + _SLACK)).any():
+            continue
+        misses.append(f"{words} {float(values.max()):.4g} {unit}, limit {limit:.4g} {unit}")
+        excess = max(excess, float(values[helped].max(initial=0.0)) / limit - 1.0)
+    return misses, excess
 
 
 def _kept_blocks(place: Any, part: SurveyedRegion, plan: FeedPlan) -> Iterator[str]:
