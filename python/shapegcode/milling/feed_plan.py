@@ -21,6 +21,8 @@ _LOWERING = 3  # attempts that only slow down earlier, before feeds are lowered 
 _TOO_FAST = 1e-6  # relative
 _DEEPER_PLUNGE = 0.01  # of the tool's end in material: a ramp cuts with its end
 _AIR_MM2 = 1e-9
+_STEEPEST_AIR = 0.7  # share of the travel in XY from which on a move in air is no plunge
+_STEP = 0.005  # feeds that differ by less are one: a border for less gains nothing
 _LIMIT_NAMES = np.array(
     [name for _, name in sorted((limit.value, name) for name, limit in _core.FeedLimit.__members__.items())],
     dtype="<U16",
@@ -167,9 +169,17 @@ def _limits_along(
     before = np.where(same & (feeds[:-1] < feeds[1:]), np.arange(len(feeds) - 1), np.arange(1, len(feeds)))
     feeds[1:], holds[1:] = feeds[before], holds[before]
     if tool.feed.air_feed_mm_per_min is not None:
-        clear = air & ~_near_material(np.asarray(track.s_mm), air, tool.feed.approach_mm)
+        level = np.asarray(track.horizontal) > _STEEPEST_AIR  # nobody wants a tool to come down faster than he said
+        clear = air & level & ~_near_material(np.asarray(track.s_mm), air, tool.feed.approach_mm)
         feeds[clear] = np.maximum(programmed[clear], min(tool.feed.air_feed_mm_per_min, fastest))
     return feeds, holds
+
+
+def _stepped(limit: Vector, programmed: Vector) -> Vector:
+    """Feeds rounded down to steps of half a percent below the programmed one, or the largest if that is more."""
+    steps = np.ceil(np.log(programmed / limit) / math.log1p(_STEP) - 1e-9)
+    down: Vector = programmed * (1.0 + _STEP) ** -steps
+    return down
 
 
 def _near_material(s_mm: Vector, air: npt.NDArray[np.bool_], approach_mm: float) -> npt.NDArray[np.bool_]:
@@ -196,7 +206,7 @@ def _stretches_that_keep(
     """Plan, travel, and slow down earlier or more where the travel is still too fast."""
     control = machine.feed_control
     kept = np.where(frozen, programmed, 0.0)
-    planned = limit.copy()
+    planned = _stepped(limit, programmed[segment])
     reach = np.full(len(stations), motion.reach_s + window_s)
     free = ~frozen[segment]
     stretches: list[_core.FeedStretch] = []

@@ -10,7 +10,7 @@ from typing import Any
 from shapegcode.block_grid import choose_grid
 from shapegcode.budget import Budget
 from shapegcode.compensation import read_for_conversion, require_decision
-from shapegcode.converter import Conversion, convert
+from shapegcode.converter import Conversion, convert, marked_out_of_tolerance
 from shapegcode.machine import Machine
 from shapegcode.milling.feed_report import RegionLoad, feed_report, load_of, scaled_stations
 from shapegcode.milling.schedule import MARGIN, FeedSchedule, schedule_survey
@@ -99,8 +99,9 @@ def convert_scheduled(
             break
         margin += excess + _MORE_MARGIN
     report: dict[str, Any] = {**conversion.report, "feed_schedule": emitted.report}
-    report["warnings"] = [*conversion.report["warnings"], *emitted.report["warnings"]]
-    return ScheduledConversion(replace(conversion, report=report), emitted)
+    report["warnings"] = list(dict.fromkeys([*emitted.report["warnings"], *conversion.report["warnings"]]))
+    text = conversion.text if emitted.within_limits else marked_out_of_tolerance(conversion.text)
+    return ScheduledConversion(replace(conversion, text=text, report=report), emitted)
 
 
 def _measured(planned: FeedSchedule, conversion: Conversion, machine: Machine, margin: float) -> FeedSchedule:

@@ -85,9 +85,11 @@ def survey(
         StockError: the stock does not suit the program.
     """
     walk = _Walk(program, tools)
-    paths = [region.path for region in program.regions if not _why_not_swept(region, program)]
+    reasons = [_why_not_swept(region, program) for region in program.regions]
+    paths = [region.path for region, reason in zip(program.regions, reasons, strict=True) if not reason]
     if not paths:
-        raise _core.ArgumentError(f"{program.source}: no cutting moves whose engagement can be computed")
+        why = f": {reasons[0]}" if reasons else ""
+        raise _core.ArgumentError(f"{program.source}: no cutting moves whose engagement can be computed{why}")
     smallest = min(tools, key=lambda tool: tool.radius_mm)
     resolution = resolution_mm or _RESOLUTION_RATIO * smallest.tool.diameter_mm
     material = build_material(stock, paths, smallest, resolution, machine)
@@ -135,6 +137,8 @@ class _Walk:
         self._ready = -1  # T before its M06
         self._number = -1
         self._collisions = 0
+        # Where a program moves from places that are not known, neither are those of its rapids.
+        self._adrift = any(region.incremental for region in program.regions)
         self._tools: dict[int, Tool] = {}
         self._any: Tool | None = None
         for tool in tools:
@@ -183,14 +187,14 @@ class _Walk:
             return
         if segment.kind == _core.SegmentKind.arc and segment.normal != 2:
             return
+        if segment.kind == _core.SegmentKind.rapid and self._adrift:
+            return
         track = _core.sweep(material, _core.Path([segment]), tool.tool.diameter_mm)
         if segment.kind == _core.SegmentKind.rapid and (track.section_mm2.any() or track.plunged_mm2.any()):
             self._collisions += 1
             if self._collisions <= _SHOWN_COLLISIONS:
-                depth = float(track.radial_depth_mm.max(initial=0.0))
                 self.warnings.append(
-                    f"{self._program.place(line)}: rapid through material, {depth:.3g} mm wide: the stock file or "
-                    "the program is wrong"
+                    f"{self._program.place(line)}: rapid into material: the stock file or the program is wrong"
                 )
 
     def sweep_region(self, material: _core.Material, index: int) -> SurveyedRegion:
