@@ -109,9 +109,9 @@ wall along which a circle of that radius could roll at that distance. All of it 
 
 A contour that closes upon itself is a pocket or a boss, by `wall` and its sense; what leads to it and away from it is
 left out. An open one is a wall from its beginning to its end and goes on straight beyond both; state `lead_in_mm` and
-`lead_out_mm` where the run of cutting moves begins before the wall. Only moves below the top of the stock count, and
-curves are polygons within 0.1 µm. Where a path crosses itself or both of its sides are walls, describe the stock as a
-`[polygon]` instead: the message says so.
+`lead_out_mm` where the run of cutting moves begins before the wall. Only moves below the top of the stock count.
+Where a path crosses itself or both of its sides are walls, describe the stock as a `[polygon]` instead: the message
+says so. Outlines are right within half a micrometre.
 """
 
 
