@@ -365,13 +365,19 @@ def test_a_path_that_crosses_itself_is_refused() -> None:
             "[box]\nx_mm = [0, 1]\ny_mm = [2, 2]\nz_mm = [0, 1]\n",
             "s.toml:3: box.y_mm = [2.0, 2.0]: the smaller number comes first, and the two must differ",
         ),
-        ("[box]\nx_mm = [0, 1, 2]\ny_mm = [0, 2]\nz_mm = [0, 1]\n", "s.toml:2: box.x_mm"),
+        (
+            "[box]\nx_mm = [0, 1, 2]\ny_mm = [0, 2]\nz_mm = [0, 1]\n",
+            "s.toml:2: box.x_mm = [0, 1, 2]: must have 2 or fewer values",
+        ),
         (
             "[box]\nx_mm = [0, inf]\ny_mm = [0, 2]\nz_mm = [0, 1]\n",
             "s.toml:2: box.x_mm.2 = inf: must be a finite number",
         ),
         ("[box]\nx_mm = [0, 1]\nz_mm = [0, 1]\n", "s.toml: box.y_mm: required, but missing (unit: mm)"),
-        ("[polygon]\npoints_mm = [[0,0],[1,0]]\nz_mm = [0,1]\n", "s.toml:2: polygon.points_mm"),
+        (
+            "[polygon]\npoints_mm = [[0,0],[1,0]]\nz_mm = [0,1]\n",
+            "s.toml:2: polygon.points_mm = [[0, 0], [1, 0]]: must have 3 or more values",
+        ),
         ("[circle]\nr = 1\n", "s.toml:1: circle = {...}: unknown key; known here: box, polygon, allowance, program"),
         (
             '[allowance]\nallowance_mm = 0.5\ncorner_radius_mm = 8\nwall = "inside"\nz_mm = [-1, 0]\n',
@@ -385,6 +391,11 @@ def test_a_path_that_crosses_itself_is_refused() -> None:
 )
 def test_a_bad_value_is_named_with_its_line_and_limit(text: str, expected: str) -> None:
     assert expected in complaint(text)
+
+
+def test_a_bad_point_is_the_only_problem_of_its_list() -> None:
+    text = '[polygon]\npoints_mm = [\n  [0, 0],\n  [1, "a"],\n  [1, 1]\n]\nz_mm = [0, 1]\n'
+    assert complaint(text) == 's.toml:2: polygon.points_mm.2.2 = "a": must be a number (unit: mm)'
 
 
 @pytest.mark.parametrize(

@@ -81,8 +81,9 @@ _INTRODUCTION = """\
 <!-- Generated: python -m shapegcode.milling.file_documentation > docs/tool_files.md -->
 
 A tool file says what cuts, how large the forces are and what must not be exceeded; a stock file says what material is
-there before the first block. Both are TOML. An unknown key, a number that is not finite or a value outside its limits
-is an error, and all errors of a file are listed at once, each with its line.
+there before the first block. `shapegcode feed` reads both; what the machine allows stands in its own file
+([feed_control](machine.md#feed_control)). Both are TOML. An unknown key, a number that is not finite or a value
+outside its limits is an error, and all errors of a file are listed at once, each with its line.
 
 A default marked **assumed** is not known for real tools in general: look it up or measure it.
 
