@@ -36,6 +36,7 @@ constexpr std::size_t samples_between_reports = 1024;
 struct Piece {
   ToolStep step;
   std::size_t lowest;
+  std::uint32_t segment;
   double end_mm;                   // along the path
   bool continues;                  // its predecessor ends where it starts...
   std::size_t predecessor_lowest;  // ...and swept these layers
@@ -65,13 +66,13 @@ class Sweeper {
     grid_error_ = std::max(1e-6, h * h / (8.0 * radius_));
     touch_ = std::max(options.touch_mm, 4.0 * grid_error_);
     kept_mm_ = exact_share * radius_;
+    longest_piece_mm_ = 2.0 * kept_mm_;
   }
 
   EngagementTrack run(const Path& path) {
     track_.first_arc.push_back(0);
     for (std::size_t i = 0; i < path.size(); ++i) run_segment(path[i], path.distance_mm(i), i);
     while (!pending_.empty()) sweep_oldest();
-    material_.compact();
     return std::move(track_);
   }
 
@@ -129,7 +130,7 @@ class Sweeper {
   void stand_at(const Vector3& place) {
     last_point_ = place.head<2>();
     last_lowest_ = material_.lowest_cut(place.z());
-    pending_.push_back({ToolStep(last_point_, last_point_), last_lowest_, 0.0, false, 0});
+    pending_.push_back({ToolStep(last_point_, last_point_), last_lowest_, index_, 0.0, false, 0});
   }
 
   void sample(const Segment& segment, double begin_mm, double to_mm, std::size_t lowest) {
@@ -165,14 +166,7 @@ class Sweeper {
     track_.plunged_mm2.push_back(plunged);
     track_.first_arc.push_back(static_cast<std::uint32_t>(track_.arcs.size()));
 
-    double curvature = 0.0;
-    if (segment.kind == SegmentKind::arc) {
-      // Start and end radius may differ a little: the arc through both ends of the step.
-      const Vector2d centre = segment.centre_mm.head<2>();
-      const double radius = 0.5 * ((last_point_ - centre).norm() + (point - centre).norm());
-      curvature = (segment.sweep_rad > 0.0 ? 1.0 : -1.0) / radius;
-    }
-    pending_.push_back({ToolStep(last_point_, point, curvature), lowest, begin_mm + to_mm, true, last_lowest_});
+    travel(segment, point, lowest, begin_mm + to_mm);
     last_point_ = point;
     last_lowest_ = lowest;
     if (travels) {
@@ -183,6 +177,28 @@ class Sweeper {
     }
     while (!pending_.empty() && begin_mm + to_mm - pending_.front().end_mm >= kept_mm_) sweep_oldest();
     if (options_.progress && track_.size() % samples_between_reports == 0) options_.progress(begin_mm + to_mm);
+  }
+
+  /// Adds the way to a place to what is pending; on one segment to the latest piece, so that the grid has less to do.
+  void travel(const Segment& segment, const Vector2d& point, std::size_t lowest, double end_mm) {
+    double curvature = 0.0;
+    if (segment.kind == SegmentKind::arc) {
+      // Start and end radius may differ a little: the arc through both ends of the step.
+      const Vector2d centre = segment.centre_mm.head<2>();
+      const double radius = 0.5 * ((last_point_ - centre).norm() + (point - centre).norm());
+      curvature = (segment.sweep_rad > 0.0 ? 1.0 : -1.0) / radius;
+    }
+    if (!pending_.empty() && pending_.back().continues && pending_.back().segment == index_ &&
+        pending_.back().lowest == lowest) {
+      Piece& latest = pending_.back();
+      const double chord = (point - latest.step.from()).norm();
+      if (chord < longest_piece_mm_ && chord * std::abs(curvature) < 2.0 * largest_turn_rad) {
+        latest.step = ToolStep(latest.step.from(), point, curvature);
+        latest.end_mm = end_mm;
+        return;
+      }
+    }
+    pending_.push_back({ToolStep(last_point_, point, curvature), lowest, index_, end_mm, true, last_lowest_});
   }
 
   void sweep_oldest() {
@@ -325,6 +341,7 @@ class Sweeper {
   double touch_ = 0.0;
   double in_grid_ = 0.0;  // the latest distance, without the newest way: tells how deep a contact is at any step
   double kept_mm_ = 0.0;
+  double longest_piece_mm_ = 0.0;
   std::vector<Look> looks_;
   std::deque<Piece> pending_;  // not yet in the grid, oldest first
   std::vector<double> places_;
