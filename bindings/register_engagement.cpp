@@ -183,7 +183,7 @@ void register_material(py::module_& module) {
         return layer_borders(pointers, bottom, top, ramp_step);
       },
       py::arg("paths"), py::arg("bottom_mm"), py::arg("top_mm"), py::arg("ramp_step_mm"),
-      "Heights between layers for these paths in a stock from bottom to top, mm: where the tool cuts on a level, the "
+      "Heights between layers for these paths in a stock from bottom to top, mm: where the tool moves on a level, the "
       "lowest points of ramps and plunges, and steps of at most `ramp_step_mm` where ramps and helices pass (a tenth "
       "of the tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.");
 }

@@ -198,10 +198,9 @@ std::vector<double> layer_borders(std::span<const Path* const> paths, double bot
       const double climb = segment.end_mm.z() - segment.start_mm.z();
       if (falls && !(cuts && climb < -level_mm)) levels.push_back(segment.start_mm.z());
       falls = cuts && climb < -level_mm;
-      if (!cuts) continue;
       if (std::abs(climb) <= level_mm) {
         levels.push_back(segment.start_mm.z());
-      } else if (std::abs(climb) < segment.length_mm * std::sqrt(1.0 - least_slope * least_slope)) {
+      } else if (cuts && std::abs(climb) < segment.length_mm * std::sqrt(1.0 - least_slope * least_slope)) {
         ramps.push_back(std::minmax(segment.start_mm.z(), segment.end_mm.z()));
       }
     }

@@ -137,9 +137,10 @@ class Sweeper {
     const Vector3 place = point_at(segment, to_mm);
     const Vector3 tangent = tangent_at(segment, to_mm);
     const Vector2d point = place.head<2>();
-    const double horizontal = std::min(1.0, tangent.head<2>().norm());
-    const bool travels = horizontal > least_horizontal;
-    const Vector2d direction = travels ? Vector2d(tangent.head<2>() / horizontal) : Vector2d::Zero();
+    const double along = tangent.head<2>().norm();
+    const bool travels = along > least_horizontal;
+    const double horizontal = tangent.z() == 0.0 ? 1.0 : (travels ? std::min(1.0, along) : 0.0);
+    const Vector2d direction = travels ? Vector2d(tangent.head<2>() / along) : Vector2d::Zero();
 
     double area = 0.0;
     widths_.clear();
@@ -159,7 +160,7 @@ class Sweeper {
     track_.x_mm.push_back(point.x());
     track_.y_mm.push_back(point.y());
     track_.direction_rad.push_back(travels ? std::atan2(direction.y(), direction.x()) : 0.0);
-    track_.horizontal.push_back(travels ? horizontal : 0.0);
+    track_.horizontal.push_back(horizontal);
     track_.segment.push_back(index_);
     track_.radial_depth_mm.push_back(union_width());
     track_.section_mm2.push_back(horizontal * area + std::max(0.0, -tangent.z()) * plunged);
@@ -259,13 +260,13 @@ class Sweeper {
       const double fc = at(Vector2d(std::cos(c), std::sin(c)));
       if (fc == 0.0) return c;
       if ((fc > 0.0) == (fb > 0.0)) {
-        if (c == b) break;
+        if (c == b) return c;
         b = c;
         fb = fc;
         if (kept == -1) fa *= 0.5;
         kept = -1;
       } else {
-        if (c == a) break;
+        if (c == a) return c;
         a = c;
         fa = fc;
         if (kept == 1) fb *= 0.5;

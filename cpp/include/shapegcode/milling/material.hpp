@@ -77,9 +77,9 @@ class Material {
   std::size_t compact_at_tiles_ = 0;  // look for uniform ones
 };
 
-/// Heights between layers for these paths in a stock from `bottom_mm` to `top_mm`: the heights at which the tool cuts
-/// on a level (taken as one within 1 um), the lowest points of ramps and plunges, and steps of at most `ramp_step_mm`
-/// wherever a ramp or helix passes. Throws Error(argument) unless bottom < top and the step is positive.
+/// Heights between layers for these paths in a stock from `bottom_mm` to `top_mm`: the heights at which the tool moves
+/// on a level (taken as one within 1 um), the lowest points of ramps and plunges that cut, and steps of at most
+/// `ramp_step_mm` wherever a ramp or helix passes. Throws Error(argument) unless bottom < top and the step is positive.
 [[nodiscard]] std::vector<double> layer_borders(std::span<const Path* const> paths, double bottom_mm, double top_mm,
                                                 double ramp_step_mm);
 
