@@ -141,6 +141,7 @@ void register_material(py::module_& module) {
            "bottom to top, mm (see layer_borders); distance of the grid's nodes, mm (a hundredth of the tool's "
            "diameter is a good choice). Raises ArgumentError on an outline or heights that enclose nothing, or a grid "
            "that needs more memory than the limit.")
+      .def("compact", &Material::compact, "Gives back the memory of what is uniform by now.")
       .def(
           "copy", [](const Material& self) { return std::make_shared<Material>(self); },
           "The material as it is now; the two are independent from here on.")

@@ -4358,6 +4358,10 @@ class Material:
         """
     def __len__(self) -> int:
         ...
+    def compact(self) -> None:
+        """
+        Gives back the memory of what is uniform by now.
+        """
     def copy(self) -> Material:
         """
         The material as it is now; the two are independent from here on.

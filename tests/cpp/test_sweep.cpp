@@ -94,7 +94,7 @@ TEST_CASE("slot: exactly the front half, in every direction") {
       CHECK(track.direction_rad[i] == doctest::Approx(std::remainder(heading, 2.0 * pi)));
       CHECK(track.horizontal[i] == 1.0);
     }
-    CHECK(track.s_mm.back() == 30.0);
+    CHECK(track.s_mm.back() == doctest::Approx(30.0).epsilon(1e-12));
   }
 }
 

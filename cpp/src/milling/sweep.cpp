@@ -55,7 +55,7 @@ class Sweeper {
         step_(options.step_mm > 0.0 ? options.step_mm : diameter / steps_per_diameter),
         options_(options) {
     const double h = material.resolution_mm();
-    const double look = std::min(2.0 * h / radius_, widest_look_rad);
+    const double look = std::min(h / radius_, widest_look_rad);
     const auto looks = static_cast<std::size_t>(std::ceil(2.0 * half_pi / look));
     for (std::size_t k = 0; k <= looks; ++k) {
       const double share = 2.0 * static_cast<double>(k) / static_cast<double>(looks) - 1.0;
