@@ -332,6 +332,14 @@ TEST_CASE("cutting force: nothing met, no feed, and a whole track") {
   CHECK(table(2, 5) == last.mean_torque_nm);
   CHECK(table(2, 6) == last.mean_power_w);
   CHECK(table(2, 7) == last.peak_chip_mm);
+  CHECK(table(2, 8) == 0.0);
+  const shapegcode::ToolBeam beam{.overhang_mm = 30.0,
+                                  .fluted_length_mm = 20.0,
+                                  .effective_diameter_mm = 6.4,
+                                  .shank_diameter_mm = 8.0,
+                                  .young_modulus_gpa = 600.0};
+  CHECK(shapegcode::figures_of(force, track, feeds, &beam)(2, 8) ==
+        force.peak_deflection_um(track.arcs_of(2), 240.0, beam));
   CHECK_THROWS_AS((void)shapegcode::figures_of(force, track, std::vector<double>{1.0}), Error);
 }
 

@@ -138,6 +138,22 @@ def test_only_pictures_import_matplotlib() -> None:
     }
 
 
+def test_only_files_of_settings_import_pydantic() -> None:
+    users = {
+        file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py") if "pydantic" in imported_modules(file)
+    }
+    tables = {name for name in users if re.fullmatch(r"machine(_[a-z]+)?\.py", name)}
+    assert users - tables == {"milling/cutting_materials.py", "milling/stock_file.py", "milling/tool_file.py"}
+
+
+def test_only_shapes_of_the_stock_import_shapely() -> None:
+    users = {
+        file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py") if "shapely" in imported_modules(file)
+    }
+    assert users == {"milling/offset_shapes.py", "milling/stock_shape.py"}
+    assert "shapely" not in loaded_after("import shapegcode.milling.stock_material, shapegcode.milling.stock_shape")
+
+
 def loaded_after(statement: str) -> set[str]:
     """The top-level modules that a fresh interpreter has loaded after the statement."""
     code = f"import sys\n{statement}\nprint(*(name.split('.')[0] for name in sys.modules))"
