@@ -1,0 +1,97 @@
+"""Cutting forces of an end mill, independent of shapegcode: means over a revolution in closed form, records by sums.
+
+Forces on the tool, x along the feed, y to its left, clockwise spindle. A tooth at azimuth t from the feed moves along
+(sin t, -cos t); the tangential force on it points the other way, the radial one to the axis; its chip is f cos t thick.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+PAPER: dict[str, float] = {
+    "specific_n_per_mm2": 221.3,
+    "specific_exponent": -0.153,
+    "ratio": 0.41,
+    "ratio_exponent": -0.0775,
+}
+
+
+def mean_chip(begin: Array, end: Array, feed_per_tooth: Array | float) -> Array:
+    """Mean of f cos t over the engagement."""
+    return np.asarray(feed_per_tooth * (np.sin(end) - np.sin(begin)) / (end - begin))
+
+
+def mean_force(
+    begin: Array, end: Array, feed_per_tooth: Array | float, flutes: int, axial_mm: float, law: Mapping[str, float]
+) -> Array:
+    """(n, 2) mean force over a revolution, coefficients of the mean chip; the helix does not matter."""
+    chip = mean_chip(begin, end, feed_per_tooth)
+    k1 = law["specific_n_per_mm2"] * chip ** law["specific_exponent"]
+    k2 = law["ratio"] * chip ** law["ratio_exponent"]
+    kte, kre = law.get("tangential_edge_n_per_mm", 0.0), law.get("radial_edge_n_per_mm", 0.0)
+    sine, cosine = np.sin(end) - np.sin(begin), np.cos(begin) - np.cos(end)  # integrals of cos t, sin t
+    double = 0.25 * (np.cos(2 * begin) - np.cos(2 * end))  # of sin t cos t
+    square = 0.5 * (end - begin) + 0.25 * (np.sin(2 * end) - np.sin(2 * begin))  # of cos^2 t
+    turn = flutes * axial_mm / (2.0 * math.pi)
+    x = k1 * feed_per_tooth * (-double - k2 * square) - kte * cosine - kre * sine
+    y = k1 * feed_per_tooth * (square - k2 * double) + kte * sine - kre * cosine
+    return turn * np.column_stack([x, y])
+
+
+def climb_arc(depth: Array, radius: float) -> tuple[Array, Array]:
+    """Azimuths of a straight down-milling cut: material on the right."""
+    return np.full(len(depth), -0.5 * math.pi), -np.arccos(np.sqrt(1.0 - (1.0 - np.asarray(depth) / radius) ** 2))
+
+
+def record(
+    x_of_time: Callable[[Array], Array],
+    arc: Callable[[Array], tuple[Array, Array]],
+    times_s: Array,
+    *,
+    feed_mm_per_min: Callable[[Array], Array],
+    spindle: float,
+    diameter: float,
+    flutes: int,
+    helix_deg: float,
+    axial_mm: float,
+    law: Mapping[str, float],
+    runout_mm: tuple[float, ...] = (),
+    slices: int = 24,
+    phase: float = 0.3,
+) -> Array:
+    """(n, 2) force on the tool at each instant, summed over flutes and slices of the axis."""
+    x = x_of_time(times_s)
+    begin, end = arc(x)
+    pitch = feed_mm_per_min(x) / spindle / flutes
+    width = np.maximum(end - begin, 1e-12)
+    chip = np.maximum(pitch * (np.sin(end) - np.sin(begin)) / width, 1e-9)
+    k1 = law["specific_n_per_mm2"] * chip ** law["specific_exponent"]
+    k2 = law["ratio"] * chip ** law["ratio_exponent"]
+    force = np.zeros((len(times_s), 2))
+    turned = phase - 2.0 * math.pi * spindle / 60.0 * times_s  # clockwise
+    dz = axial_mm / slices
+    for flute in range(flutes):
+        # The flute that cuts before this one stood here one tooth earlier.
+        stands_out = runout_mm[flute] - runout_mm[flute - 1] if runout_mm else 0.0
+        for z in (np.arange(slices) + 0.5) * dz:
+            lag = z * math.tan(math.radians(helix_deg)) / (0.5 * diameter)
+            t = turned + 2.0 * math.pi * flute / flutes + lag
+            t = (t + math.pi) % (2.0 * math.pi) - math.pi
+            thick = np.where((t > begin) & (t < end), np.maximum(pitch * np.cos(t) + stands_out, 0.0), 0.0)
+            tangential, radial = k1 * thick * dz, k1 * k2 * thick * dz
+            force[:, 0] += -tangential * np.sin(t) - radial * np.cos(t)
+            force[:, 1] += tangential * np.cos(t) - radial * np.sin(t)
+    return force
+
+
+def rows(columns: Mapping[str, Any]) -> str:
+    """CSV text of columns."""
+    table = np.column_stack(list(columns.values()))
+    return ",".join(columns) + "\n" + "\n".join(",".join(f"{value:.7g}" for value in row) for row in table) + "\n"
