@@ -1,1 +1,1 @@
-"""Milling: what describes tool, stock and material, and what is computed from them."""
+"""Milling: files that describe tool, stock and work material."""
