@@ -111,7 +111,7 @@ class CoefficientFit:
 
     def cutting(self) -> dict[str, Any]:
         """The table ``[cutting]``."""
-        return {**{each.name: each.value for each in self.coefficients}, "thickness": self.thickness}
+        return {**{each.name: each.value for each in self.coefficients}, "chip_thickness": self.thickness}
 
 
 class _Model:
@@ -129,7 +129,7 @@ class _Model:
             "specific_exponent": float(parameters[1]),
             "ratio": math.exp(parameters[2] - parameters[3] * logarithm),
             "ratio_exponent": float(parameters[3]),
-            "thickness": self.thickness,
+            "chip_thickness": self.thickness,
         }
         if len(parameters) > 4:
             found["tangential_edge_n_per_mm"], found["radial_edge_n_per_mm"] = parameters[4:]
@@ -248,7 +248,7 @@ def _check(data: MeanForces, chip: Array, count: int, edge: bool) -> None:
 
 def _start(model: _Model, data: MeanForces, count: int) -> Array:
     """Constant k1 and k2 that fit best: with exponent 0 the force is linear in k1 and k1 k2."""
-    unit = {"specific_n_per_mm2": 1.0, "thickness": model.thickness}
+    unit = {"specific_n_per_mm2": 1.0, "chip_thickness": model.thickness}
     along = model.with_values({**unit, "ratio": 0.0})
     across = model.with_values({**unit, "ratio": 1.0}) - along
     columns = np.column_stack([along.ravel(), across.ravel()])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,9 +13,18 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.milling.cut_plan import CutTool, Engagement
 
-__all__ = ["CutForces", "ForceLaw", "coefficients", "mean_chip_mm"]
+__all__ = ["COEFFICIENTS", "CutForces", "ForceLaw", "coefficients", "mean_chip_mm"]
 
 Array = npt.NDArray[np.float64]
+
+COEFFICIENTS = (
+    "specific_n_per_mm2",
+    "specific_exponent",
+    "ratio",
+    "ratio_exponent",
+    "tangential_edge_n_per_mm",
+    "radial_edge_n_per_mm",
+)
 
 
 @dataclass(frozen=True)
@@ -35,25 +45,11 @@ class CutForces:
 
 
 def coefficients(values: Mapping[str, Any]) -> _core.CuttingCoefficients:
-    """The core's coefficients from the keys of ``[cutting]``; keys that are not its own are left out.
-
-    Raises:
-        ArgumentError: a value that the core refuses.
-    """
-    made = _core.CuttingCoefficients()
-    for name in (
-        "specific_n_per_mm2",
-        "specific_exponent",
-        "ratio",
-        "ratio_exponent",
-        "tangential_edge_n_per_mm",
-        "radial_edge_n_per_mm",
-    ):
-        if name in values:
-            setattr(made, name, float(values[name]))
-    local = values.get("thickness", "mean") == "local"
-    made.thickness = _core.ChipThickness.local if local else _core.ChipThickness.mean
-    return made
+    """The core's coefficients from the keys of a tool file's ``[cutting]``; those that are left out are 0."""
+    return _core.CuttingCoefficients(
+        **{name: float(values.get(name, 0.0)) for name in COEFFICIENTS},
+        thickness=_core.ChipThickness.__members__[values.get("chip_thickness", "mean")],
+    )
 
 
 class ForceLaw:
@@ -67,11 +63,7 @@ class ForceLaw:
         Raises:
             ArgumentError: a tool or coefficients that the core refuses.
         """
-        mill = _core.EndMill()
-        mill.diameter_mm = tool.diameter_mm
-        mill.flutes = tool.flutes
-        mill.helix_rad = float(np.radians(tool.helix_deg))
-        mill.runout_mm = list(tool.runout_mm)
+        mill = _core.EndMill(tool.diameter_mm, tool.flutes, math.radians(tool.helix_deg), list(tool.runout_mm))
         self._force = _core.MillingForce(mill, coefficients(values), spindle_rev_per_min)
         self._depth = axial_depth_mm
 

@@ -35,7 +35,7 @@ class CutTool:
         flutes: their number.
         helix_deg: right-hand helix.
         runout_mm: how far each flute stands out; empty: not known.
-        cutting: coefficients of the force law as in the tool file's ``[cutting]``; empty: not known.
+        cutting: the seven coefficients of the force law, as in the tool file's ``[cutting]``: what is known before.
     """
 
     diameter_mm: float
