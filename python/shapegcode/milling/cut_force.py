@@ -73,13 +73,9 @@ class ForceLaw:
         for k, (begin, end, feed) in enumerate(zip(met.from_rad, met.to_rad, feed_mm_per_min, strict=True)):
             if end <= begin or feed <= 0.0:
                 continue
-            figures = self._force.figures([_core.EngagedArc(begin, end, 0.0, self._depth)], float(feed))
-            rows[k] = (
-                *figures.mean_n,
-                figures.mean_resultant_n,
-                figures.peak_resultant_n,
-                figures.mean_torque_nm,
-            )
+            figures = self._force.figures(np.array([[begin, end, 0.0, self._depth]]), float(feed))
+            rows[k, :2] = figures.mean_n
+            rows[k, 2:] = figures.mean_resultant_n, figures.peak_resultant_n, figures.mean_torque_nm
         return CutForces(rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4])
 
 
