@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LinearPlant', 'MetrologyOptions', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'line_sections', 'linear_model', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'time_program', 'wilson_theta', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LinearPlant', 'Material', 'MetrologyOptions', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'layer_borders', 'line_sections', 'linear_model', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'time_program', 'wilson_theta', 'worst_residual', 'write_blocks', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -4203,6 +4203,387 @@ class PlayedStream:
         """
         The next rows, at most so many; none behind the end.
         """
+class SpindleSense:
+    """
+    Sense in which the spindle turns, seen towards the work piece.
+    
+    Members:
+    
+      clockwise : M03.
+    
+      counter_clockwise : M04.
+    """
+    __members__: typing.ClassVar[dict[str, SpindleSense]]
+    clockwise: typing.ClassVar[SpindleSense]
+    counter_clockwise: typing.ClassVar[SpindleSense]
+    @typing.overload
+    def __eq__(self, other: SpindleSense) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: SpindleSense) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class EndMill:
+    """
+    A cylindrical end mill with a flat end.
+    """
+    def __init__(self, diameter_mm: typing.SupportsFloat | typing.SupportsIndex, flutes: typing.SupportsInt | typing.SupportsIndex, helix_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0, runout_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = []) -> None:
+        """
+        Helix of a right-hand cutter, rad; runout: how far each flute stands out beyond the mean radius, mm, in the order in which they cut. Raises ArgumentError on a value that no tool can have.
+        """
+    @property
+    def diameter_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def flutes(self) -> int:
+        """
+        Their number.
+        """
+    @property
+    def helix_rad(self) -> float:
+        """
+        rad.
+        """
+    @property
+    def radius_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def runout_mm(self) -> list[float]:
+        """
+        One per flute, or none, mm.
+        """
+class EngagementTrack:
+    """
+    What the tool meets along a path, sample by sample. Azimuths in rad from the direction of feed, positive to its left; with a clockwise spindle a tooth passes from +pi/2 (up milling) to -pi/2 (down milling).
+    """
+    def __len__(self) -> int:
+        ...
+    def arcs_of(self, sample: typing.SupportsInt | typing.SupportsIndex) -> numpy.ndarray:
+        """
+        The rows of `arcs` that belong to a sample, (k, 4).
+        """
+    @property
+    def arcs(self) -> numpy.ndarray:
+        """
+        Engaged stretches of the circumference, (m, 4): from and to azimuth, rad, bottom and top above the tip, mm.
+        """
+    @property
+    def direction_rad(self) -> numpy.ndarray:
+        """
+        Of feed in the XY plane, from +X, (n,), rad; 0 where the tool only plunges.
+        """
+    @property
+    def first_arc(self) -> numpy.ndarray:
+        """
+        Index of each sample's first row of `arcs`, (n + 1,).
+        """
+    @property
+    def horizontal(self) -> numpy.ndarray:
+        """
+        Share of the travel that lies in the XY plane, (n,): 1 level, 0 a plunge.
+        """
+    @property
+    def plunged_mm2(self) -> numpy.ndarray:
+        """
+        Area of material below the end of a tool that goes down, (n,), mm2.
+        """
+    @property
+    def radial_depth_mm(self) -> numpy.ndarray:
+        """
+        Width of what is met, across the direction of feed, (n,), mm.
+        """
+    @property
+    def s_mm(self) -> numpy.ndarray:
+        """
+        Distance along the path, (n,), mm.
+        """
+    @property
+    def section_mm2(self) -> numpy.ndarray:
+        """
+        Area across the direction of feed, (n,), mm2; times the feed: material removal rate.
+        """
+    @property
+    def segment(self) -> numpy.ndarray:
+        """
+        Index of the path's segment, (n,).
+        """
+    @property
+    def x_mm(self) -> numpy.ndarray:
+        """
+        Of the tool's axis, (n,), mm.
+        """
+    @property
+    def y_mm(self) -> numpy.ndarray:
+        """
+        Of the tool's axis, (n,), mm.
+        """
+class Material:
+    """
+    A work piece of horizontal layers, each with its boundary as a field of distances on a grid.
+    """
+    def __init__(self, rings_mm: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], borders_mm: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], resolution_mm: typing.SupportsFloat | typing.SupportsIndex, memory_limit_bytes: typing.SupportsInt | typing.SupportsIndex = 2147483648) -> None:
+        """
+        Outlines of the stock, each (n, 2), mm, holes included (even-odd rule); heights between the layers from bottom to top, mm (see layer_borders); distance of the grid's nodes, mm (a hundredth of the tool's diameter is a good choice). Raises ArgumentError on an outline or heights that enclose nothing, or a grid that needs more memory than the limit.
+        """
+    def __len__(self) -> int:
+        ...
+    def copy(self) -> Material:
+        """
+        The material as it is now; the two are independent from here on.
+        """
+    def distance_mm(self, layer: typing.SupportsInt | typing.SupportsIndex, x_mm: typing.SupportsFloat | typing.SupportsIndex, y_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Distance from the boundary of a layer, positive in material, limited to two nodes of the grid, mm.
+        """
+    def heights_mm(self, low_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], high_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], rows: typing.SupportsInt | typing.SupportsIndex, columns: typing.SupportsInt | typing.SupportsIndex) -> numpy.ndarray:
+        """
+        Top of the material over a rectangle, (rows, columns), mm, from its low corner on; NaN where there is none. Raises ArgumentError on less than one row or column.
+        """
+    def is_material(self, x_mm: typing.SupportsFloat | typing.SupportsIndex, y_mm: typing.SupportsFloat | typing.SupportsIndex, z_mm: typing.SupportsFloat | typing.SupportsIndex) -> bool:
+        """
+        Whether there is material at a place.
+        """
+    def volume_in_cylinder_mm3(self, x_mm: typing.SupportsFloat | typing.SupportsIndex, y_mm: typing.SupportsFloat | typing.SupportsIndex, radius_mm: typing.SupportsFloat | typing.SupportsIndex, bottom_mm: typing.SupportsFloat | typing.SupportsIndex, top_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Material in an upright cylinder, mm3: what a tool would stand in.
+        """
+    @property
+    def borders_mm(self) -> list[float]:
+        """
+        Heights between the layers, ascending, mm.
+        """
+    @property
+    def bottom_mm(self) -> float:
+        """
+        Of the stock, mm.
+        """
+    @property
+    def bytes(self) -> int:
+        """
+        Memory in use.
+        """
+    @property
+    def high_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+        """
+        High corner of the stock as it was, (2,), mm.
+        """
+    @property
+    def low_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+        """
+        Low corner of the stock as it was, (2,), mm.
+        """
+    @property
+    def resolution_mm(self) -> float:
+        """
+        Distance of the grid's nodes, mm.
+        """
+    @property
+    def top_mm(self) -> float:
+        """
+        Of the stock as it was, mm.
+        """
+    @property
+    def volume_mm3(self) -> float:
+        """
+        What is left, mm3.
+        """
+class CornerSection:
+    """
+    Sections S1 to S4 of paper 001.
+    
+    Members:
+    
+      s1 : Straight, the tool enters at the straight rough wall.
+    
+      s2 : Straight, the tool enters in the rough corner.
+    
+      s3 : On the arc of the finished corner.
+    
+      s4 : On the straight behind it.
+    """
+    __members__: typing.ClassVar[dict[str, CornerSection]]
+    s1: typing.ClassVar[CornerSection]
+    s2: typing.ClassVar[CornerSection]
+    s3: typing.ClassVar[CornerSection]
+    s4: typing.ClassVar[CornerSection]
+    @typing.overload
+    def __eq__(self, other: CornerSection) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: CornerSection) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class CornerEngagement:
+    """
+    What the tool meets at one place of a corner.
+    """
+    @property
+    def direction_rad(self) -> float:
+        """
+        Of feed, from +X, rad.
+        """
+    @property
+    def from_rad(self) -> float:
+        """
+        Engaged azimuths, from the direction of feed, rad.
+        """
+    @property
+    def radial_depth_mm(self) -> float:
+        """
+        From the end on the rough boundary to the finished wall's tangent at the contact, mm.
+        """
+    @property
+    def section(self) -> CornerSection:
+        """
+        Section of the path.
+        """
+    @property
+    def to_rad(self) -> float:
+        """
+        rad.
+        """
+    @property
+    def turned_rad(self) -> float:
+        """
+        Of the tool centre's arc so far, rad.
+        """
+    @property
+    def x_mm(self) -> float:
+        """
+        Of the tool's axis, mm.
+        """
+    @property
+    def y_mm(self) -> float:
+        """
+        Of the tool's axis, mm.
+        """
+class CornerCut:
+    """
+    The corner of a pocket that is finished after roughing (paper 001).
+    """
+    def __init__(self, tool_radius_mm: typing.SupportsFloat | typing.SupportsIndex, rough_radius_mm: typing.SupportsFloat | typing.SupportsIndex, finish_radius_mm: typing.SupportsFloat | typing.SupportsIndex, allowance_mm: typing.SupportsFloat | typing.SupportsIndex, turn_rad: typing.SupportsFloat | typing.SupportsIndex = 1.5707963267948966, before_mm: typing.SupportsFloat | typing.SupportsIndex = 10.0, after_mm: typing.SupportsFloat | typing.SupportsIndex = 10.0, mirrored: bool = False) -> None:
+        """
+        The tool comes along +X with the wall to its right, turns left by `turn_rad` and follows the second wall; the finished walls meet at the origin. `mirrored`: wall to the left. Equal tool and finish radius: the path has a sharp vertex. Raises ArgumentError on radii below the tool's or an allowance above it.
+        """
+    def at(self, s_mm: typing.SupportsFloat | typing.SupportsIndex, behind_vertex: bool = False) -> CornerEngagement:
+        """
+        Engagement at a distance along the path, in closed form.
+        """
+    def path(self, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, z_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Path:
+        """
+        The tool's path: line, arc if the radii differ, line.
+        """
+    def stock(self, beyond_mm: typing.SupportsFloat | typing.SupportsIndex) -> numpy.ndarray:
+        """
+        The material before finishing as a ring (n, 2), mm, to `beyond_mm` outside of the walls.
+        """
+    def track(self, axial_depth_mm: typing.SupportsFloat | typing.SupportsIndex, step_mm: typing.SupportsFloat | typing.SupportsIndex) -> EngagementTrack:
+        """
+        The closed form as a track with samples at most `step_mm` apart; at a sharp vertex two share one place.
+        """
+    @property
+    def after_mm(self) -> float:
+        """
+        Straight behind the corner, mm.
+        """
+    @property
+    def allowance_mm(self) -> float:
+        """
+        Left on both walls, mm.
+        """
+    @property
+    def before_mm(self) -> float:
+        """
+        Straight before the corner, mm.
+        """
+    @property
+    def finish_radius_mm(self) -> float:
+        """
+        Of the corner to be made, mm.
+        """
+    @property
+    def length_mm(self) -> float:
+        """
+        Of the tool's path, mm.
+        """
+    @property
+    def mirrored(self) -> bool:
+        """
+        The wall is to the left.
+        """
+    @property
+    def rough_radius_mm(self) -> float:
+        """
+        Of the corner as roughing left it, mm.
+        """
+    @property
+    def tool_radius_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def turn_rad(self) -> float:
+        """
+        Through which the path turns, rad.
+        """
 def acceleration_filters(model: ControllerModel) -> list[Fir]:
     """
     Filters behind interpolation in order, none, one or two.
@@ -4497,6 +4878,10 @@ def interpolate(path: Path, profile: SpeedProfile, period_s: typing.SupportsFloa
 def interpolate_program(program: ProgramText, model: ControllerModel) -> InterpolatedTime:
     """
     The same by full interpolation, every set-point of every step. Raises ArgumentError on a model that no controller can have, or a program of more than 4e9 set-points.
+    """
+def layer_borders(paths: collections.abc.Sequence[Path], bottom_mm: typing.SupportsFloat | typing.SupportsIndex, top_mm: typing.SupportsFloat | typing.SupportsIndex, ramp_step_mm: typing.SupportsFloat | typing.SupportsIndex) -> list[float]:
+    """
+    Heights between layers for these paths in a stock from bottom to top, mm: where the tool cuts on a level, the lowest points of ramps and plunges, and steps of at most `ramp_step_mm` where ramps and helices pass (a tenth of the tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.
     """
 def line_sections(path: Path, ranges: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]]) -> list[PathSection]:
     """
@@ -4819,6 +5204,10 @@ def stabilisation_poles(responses: collections.abc.Sequence[typing.Annotated[num
         ArgumentError: As arma_driven; fewer samples than 8*n_max+8.
     
     Source: R. Roy, T. Kailath 1989.
+    """
+def sweep(material: Material, path: Path, tool_diameter_mm: typing.SupportsFloat | typing.SupportsIndex, *, step_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0, touch_mm: typing.SupportsFloat | typing.SupportsIndex = 0.002, progress: collections.abc.Callable | None = None) -> EngagementTrack:
+    """
+    Moves a tool along a path through the material, takes away what it sweeps, and tells what it met. Samples stand at most `step_mm` apart (0: a fortieth of the diameter) and at the end of every segment; contacts less deep or wide than `touch_mm` are none. `progress` is called now and then with the distance travelled, mm. Whatever stands in the tool at the start counts as gone; a rapid is swept like any other move. Raises ArgumentError on values out of range, an arc outside of the XY plane, or if the material needs more memory than its limit.
     """
 def time_program(program: ProgramText, model: ControllerModel, per_block: bool = False) -> CycleTime:
     """

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "shapegcode/milling/material_layer.hpp"
+#include "shapegcode/path/path.hpp"
+
+namespace shapegcode {
+
+/// A work piece of horizontal layers, each a MaterialLayer from one border in Z to the next. A tool takes away whole
+/// layers: those whose middle lies above its tip. Copies are independent of each other.
+class Material {
+ public:
+  /// `rings`: outlines of the stock, holes included (even-odd rule); `borders_mm`: heights in Z between the layers,
+  /// ascending, from the bottom of the stock to its top; `resolution_mm`: grid, a hundredth of the tool's diameter is
+  /// a good choice. Throws Error(argument) if there is no ring, a ring has fewer than 3 points or encloses nothing
+  /// with the others, a number is not finite, fewer than two borders or not ascending ones, a resolution that is not
+  /// positive, or a grid that needs more than `memory_limit_bytes`.
+  Material(std::span<const Ring> rings, std::span<const double> borders_mm, double resolution_mm,
+           std::size_t memory_limit_bytes = default_memory_limit_bytes);
+
+  [[nodiscard]] std::size_t size() const noexcept { return layers_.size(); }
+  [[nodiscard]] const MaterialLayer& layer(std::size_t i) const noexcept { return layers_[i]; }
+  [[nodiscard]] const std::vector<double>& borders_mm() const noexcept { return borders_; }
+  [[nodiscard]] double bottom_mm() const noexcept { return borders_.front(); }
+  [[nodiscard]] double top_mm() const noexcept { return borders_.back(); }
+  [[nodiscard]] double resolution_mm() const noexcept { return layers_.front().resolution_mm(); }
+  /// Corners of the rectangle around the stock as it was.
+  [[nodiscard]] const Eigen::Vector2d& low_mm() const noexcept { return low_; }
+  [[nodiscard]] const Eigen::Vector2d& high_mm() const noexcept { return high_; }
+
+  /// Index of the lowest layer that a tool with its tip at this height takes away; size() if it is above all of them.
+  [[nodiscard]] std::size_t lowest_cut(double tip_mm) const noexcept;
+
+  /// Whether there is material at a place; false outside of the stock.
+  [[nodiscard]] bool is_material(double x_mm, double y_mm, double z_mm) const noexcept;
+
+  /// What is left, mm3.
+  [[nodiscard]] double volume_mm3() const noexcept;
+
+  /// Material in an upright cylinder, mm3, such as a tool that stands at its start.
+  [[nodiscard]] double volume_in_cylinder_mm3(double x_mm, double y_mm, double radius_mm, double bottom_mm,
+                                              double top_mm) const noexcept;
+
+  /// Top of the material over a rectangle, as `rows` rows of `columns` values from the low corner on, the outer ones on
+  /// its edges; NaN where there is none. Throws Error(argument) on less than one row or column.
+  [[nodiscard]] Eigen::MatrixXd heights_mm(const Eigen::Vector2d& low_mm, const Eigen::Vector2d& high_mm,
+                                           std::ptrdiff_t rows, std::ptrdiff_t columns) const;
+
+  /// Memory in use.
+  [[nodiscard]] std::size_t bytes() const noexcept;
+
+  /// Takes away what a tool sweeps on a step in one layer; see MaterialLayer::remove. Throws Error(argument) where that
+  /// needs more memory than the limit.
+  void remove(std::size_t layer, const ToolStep& step, double tool_radius_mm, bool continues);
+
+  /// Gives back the memory of what is uniform by now.
+  void compact();
+
+  static constexpr std::size_t default_memory_limit_bytes = std::size_t{2} << 30U;
+
+ private:
+  void check_memory(std::size_t needed) const;
+
+  std::vector<double> borders_;
+  std::vector<double> middles_;
+  std::vector<MaterialLayer> layers_;
+  Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d high_ = Eigen::Vector2d::Zero();
+  std::size_t memory_limit_;
+  std::size_t tiles_ = 0;         // that carry values, of all layers
+  std::size_t compact_at_tiles_;  // look for uniform ones
+};
+
+/// Heights between layers for these paths in a stock from `bottom_mm` to `top_mm`: the heights at which the tool cuts
+/// on a level (taken as one within 1 um), the lowest points of ramps and plunges, and steps of at most `ramp_step_mm`
+/// wherever a ramp or helix passes. Throws Error(argument) unless bottom < top and the step is positive.
+[[nodiscard]] std::vector<double> layer_borders(std::span<const Path* const> paths, double bottom_mm, double top_mm,
+                                                double ramp_step_mm);
+
+}  // namespace shapegcode

@@ -1,0 +1,262 @@
+#include "shapegcode/milling/corner.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr double pi = std::numbers::pi;
+constexpr double degree = pi / 180.0;
+constexpr double chord_error_mm = 5e-5;
+constexpr double place_tolerance_mm = 1e-9;  // so far an s may lie outside, as sums of lengths do
+
+/// The corner as if it turned left, with the finished walls' meeting point at the origin.
+struct Geometry {
+  explicit Geometry(const CornerCut& cut)
+      : along{Vector2d::UnitX(), Vector2d(std::cos(cut.turn_rad), std::sin(cut.turn_rad))},
+        inward{left_of(along[0]), left_of(along[1])},
+        path_radius(cut.finish_radius_mm - cut.tool_radius_mm),
+        finish_tangent(cut.finish_radius_mm * std::tan(0.5 * cut.turn_rad)),
+        path_centre(at_both_walls(cut.finish_radius_mm, cut.turn_rad)),
+        rough_centre(at_both_walls(cut.allowance_mm + cut.rough_radius_mm, cut.turn_rad)),
+        arc_length(path_radius * cut.turn_rad) {}
+
+  static Vector2d left_of(const Vector2d& v) { return {-v.y(), v.x()}; }
+
+  /// The place at a distance inward from both walls.
+  static Vector2d at_both_walls(double distance, double turn) { return {-distance * std::tan(0.5 * turn), distance}; }
+
+  std::array<Vector2d, 2> along;   // both walls, in the direction of travel
+  std::array<Vector2d, 2> inward;  // to the left
+  double path_radius;
+  double finish_tangent;  // from the walls' meeting point to where the finished corner begins
+  Vector2d path_centre;
+  Vector2d rough_centre;
+  double arc_length;
+};
+
+/// Where the tool stands and where it goes, as if the corner turned left.
+struct Place {
+  Vector2d centre;
+  Vector2d direction;
+  double turned;
+  int leg;  // 0 before the arc, 1 on it, 2 behind
+};
+
+Place place_at(const CornerCut& cut, const Geometry& g, double s, bool behind_vertex) {
+  const bool before = s < cut.before_mm || (s == cut.before_mm && !(behind_vertex && g.arc_length == 0.0));
+  if (before) {
+    const Vector2d tangent_point = -g.finish_tangent * g.along[0] + cut.tool_radius_mm * g.inward[0];
+    return {tangent_point - (cut.before_mm - s) * g.along[0], g.along[0], 0.0, 0};
+  }
+  const double on_arc = s - cut.before_mm;
+  if (on_arc < g.arc_length) {
+    const double turned = on_arc / g.path_radius;
+    const Vector2d direction(std::cos(turned), std::sin(turned));
+    return {g.path_centre - g.path_radius * Geometry::left_of(direction), direction, turned, 1};
+  }
+  const Vector2d tangent_point = g.finish_tangent * g.along[1] + cut.tool_radius_mm * g.inward[1];
+  return {tangent_point + (on_arc - g.arc_length) * g.along[1], g.along[1], cut.turn_rad,
+          on_arc == g.arc_length && g.arc_length > 0.0 ? 1 : 2};
+}
+
+struct Entry {
+  Vector2d place;
+  bool in_corner;
+};
+
+/// Where the front of the tool crosses the rough boundary. As the rough corner is not sharper than the tool, its
+/// circle crosses the boundary twice at most: once in front.
+Entry entry_of(const CornerCut& cut, const Geometry& g, const Place& tool) {
+  const double radius = cut.tool_radius_mm;
+  Entry best{tool.centre - radius * Geometry::left_of(tool.direction), false};
+  double furthest = -2.0;  // sine of the azimuth
+  const auto consider = [&](const Vector2d& place, bool in_corner) {
+    const Vector2d arm = (place - tool.centre) / radius;
+    const double sine = arm.dot(Geometry::left_of(tool.direction));
+    if (arm.dot(tool.direction) > -1e-12 && sine > furthest) {
+      furthest = sine;
+      best = {place, in_corner};
+    }
+  };
+  for (std::size_t wall = 0; wall < 2; ++wall) {
+    const double height = cut.allowance_mm - tool.centre.dot(g.inward[wall]);  // of the rough wall above the axis
+    const double half_squared = radius * radius - height * height;
+    if (half_squared < 0.0) continue;
+    for (const double sign : {-1.0, 1.0}) {
+      const Vector2d place = tool.centre + height * g.inward[wall] + sign * std::sqrt(half_squared) * g.along[wall];
+      const double beyond = (place - g.rough_centre).dot(g.along[wall]);  // of where the rough corner is tangent
+      if (wall == 0 ? beyond <= 0.0 : beyond >= 0.0) consider(place, false);
+    }
+  }
+  const Vector2d between = g.rough_centre - tool.centre;
+  const double distance = between.norm();
+  if (distance > 0.0) {
+    const double share =
+        (distance * distance + radius * radius - cut.rough_radius_mm * cut.rough_radius_mm) / (2.0 * distance);
+    const double half_squared = radius * radius - share * share;
+    if (half_squared >= 0.0) {
+      const Vector2d unit = between / distance;
+      for (const double sign : {-1.0, 1.0}) {
+        const Vector2d place = tool.centre + share * unit + sign * std::sqrt(half_squared) * Geometry::left_of(unit);
+        const Vector2d arm = place - g.rough_centre;
+        if (arm.dot(g.along[0]) >= 0.0 && arm.dot(g.along[1]) <= 0.0) consider(place, true);
+      }
+    }
+  }
+  return best;
+}
+
+Vector2d turned_over(const CornerCut& cut, const Vector2d& v) { return cut.mirrored ? Vector2d(v.x(), -v.y()) : v; }
+
+Vector3 at_height(const Vector2d& v, double z) { return {v.x(), v.y(), z}; }
+
+void refuse(const std::string& message) { throw Error(ErrorKind::argument, message); }
+
+}  // namespace
+
+void check(const CornerCut& cut) {
+  const auto length = [](double value) { return std::to_string(value) + " mm"; };
+  if (!(cut.tool_radius_mm > 0.0) || !std::isfinite(cut.tool_radius_mm)) {
+    refuse("tool radius is " + length(cut.tool_radius_mm) + ", must be above 0");
+  }
+  if (!(cut.allowance_mm > 0.0 && cut.allowance_mm <= cut.tool_radius_mm)) {
+    refuse("allowance is " + length(cut.allowance_mm) + ", must be above 0 and at most the tool radius, " +
+           length(cut.tool_radius_mm));
+  }
+  for (const auto& [name, radius] : {std::pair{"rough", cut.rough_radius_mm}, {"finish", cut.finish_radius_mm}}) {
+    if (!(radius >= cut.tool_radius_mm) || !std::isfinite(radius)) {
+      refuse(std::string(name) + " corner radius is " + length(radius) + ", must be at least the tool radius, " +
+             length(cut.tool_radius_mm));
+    }
+  }
+  if (!(cut.turn_rad >= degree && cut.turn_rad <= 179.0 * degree)) {
+    refuse("the corner turns by " + std::to_string(cut.turn_rad / degree) + " degrees, must be 1 to 179");
+  }
+  for (const double straight : {cut.before_mm, cut.after_mm}) {
+    if (!(straight >= 0.0) || !std::isfinite(straight)) {
+      refuse("a straight at the corner is " + length(straight) + ", must be at least 0");
+    }
+  }
+}
+
+double corner_length_mm(const CornerCut& cut) {
+  check(cut);
+  return cut.before_mm + Geometry(cut).arc_length + cut.after_mm;
+}
+
+CornerEngagement corner_engagement(const CornerCut& cut, double s_mm, bool behind_vertex) {
+  const double length = corner_length_mm(cut);
+  if (!(s_mm >= -place_tolerance_mm && s_mm <= length + place_tolerance_mm)) {
+    refuse("place on the corner's path is " + std::to_string(s_mm) + " mm, must be 0 to " + std::to_string(length));
+  }
+  const Geometry g(cut);
+  const Place tool = place_at(cut, g, std::clamp(s_mm, 0.0, length), behind_vertex);
+  const Entry entry = entry_of(cut, g, tool);
+  const Vector2d arm = entry.place - tool.centre;
+  const double across = arm.dot(Geometry::left_of(tool.direction));
+  const double azimuth = std::atan2(across, std::max(arm.dot(tool.direction), 0.0));
+
+  CornerEngagement result;
+  const Vector2d centre = turned_over(cut, tool.centre);
+  const Vector2d direction = turned_over(cut, tool.direction);
+  const bool on_straight_wall = !entry.in_corner && (entry.place - g.rough_centre).dot(g.along[0]) <= 0.0;
+  result.section = tool.leg == 1   ? CornerSection::s3
+                   : tool.leg == 2 ? CornerSection::s4
+                                   : (on_straight_wall ? CornerSection::s1 : CornerSection::s2);
+  result.x_mm = centre.x();
+  result.y_mm = centre.y();
+  result.direction_rad = std::atan2(direction.y(), direction.x());
+  result.turned_rad = tool.turned;
+  result.from_rad = cut.mirrored ? -azimuth : -0.5 * pi;
+  result.to_rad = cut.mirrored ? 0.5 * pi : azimuth;
+  result.radial_depth_mm = cut.tool_radius_mm + across;
+  return result;
+}
+
+Path corner_path(const CornerCut& cut, double feed_mm_per_s, double z_mm) {
+  const double length = corner_length_mm(cut);
+  const Geometry g(cut);
+  const auto place = [&](double s) { return at_height(turned_over(cut, place_at(cut, g, s, true).centre), z_mm); };
+  const double arc_end = cut.before_mm + g.arc_length;
+  std::vector<Segment> segments;
+  if (cut.before_mm > 0.0) segments.push_back(make_line(place(0.0), place(cut.before_mm), feed_mm_per_s));
+  if (g.arc_length > 0.0) {
+    segments.push_back(make_arc(place(cut.before_mm), place(arc_end), at_height(turned_over(cut, g.path_centre), z_mm),
+                                cut.mirrored ? -cut.turn_rad : cut.turn_rad, 2, feed_mm_per_s));
+  }
+  if (cut.after_mm > 0.0) segments.push_back(make_line(place(arc_end), place(length), feed_mm_per_s));
+  return Path(std::move(segments));
+}
+
+Ring corner_stock(const CornerCut& cut, double beyond_mm) {
+  check(cut);
+  if (!(beyond_mm > 0.0) || !std::isfinite(beyond_mm)) {
+    refuse("the stock reaches " + std::to_string(beyond_mm) + " mm beyond the walls, must be above 0");
+  }
+  const Geometry g(cut);
+  const double before = g.finish_tangent + cut.before_mm + beyond_mm;
+  const double after = g.finish_tangent + cut.after_mm + beyond_mm;
+  Ring ring;
+  ring.emplace_back(-before * g.along[0] + cut.allowance_mm * g.inward[0]);
+  const double step = std::sqrt(8.0 * chord_error_mm / cut.rough_radius_mm);
+  const double pieces = std::ceil(cut.turn_rad / step);
+  for (double k = 0.0; k <= pieces; ++k) {
+    const double angle = cut.turn_rad * k / pieces - 0.5 * pi;
+    ring.emplace_back(g.rough_centre + cut.rough_radius_mm * Vector2d(std::cos(angle), std::sin(angle)));
+  }
+  ring.emplace_back(after * g.along[1] + cut.allowance_mm * g.inward[1]);
+  ring.emplace_back(after * g.along[1] - beyond_mm * g.inward[1]);
+  ring.emplace_back(Geometry::at_both_walls(-beyond_mm, cut.turn_rad));
+  ring.emplace_back(-before * g.along[0] - beyond_mm * g.inward[0]);
+  for (Vector2d& point : ring) point = turned_over(cut, point);
+  return ring;
+}
+
+EngagementTrack corner_track(const CornerCut& cut, double axial_depth_mm, double step_mm) {
+  if (!(axial_depth_mm > 0.0) || !std::isfinite(axial_depth_mm)) {
+    refuse("axial depth is " + std::to_string(axial_depth_mm) + " mm, must be above 0");
+  }
+  if (!(step_mm > 0.0)) refuse("step is " + std::to_string(step_mm) + " mm, must be above 0");
+  check(cut);
+  const Geometry g(cut);
+  EngagementTrack track;
+  track.first_arc.push_back(0);
+  std::uint32_t segment = 0;
+  const auto add = [&](double s, bool behind_vertex) {
+    const CornerEngagement at = corner_engagement(cut, s, behind_vertex);
+    track.s_mm.push_back(s);
+    track.x_mm.push_back(at.x_mm);
+    track.y_mm.push_back(at.y_mm);
+    track.direction_rad.push_back(at.direction_rad);
+    track.horizontal.push_back(1.0);
+    track.segment.push_back(segment);
+    track.radial_depth_mm.push_back(at.radial_depth_mm);
+    track.section_mm2.push_back(at.radial_depth_mm * axial_depth_mm);
+    track.plunged_mm2.push_back(0.0);
+    track.arcs.push_back({at.from_rad, at.to_rad, 0.0, axial_depth_mm});
+    track.first_arc.push_back(static_cast<std::uint32_t>(track.arcs.size()));
+  };
+  double begin = 0.0;
+  for (const double leg : {cut.before_mm, g.arc_length, cut.after_mm}) {
+    if (!(leg > 0.0)) continue;
+    const double pieces = std::ceil(leg / step_mm * (1.0 - 1e-12));
+    // The sample at the start shows what the leg begins with: at a sharp vertex something else than the end before.
+    if (track.size() == 0 || (g.arc_length == 0.0 && begin > 0.0)) add(begin, true);
+    for (double k = 1.0; k <= pieces; ++k) add(begin + leg * k / pieces, false);
+    begin += leg;
+    ++segment;
+  }
+  return track;
+}
+
+}  // namespace shapegcode

@@ -1,0 +1,359 @@
+#include "shapegcode/milling/sweep.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <deque>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr double half_pi = 0.5 * std::numbers::pi;
+constexpr double steps_per_diameter = 40.0;
+constexpr double largest_turn_rad = 0.35;  // of one step on an arc
+// Behind a vertex the load changes at once: the first step there is cut up at these shares.
+constexpr std::array<double, 4> shares_behind_vertex = {0.0625, 0.125, 0.25, 0.5};
+constexpr double vertex_rad = 0.05;
+// The newest way is kept apart from the grid, exactly, for this share of the radius: beside the tool it has left its
+// own wall a moment ago, and errors of the grid there must not be taken for material.
+constexpr double exact_share = 0.1;
+constexpr double widest_look_rad = 0.05;  // between two looks along the circumference
+constexpr double azimuth_tolerance_rad = 1e-7;
+constexpr double same_azimuth_rad = 1e-4;
+constexpr double least_horizontal = 1e-6;
+constexpr std::size_t samples_between_reports = 1024;
+
+/// A step of the tool with the lowest layer that it cuts.
+struct Piece {
+  ToolStep step;
+  std::size_t lowest;
+  double end_mm;                   // along the path
+  bool continues;                  // its predecessor ends where it starts...
+  std::size_t predecessor_lowest;  // ...and swept these layers
+};
+
+struct AzimuthRange {
+  double from;
+  double to;
+};
+
+class Sweeper {
+ public:
+  Sweeper(Material& material, double diameter, const SweepOptions& options)
+      : material_(material),
+        radius_(0.5 * diameter),
+        step_(options.step_mm > 0.0 ? options.step_mm : diameter / steps_per_diameter),
+        options_(options) {
+    const double h = material.resolution_mm();
+    const double look = std::min(2.0 * h / radius_, widest_look_rad);
+    const auto looks = static_cast<std::size_t>(std::ceil(2.0 * half_pi / look));
+    for (std::size_t k = 0; k <= looks; ++k) {
+      const double share = 2.0 * static_cast<double>(k) / static_cast<double>(looks) - 1.0;
+      const double azimuth = half_pi * share;
+      looks_.push_back({azimuth, Vector2d(std::cos(azimuth), std::sin(azimuth))});
+    }
+    // The bilinear interpolation of the distance from a disc is off by up to h^2 / (8 R); four of these are not met.
+    grid_error_ = std::max(1e-6, h * h / (8.0 * radius_));
+    touch_ = std::max(options.touch_mm, 4.0 * grid_error_);
+    kept_mm_ = exact_share * radius_;
+  }
+
+  EngagementTrack run(const Path& path) {
+    track_.first_arc.push_back(0);
+    for (std::size_t i = 0; i < path.size(); ++i) run_segment(path[i], path.distance_mm(i), i);
+    while (!pending_.empty()) sweep_oldest();
+    material_.compact();
+    return std::move(track_);
+  }
+
+ private:
+  void run_segment(const Segment& segment, double begin_mm, std::size_t index) {
+    if (!(segment.length_mm > 0.0)) return;
+    if (segment.kind == SegmentKind::arc && segment.normal != 2) {
+      throw Error(ErrorKind::argument, "line " + std::to_string(segment.line) + ": arc outside of the XY plane (G17)",
+                  segment.line);
+    }
+    index_ = static_cast<std::uint32_t>(index);
+    if (track_.size() == 0 && pending_.empty()) stand_at(segment.start_mm);
+    const double longest = segment.kind == SegmentKind::arc
+                               ? std::min(step_, largest_turn_rad * segment.length_mm / std::abs(segment.sweep_rad))
+                               : step_;
+    places_.clear();
+    const double count = std::ceil(segment.length_mm / longest * (1.0 - 1e-12));
+    const double spacing = segment.length_mm / count;
+    const Vector3 start_tangent = tangent_at(segment, 0.0);
+    const Vector2d start_direction = start_tangent.head<2>();
+    if (start_direction.norm() > least_horizontal && !goes_on(start_direction.normalized())) {
+      for (const double share : shares_behind_vertex) places_.push_back(share * spacing);
+    }
+    for (double k = 1.0; k < count; ++k) places_.push_back(k * spacing);
+    places_.push_back(segment.length_mm);
+    if (segment.start_mm.z() != segment.end_mm.z()) add_crossings(segment);
+
+    double from_mm = 0.0;
+    for (const double to_mm : places_) {
+      const double middle_z = point_at(segment, 0.5 * (from_mm + to_mm)).z();
+      sample(segment, begin_mm, to_mm, material_.lowest_cut(middle_z));
+      from_mm = to_mm;
+    }
+  }
+
+  /// Places at which a ramp passes the middle of a layer.
+  void add_crossings(const Segment& segment) {
+    const double low = std::min(segment.start_mm.z(), segment.end_mm.z());
+    const double high = std::max(segment.start_mm.z(), segment.end_mm.z());
+    const double per_mm = segment.length_mm / (segment.end_mm.z() - segment.start_mm.z());
+    const std::vector<double>& borders = material_.borders_mm();
+    for (std::size_t i = 1; i < borders.size(); ++i) {
+      const double middle = 0.5 * (borders[i - 1] + borders[i]);
+      if (middle > low && middle < high) places_.push_back((middle - segment.start_mm.z()) * per_mm);
+    }
+    std::sort(places_.begin(), places_.end());
+    places_.erase(std::unique(places_.begin(), places_.end()), places_.end());
+  }
+
+  [[nodiscard]] bool goes_on(const Vector2d& direction) const {
+    return has_direction_ && direction.dot(last_direction_) > std::cos(vertex_rad);
+  }
+
+  /// The tool is where the path begins: its disc has gone.
+  void stand_at(const Vector3& place) {
+    last_point_ = place.head<2>();
+    last_lowest_ = material_.lowest_cut(place.z());
+    pending_.push_back({ToolStep(last_point_, last_point_), last_lowest_, 0.0, false, 0});
+  }
+
+  void sample(const Segment& segment, double begin_mm, double to_mm, std::size_t lowest) {
+    const Vector3 place = point_at(segment, to_mm);
+    const Vector3 tangent = tangent_at(segment, to_mm);
+    const Vector2d point = place.head<2>();
+    const double horizontal = std::min(1.0, tangent.head<2>().norm());
+    const bool travels = horizontal > least_horizontal;
+    const Vector2d direction = travels ? Vector2d(tangent.head<2>() / horizontal) : Vector2d::Zero();
+
+    double area = 0.0;
+    widths_.clear();
+    open_.clear();
+    if (travels) {
+      for (std::size_t layer = lowest; layer < material_.size(); ++layer) {
+        meet(layer, point, direction);
+        // A tool takes away everything above its tip, so above a layer without material there is none either.
+        if (found_.empty()) break;
+        area += add_arcs(layer, place.z());
+      }
+    }
+    double plunged = 0.0;
+    if (tangent.z() < 0.0 && lowest > 0) plunged = area_below(lowest - 1, point);
+
+    track_.s_mm.push_back(begin_mm + to_mm);
+    track_.x_mm.push_back(point.x());
+    track_.y_mm.push_back(point.y());
+    track_.direction_rad.push_back(travels ? std::atan2(direction.y(), direction.x()) : 0.0);
+    track_.horizontal.push_back(travels ? horizontal : 0.0);
+    track_.segment.push_back(index_);
+    track_.radial_depth_mm.push_back(union_width());
+    track_.section_mm2.push_back(horizontal * area + std::max(0.0, -tangent.z()) * plunged);
+    track_.plunged_mm2.push_back(plunged);
+    track_.first_arc.push_back(static_cast<std::uint32_t>(track_.arcs.size()));
+
+    double curvature = 0.0;
+    if (segment.kind == SegmentKind::arc) {
+      // Start and end radius may differ a little: the arc through both ends of the step.
+      const Vector2d centre = segment.centre_mm.head<2>();
+      const double radius = 0.5 * ((last_point_ - centre).norm() + (point - centre).norm());
+      curvature = (segment.sweep_rad > 0.0 ? 1.0 : -1.0) / radius;
+    }
+    pending_.push_back({ToolStep(last_point_, point, curvature), lowest, begin_mm + to_mm, true, last_lowest_});
+    last_point_ = point;
+    last_lowest_ = lowest;
+    if (travels) {
+      last_direction_ = direction;
+      has_direction_ = true;
+    } else {
+      has_direction_ = false;
+    }
+    while (!pending_.empty() && begin_mm + to_mm - pending_.front().end_mm >= kept_mm_) sweep_oldest();
+    if (options_.progress && track_.size() % samples_between_reports == 0) options_.progress(begin_mm + to_mm);
+  }
+
+  void sweep_oldest() {
+    const Piece& piece = pending_.front();
+    const bool moves = piece.step.chord() != Vector2d::Zero();
+    for (std::size_t layer = piece.lowest; layer < material_.size(); ++layer) {
+      const bool continues = piece.continues && layer >= piece.predecessor_lowest;
+      if (moves || !continues) material_.remove(layer, piece.step, radius_, continues);
+    }
+    pending_.pop_front();
+  }
+
+  /// Distance of a place on the tool's circumference from where there is no material, the newest way included.
+  [[nodiscard]] double distance(std::size_t layer, const Vector2d& place) {
+    double d = material_.layer(layer).distance_mm(place.x(), place.y());
+    in_grid_ = d;
+    if (d <= 0.0) return d;
+    for (const Piece& piece : pending_) {
+      if (piece.lowest <= layer) d = std::min(d, piece.step.distance_mm(place) - radius_);
+    }
+    return d;
+  }
+
+  /// Fills found_ with the azimuths at which the front half of the tool is in a layer's material.
+  void meet(std::size_t layer, const Vector2d& point, const Vector2d& direction) {
+    found_.clear();
+    if (material_.layer(layer).is_empty_around(point.x(), point.y(), radius_)) return;
+    const Vector2d left(-direction.y(), direction.x());
+    const auto at = [&](const Vector2d& unit) {
+      return distance(layer, point + radius_ * (unit.x() * direction + unit.y() * left));
+    };
+    double before = at(looks_[0].unit);
+    double from = -half_pi;
+    double depth = in_grid_;
+    for (std::size_t k = 1; k < looks_.size(); ++k) {
+      const double now = at(looks_[k].unit);
+      const double here = in_grid_;
+      if (now > 0.0 && before <= 0.0) {
+        from = boundary(at, looks_[k - 1].azimuth, before, looks_[k].azimuth, now);
+        depth = here;
+      }
+      if (now <= 0.0 && before > 0.0 && depth > touch_) {
+        add_range(from, boundary(at, looks_[k - 1].azimuth, before, looks_[k].azimuth, now));
+      }
+      depth = std::max(depth, here);
+      before = now;
+    }
+    if (before > 0.0 && depth > touch_) add_range(from, half_pi);
+  }
+
+  /// Azimuth at which the distance changes its sign, by the Illinois form of regula falsi.
+  template <typename Function>
+  static double boundary(const Function& at, double a, double fa, double b, double fb) {
+    constexpr int most_iterations = 40;
+    int kept = 0;
+    for (int i = 0; i < most_iterations && b - a > azimuth_tolerance_rad && fa != fb; ++i) {
+      const double c = std::clamp((a * fb - b * fa) / (fb - fa), a, b);
+      const double fc = at(Vector2d(std::cos(c), std::sin(c)));
+      if (fc == 0.0) return c;
+      if ((fc > 0.0) == (fb > 0.0)) {
+        if (c == b) break;
+        b = c;
+        fb = fc;
+        if (kept == -1) fa *= 0.5;
+        kept = -1;
+      } else {
+        if (c == a) break;
+        a = c;
+        fa = fc;
+        if (kept == 1) fb *= 0.5;
+        kept = 1;
+      }
+    }
+    return 0.5 * (a + b);
+  }
+
+  /// Keeps a range that is wide enough; ends that the grid cannot tell from the side of the tool are there.
+  void add_range(double from, double to) {
+    if (radius_ * (1.0 + std::sin(from)) < grid_error_) from = -half_pi;
+    if (radius_ * (1.0 - std::sin(to)) < grid_error_) to = half_pi;
+    if (radius_ * (std::sin(to) - std::sin(from)) > touch_) found_.push_back({from, to});
+  }
+
+  /// Puts found_ into the track; returns the area across the direction of feed.
+  double add_arcs(std::size_t layer, double tip_mm) {
+    const double bottom = std::max(0.0, material_.borders_mm()[layer] - tip_mm);
+    const double top = material_.borders_mm()[layer + 1] - tip_mm;
+    double area = 0.0;
+    next_open_.clear();
+    for (const AzimuthRange& range : found_) {
+      area += radius_ * (std::sin(range.to) - std::sin(range.from)) * (top - bottom);
+      widths_.push_back({radius_ * std::sin(range.from), radius_ * std::sin(range.to)});
+      const auto same = std::find_if(open_.begin(), open_.end(), [&](std::size_t k) {
+        const EngagedArc& arc = track_.arcs[k];
+        return std::abs(arc.from_rad - range.from) <= same_azimuth_rad &&
+               std::abs(arc.to_rad - range.to) <= same_azimuth_rad;
+      });
+      if (same != open_.end()) {
+        track_.arcs[*same].top_mm = top;
+        next_open_.push_back(*same);
+      } else {
+        next_open_.push_back(track_.arcs.size());
+        track_.arcs.push_back({range.from, range.to, bottom, top});
+      }
+    }
+    std::swap(open_, next_open_);
+    return area;
+  }
+
+  /// How wide the ranges of all layers are together, across the direction of feed.
+  double union_width() {
+    std::sort(widths_.begin(), widths_.end());
+    double width = 0.0;
+    double reached = -radius_;
+    for (const auto& [from, to] : widths_) {
+      width += std::max(0.0, to - std::max(from, reached));
+      reached = std::max(reached, to);
+    }
+    return width;
+  }
+
+  double area_below(std::size_t layer, const Vector2d& point) {
+    const auto is_swept_later = [&](const Piece& piece) { return piece.lowest <= layer; };
+    if (std::any_of(pending_.begin(), pending_.end(), is_swept_later)) {
+      while (!pending_.empty()) sweep_oldest();
+    }
+    return material_.layer(layer).area_in_disc_mm2(point.x(), point.y(), radius_);
+  }
+
+  struct Look {
+    double azimuth;
+    Vector2d unit;  // along and left of the direction of feed
+  };
+
+  Material& material_;
+  double radius_;
+  double step_;
+  const SweepOptions& options_;
+  double grid_error_ = 0.0;
+  double touch_ = 0.0;
+  double in_grid_ = 0.0;  // the latest distance, without the newest way: tells how deep a contact is at any step
+  double kept_mm_ = 0.0;
+  std::vector<Look> looks_;
+  std::deque<Piece> pending_;  // not yet in the grid, oldest first
+  std::vector<double> places_;
+  std::vector<AzimuthRange> found_;
+  std::vector<std::pair<double, double>> widths_;
+  std::vector<std::size_t> open_;  // arcs of the layer below
+  std::vector<std::size_t> next_open_;
+  Vector2d last_point_ = Vector2d::Zero();
+  Vector2d last_direction_ = Vector2d::Zero();
+  std::size_t last_lowest_ = 0;
+  bool has_direction_ = false;
+  std::uint32_t index_ = 0;
+  EngagementTrack track_;
+};
+
+}  // namespace
+
+EngagementTrack sweep(Material& material, const Path& path, double tool_diameter_mm, const SweepOptions& options) {
+  const auto refuse = [](const std::string& message) { throw Error(ErrorKind::argument, message); };
+  if (!(tool_diameter_mm > 0.0) || !std::isfinite(tool_diameter_mm)) {
+    refuse("tool diameter is " + std::to_string(tool_diameter_mm) + " mm, must be above 0");
+  }
+  if (!(options.step_mm >= 0.0) || !std::isfinite(options.step_mm)) {
+    refuse("step is " + std::to_string(options.step_mm) + " mm, must be above 0, or 0 for a fortieth of the diameter");
+  }
+  if (!(options.touch_mm >= 0.0) || !std::isfinite(options.touch_mm)) {
+    refuse("touch is " + std::to_string(options.touch_mm) + " mm, must be at least 0");
+  }
+  return Sweeper(material, tool_diameter_mm, options).run(path);
+}
+
+}  // namespace shapegcode
