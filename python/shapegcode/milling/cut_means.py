@@ -11,14 +11,15 @@ from shapegcode._core import ArgumentError
 from shapegcode.milling.cut_plan import MeasuringPass, TestCut, engagement
 from shapegcode.milling.cut_record import ForceRecord
 
-__all__ = ["Revolutions", "Shape", "revolutions", "spindle_speed"]
+__all__ = ["FEWEST_SAMPLES", "PlacedRecord", "Revolutions", "Shape", "placed", "revolutions", "spindle_speed", "turned"]
 
 Array = npt.NDArray[np.float64]
 
 _PER_MINUTE = 60.0
 #: Samples per revolution from which on a file is a record and not a table of means.
-_FEWEST_SAMPLES = 6.0
+FEWEST_SAMPLES = 6.0
 _LEAST_AIR_REVS = 5
+_TELL_SPEED, _TELL_FEED = 0.002, 0.005
 _GUARD_REVS = 2
 #: Of the noise in the air, and of the largest force: what is more is a cut.
 _ABOVE_NOISE, _ABOVE_SHARE = 6.0, 0.04
@@ -30,9 +31,55 @@ _SHIFT_STEPS = 81
 _CHATTER, _CHATTER_LEAST = 6.0, 0.01  # times the median deviation; the least that counts as one, of the median
 
 
+@dataclass(frozen=True)
+class Shape:
+    """The course of the mean force that is expected along a pass, to find its beginning and end in the record.
+
+    Attributes:
+        x_mm: (n,) ascending X of the tool's axis.
+        resultant_n: (n,) magnitude of the mean force, in any unit.
+    """
+
+    x_mm: Array
+    resultant_n: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedRecord:
+    """A sampled record of one pass, offset and drift of the dynamometer taken off, with the place of each sample.
+
+    Attributes:
+        file: where it was read.
+        cut: the test cut.
+        measuring: the pass.
+        time_s: (n,).
+        x_mm: (n,) X of the tool's axis.
+        force_n: (n, 2) on the tool, along the feed and to its left.
+        torque_nm: (n, 1); None: not recorded.
+        samples: per revolution.
+        spindle_rev_per_min: as the record shows it, or as commanded.
+        offset_n: (2,) force that was shown in the air before the cut.
+        drift_n: (2,) change of it until after the cut.
+        notes: what else the user should know.
+    """
+
+    file: str
+    cut: TestCut
+    measuring: MeasuringPass
+    time_s: Array
+    x_mm: Array
+    force_n: Array
+    torque_nm: Array | None
+    samples: float
+    spindle_rev_per_min: float
+    offset_n: Array
+    drift_n: Array
+    notes: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Revolutions:
-    """Means over whole revolutions of one pass, offset and drift of the dynamometer taken off.
+    """Means over whole revolutions of one pass.
 
     Attributes:
         source: the file.
@@ -41,8 +88,7 @@ class Revolutions:
         torque_nm: (n,) mean torque; None: not recorded.
         resultant_n: (n,) mean magnitude.
         peak_n: (n,) largest magnitude.
-        uneven_n: (n,) standard deviation of the force within the revolution, of both directions together.
-        chatter: (n,) whether the force swings more than that of the neighbours.
+        chatter: (n,) whether the force swings more than its mean lets expect from the rest of the pass.
         feed_mm_per_min: the feed between entry and exit, as the record shows it; of a pass with changing feeds the
             first one.
         spindle_rev_per_min: as the record shows it, or as commanded.
@@ -57,26 +103,12 @@ class Revolutions:
     torque_nm: Array | None
     resultant_n: Array
     peak_n: Array
-    uneven_n: Array
     chatter: npt.NDArray[np.bool_]
     feed_mm_per_min: float
     spindle_rev_per_min: float
     offset_n: Array
     drift_n: Array
     notes: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Shape:
-    """The course of the mean force that is expected along a pass, to find its beginning and end in the record.
-
-    Attributes:
-        x_mm: (n,) ascending X of the tool's axis.
-        resultant_n: (n,) magnitude of the mean force, in any unit.
-    """
-
-    x_mm: Array
-    resultant_n: Array
 
 
 def spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
@@ -116,8 +148,8 @@ def spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: int
     return (commanded, False) if best is None else (best[1], True)
 
 
-def revolutions(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, shape: Shape) -> Revolutions:
-    """Reduce a sampled record of one pass to means over whole revolutions in place.
+def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, shape: Shape) -> PlacedRecord:
+    """Take offset and drift off a sampled record of one pass, and find the place of each sample.
 
     Args:
         record: with time, or with a position (then the commanded feeds give the time).
@@ -132,28 +164,26 @@ def revolutions(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, sha
     time, moved = _clock(record, measuring)
     period = float(time[-1] - time[0]) / (len(time) - 1)
     turn = _PER_MINUTE / cut.spindle_rev_per_min
-    if turn / period < _FEWEST_SAMPLES:
+    if turn / period < FEWEST_SAMPLES:
         raise ArgumentError(
-            f"{record.file}: {turn / period:.1f} samples per revolution: must be {_FEWEST_SAMPLES:g} or more, better "
+            f"{record.file}: {turn / period:.1f} samples per revolution: must be {FEWEST_SAMPLES:g} or more, better "
             f"{12 * cut.tool.flutes}; or give means over whole revolutions, at most one row per revolution"
         )
-    begin, end = _contact(record, period, turn)
+    begin, end = _contact(record, turn / period)
     speed, told = spindle_speed(record.force_n[begin:end], period, cut.spindle_rev_per_min, cut.tool.flutes)
     notes = []
-    if told and abs(speed / cut.spindle_rev_per_min - 1.0) > 0.002:
+    if told and abs(speed / cut.spindle_rev_per_min - 1.0) > _TELL_SPEED:
         notes.append(f"the spindle turned at {speed:.1f} rev/min, {cut.spindle_rev_per_min:g} were commanded")
-    turn = _PER_MINUTE / speed
-    force, offset, drift = _without_offset(record.force_n, begin, end, round(_GUARD_REVS * turn / period))
+    samples = _PER_MINUTE / speed / period
+    force, offset, drift = _without_offset(record.force_n, begin, end, round(_GUARD_REVS * samples))
     torque = None
     if record.torque_nm is not None:
-        torque = _without_offset(record.torque_nm[:, None], begin, end, round(_GUARD_REVS * turn / period))[0]
-    smooth = _turned(force, turn / period)
-    x = _placed(record, cut, measuring, shape, np.linalg.norm(smooth, axis=1), time, moved, (begin, end), notes)
-    inside = np.flatnonzero((x >= measuring.start_mm) & (x <= measuring.end_mm))
-    first, last = int(inside[0]), int(inside[-1])
-    turns = int((last - first) * period / turn)
-    edges = first + np.arange(turns + 1) * turn / period
-    return _reduced(record.file, cut, measuring, x, force, torque, edges, (speed, offset, drift), notes)
+        torque = _without_offset(record.torque_nm[:, None], begin, end, round(_GUARD_REVS * samples))[0]
+    size = np.linalg.norm(turned(force, samples), axis=1)
+    x = _placed(record, measuring, shape, size, time, moved, (begin, end), notes)
+    return PlacedRecord(
+        record.file, cut, measuring, time, x, force, torque, samples, speed, offset, drift, tuple(notes)
+    )
 
 
 def _clock(record: ForceRecord, measuring: MeasuringPass) -> tuple[Array, Array]:
@@ -169,8 +199,8 @@ def _clock(record: ForceRecord, measuring: MeasuringPass) -> tuple[Array, Array]
     return time, (time - time[0]) * measuring.feed_mm_per_min / _PER_MINUTE
 
 
-def _turned(force: Array, samples: float) -> Array:
-    """Moving mean over a stretch of a number of samples that need not be whole, centred."""
+def turned(force: Array, samples: float) -> Array:
+    """Moving mean of each column over a stretch of a number of samples that need not be whole, centred."""
     sums = np.vstack([np.zeros((1, force.shape[1])), np.cumsum(force, axis=0)])
     at = np.arange(len(sums), dtype=np.float64)
     middle = np.arange(len(force)) + 0.5
@@ -179,13 +209,12 @@ def _turned(force: Array, samples: float) -> Array:
     return np.column_stack(means)
 
 
-def _contact(record: ForceRecord, period: float, turn: float) -> tuple[int, int]:
+def _contact(record: ForceRecord, samples: float) -> tuple[int, int]:
     """First and last sample of the cut, roughly."""
-    samples = turn / period
     air = round(_LEAST_AIR_REVS * samples)
     if len(record) < 4 * air:
         raise ArgumentError(f"{record.file}: {len(record) / samples:.1f} revolutions: a pass has many more")
-    smooth = _turned(record.force_n, samples)
+    smooth = turned(record.force_n, samples)
     before, after = smooth[:air], smooth[-air:]
     line = np.linspace(0.0, 1.0, len(smooth))[:, None]
     base = np.median(before, axis=0) * (1.0 - line) + np.median(after, axis=0) * line
@@ -220,7 +249,6 @@ def _without_offset(force: Array, begin: int, end: int, guard: int) -> tuple[Arr
 
 def _placed(
     record: ForceRecord,
-    cut: TestCut,
     measuring: MeasuringPass,
     shape: Shape,
     size: Array,
@@ -249,7 +277,7 @@ def _placed(
         share = (x - wanted[0]) / (wanted[1] - wanted[0])
         x = x + ends[0] * (1.0 - share) + ends[1] * share
         rate = float(np.polyfit(time, x, 1)[0]) * _PER_MINUTE
-        if abs(rate / measuring.feed_mm_per_min - 1.0) > 0.005:
+        if abs(rate / measuring.feed_mm_per_min - 1.0) > _TELL_FEED:
             notes.append(f"the feed was {rate:.1f} mm/min, {measuring.feed_mm_per_min:g} were commanded")
     else:
         x = x + ends[0]
@@ -283,49 +311,43 @@ def _shift(shape: Shape, x: Array, size: Array, side: float) -> float:
     return float(tried[best] + (0.5 * (left - right) / bent * (tried[1] - tried[0]) if bent > 0.0 else 0.0))
 
 
-def _reduced(
-    file: str,
-    cut: TestCut,
-    measuring: MeasuringPass,
-    x: Array,
-    force: Array,
-    torque: Array | None,
-    edges: Array,
-    found: tuple[float, Array, Array],
-    notes: list[str],
-) -> Revolutions:
-    columns = [force, np.linalg.norm(force, axis=1)[:, None], np.sum(force**2, axis=1)[:, None], x[:, None]]
-    if torque is not None:
-        columns.append(torque)
-    sums = np.vstack([np.zeros((1, sum(part.shape[1] for part in columns))), np.cumsum(np.hstack(columns), axis=0)])
+def revolutions(record: PlacedRecord) -> Revolutions:
+    """Means over whole revolutions of a pass."""
+    cut, measuring, x = record.cut, record.measuring, record.x_mm
+    inside = np.flatnonzero((x >= measuring.start_mm) & (x <= measuring.end_mm))
+    turns = int((inside[-1] - inside[0]) / record.samples)
+    edges = inside[0] + np.arange(turns + 1) * record.samples
+    size = np.linalg.norm(record.force_n, axis=1)
+    columns = [record.force_n, size[:, None], size[:, None] ** 2, x[:, None]]
+    if record.torque_nm is not None:
+        columns.append(record.torque_nm)
+    table = np.hstack(columns)
+    sums = np.vstack([np.zeros((1, table.shape[1])), np.cumsum(table, axis=0)])
     at = np.arange(len(sums), dtype=np.float64)
-    means = np.diff(np.column_stack([np.interp(edges, at, column) for column in sums.T]), axis=0)
-    means /= np.diff(edges)[:, None]
-    starts = edges[:-1].astype(np.intp)
-    peaks = np.maximum.reduceat(np.linalg.norm(force[: int(edges[-1])], axis=1), starts)
+    means = np.diff(np.column_stack([np.interp(edges, at, column) for column in sums.T]), axis=0) / record.samples
+    peaks = np.maximum.reduceat(size[: int(edges[-1])], edges[:-1].astype(np.intp))
     middle = means[:, 4]
     uneven = np.sqrt(np.maximum(means[:, 3] - np.sum(means[:, :2] ** 2, axis=1), 0.0))
     met = engagement(cut, measuring, middle)
     full = np.flatnonzero(met.to_rad > met.from_rad)[_GUARD_REVS:-_GUARD_REVS]
     chatter = np.zeros(len(middle), dtype=bool)
     chatter[full] = _swings(middle[full], uneven[full], means[full, 2])
-    rate = np.polyfit(np.arange(len(x)), x, 1)[0] if measuring.constant_feed else 0.0
-    sample = float(np.mean(np.diff(edges))) * found[0] / _PER_MINUTE
-    feed = float(rate) * sample * _PER_MINUTE if measuring.constant_feed else measuring.feed_mm_per_min
+    feed = measuring.feed_mm_per_min
+    if measuring.constant_feed:
+        feed = float(np.polyfit(record.time_s[inside], x[inside], 1)[0]) * _PER_MINUTE
     return Revolutions(
-        file,
+        record.file,
         middle,
         means[:, :2],
-        np.abs(means[:, 5]) if torque is not None else None,
+        np.abs(means[:, 5]) if record.torque_nm is not None else None,
         means[:, 2],
         peaks,
-        uneven,
         chatter,
         feed,
-        found[0],
-        found[1],
-        found[2],
-        tuple(notes),
+        record.spindle_rev_per_min,
+        record.offset_n,
+        record.drift_n,
+        record.notes,
     )
 
 
