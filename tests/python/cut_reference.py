@@ -78,13 +78,14 @@ def record(
     turned = phase - 2.0 * math.pi * spindle / 60.0 * times_s  # clockwise
     dz = axial_mm / slices
     for flute in range(flutes):
-        # The flute that cuts before this one stood here one tooth earlier.
-        stands_out = runout_mm[flute] - runout_mm[flute - 1] if runout_mm else 0.0
+        # What flute j teeth before left; none may cut more than there is.
+        ahead = [(j, runout_mm[flute] - runout_mm[flute - j] if runout_mm else 0.0) for j in range(1, flutes + 1)]
         for z in (np.arange(slices) + 0.5) * dz:
             lag = z * math.tan(math.radians(helix_deg)) / (0.5 * diameter)
             t = turned + 2.0 * math.pi * flute / flutes + lag
             t = (t + math.pi) % (2.0 * math.pi) - math.pi
-            thick = np.where((t > begin) & (t < end), np.maximum(pitch * np.cos(t) + stands_out, 0.0), 0.0)
+            left = np.min([j * pitch * np.cos(t) + more for j, more in (ahead if runout_mm else ahead[:1])], axis=0)
+            thick = np.where((t > begin) & (t < end), np.maximum(left, 0.0), 0.0)
             tangential, radial = k1 * thick * dz, k1 * k2 * thick * dz
             force[:, 0] += -tangential * np.sin(t) - radial * np.cos(t)
             force[:, 1] += tangential * np.cos(t) - radial * np.sin(t)

@@ -6,6 +6,7 @@ fitted about the middle of the chip thicknesses, where factor and exponent do no
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -56,6 +57,8 @@ class MeanForces:
         force_n: (n, 2) along the feed and to its left.
         revolutions: (n,) how many each is the mean of.
         group: (n,) number of the pass or file, in the order in which it was cut.
+        displaced: n engagements if the place of the tool were off by its standard error, the same way for all rows of
+            a group; None: the engagements are exact.
     """
 
     met: Engagement
@@ -64,6 +67,7 @@ class MeanForces:
     force_n: Array
     revolutions: Array
     group: npt.NDArray[np.intp]
+    displaced: Engagement | None = None
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,8 @@ class CoefficientFit:
     Attributes:
         coefficients: in the order of ``[cutting]``.
         thickness: "mean" or "local": to which chip thickness they belong.
+        middle_chip_mm: geometric mean of the mean chip thicknesses.
+        at_chip: k1 in N/mm² and k2 there: much better known than the factors, which are those of a chip of 1 mm.
         chip_mm: (n,) mean chip thickness of each row.
         predicted_n: (n, 2) mean force of the fit.
         outlier: (n,) rows that were left out, as their force is not that of the others.
@@ -102,6 +108,8 @@ class CoefficientFit:
 
     coefficients: tuple[Coefficient, ...]
     thickness: str
+    middle_chip_mm: float
+    at_chip: tuple[Coefficient, ...]
     chip_mm: Array
     predicted_n: Array
     outlier: npt.NDArray[np.bool_]
@@ -117,9 +125,11 @@ class CoefficientFit:
 class _Model:
     """Mean forces over the parameters: ln k1 and ln k2 at the reference chip, their exponents, edge forces."""
 
-    def __init__(self, tool: CutTool, axial_depth_mm: float, data: MeanForces, thickness: str, chip: Array) -> None:
+    def __init__(
+        self, tool: CutTool, axial_depth_mm: float, data: MeanForces, thickness: str, reference_mm: float
+    ) -> None:
         self.tool, self.depth, self.data, self.thickness = tool, axial_depth_mm, data, thickness
-        self.reference = math.exp(float(np.mean(np.log(chip))))
+        self.reference = reference_mm
 
     def values(self, parameters: Array) -> dict[str, Any]:
         """The keys of ``[cutting]``."""
@@ -174,7 +184,8 @@ def fit_coefficients(
     count = 6 if edge else 4
     chip = _chips(tool, axial_depth_mm, data)
     _check(data, chip, count, edge)
-    model = _Model(tool, axial_depth_mm, data, thickness, chip)
+    middle = math.exp(float(np.mean(np.log(chip))))
+    model = _Model(tool, axial_depth_mm, data, thickness, middle)
     parameters = _start(model, data, count)
     noise = np.full((len(chip), 2), 1.0)
     robust = np.ones((len(chip), 2))
@@ -195,13 +206,16 @@ def fit_coefficients(
     weights = np.where(outlier[:, None], 0.0, 1.0 / noise**2)
     parameters, left, slopes = _solved(model, data.force_n, parameters, weights)
     correlation = _correlation(left / noise, data, outlier)
-    covariance = _covariance(slopes, left, weights, correlation)
     predicted = data.force_n - left
+    covariance = _covariance(slopes, left, weights, correlation) + _of_place(model, parameters, slopes, weights)
     kept = left[~outlier]
     size = np.linalg.norm(data.force_n[~outlier], axis=1)
+    free = int((weights > 0.0).sum()) - count
     return CoefficientFit(
-        _with_intervals(model, parameters, covariance, int((weights > 0.0).sum()) - count),
+        _with_intervals(model, parameters, covariance, free, 1.0),
         thickness,
+        model.reference,
+        _with_intervals(model, parameters, covariance, free, model.reference)[:4:2],
         chip,
         predicted,
         outlier,
@@ -355,23 +369,40 @@ def _covariance(slopes: Array, left: Array, weights: Array, correlation: float) 
     return np.asarray(inner / np.outer(scale, scale) * square * (1.0 + correlation) / (1.0 - correlation))
 
 
-def _with_intervals(model: _Model, parameters: Array, covariance: Array, free: int) -> tuple[Coefficient, ...]:
+def _of_place(model: _Model, parameters: Array, slopes: Array, weights: Array) -> Array:
+    """Covariance that comes from not knowing exactly where the tool was in each group."""
+    data, count = model.data, len(parameters)
+    found = np.zeros((count, count))
+    if data.displaced is None:
+        return found
+    there = dataclasses.replace(data, met=data.displaced)
+    moved = _Model(model.tool, model.depth, there, model.thickness, model.reference)
+    change = moved.forces(parameters) - model.forces(parameters)
+    root = np.sqrt(weights)
+    inverse = np.linalg.pinv(slopes * root.ravel()[:, None])
+    for group in np.unique(data.group):
+        effect = inverse @ (root * np.where((data.group == group)[:, None], change, 0.0)).ravel()
+        found += np.outer(effect, effect)
+    return found
+
+
+def _with_intervals(
+    model: _Model, parameters: Array, covariance: Array, free: int, chip_mm: float
+) -> tuple[Coefficient, ...]:
+    """Values with their intervals; the factors k1 and k2 at a chip thickness."""
     from scipy.stats import t as student
 
     quantile = float(student.ppf(0.975, max(free, 1)))
-    logarithm = math.log(model.reference)
-    values = model.values(parameters)
+    way = math.log(chip_mm / model.reference)
     found = []
     for k, (name, unit) in enumerate(_NAMES[: len(parameters)]):
+        factor = k in (0, 2)
         direction = np.zeros(len(parameters))
         direction[k] = 1.0
-        if k in (0, 2):
-            direction[k + 1] = -logarithm
+        if factor:
+            direction[k + 1] = way
+        value = float(direction @ parameters)
         half = quantile * math.sqrt(max(float(direction @ covariance @ direction), 0.0))
-        value = float(values[name])
-        if k in (0, 2):
-            ends = value * math.exp(-half), value * math.exp(half)
-        else:
-            ends = value - half, value + half
-        found.append(Coefficient(name, value, *ends, unit))
+        ends = (value, value - half, value + half)
+        found.append(Coefficient(name, *(math.exp(each) if factor else each for each in ends), unit))
     return tuple(found)

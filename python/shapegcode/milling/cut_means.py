@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode._core import ArgumentError
-from shapegcode.milling.cut_plan import MeasuringPass, TestCut, engagement
+from shapegcode.milling.cut_plan import MeasuringPass, TestCut, fully_engaged
 from shapegcode.milling.cut_record import ForceRecord
 
 __all__ = ["FEWEST_SAMPLES", "PlacedRecord", "Revolutions", "Shape", "placed", "revolutions", "spindle_speed", "turned"]
@@ -328,8 +328,7 @@ def revolutions(record: PlacedRecord) -> Revolutions:
     peaks = np.maximum.reduceat(size[: int(edges[-1])], edges[:-1].astype(np.intp))
     middle = means[:, 4]
     uneven = np.sqrt(np.maximum(means[:, 3] - np.sum(means[:, :2] ** 2, axis=1), 0.0))
-    met = engagement(cut, measuring, middle)
-    full = np.flatnonzero(met.to_rad > met.from_rad)[_GUARD_REVS:-_GUARD_REVS]
+    full = np.flatnonzero(fully_engaged(cut, measuring, middle))[_GUARD_REVS:-_GUARD_REVS]
     chatter = np.zeros(len(middle), dtype=bool)
     chatter[full] = _swings(middle[full], uneven[full], means[full, 2])
     feed = measuring.feed_mm_per_min

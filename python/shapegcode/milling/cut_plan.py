@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from shapegcode._core import ArgumentError
 
-__all__ = ["FORMAT", "KINDS", "CutTool", "Engagement", "MeasuringPass", "TestCut", "engagement", "load_cut"]
+__all__ = ["FORMAT", "KINDS", "CutTool", "Engagement", "MeasuringPass", "TestCut", "engagement", "fully_engaged", "load_cut"]
 
 Array = npt.NDArray[np.float64]
 
@@ -183,6 +183,17 @@ def _crossing(x: Array, begin: Array, edge_x: Array, edge_y: Array, radius: floa
         found[active[inside]] = u[inside]
         open_[active[inside]] = False
     return found
+
+
+def fully_engaged(
+    cut: TestCut, measuring: MeasuringPass, x_mm: Array, margin_mm: float = 0.0
+) -> npt.NDArray[np.bool_]:
+    """Where the tool is over the stock with all of its engagement, and by a margin within its ends."""
+    met = engagement(cut, measuring, x_mm)
+    reach = cut.tool.radius_mm * np.maximum(np.cos(met.to_rad), np.cos(met.from_rad))
+    # The engagement ends at the end of the stock: there it is not whole, by whatever little.
+    low, high = measuring.edge_x_mm[0] + margin_mm, measuring.edge_x_mm[-1] - max(margin_mm, 1e-6)
+    return np.asarray((x_mm >= low) & (x_mm + reach <= high) & (met.to_rad > met.from_rad))
 
 
 def load_cut(path: str | Path) -> TestCut:
