@@ -14,13 +14,22 @@ from shapegcode import _core
 from shapegcode._core import ArgumentError
 from shapegcode.milling.cut_edges import Edge, left_edge, reduced, tool_path, unrolled_edge
 from shapegcode.milling.cut_force import COEFFICIENTS, ForceLaw
-from shapegcode.milling.cut_plan import CutTool, Engagement, MeasuringPass, TestCut, engagement
+from shapegcode.milling.cut_plan import CutTool, MeasuringPass, TestCut, engagement, straight_engagement
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
     from shapegcode.milling.tool_file import Tool
 
-__all__ = ["Conditions", "Corner", "Design", "corner_cut", "corner_feeds", "interval_cut", "taper_cut"]
+__all__ = [
+    "Conditions",
+    "Corner",
+    "Design",
+    "corner_cut",
+    "corner_feed_sequence",
+    "corner_feeds",
+    "interval_cut",
+    "taper_cut",
+]
 
 Array = npt.NDArray[np.float64]
 
@@ -28,7 +37,8 @@ _LEAST_AIR_MM = 5.0
 _AIR_REVS = 20.0
 _LARGEST_SHARE = 0.95  # of the radius, up to which a radial depth is taken
 _STATION_MM = 0.01
-_FEW_MM = 1e-3
+_FEW_UM = 1e-3  # mm
+_SAME_MM = 1e-6
 
 
 @dataclass(frozen=True)
@@ -146,9 +156,7 @@ def _rounded(value: float) -> float:
     return round(value, 3)
 
 
-def taper_cut(
-    given: Conditions, feeds: Sequence[float], depths_mm: tuple[float, float], length_mm: float
-) -> Design:
+def taper_cut(given: Conditions, feeds: Sequence[float], depths_mm: tuple[float, float], length_mm: float) -> Design:
     """Straight passes along a tapered work piece (paper 001, figure 4): one per feed, for k1 and k2.
 
     Args:
@@ -168,7 +176,9 @@ def taper_cut(
             f"radial depths from {low:g} to {high:g} mm: must ascend, above 0 and at most {_LARGEST_SHARE * radius:g} mm"
         )
     if high - low > 0.2 * length_mm:
-        raise ArgumentError(f"{length_mm:g} mm are too short for a taper of {high - low:g} mm: at least 5 times as long")
+        raise ArgumentError(
+            f"{length_mm:g} mm are too short for a taper of {high - low:g} mm: at least 5 times as long"
+        )
     edge = Edge(np.array([0.0, length_mm]), np.array([_rounded(low), _rounded(high)]))
     passes = _passes_through(given, edge, length_mm, [f"F{feed:g}" for feed in feeds], [[(None, f)] for f in feeds])
     cut = _cut("taper", given, list(passes), {"radial_depth_mm": [low, high], "length_mm": length_mm})
@@ -184,11 +194,8 @@ def corner_feeds(given: Conditions, radial_depth_mm: Array) -> Array:
     """
     tool = given.cut_tool()
     law = ForceLaw(tool, tool.cutting, given.spindle_rev_per_min, given.axial_depth_mm)
-    radius = tool.radius_mm
-    last = -np.arcsin(np.clip((radius - radial_depth_mm) / radius, -1.0, 1.0))
-    first = np.full(len(last), -0.5 * math.pi)
-    met = Engagement(-last, -first, radial_depth_mm) if given.up else Engagement(first, last, radial_depth_mm)
-    force = law.forces(met, np.full(len(last), given.feed_mm_per_min)).mean_resultant_n
+    met = straight_engagement(tool, radial_depth_mm, up=given.up)
+    force = law.forces(met, np.full(len(radial_depth_mm), given.feed_mm_per_min)).mean_resultant_n
     return np.asarray(given.feed_mm_per_min * force[0] / force)
 
 
@@ -203,73 +210,89 @@ def _blocks(x_mm: Array, feed: Array, interval_mm: float, begin: float, end: flo
     return blocks
 
 
-def _changing(depth: Array) -> tuple[int, int]:
-    """First and last sample at which the radial depth is not that of the straight walls."""
-    off = np.flatnonzero(np.abs(depth - depth[0]) > _FEW_MM)
+def _corner_depth(given: Conditions, corner: Corner, straight_mm: float) -> tuple[Array, Array]:
+    """Distance along the corner's path, 0 where the radial depth begins to change, and the depth until it is constant.
+
+    Raises:
+        ArgumentError: not a corner, or none that changes the radial depth.
+    """
+    before = straight_mm + 2.0 * (corner.rough_radius_mm + corner.finish_radius_mm)
+    cut = _core.CornerCut(
+        given.tool.radius_mm,
+        corner.rough_radius_mm,
+        corner.finish_radius_mm,
+        corner.allowance_mm,
+        before_mm=before,
+        after_mm=before,
+    )
+    track = cut.track(given.axial_depth_mm, _STATION_MM)
+    s, depth = np.array(track.s_mm), np.array(track.radial_depth_mm)
+    off = np.flatnonzero(np.abs(depth - depth[0]) > _SAME_MM)
     if off.size == 0:
         raise ArgumentError("the radial depth of this corner does not change: nothing to unroll")
-    return int(off[0]), int(off[-1])
+    first, last = max(int(off[0]) - 1, 0), min(int(off[-1]) + 1, len(s) - 1)
+    return s[first : last + 1] - s[first], depth[first : last + 1]
 
 
-def corner_cut(
-    given: Conditions, corner: Corner, s_mm: Array, radial_depth_mm: Array, interval_mm: float, straight_mm: float
-) -> Design:
+def corner_feed_sequence(given: Conditions, corner: Corner, interval_mm: float) -> list[float]:
+    """Feeds of a corner (eq. 7) in blocks of one length, mm/min.
+
+    Raises:
+        ArgumentError: as for :func:`corner_cut`.
+    """
+    s, depth = _corner_depth(given, corner, 0.0)
+    return [feed for _, feed in _blocks(s, corner_feeds(given, depth), interval_mm, 0.0, float(s[-1]))]
+
+
+def corner_cut(given: Conditions, corner: Corner, interval_mm: float) -> Design:
     """A corner unrolled on a straight line (paper 001, figure 7): a pass with constant and one with modified feed.
 
     Args:
         given: tool, spindle, axial depth, feed on the straight walls.
-        corner: for the report.
-        s_mm: (n,) distance along the corner's path, ascending.
-        radial_depth_mm: (n,) its radial depth there.
+        corner: to unroll.
         interval_mm: length of the blocks with a feed of their own.
-        straight_mm: constant radial depth before and after.
 
     Raises:
         ArgumentError: the corner cannot be unrolled, or is more than the tool or the machine can do.
     """
     given.check([given.feed_mm_per_min])
     radius = given.tool.radius_mm
-    first, last = _changing(radial_depth_mm)
-    s, depth = s_mm[first : last + 1], radial_depth_mm[first : last + 1]
-    at = straight_mm - float(s[0])
-    reach = math.sqrt(radius**2 - (radius - float(depth[-1])) ** 2)
-    stock = math.ceil(at + float(s[-1]) + reach + straight_mm)
-    wanted_edge = unrolled_edge(s_mm, radial_depth_mm, radius, stock, at)
+    straight = max(10.0, 3.0 * radius)
+    s, depth = _corner_depth(given, corner, straight)
+    stock = math.ceil(2.0 * straight + float(s[-1]) + radius)
+    wanted_edge = unrolled_edge(s, depth, radius, stock, straight)
     # What the round tool leaves is the edge that the passes meet: where the wanted one is hollow more sharply than
     # the tool is round, it stays higher.
     far = 3.0 * radius
     path = tool_path(wanted_edge, radius, -far, stock + far)
     edge = reduced(left_edge(path, radius, -radius, stock + radius), 1e-4)
-    x_mm = np.arange(0.0, stock - radius, _STATION_MM)
+    x = np.arange(0.0, stock - radius, _STATION_MM)
     probe = _passes_through(given, edge, stock, ["probe"], [[(None, given.feed_mm_per_min)]])
     cut = _cut("corner", given, list(probe), {})
-    met = engagement(cut, cut.passes[0], x_mm).radial_depth_mm
-    wanted = np.interp(x_mm, s_mm + at, radial_depth_mm)
-    feeds = corner_feeds(given, met)
-    begin, end = _rounded(at + float(s[0])), at + float(s[-1])
-    off = np.flatnonzero(np.abs(met - met[0]) > _FEW_MM)
-    end = max(end, float(x_mm[off[-1]]))
-    blocks = [(begin, given.feed_mm_per_min), *_blocks(x_mm, feeds, interval_mm, begin, end)]
+    met = engagement(cut, cut.passes[0], x).radial_depth_mm
+    wanted = np.interp(x, s + straight, depth)
+    off = np.flatnonzero(np.abs(met - corner.allowance_mm) > _FEW_UM)
+    begin, end = _rounded(min(straight, float(x[off[0]]))), max(straight + float(s[-1]), float(x[off[-1]]))
+    blocks = [(begin, given.feed_mm_per_min), *_blocks(x, corner_feeds(given, met), interval_mm, begin, end)]
     given.check([feed for _, feed in blocks])
     programs = [[(None, given.feed_mm_per_min)], [*blocks, (None, given.feed_mm_per_min)]]
     names = ["CONSTANT FEED", "MODIFIED FEED"]
-    excess = met - wanted
     about = {
         "allowance_mm": corner.allowance_mm,
         "rough_radius_mm": corner.rough_radius_mm,
         "finish_radius_mm": corner.finish_radius_mm,
         "interval_mm": interval_mm,
-        "corner_begins_at_mm": _rounded(at),
-        "radial_depth_mm": {"max": float(met.max()), "at_mm": float(x_mm[int(np.argmax(met))])},
-        "deeper_than_corner": _stretch(x_mm, excess),
+        "corner_begins_at_mm": straight,
+        "radial_depth_mm": {"max": float(met.max()), "at_mm": float(x[int(np.argmax(met))])},
+        "deeper_than_corner": _stretch(x, met - wanted),
     }
     cut = _cut("corner", given, list(_passes_through(given, edge, stock, names, programs)), about)
-    return Design(cut, (wanted_edge, wanted_edge), stock, np.vstack([x_mm, wanted]))
+    return Design(cut, (wanted_edge, wanted_edge), stock, np.vstack([x, wanted]))
 
 
 def _stretch(x_mm: Array, excess_mm: Array) -> dict[str, float] | None:
     """Where the passes meet more than the corner has, by more than 1 µm."""
-    off = np.flatnonzero(excess_mm > _FEW_MM)
+    off = np.flatnonzero(excess_mm > _FEW_UM)
     if off.size == 0:
         return None
     return {
@@ -296,7 +319,9 @@ def interval_cut(
     given.check([given.feed_mm_per_min, *(feed for sequence in sequences for feed in sequence)])
     radius = given.tool.radius_mm
     if not 0.0 < depth_mm <= _LARGEST_SHARE * radius:
-        raise ArgumentError(f"a radial depth of {depth_mm:g} mm: must be above 0, at most {_LARGEST_SHARE * radius:g} mm")
+        raise ArgumentError(
+            f"a radial depth of {depth_mm:g} mm: must be above 0, at most {_LARGEST_SHARE * radius:g} mm"
+        )
     straight = max(10.0, 4.0 * radius)
     lengths = [len(feeds) * step for feeds, step in zip(sequences, intervals_mm, strict=True)]
     stock = float(math.ceil(max(lengths) + 2.0 * straight))

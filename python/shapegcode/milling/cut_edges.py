@@ -39,7 +39,9 @@ class Edge:
         inside = np.interp(x_mm, x, y)
         first, last = ((y[k + 1] - y[k]) / (x[k + 1] - x[k]) for k in (0, -2))
         return np.asarray(
-            inside + np.where(x_mm < x[0], (x_mm - x[0]) * first, 0.0) + np.where(x_mm > x[-1], (x_mm - x[-1]) * last, 0.0)
+            inside
+            + np.where(x_mm < x[0], (x_mm - x[0]) * first, 0.0)
+            + np.where(x_mm > x[-1], (x_mm - x[-1]) * last, 0.0)
         )
 
 
@@ -73,9 +75,7 @@ def unrolled_edge(s_mm: Array, radial_depth_mm: Array, radius_mm: float, stock_m
             f"on a straight pass of a tool of {2 * radius_mm:g} mm: such a corner cannot be unrolled on a straight line"
         )
     ends = np.array([min(0.0, x[0] - 1.0), max(stock_mm, x[-1] + 1.0)])
-    return Edge(
-        np.concatenate([ends[:1], x, ends[1:]]), np.concatenate([depth[:1], depth, depth[-1:]])
-    )
+    return Edge(np.concatenate([ends[:1], x, ends[1:]]), np.concatenate([depth[:1], depth, depth[-1:]]))
 
 
 def tool_path(edge: Edge, radius_mm: float, start_mm: float, end_mm: float) -> Edge:

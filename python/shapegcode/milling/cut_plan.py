@@ -18,7 +18,18 @@ import numpy.typing as npt
 
 from shapegcode._core import ArgumentError
 
-__all__ = ["FORMAT", "KINDS", "CutTool", "Engagement", "MeasuringPass", "TestCut", "engagement", "fully_engaged", "load_cut"]
+__all__ = [
+    "FORMAT",
+    "KINDS",
+    "CutTool",
+    "Engagement",
+    "MeasuringPass",
+    "TestCut",
+    "engagement",
+    "fully_engaged",
+    "load_cut",
+    "straight_engagement",
+]
 
 Array = npt.NDArray[np.float64]
 
@@ -185,9 +196,14 @@ def _crossing(x: Array, begin: Array, edge_x: Array, edge_y: Array, radius: floa
     return found
 
 
-def fully_engaged(
-    cut: TestCut, measuring: MeasuringPass, x_mm: Array, margin_mm: float = 0.0
-) -> npt.NDArray[np.bool_]:
+def straight_engagement(tool: CutTool, radial_depth_mm: Array, *, up: bool) -> Engagement:
+    """Engagement of straight cuts of known radial depth."""
+    last = -np.arcsin(1.0 - radial_depth_mm / tool.radius_mm)
+    first = np.full(len(last), -0.5 * math.pi)
+    return Engagement(-last, -first, radial_depth_mm) if up else Engagement(first, last, radial_depth_mm)
+
+
+def fully_engaged(cut: TestCut, measuring: MeasuringPass, x_mm: Array, margin_mm: float = 0.0) -> npt.NDArray[np.bool_]:
     """Where the tool is over the stock with all of its engagement, and by a margin within its ends."""
     met = engagement(cut, measuring, x_mm)
     reach = cut.tool.radius_mm * np.maximum(np.cos(met.to_rad), np.cos(met.from_rad))

@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from shapegcode.milling.cut_force import ForceLaw
 from shapegcode.milling.cut_means import Shape
-from shapegcode.milling.cut_plan import Engagement, MeasuringPass, TestCut, engagement
+from shapegcode.milling.cut_plan import MeasuringPass, TestCut, engagement
 
-__all__ = ["Expected", "expected", "straight_engagement"]
+__all__ = ["Expected", "expected"]
 
 Array = npt.NDArray[np.float64]
 
@@ -62,13 +62,3 @@ def expected(cut: TestCut, measuring: MeasuringPass, cutting: Mapping[str, Any] 
     forces = law.forces(met, feed)
     size = np.linalg.norm(forces.mean_n, axis=1)
     return Expected(x, feed, met.radial_depth_mm, size, forces.mean_resultant_n, forces.peak_resultant_n)
-
-
-def straight_engagement(cut: TestCut, radial_depth_mm: Array) -> Engagement:
-    """Engagement of straight cuts of known radial depth."""
-    radius = cut.tool.radius_mm
-    last = -np.arcsin(1.0 - radial_depth_mm / radius)
-    first = np.full(len(last), -0.5 * math.pi)
-    if cut.milling == "up":
-        return Engagement(-last, -first, radial_depth_mm)
-    return Engagement(first, last, radial_depth_mm)

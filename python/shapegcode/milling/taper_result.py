@@ -12,9 +12,16 @@ import numpy.typing as npt
 from shapegcode._core import ArgumentError
 from shapegcode.milling.coefficient_fit import CoefficientFit, MeanForces, fit_coefficients
 from shapegcode.milling.cut_means import FEWEST_SAMPLES, Revolutions, placed, revolutions
-from shapegcode.milling.cut_plan import Engagement, MeasuringPass, TestCut, engagement, fully_engaged
+from shapegcode.milling.cut_plan import (
+    Engagement,
+    MeasuringPass,
+    TestCut,
+    engagement,
+    fully_engaged,
+    straight_engagement,
+)
 from shapegcode.milling.cut_record import ForceRecord
-from shapegcode.milling.cut_shape import expected, straight_engagement
+from shapegcode.milling.cut_shape import expected
 
 __all__ = ["Measured", "TaperResult", "fit_taper"]
 
@@ -193,7 +200,11 @@ def _of_means(cut: TestCut, measuring: MeasuringPass, record: ForceRecord) -> _R
                 f"{record.file}: a radial depth of {depth[wrong[0]]:g} mm: must be above 0 and below the diameter, "
                 f"{cut.tool.diameter_mm:g} mm"
             )
-        met, x, force = straight_engagement(cut, depth), np.full(len(depth), np.nan), record.force_n
+        met, x, force = (
+            straight_engagement(cut.tool, depth, up=cut.milling == "up"),
+            np.full(len(depth), np.nan),
+            record.force_n,
+        )
         displaced = met
     else:
         if record.position_mm is None:
@@ -235,7 +246,9 @@ def _stretches(found: Revolutions) -> list[tuple[float, float]]:
 def _joined(rows: Sequence[_Rows]) -> MeanForces:
     sizes = [len(each.force_n) for each in rows]
     met, displaced = (
-        Engagement(*(np.concatenate(columns) for columns in zip(*(vars(each).values() for each in engaged), strict=True)))
+        Engagement(
+            *(np.concatenate(columns) for columns in zip(*(vars(each).values() for each in engaged), strict=True))
+        )
         for engaged in ([each.met for each in rows], [each.displaced for each in rows])
     )
     return MeanForces(
