@@ -96,3 +96,48 @@ def rows(columns: Mapping[str, Any]) -> str:
     """CSV text of columns."""
     table = np.column_stack(list(columns.values()))
     return ",".join(columns) + "\n" + "\n".join(",".join(f"{value:.7g}" for value in row) for row in table) + "\n"
+
+
+def local_mean_force(
+    begin: float, end: float, feed_per_tooth: float, flutes: int, axial_mm: float, law: Mapping[str, float]
+) -> Array:
+    """Mean force over a revolution with coefficients of the local chip, by Gauss-Legendre quadrature."""
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    # Equal steps of the square root of the distance to the thin end: the force has a fractional power there.
+    root = math.sqrt(end - begin) * 0.5 * (nodes + 1.0)
+    t = begin + root**2
+    weights = weights * 0.5 * math.sqrt(end - begin) * 2.0 * root
+    chip = feed_per_tooth * np.cos(t)
+    tangential = law["specific_n_per_mm2"] * chip ** (1.0 + law["specific_exponent"])
+    radial = tangential * law["ratio"] * chip ** law["ratio_exponent"]
+    x = float(weights @ (-tangential * np.sin(t) - radial * np.cos(t)))
+    y = float(weights @ (tangential * np.cos(t) - radial * np.sin(t)))
+    return flutes * axial_mm / (2.0 * math.pi) * np.array([x, y])
+
+
+def met_by_circle(edge: Callable[[Array], Array], x: Array, radius: float, length: float) -> tuple[Array, Array]:
+    """Azimuths at which the front of a tool is in material below an edge over 0 ... length, its wall at height 0.
+
+    By trying points of the front half, on stations between which is interpolated.
+    """
+    stations = np.arange(x.min() - 0.02, x.max() + 0.04, 0.02)
+    t = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 4001)
+    begin, end = np.zeros(len(stations)), np.zeros(len(stations))
+    for k, at in enumerate(stations):
+        px, py = at + radius * np.cos(t), radius + radius * np.sin(t)
+        inside = (px >= 0.0) & (px <= length) & (py <= edge(px))
+        if inside.any():
+            begin[k], end[k] = t[np.argmax(inside)], t[len(t) - 1 - np.argmax(inside[::-1])]
+    return np.interp(x, stations, begin), np.interp(x, stations, end)
+
+
+def lagging_way(blocks: list[tuple[float, float]], start: float, lag_s: float, step_s: float = 2e-4) -> Array:
+    """Way over time at the feeds of blocks (end, mm/min), followed with a first-order lag: rows of time and X."""
+    x, speed, time, rows = start, blocks[0][1] / 60.0, 0.0, [(0.0, start)]
+    for end, feed in blocks:
+        while x < end:
+            speed += (feed / 60.0 - speed) * (step_s / lag_s if lag_s > step_s else 1.0)
+            x += speed * step_s
+            time += step_s
+            rows.append((time, x))
+    return np.array(rows)

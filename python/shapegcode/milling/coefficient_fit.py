@@ -30,9 +30,11 @@ LEAST_FEED_RATIO = 1.3
 _ROUNDS = 6
 _HUBER = 2.5
 _OUTLIER = 4.0
+_MEDIAN = 0.4549
 _LARGEST_SHARE_OUT = 0.25
 _STEP = 1e-5
-_DONE = 1e-9
+_DONE = 1e-7
+_SETTLED = 1e-4
 _MOST_STEPS = 40
 _LARGEST_CORRELATION = 0.95
 
@@ -195,7 +197,7 @@ def fit_coefficients(
         noise = _noise(left, model.forces(parameters), data, robust)
         scaled = np.abs(left) / noise
         robust = np.minimum(1.0, _HUBER / np.maximum(scaled, 1e-12))
-        if np.max(np.abs(parameters - before)) < 1e-7:
+        if np.all(np.abs(parameters - before) < _SETTLED * np.maximum(np.abs(parameters), 1.0)):
             break
     outlier = np.any(np.abs(left) > _OUTLIER * noise, axis=1)
     if outlier.mean() > _LARGEST_SHARE_OUT:
@@ -333,6 +335,8 @@ def _noise(left: Array, predicted: Array, data: MeanForces, robust: Array) -> Ar
             constant, share = _not_negative(columns * weight[:, None], observed * weight)
             level = constant + share * square
             level = np.maximum(level, 1e-4 * float(level.max()) + 1e-300)
+        # The median is not moved by outliers; of squares of a normal variable it is _MEDIAN of the mean.
+        level *= float(np.median(left[:, k] ** 2 * many / level)) / _MEDIAN
         found[:, k] = np.sqrt(level / many)
     return found
 
@@ -404,5 +408,6 @@ def _with_intervals(
         value = float(direction @ parameters)
         half = quantile * math.sqrt(max(float(direction @ covariance @ direction), 0.0))
         ends = (value, value - half, value + half)
-        found.append(Coefficient(name, *(math.exp(each) if factor else each for each in ends), unit))
+        best, low, high = (math.exp(each) for each in ends) if factor else ends
+        found.append(Coefficient(name, best, low, high, unit))
     return tuple(found)

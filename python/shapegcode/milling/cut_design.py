@@ -173,7 +173,7 @@ def taper_cut(given: Conditions, feeds: Sequence[float], depths_mm: tuple[float,
     low, high = depths_mm
     if not 0.0 < low < high <= _LARGEST_SHARE * radius:
         raise ArgumentError(
-            f"radial depths from {low:g} to {high:g} mm: must ascend, above 0 and at most {_LARGEST_SHARE * radius:g} mm"
+            f"radial depths from {low:g} to {high:g} mm: must ascend, above 0, at most {_LARGEST_SHARE * radius:g} mm"
         )
     if high - low > 0.2 * length_mm:
         raise ArgumentError(

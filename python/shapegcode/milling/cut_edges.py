@@ -6,6 +6,7 @@ away from every point that must stay.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,8 +49,8 @@ class Edge:
 def unrolled_edge(s_mm: Array, radial_depth_mm: Array, radius_mm: float, stock_mm: float, at_mm: float) -> Edge:
     """The edge on which a straight pass meets the radial depth of another path at each distance.
 
-    Where the axis stands at X, the front of the tool comes out of the edge at X + sqrt(R² - (R - depth)²), as high above
-    the wall as the depth: these points are the edge.
+    Where the axis stands at X, the front of the tool comes out of the edge at X + sqrt(R² - (R - depth)²), as high
+    above the wall as the depth: these points are the edge.
 
     Args:
         s_mm: (n,) ascending distances along the other path.
@@ -100,7 +101,7 @@ def _envelope(line: Edge, radius: float, start: float, end: float, side: float) 
     if len(line.x_mm) == 2:
         slope = float(np.diff(line.height_mm)[0] / np.diff(line.x_mm)[0])
         x = np.array([start, end])
-        return Edge(x, line.at(x) + side * radius * np.sqrt(1.0 + slope * slope))
+        return Edge(x, line.at(x) + side * radius * math.sqrt(1.0 + slope * slope))
     count = int(np.ceil((end - start) / _GRID_MM)) + 1
     reach = int(np.ceil(radius / _GRID_MM))
     x = start + _GRID_MM * np.arange(-reach, count + reach)

@@ -28,6 +28,8 @@ _CLEAR_LINE = 8.0  # times the median of the spectrum around it
 _FEWEST_FOR_SPEED = 20.0
 _LARGEST_SHIFT_MM = 1.0
 _SHIFT_STEPS = 81
+#: The cut may last so much longer or shorter: at another feed override; where the place or the feeds are stated.
+_OTHER_FEED, _OTHER_LENGTH = 0.6, 0.15
 _CHATTER, _CHATTER_LEAST = 6.0, 0.01  # times the median deviation; the least that counts as one, of the median
 
 
@@ -134,7 +136,7 @@ def spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: int
     best: tuple[float, float] | None = None
     for order in (flutes, 1, 2 * flutes, 2):
         centre = order * commanded / _PER_MINUTE
-        low, high = (int(round(centre * side / step)) for side in (1.0 - _SPEED_RANGE, 1.0 + _SPEED_RANGE))
+        low, high = (round(centre * side / step) for side in (1.0 - _SPEED_RANGE, 1.0 + _SPEED_RANGE))
         if high + 1 >= len(power) or high - low < 8:
             continue
         part = power[low : high + 1]
@@ -265,7 +267,7 @@ def _placed(
         moved = _way_of_blocks(measuring, time - time[contact[0]], wanted[0])
     scale = (wanted[1] - wanted[0]) / (moved[contact[1]] - moved[contact[0]])
     free = record.position_mm is None and measuring.constant_feed
-    if abs(scale - 1.0) > (0.6 if free else 0.05):
+    if abs(scale - 1.0) > (_OTHER_FEED if free else _OTHER_LENGTH):
         raise ArgumentError(
             f"{record.file}: the cut is {moved[contact[1]] - moved[contact[0]]:.2f} mm long, it should be "
             f"{wanted[1] - wanted[0]:.2f} mm: is it the right pass, and was the feed override 100 %?"

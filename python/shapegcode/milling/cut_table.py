@@ -84,14 +84,14 @@ def result_table(result: Result) -> Table:
     table = _table(
         "how the feed is followed", "interval mm", "largest deviation", "at X mm", "noise", "lag ms", "follows"
     )
-    for each in result.passes:
+    for row in result.passes:
         table.add_row(
-            f"{each.interval_mm:g}",
-            f"{100 * each.deviation:.0f} %",
-            f"{each.at_mm:.2f}",
-            f"{100 * each.noise:.1f} %",
-            f"{1e3 * each.lag_s:.0f}",
-            "yes" if each.follows else "no",
+            f"{row.interval_mm:g}",
+            f"{100 * row.deviation:.0f} %",
+            f"{row.at_mm:.2f}",
+            f"{100 * row.noise:.1f} %",
+            f"{1e3 * row.lag_s:.0f}",
+            "yes" if row.follows else "no",
         )
     return table
 

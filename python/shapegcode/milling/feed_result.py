@@ -265,7 +265,8 @@ def _followed(cut: TestCut, each: Measured, interval: float) -> FollowedPass:
 
 def _speeds(measuring: MeasuringPass, time_s: Array, lag: float) -> Array:
     """Feed over time, from 0 at the first change, that follows each block's F with a first-order lag, mm/min."""
-    begins, starts, commands = [0.0], [measuring.feeds[0][1]], []
+    begins, starts = [0.0], [measuring.feeds[0][1]]
+    commands: list[float] = []
     length = np.diff([end for end, _ in measuring.feeds])
     for way, (_, feed) in zip(length, measuring.feeds[1:], strict=True):
         speed, command = starts[-1] / _PER_MINUTE, feed / _PER_MINUTE
@@ -276,9 +277,9 @@ def _speeds(measuring: MeasuringPass, time_s: Array, lag: float) -> Array:
         starts.append((command + (speed - command) * left) * _PER_MINUTE)
     block = np.clip(np.searchsorted(begins, time_s, side="right") - 1, 0, len(commands) - 1)
     into = time_s - np.array(begins)[block]
-    command, start = np.array(commands)[block], np.array(starts)[block]
-    share = np.exp(-into / lag) if lag > 0.0 else np.zeros(len(into))
-    return np.where(time_s < 0.0, measuring.feeds[0][1], command + (start - command) * share)
+    wanted, begun = np.array(commands)[block], np.array(starts)[block]
+    share = np.exp(-np.maximum(into, 0.0) / lag) if lag > 0.0 else np.zeros(len(into))
+    return np.where(time_s < 0.0, measuring.feeds[0][1], wanted + (begun - wanted) * share)
 
 
 def _block_time(way: float, speed: float, command: float, lag: float) -> float:
