@@ -98,7 +98,7 @@ def test_intervals_hold_the_truth_in_most_draws() -> None:
 
 @pytest.mark.slow
 def test_intervals_hold_the_truth_in_95_of_100_draws() -> None:
-    inside = share_of_intervals_with_the_truth(400, 3)
+    inside = share_of_intervals_with_the_truth(250, 3)
     assert np.all(inside > 0.91), inside
     assert np.all(inside < 0.985), inside
 
