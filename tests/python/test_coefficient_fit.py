@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-import cut_reference as reference
 import numpy as np
 import numpy.typing as npt
 import pytest
 
+import cut_reference as reference
 from shapegcode._core import ArgumentError
 from shapegcode.milling.coefficient_fit import CoefficientFit, MeanForces, fit_coefficients
 from shapegcode.milling.cut_force import COEFFICIENTS, ForceLaw, mean_chip_mm
@@ -166,7 +166,7 @@ def test_forces_of_the_wrong_sign_are_refused(turn: object) -> None:
 def test_neighbours_that_share_their_error_widen_the_intervals() -> None:
     rng = np.random.default_rng(7)
     plain = drawn(rng, np.linspace(0.4, 2.8, 100), (108.0, 432.0), 0.0)
-    wave = np.convolve(rng.standard_normal((len(plain.force_n) + 9)), np.ones(10) / math.sqrt(10.0), "valid")
+    wave = np.convolve(rng.standard_normal(len(plain.force_n) + 9), np.ones(10) / math.sqrt(10.0), "valid")
     white = rng.standard_normal(len(plain.force_n))
     widths = []
     for error in (white, wave):

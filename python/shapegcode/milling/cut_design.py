@@ -210,13 +210,13 @@ def _blocks(x_mm: Array, feed: Array, interval_mm: float, begin: float, end: flo
     return blocks
 
 
-def _corner_depth(given: Conditions, corner: Corner, straight_mm: float) -> tuple[Array, Array]:
-    """Distance along the corner's path, 0 where the radial depth begins to change, and the depth until it is constant.
+def _corner_depth(given: Conditions, corner: Corner) -> tuple[Array, Array]:
+    """Distance along the corner's path from the beginning of S2 on, and the radial depth until it is constant again.
 
     Raises:
         ArgumentError: not a corner, or none that changes the radial depth.
     """
-    before = straight_mm + 2.0 * (corner.rough_radius_mm + corner.finish_radius_mm)
+    before = 2.0 * (corner.rough_radius_mm + corner.finish_radius_mm)
     cut = _core.CornerCut(
         given.tool.radius_mm,
         corner.rough_radius_mm,
@@ -225,13 +225,17 @@ def _corner_depth(given: Conditions, corner: Corner, straight_mm: float) -> tupl
         before_mm=before,
         after_mm=before,
     )
-    track = cut.track(given.axial_depth_mm, _STATION_MM)
-    s, depth = np.array(track.s_mm), np.array(track.radial_depth_mm)
+    low, high = 0.0, before
+    while high - low > _SAME_MM:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if cut.at(middle).section == _core.CornerSection.s1 else (low, middle)
+    s = np.arange(0.0, cut.length_mm - low, _STATION_MM)
+    depth = np.array([cut.at(low + each).radial_depth_mm for each in s])
     off = np.flatnonzero(np.abs(depth - depth[0]) > _SAME_MM)
     if off.size == 0:
         raise ArgumentError("the radial depth of this corner does not change: nothing to unroll")
-    first, last = max(int(off[0]) - 1, 0), min(int(off[-1]) + 1, len(s) - 1)
-    return s[first : last + 1] - s[first], depth[first : last + 1]
+    last = min(int(off[-1]) + 2, len(s))
+    return s[:last], depth[:last]
 
 
 def corner_feed_sequence(given: Conditions, corner: Corner, interval_mm: float) -> list[float]:
@@ -240,7 +244,7 @@ def corner_feed_sequence(given: Conditions, corner: Corner, interval_mm: float) 
     Raises:
         ArgumentError: as for :func:`corner_cut`.
     """
-    s, depth = _corner_depth(given, corner, 0.0)
+    s, depth = _corner_depth(given, corner)
     return [feed for _, feed in _blocks(s, corner_feeds(given, depth), interval_mm, 0.0, float(s[-1]))]
 
 
@@ -258,7 +262,7 @@ def corner_cut(given: Conditions, corner: Corner, interval_mm: float) -> Design:
     given.check([given.feed_mm_per_min])
     radius = given.tool.radius_mm
     straight = max(10.0, 3.0 * radius)
-    s, depth = _corner_depth(given, corner, straight)
+    s, depth = _corner_depth(given, corner)
     stock = math.ceil(2.0 * straight + float(s[-1]) + radius)
     wanted_edge = unrolled_edge(s, depth, radius, stock, straight)
     # What the round tool leaves is the edge that the passes meet: where the wanted one is hollow more sharply than

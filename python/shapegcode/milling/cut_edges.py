@@ -14,12 +14,13 @@ import numpy.typing as npt
 
 from shapegcode._core import ArgumentError
 
-__all__ = ["Edge", "left_edge", "reduced", "tool_path", "unrolled_edge"]
+__all__ = ["Edge", "left_edge", "on_increments", "reduced", "tool_path", "unrolled_edge"]
 
 Array = npt.NDArray[np.float64]
 
 _GRID_MM = 0.01
-_CHORD_MM = 2e-4
+_CHORD_MM = 1e-4
+_MOVED = 9  # increments
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,7 @@ def unrolled_edge(s_mm: Array, radial_depth_mm: Array, radius_mm: float, stock_m
 
 
 def tool_path(edge: Edge, radius_mm: float, start_mm: float, end_mm: float) -> Edge:
-    """The line of the tool's axis that mills an edge without cutting into it, within 0.2 µm of what is possible.
+    """The line of the tool's axis that mills an edge without cutting into it, within 0.1 µm of what is possible.
 
     Args:
         edge: what must stay lies below it.
@@ -113,6 +114,28 @@ def _envelope(line: Edge, radius: float, start: float, end: float, side: float) 
             part = heights[reach + offset : reach + offset + count]
             np.maximum(best, part + np.sqrt(radius * radius - away * away), out=best)
     return Edge(x[reach : reach + count], side * best)
+
+
+def on_increments(line: Edge, step_mm: float) -> Edge:
+    """The points of a line moved along it, by a few increments, to where both coordinates are increments, or nearly.
+
+    Args:
+        line: its inner points may move; those at its ends are rounded.
+        step_mm: the least increment.
+    """
+    tried = step_mm * (np.round(line.x_mm / step_mm)[:, None] + np.arange(-_MOVED, _MOVED + 1))
+    tried[[0, -1]] = step_mm * np.round(line.x_mm[[0, -1]] / step_mm)[:, None]
+    # Neighbours stay apart.
+    gaps = 0.4 * np.diff(line.x_mm)
+    low = np.concatenate([[-np.inf], line.x_mm[1:] - gaps])
+    high = np.concatenate([line.x_mm[:-1] + gaps, [np.inf]])
+    heights = np.stack([line.at(column) for column in tried.T], axis=1)
+    off = np.abs(heights - step_mm * np.round(heights / step_mm))
+    off[(tried < low[:, None]) | (tried > high[:, None])] = np.inf
+    off[[0, -1], _MOVED] = 0.0
+    best = np.argmin(off, axis=1)
+    rows = np.arange(len(best))
+    return Edge(tried[rows, best], step_mm * np.round(heights[rows, best] / step_mm))
 
 
 def reduced(line: Edge, chord_mm: float = _CHORD_MM) -> Edge:

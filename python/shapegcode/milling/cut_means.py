@@ -30,7 +30,8 @@ _LARGEST_SHIFT_MM = 1.0
 _SHIFT_STEPS = 81
 #: The cut may last so much longer or shorter: at another feed override; where the place or the feeds are stated.
 _OTHER_FEED, _OTHER_LENGTH = 0.6, 0.15
-_CHATTER, _CHATTER_LEAST = 6.0, 0.01  # times the median deviation; the least that counts as one, of the median
+_CHATTER, _CHATTER_LEAST = 8.0, 0.02  # times the median deviation; the least that counts as one, of the median
+_CHATTER_ROUNDS = 12
 
 
 @dataclass(frozen=True)
@@ -163,7 +164,7 @@ def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, shape: S
         ArgumentError: too few samples per revolution, no air before or after the cut, no cut, or a cut whose length
             does not fit the description.
     """
-    time, moved = _clock(record, measuring)
+    time, moved = _clock(record, measuring, cut.kind)
     period = float(time[-1] - time[0]) / (len(time) - 1)
     turn = _PER_MINUTE / cut.spindle_rev_per_min
     if turn / period < FEWEST_SAMPLES:
@@ -188,7 +189,7 @@ def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, shape: S
     )
 
 
-def _clock(record: ForceRecord, measuring: MeasuringPass) -> tuple[Array, Array]:
+def _clock(record: ForceRecord, measuring: MeasuringPass, kind: str) -> tuple[Array, Array]:
     """Time of each sample, and the way gone since the first one at the commanded feeds (or as measured)."""
     if record.position_mm is not None:
         x = record.position_mm
@@ -196,7 +197,10 @@ def _clock(record: ForceRecord, measuring: MeasuringPass) -> tuple[Array, Array]
             return record.time_s, x - x[0]
         pace = _PER_MINUTE / measuring.commanded_feed(0.5 * (x[1:] + x[:-1]))
         return np.concatenate([[0.0], np.cumsum(np.diff(x) * pace)]), x - x[0]
-    assert record.time_s is not None
+    if record.time_s is None:
+        raise ArgumentError(
+            f"{record.file}: a table of means: a {kind} needs sampled records with time_s or position_mm"
+        )
     time = record.time_s
     return time, (time - time[0]) * measuring.feed_mm_per_min / _PER_MINUTE
 
@@ -354,18 +358,15 @@ def revolutions(record: PlacedRecord) -> Revolutions:
 
 def _swings(x: Array, uneven: Array, resultant: Array) -> npt.NDArray[np.bool_]:
     """Where the force within a revolution swings more, for its mean, than in the rest of the pass."""
-    found = np.zeros(len(uneven), dtype=bool)
     if len(uneven) < _FEWEST_FOR_SPEED:
-        return found
+        return np.zeros(len(uneven), dtype=bool)
     share = uneven / np.maximum(resultant, 1e-300)
     place = (x - x.mean()) / max(float(np.ptp(x)), 1e-300)
-    for _ in range(6):
-        kept = ~found
-        usual = np.polyval(np.polyfit(place[kept], share[kept], 2), place)
-        off = share - usual
-        spread = 1.4826 * float(np.median(np.abs(off[kept]))) + _CHATTER_LEAST * float(np.median(share))
-        now = off > _CHATTER * spread
-        if now.sum() > 0.4 * len(now) or np.array_equal(now, found):
-            break
-        found = now
-    return found
+    floor = _CHATTER_LEAST * float(np.median(share))
+    weight = np.ones(len(share))
+    for _ in range(_CHATTER_ROUNDS):
+        # Least absolute deviations: what stands out does not bend the curve of the rest.
+        off = share - np.polyval(np.polyfit(place, share, 2, w=np.sqrt(weight)), place)
+        weight = 1.0 / np.maximum(np.abs(off), floor)
+    spread = 1.4826 * float(np.median(np.abs(off))) + floor
+    return np.asarray(off > _CHATTER * spread)

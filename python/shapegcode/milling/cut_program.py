@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shapegcode.milling.cut_design import Design
-from shapegcode.milling.cut_edges import Edge, tool_path
+from shapegcode.milling.cut_edges import Edge, on_increments, tool_path
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -130,6 +130,7 @@ class _Writer:
     def _edge(self, each: MeasuringPass, edge: Edge, wall: float, offset: float) -> Iterator[str]:
         """One cut along the edge, farther out by an offset."""
         path = tool_path(edge, self.radius, each.start_mm, each.end_mm)
+        path = on_increments(path, self.machine.controller.least_increment_mm)
         y = wall - path.height_mm - offset
         feed = min(feed for _, feed in each.feeds)
         shortest = float(np.min(np.hypot(np.diff(path.x_mm), np.diff(y))))
@@ -150,7 +151,7 @@ def _offsets(edge: Edge, before: float, wall: float, stock: float, diameter: flo
     if most <= _SKIM_MM:
         return [0.0]
     rough = math.ceil((most - _SKIM_MM) / (_ROUGH_SHARE * diameter))
-    return [_SKIM_MM + (most - _SKIM_MM) * k / rough for k in range(rough - 1, -1, -1)] + [0.0]
+    return [round(_SKIM_MM + (most - _SKIM_MM) * k / rough, 3) for k in range(rough - 1, -1, -1)] + [0.0]
 
 
 def _plain(name: str) -> str:

@@ -22,7 +22,7 @@ __all__ = ["CornerResult", "FollowedPass", "IntervalResult", "corner_result", "i
 Array = npt.NDArray[np.float64]
 
 _RATIO_LIMIT = 0.10
-_DEVIATION_LIMIT = 0.10
+_DEVIATION_LIMIT = 0.05
 _NOISE_SHARE = 2.0
 _PER_MINUTE = 60.0
 _LAGS_S = np.concatenate([[0.0], np.geomspace(2e-3, 0.5, 49)])
@@ -126,7 +126,7 @@ class FollowedPass:
         at_mm: X of the end of that block.
         noise: standard deviation of such a mean where the feed does not change, as a share of it.
         lag_s: time constant with which the feed follows best.
-        follows: whether the deviation is below 10 % and twice the noise.
+        follows: whether the deviation is below 5 % and twice the noise.
         time_s: (m,) of the record.
         force_n: (m,) mean over a revolution, scaled.
         immediate_n: (m,) expected if the feed follows at once.
