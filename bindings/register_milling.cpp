@@ -37,8 +37,9 @@ std::span<const double> feeds_from(const VectorArray& feeds) {
 }
 
 py::dict columns(const Eigen::MatrixXd& table) {
-  static constexpr const char* names[] = {"mean_x_n",       "mean_y_n",       "mean_resultant_n", "peak_resultant_n",
-                                          "peak_torque_nm", "mean_torque_nm", "mean_power_w",     "peak_chip_mm"};
+  static constexpr const char* names[] = {"mean_x_n",         "mean_y_n",       "mean_resultant_n",
+                                          "peak_resultant_n", "peak_torque_nm", "mean_torque_nm",
+                                          "mean_power_w",     "peak_chip_mm",   "peak_deflection_um"};
   static_assert(std::size(names) == force_columns);
   py::dict out;
   for (int k = 0; k < force_columns; ++k) {
@@ -192,21 +193,22 @@ Raises:
           "where that force is 0.")
       .def(
           "figures_of",
-          [](MillingForce& self, const EngagementTrack& track, const VectorArray& feed_mm_per_min) {
+          [](MillingForce& self, const EngagementTrack& track, const VectorArray& feed_mm_per_min,
+             const std::optional<ToolBeam>& beam) {
             const auto feeds = feeds_from(feed_mm_per_min);
             Eigen::MatrixXd table;
             {
               const py::gil_scoped_release release;
-              table = figures_of(self, track, feeds);
+              table = figures_of(self, track, feeds, beam ? &*beam : nullptr);
             }
             return columns(table);
           },
-          py::arg("track"), py::arg("feed_mm_per_min"),
+          py::arg("track"), py::arg("feed_mm_per_min"), py::arg("beam") = py::none(),
           R"(Figures of a whole track, a feed along the path for each sample.
 
 Returns:
     Arrays (n_samples,) by name: mean_x_n, mean_y_n (frame of the tool), mean_resultant_n, peak_resultant_n,
-    peak_torque_nm, mean_torque_nm, mean_power_w, peak_chip_mm.
+    peak_torque_nm, mean_torque_nm, mean_power_w, peak_chip_mm, peak_deflection_um (of the tip; 0 without a beam).
 
 Raises:
     ArgumentError: Another number of feeds, or as the class.)");

@@ -21,6 +21,8 @@ _LOWERING = 3  # attempts that only slow down earlier, before feeds are lowered 
 _TOO_FAST = 1e-6  # relative
 _DEEPER_PLUNGE = 0.01  # of the tool's end in material: a ramp cuts with its end
 _AIR_MM2 = 1e-9
+_STEEPEST_AIR = 0.7  # share of the travel in XY from which on a move in air is no plunge
+_STEP = 0.005  # feeds that differ by less are one: a border for less gains nothing
 _LIMIT_NAMES = np.array(
     [name for _, name in sorted((limit.value, name) for name, limit in _core.FeedLimit.__members__.items())],
     dtype="<U16",
@@ -108,7 +110,7 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Motion, divi
     teeth_per_min = tool.tool.flutes * surveyed.spindle_rev_per_min
     path = region.path
     segment = np.asarray(track.segment)
-    programmed = np.array([path[i].feed_mm_per_s * 60.0 for i in range(len(path))])
+    programmed = path.segment_feeds_mm_per_s * 60.0
     lowest = max((tool.limits.feed_per_tooth_min_mm or 0.0) * teeth_per_min, machine.controller.minimum_feed_mm_per_min)
     kept = _kept_segments(surveyed, programmed, lowest, tool)
     limit, holds = _limits_along(surveyed, programmed[segment], lowest, machine, margin)
@@ -167,9 +169,17 @@ def _limits_along(
     before = np.where(same & (feeds[:-1] < feeds[1:]), np.arange(len(feeds) - 1), np.arange(1, len(feeds)))
     feeds[1:], holds[1:] = feeds[before], holds[before]
     if tool.feed.air_feed_mm_per_min is not None:
-        clear = air & ~_near_material(np.asarray(track.s_mm), air, tool.feed.approach_mm)
+        level = np.asarray(track.horizontal) > _STEEPEST_AIR  # nobody wants a tool to come down faster than he said
+        clear = air & level & ~_near_material(np.asarray(track.s_mm), air, tool.feed.approach_mm)
         feeds[clear] = np.maximum(programmed[clear], min(tool.feed.air_feed_mm_per_min, fastest))
     return feeds, holds
+
+
+def _stepped(limit: Vector, programmed: Vector) -> Vector:
+    """Feeds rounded down to steps of half a percent below the programmed one, or the largest if that is more."""
+    steps = np.ceil(np.log(programmed / limit) / math.log1p(_STEP) - 1e-9)
+    down: Vector = programmed * (1.0 + _STEP) ** -steps
+    return down
 
 
 def _near_material(s_mm: Vector, air: npt.NDArray[np.bool_], approach_mm: float) -> npt.NDArray[np.bool_]:
@@ -195,17 +205,15 @@ def _stretches_that_keep(
 ) -> list[_core.FeedStretch]:
     """Plan, travel, and slow down earlier or more where the travel is still too fast."""
     control = machine.feed_control
-    ends = np.cumsum([path[i].length_mm for i in range(len(path))])
-    ends[-1] = path.length_mm
     kept = np.where(frozen, programmed, 0.0)
-    planned = limit.copy()
+    planned = _stepped(limit, programmed[segment])
     reach = np.full(len(stations), motion.reach_s + window_s)
     free = ~frozen[segment]
     stretches: list[_core.FeedStretch] = []
     for attempt in range(_ATTEMPTS):
         feeds = _core.look_ahead_on_load(stations, planned, reach)
         stretches = _core.schedule_feed(
-            ends, kept, divisible, stations, feeds, control.interval_mm,
+            path.segment_ends_mm, kept, divisible, stations, feeds, control.interval_mm,
             np.inf if control.max_change_mm_per_min is None else control.max_change_mm_per_min, feed_unit,
         )  # fmt: skip
         travelled = motion.travel(_core.with_feeds(path, stretches), stations, window_s)

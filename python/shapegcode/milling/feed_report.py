@@ -11,11 +11,11 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.milling.feed_plan import KEPT, FeedPlan, limits_of, milling_force, tool_beam
+from shapegcode.milling.feed_plan import KEPT, MINIMUM, FeedPlan, limits_of, milling_force, tool_beam
 from shapegcode.milling.survey import Survey, SurveyedRegion
 from shapegcode.milling.travel import Motion, Travelled, Vector
 
-__all__ = ["Load", "RegionLoad", "feed_report", "region_load", "scaled_stations"]
+__all__ = ["Load", "RegionLoad", "feed_report", "load_of", "region_load", "scaled_stations"]
 
 _SLACK = 1e-3  # of a limit: what its own search and the rounding of a figure may be off by
 _AIR_N = 1e-9
@@ -77,25 +77,24 @@ def region_load(
         return None
     stations = np.asarray(part.track.s_mm)
     window_s = 60.0 / (part.tool.tool.flutes * part.spindle_rev_per_min)
-    force = milling_force(part.tool, part)
-    original = before.travel(part.region.path, stations, window_s)
-    was = _load(part, force, original)
+    was = load_of(part, before.travel(part.region.path, stations, window_s))
     if plan is None and before is after:
         return RegionLoad(stations, was, was)
     travelled = after.travel(written, scaled_stations(stations, written), window_s)
-    return RegionLoad(stations, was, _load(part, force, travelled))
+    return RegionLoad(stations, was, load_of(part, travelled))
 
 
 def scaled_stations(stations_mm: Vector, path: _core.Path) -> Vector:
     """The stations on the same path as read back, whose blocks end on the least increment."""
-    scaled = stations_mm * (path.length_mm / stations_mm[-1])
+    scaled: Vector = stations_mm * (path.length_mm / stations_mm[-1])
     scaled[-1] = path.length_mm
     return scaled
 
 
-def _load(part: SurveyedRegion, force: _core.MillingForce, travelled: Travelled) -> Load:
+def load_of(part: SurveyedRegion, travelled: Travelled) -> Load:
+    """Load along a region that is travelled so."""
     assert part.tool is not None and part.track is not None
-    figures = force.figures_of(part.track, travelled.feed_mm_per_min, tool_beam(part.tool))
+    figures = milling_force(part.tool, part).figures_of(part.track, travelled.feed_mm_per_min, tool_beam(part.tool))
     return Load(
         travelled.feed_mm_per_min,
         travelled.time_s,
@@ -113,9 +112,18 @@ def feed_report(
     """The report of a schedule (see docs/feed.md), without its times and blocks."""
     program = surveyed.program
     warnings = [*program.warnings, *surveyed.warnings]
+    for tool in {id(part.tool): part.tool for part in surveyed.regions if part.tool is not None}.values():
+        limits = limits_of(tool, machine, 0.0)
+        if not any(np.isfinite(getattr(limits, name)) for _, name, *_ in _LIMITED):
+            warnings.append(
+                f"tool {tool.tool.name}: no limit of force, deflection, torque or power is set, so nothing slows "
+                "its feed: set one of [limits] in its file; the column before shows what it takes now"
+            )
     regions: list[dict[str, Any]] = []
+    excess = 0.0
     for part, plan, load in zip(surveyed.regions, plans, loads, strict=True):
-        misses = _misses(part, plan, load, machine)
+        misses, beyond = _misses(part, plan, load, machine)
+        excess = max(excess, beyond)
         place = f"{program.place(part.region.first_line)}: {program.lines(part.region)}"
         if part.kept:
             warnings.append(f"{place} keep their feeds: {part.kept}")
@@ -152,6 +160,7 @@ def feed_report(
         },
         "limits": limits,
         "regions": regions,
+        "excess_ratio": excess,
         "within_limits": not any(region["misses"] for region in regions),
         "warnings": warnings,
     }
@@ -206,34 +215,41 @@ def _feeds(surveyed: Survey, plans: Sequence[FeedPlan | None]) -> dict[str, floa
     feeds: list[float] = []
     for part, plan in zip(surveyed.regions, plans, strict=True):
         if plan is None:
-            path = part.region.path
-            feeds += [path[i].feed_mm_per_s * 60.0 for i in range(len(path))]
+            feeds += (part.region.path.segment_feeds_mm_per_s * 60.0).tolist()
         else:
             feeds += [stretch.feed_mm_per_min for stretch in plan.stretches]
     return {"min": min(feeds), "max": max(feeds)} if feeds else {"min": 0.0, "max": 0.0}
 
 
-def _misses(part: SurveyedRegion, plan: FeedPlan | None, load: RegionLoad | None, machine: Machine) -> list[str]:
-    """Limits that the region does not keep behind the schedule, in words."""
-    if load is None or part.tool is None:
-        return []
+def _misses(
+    part: SurveyedRegion, plan: FeedPlan | None, load: RegionLoad | None, machine: Machine
+) -> tuple[list[str], float]:
+    """Limits that the region does not keep behind the schedule, in words, and the largest share that is too much.
+
+    The share counts where a lower feed could help: not where feeds stay, or are the least already.
+    """
+    if load is None or part.tool is None or part.track is None:
+        return [], 0.0
     limits = limits_of(part.tool, machine, 0.0)
-    misses = []
+    helped = np.zeros(len(load.s_mm), dtype=bool) if plan is None else ~np.isin(plan.holds, (KEPT, MINIMUM))
+    misses, excess = [], 0.0
     for column, name, words, unit in _LIMITED:
         limit = getattr(limits, name)
-        largest = float(getattr(load.after, column).max(initial=0.0))
-        if np.isfinite(limit) and largest > limit * (1.0 + _SLACK):
-            misses.append(f"{words} {largest:.4g} {unit}, limit {limit:.4g} {unit}")
-    return misses
+        values = getattr(load.after, column)
+        if not np.isfinite(limit) or not (values > limit * (1.0 + _SLACK)).any():
+            continue
+        misses.append(f"{words} {float(values.max()):.4g} {unit}, limit {limit:.4g} {unit}")
+        excess = max(excess, float(values[helped].max(initial=0.0)) / limit - 1.0)
+    return misses, excess
 
 
 def _kept_blocks(place: Any, part: SurveyedRegion, plan: FeedPlan) -> Iterator[str]:
     """One sentence per run of blocks that are left alone for one reason."""
-    path = part.region.path
-    for reason, run in groupby(range(len(path)), key=lambda i: plan.kept[i]):
+    lines = part.region.path.segment_lines
+    for reason, run in groupby(range(len(lines)), key=lambda i: plan.kept[i]):
         indices = list(run)
         if reason:
-            first, last = path[indices[0]].line, path[indices[-1]].line
+            first, last = int(lines[indices[0]]), int(lines[indices[-1]])
             where = "" if first == last else f" to line {last}"
             yield f"{place(first)}{where}: left as it was: {reason}"
 
@@ -242,7 +258,7 @@ def _limits(part: SurveyedRegion, plan: FeedPlan | None) -> Iterator[dict[str, A
     """Ranges of lines, each with its feeds and what holds them."""
     path = part.region.path
     if plan is None:
-        feeds = [path[i].feed_mm_per_s * 60.0 for i in range(len(path))]
+        feeds = (path.segment_feeds_mm_per_s * 60.0).tolist()
         yield _range(part.region.first_line, part.region.last_line, feeds, KEPT, part.kept)
         return
     track = part.track
@@ -256,10 +272,11 @@ def _limits(part: SurveyedRegion, plan: FeedPlan | None) -> Iterator[dict[str, A
         tightest = int(np.argmin(plan.limit_mm_per_min[inside])) if ends[i] > starts[i] else 0
         holds.append(str(plan.holds[inside][tightest]) if ends[i] > starts[i] else KEPT)
     written = _feeds_of_segments(plan, path)
+    lines = path.segment_lines
     for (hold, reason), run in groupby(range(len(path)), key=lambda i: (holds[i], plan.kept[i])):
         indices = list(run)
         feeds = [feed for i in indices for feed in written[i]]
-        yield _range(path[indices[0]].line, path[indices[-1]].line, feeds, hold, reason)
+        yield _range(int(lines[indices[0]]), int(lines[indices[-1]]), feeds, hold, reason)
 
 
 def _range(first: int, last: int, feeds: list[float], hold: str, reason: str) -> dict[str, Any]:
@@ -275,7 +292,7 @@ def _feeds_of_segments(plan: FeedPlan, path: _core.Path) -> list[list[float]]:
     """The feeds that stand in each segment."""
     ends = np.array([stretch.end_mm for stretch in plan.stretches])
     feeds = [stretch.feed_mm_per_min for stretch in plan.stretches]
-    borders = np.concatenate(([0.0], np.cumsum([path[i].length_mm for i in range(len(path))])))
+    borders = np.concatenate(([0.0], path.segment_ends_mm))
     first = np.searchsorted(ends, borders[:-1] + 1e-6, side="right")
     last = np.searchsorted(ends, borders[1:] - 1e-6)
     most = len(feeds) - 1

@@ -73,7 +73,9 @@ def _limit_table(report: Mapping[str, Any]) -> Table:
         feed = entry["feed_mm_per_min"]
         feeds = f"{feed['min']:g}" if feed["min"] == feed["max"] else f"{feed['min']:g} to {feed['max']:g}"
         table.add_row(
-            f"{first}" if first == last else f"{first} to {last}", feeds, _LIMIT_WORDS.get(entry["limit"], entry["limit"])
+            f"{first}" if first == last else f"{first} to {last}",
+            feeds,
+            _LIMIT_WORDS.get(entry["limit"], entry["limit"]),
         )
     return table
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +22,13 @@ from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.timing import cycle_time
 from shapegcode.verify import RoundTripError
 
-__all__ = ["MARGIN", "FeedSchedule", "schedule"]
+__all__ = ["MARGIN", "FeedSchedule", "schedule", "schedule_survey"]
 
 MARGIN = 0.015
 """Share of each limit that a schedule leaves free: for what model and position of the load are off by."""
 
-_SHARES = {"sweeping": (0.0, 0.4), "planning": (0.4, 0.4), "measuring": (0.8, 0.2)}
+_SWEEPING = 0.5  # share of the progress bar; of the rest for planning
+_PLANNING = 0.7
 _SAME_PLACE_INCREMENTS = 1.0
 
 Progress = Callable[[float], None]
@@ -40,6 +40,7 @@ class FeedSchedule:
 
     Attributes:
         text: the program with its new feeds.
+        written: the same, as read back.
         survey: what the tool meets.
         plans: the feeds of each region that may change; None for the others.
         loads: force, torque and deflection along each region before and after; None where nothing is known.
@@ -47,6 +48,7 @@ class FeedSchedule:
     """
 
     text: bytes
+    written: Program
     survey: Survey
     plans: tuple[FeedPlan | None, ...]
     loads: tuple[RegionLoad | None, ...]
@@ -92,8 +94,6 @@ def schedule(
         StockError: the stock does not suit the program.
         RoundTripError: the written text would not be equivalent: a defect of shapegcode.
     """
-    if not 0.0 <= margin < 1.0:
-        raise _core.ArgumentError(f"margin is {margin:g}, must be at least 0 and below 1")
     tools = [tools] if isinstance(tools, Tool) else list(tools)
     if not tools:
         raise _core.ArgumentError("a feed schedule needs a tool")
@@ -101,36 +101,62 @@ def schedule(
         program = read_for_conversion(program, machine)
     require_decision(program, machine)
 
-    def stage(name: str, done: int, total: int) -> None:
-        begin, share = _SHARES[name]
-        on_progress(begin + share * done / max(total, 1))
-
     surveyed = survey(
-        program, machine, tools, stock, resolution_mm=resolution_mm, on_progress=partial(stage, "sweeping")
+        program,
+        machine,
+        tools,
+        stock,
+        resolution_mm=resolution_mm,
+        on_progress=lambda done, total: on_progress(_SWEEPING * done / max(total, 1)),
     )
-    own = motion or OrdinaryMotion(machine)
-    plans = _plan_all(surveyed, machine, own, margin, partial(stage, "planning"))
+    return schedule_survey(
+        surveyed,
+        machine,
+        motion=motion,
+        margin=margin,
+        on_progress=lambda done: on_progress(_SWEEPING + (1.0 - _SWEEPING) * done),
+    )
+
+
+def schedule_survey(
+    surveyed: Survey,
+    machine: Machine,
+    *,
+    motion: Motion | None = None,
+    margin: float = MARGIN,
+    on_progress: Progress = lambda _done: None,
+) -> FeedSchedule:
+    """As :func:`schedule`, for a program whose engagement is known already.
+
+    Raises:
+        ArgumentError: a margin outside its range.
+        RoundTripError: the written text would not be equivalent: a defect of shapegcode.
+    """
+    if not 0.0 <= margin < 1.0:
+        raise _core.ArgumentError(f"margin is {margin:g}, must be at least 0 and below 1")
+    program = surveyed.program
+    ordinary = OrdinaryMotion(machine)
+    own = motion or ordinary
+    total = max(len(surveyed.regions), 1)
+    plans = _plan_all(surveyed, machine, own, margin, lambda done: on_progress(_PLANNING * done / total))
     text, places, blocks = _write(program, plans, machine)
-    emitted = _read_back(text, program, places, machine)
-    before_motion = OrdinaryMotion(machine)
+    written = _read_back(text, program, places, machine)
     loads: list[RegionLoad | None] = []
-    for done, (plan, part) in enumerate(zip(plans, surveyed.regions, strict=True)):
-        loads.append(region_load(part, plan, emitted.regions[done].path, machine, before=before_motion, after=own))
-        stage("measuring", done + 1, len(plans))
+    for index, (plan, part) in enumerate(zip(plans, surveyed.regions, strict=True)):
+        path = written.regions[index].path
+        loads.append(region_load(part, plan, path, machine, before=ordinary, after=own))
+        on_progress(_PLANNING + (1.0 - _PLANNING) * (index + 1) / total)
     report = feed_report(surveyed, plans, loads, machine, margin)
     report["cycle_time_s"] = {
         "before": cycle_time(program, machine).total_s,
-        "after": cycle_time(emitted, machine).total_s,
+        "after": cycle_time(written, machine).total_s,
     }
-    report["blocks"] = {
-        "before": sum(region.blocks for region in program.regions),
-        "after": blocks,
-    }
-    return FeedSchedule(text, surveyed, tuple(plans), tuple(loads), report)
+    report["blocks"] = {"before": sum(region.blocks for region in program.regions), "after": blocks}
+    return FeedSchedule(text, written, surveyed, tuple(plans), tuple(loads), report)
 
 
 def _plan_all(
-    surveyed: Survey, machine: Machine, motion: Motion, margin: float, on_progress: Callable[[int, int], None]
+    surveyed: Survey, machine: Machine, motion: Motion, margin: float, on_progress: Callable[[int], None]
 ) -> list[FeedPlan | None]:
     """Plans of the regions, each on its own: two at a time, as they share nothing."""
     program = surveyed.program
@@ -147,7 +173,7 @@ def _plan_all(
     with ThreadPoolExecutor(max_workers=2) as pool:
         for done, result in enumerate(pool.map(plan, range(len(surveyed.regions)))):
             plans.append(result)
-            on_progress(done + 1, len(surveyed.regions))
+            on_progress(done + 1)
     return plans
 
 

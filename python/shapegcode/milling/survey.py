@@ -85,9 +85,11 @@ def survey(
         StockError: the stock does not suit the program.
     """
     walk = _Walk(program, tools)
-    paths = [region.path for region in program.regions if not _why_not_swept(region, program)]
+    reasons = [_why_not_swept(region, program) for region in program.regions]
+    paths = [region.path for region, reason in zip(program.regions, reasons, strict=True) if not reason]
     if not paths:
-        raise _core.ArgumentError(f"{program.source}: no cutting moves whose engagement can be computed")
+        why = f": {reasons[0]}" if reasons else ""
+        raise _core.ArgumentError(f"{program.source}: no cutting moves whose engagement can be computed{why}")
     smallest = min(tools, key=lambda tool: tool.radius_mm)
     resolution = resolution_mm or _RESOLUTION_RATIO * smallest.tool.diameter_mm
     material = build_material(stock, paths, smallest, resolution, machine)
@@ -110,7 +112,6 @@ def survey(
 
 def _why_not_swept(region: _core.Region, program: Program) -> str:
     """Why what the tool meets on a region cannot be told; empty if it can."""
-    path = region.path
     first = program.regions[0].exit
     if (region.exit.coordinate_system, region.exit.coordinate_number) != (
         first.coordinate_system,
@@ -119,7 +120,7 @@ def _why_not_swept(region: _core.Region, program: Program) -> str:
         return "it is cut in other work coordinates than the first cutting move, in whose the stock lies"
     if region.incremental:
         return "its place is not known"
-    if any(path[i].kind == _core.SegmentKind.arc and path[i].normal != 2 for i in range(len(path))):
+    if not region.path.arcs_in_xy:
         return "it holds arcs that are not in the XY plane (G17)"
     return ""
 
@@ -136,6 +137,8 @@ class _Walk:
         self._ready = -1  # T before its M06
         self._number = -1
         self._collisions = 0
+        # Where a program moves from places that are not known, neither are those of its rapids.
+        self._adrift = any(region.incremental for region in program.regions)
         self._tools: dict[int, Tool] = {}
         self._any: Tool | None = None
         for tool in tools:
@@ -184,14 +187,14 @@ class _Walk:
             return
         if segment.kind == _core.SegmentKind.arc and segment.normal != 2:
             return
+        if segment.kind == _core.SegmentKind.rapid and self._adrift:
+            return
         track = _core.sweep(material, _core.Path([segment]), tool.tool.diameter_mm)
         if segment.kind == _core.SegmentKind.rapid and (track.section_mm2.any() or track.plunged_mm2.any()):
             self._collisions += 1
             if self._collisions <= _SHOWN_COLLISIONS:
-                depth = float(track.radial_depth_mm.max(initial=0.0))
                 self.warnings.append(
-                    f"{self._program.place(line)}: rapid through material, {depth:.3g} mm wide: the stock file or "
-                    "the program is wrong"
+                    f"{self._program.place(line)}: rapid into material: the stock file or the program is wrong"
                 )
 
     def sweep_region(self, material: _core.Material, index: int) -> SurveyedRegion:
