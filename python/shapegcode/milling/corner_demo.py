@@ -87,7 +87,6 @@ def _figures(study: CornerStudy) -> dict[str, Any]:
     case, scheduled, length = study.case, study.scheduled, study.length_mm
     programmed, blocks = study.programmed, np.diff(study.blocks_mm)
     deepest = study.deepest()
-    # The wall's end at the straight is what the corner is compared with.
     after = study.equation7
     target = float(programmed.peak_n[0])
     return {
@@ -201,8 +200,8 @@ def _jump_rows(of: dict[str, Any]) -> list[dict[str, Any]]:
     return [
         _row(
             number, "jump of the radial depth", "0.9 D", f"{of['radial_depth_ratio']:.2f} D", False,
-            f"{_DIFFERS}: {depth['max']:.2f} mm before the vertex, {depth['behind']:.2f} mm behind it; 0.9 D would need "
-            f"an allowance of {of['allowance_for_paper_jump_mm']:.2f} mm",
+            f"{_DIFFERS}: {depth['max']:.2f} mm before the vertex, {depth['behind']:.2f} mm behind it; 0.9 D would "
+            f"need an allowance of {of['allowance_for_paper_jump_mm']:.2f} mm",
         ),
         _row(
             number, "feeds by equation 7 with the mean resultant, mm/min", "(none)",

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -154,6 +155,11 @@ class CornerStudy:
         near = np.linspace(s_mm[self.worst - 1], s_mm[self.worst + 1], _FINER)
         return max((self.cut.at(float(s)) for s in near), key=lambda engagement: engagement.radial_depth_mm)
 
+    @property
+    def feeds(self) -> tuple[tuple[str, AlongCorner], ...]:
+        """The feeds that are compared, with their names for people."""
+        return (("as programmed", self.programmed), ("equation 7", self.equation7), ("scheduled", self.scheduled.along))
+
     def share_within(self, share: float = _WITHIN) -> float:
         """Share of the path on which the schedule's peak is at least this share of the target."""
         target = self.programmed.peak_n[0]
@@ -220,10 +226,7 @@ def _equation7(cut: _core.CornerCut, track: _core.EngagementTrack, programmed: A
     # A remainder much shorter than a block is left to the block before it.
     inside = [float(joint) for joint in joints if begin < joint < end - _LEAST_BLOCK_SHARE * BLOCK_MM]
     corners = [begin, *inside, end]
-    pieces = [
-        np.linspace(a, b, math.ceil((b - a) / BLOCK_MM - _LEAST_BLOCK_SHARE) + 1)
-        for a, b in zip(corners, corners[1:], strict=False)
-    ]
+    pieces = [np.linspace(a, b, math.ceil((b - a) / BLOCK_MM - _LEAST_BLOCK_SHARE) + 1) for a, b in pairwise(corners)]
     borders = np.concatenate([pieces[0][:1], *(piece[1:] for piece in pieces)])
     feeds = programmed.feed_mm_per_min.copy()
     reference = programmed.mean_n[0]
@@ -245,7 +248,9 @@ def _scheduled(
     target_n: float,
     machine: Machine,
 ) -> Scheduled:
-    tool = Tool.from_toml(_tool_text(f'[limits]\nresultant_n = {target_n!r}\nresultant = "peak"\n'), "paper001_tool.toml")
+    tool = Tool.from_toml(
+        _tool_text(f'[limits]\nresultant_n = {target_n!r}\nresultant = "peak"\n'), "paper001_tool.toml"
+    )
     stock = Stock.from_toml(_stock_text(case), "paper001_stock.toml")
     text = corner_program(case, cut, case.feed_mm_per_min)
     result = schedule(Program.from_text(text, machine, source=_source(case)), machine, tool, stock)
