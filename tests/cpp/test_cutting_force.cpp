@@ -84,25 +84,27 @@ double apart(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return (a - b
 TEST_CASE("cutting force: means are Altintas' closed form, any immersion and helix") {
   for (const CuttingCoefficients& k : {constant, with_edges, local(with_edges)}) {
     for (const double helix : {0.0, 0.0001, 30.0, 60.0}) {
-      for (const auto& [start, exit] : {std::pair{0.0, 180.0},
-                                        {0.0, 90.0},
-                                        {90.0, 180.0},
-                                        {0.0, 37.0},
-                                        {141.0, 180.0},
-                                        {20.0, 155.0},
-                                        {80.0, 81.0}}) {
+      for (const auto& [from_left, to_left] : {std::pair{0.0, 180.0},
+                                               {0.0, 90.0},
+                                               {90.0, 180.0},
+                                               {0.0, 37.0},
+                                               {141.0, 180.0},
+                                               {20.0, 155.0},
+                                               {80.0, 81.0}}) {
+        const double start = from_left * degree;
+        const double exit = to_left * degree;
         CAPTURE(helix);
         CAPTURE(start);
         CAPTURE(exit);
         MillingForce force({.diameter_mm = 10.0, .flutes = 3, .helix_rad = helix * degree}, k, 2000.0);
-        const Arcs arcs{{pi / 2 - exit * degree, pi / 2 - start * degree, 0.0, 7.0}};
+        const Arcs arcs{{pi / 2 - exit, pi / 2 - start, 0.0, 7.0}};
         const ForceFigures f = force.figures(arcs, 480.0);
-        const Eigen::Vector2d expected = altintas_mean(k, 3, 7.0, 0.08, start * degree, exit * degree);
+        const Eigen::Vector2d expected = altintas_mean(k, 3, 7.0, 0.08, start, exit);
         CHECK(apart(f.mean_n, expected) < 1e-8 * expected.norm());
-        const double length = 7.0 * (std::cos(start * degree) - std::cos(exit * degree));  // chip area per feed
+        const double length = 7.0 * (std::cos(start) - std::cos(exit));  // chip area per feed
         const double torque =
             3 / (2 * pi) * 5.0 *
-            (k.specific_n_per_mm2 * 0.08 * length + k.tangential_edge_n_per_mm * 7.0 * (exit - start) * degree);
+            (k.specific_n_per_mm2 * 0.08 * length + k.tangential_edge_n_per_mm * 7.0 * (exit - start));
         CHECK(f.mean_torque_nm == doctest::Approx(torque * 1e-3).epsilon(1e-9));
         CHECK(f.mean_power_w == doctest::Approx(torque * 1e-3 * 2000.0 * 2 * pi / 60).epsilon(1e-9));
       }

@@ -105,32 +105,42 @@ ChipTable::ChipTable(const ChipPowers& powers, ChipProfile profile, double feed_
       feed_mm_(feed_per_tooth_mm),
       size_(3U + (powers.one_power() ? 0U : 2U) + (powers.edges ? 3U : 0U)),
       grid_(quick ? Grid::quick() : Grid::fine()),
-      nodes_((grid_.cells + 1) * size_ * 2),
-      twice_(nodes_.size()) {
+      nodes_((grid_.cells + 1) * size_ * 2) {
   for (const double u : profile_.kinks()) {
     if (u < feed_mm_) kinks_.push_back(coordinate_of(std::acos(u / feed_mm_)));
   }
   std::sort(kinks_.begin(), kinks_.end());
-  const auto cells = static_cast<double>(grid_.cells);
   Values sum{};
   Values slope{};
+  const double per_cell = -std::numbers::pi / static_cast<double>(grid_.cells * grid_.cells);
   for (std::size_t node = grid_.cells + 1; node-- > 0;) {
     if (node < grid_.cells) integrate(node, sum);
     values(grid_.node[node].sine, grid_.node[node].cosine, slope);
-    const double fall = -std::numbers::pi * static_cast<double>(node) / (cells * cells);  // of azimuth, per cell
+    const double fall = per_cell * static_cast<double>(node);  // of azimuth
     double* to = nodes_.data() + node * size_ * 2;
-    double* twice = twice_.data() + node * size_ * 2;
     for (std::size_t k = 0; k < size_; ++k) {
       to[2 * k] = sum[k];
       to[2 * k + 1] = fall * slope[k];
-      twice[2 * k + 1] = fall * sum[k];
+    }
+  }
+}
+
+// Simpson's rule, its middle from the cubic.
+void ChipTable::prepare_twice() {
+  if (!twice_.empty()) return;
+  twice_.resize(nodes_.size());
+  const double step = 1.0 / static_cast<double>(grid_.cells);
+  for (std::size_t node = grid_.cells + 1; node-- > 0;) {
+    const double y = static_cast<double>(node) * step;
+    const double* at = nodes_.data() + node * size_ * 2;
+    double* to = twice_.data() + node * size_ * 2;
+    for (std::size_t k = 0; k < 2 * size_; k += 2) {
+      to[k + 1] = -std::numbers::pi * y * step * at[k];
       if (node == grid_.cells) continue;
-      const double* next = to + 2 * size_;  // Simpson's rule, its middle from the cubic
-      const double y = static_cast<double>(node) / cells;
-      const double middle = 0.5 * (to[2 * k] + next[2 * k]) + 0.125 * (to[2 * k + 1] - next[2 * k + 1]);
-      twice[2 * k] = twice[2 * k + 2 * size_] +
-                     std::numbers::pi / (6.0 * cells) *
-                         (y * to[2 * k] + 4.0 * (y + 0.5 / cells) * middle + (y + 1.0 / cells) * next[2 * k]);
+      const double* next = at + 2 * size_;
+      const double middle = 0.5 * (at[k] + next[k]) + 0.125 * (at[k + 1] - next[k + 1]);
+      to[k] = to[k + 2 * size_] +
+              std::numbers::pi / 6.0 * step * (y * at[k] + 4.0 * (y + 0.5 * step) * middle + (y + step) * next[k]);
     }
   }
 }

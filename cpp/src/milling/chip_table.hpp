@@ -61,7 +61,9 @@ class ChipTable {
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   /// The integrals from 0 to an azimuth within -pi/2 ... pi/2.
   void cumulated(double azimuth, Values& out) const noexcept;
-  /// The integrals of those integrals.
+  /// Makes what cumulated_twice needs, unless it is there.
+  void prepare_twice();
+  /// The integrals of those integrals; prepare_twice() must have been called.
   void cumulated_twice(double azimuth, Values& out) const noexcept;
   /// The integrands.
   void density(double azimuth, Values& out) const noexcept;
@@ -82,7 +84,7 @@ class ChipTable {
   const Grid& grid_;
   std::vector<double> kinks_;  // grid coordinate 0 ... 1 of the profile's kinks
   std::vector<double> nodes_;  // value and slope by grid coordinate of each integral, node by node
-  std::vector<double> twice_;  // the same of their integrals
+  std::vector<double> twice_;  // the same of their integrals; empty until asked for
 };
 
 }  // namespace shapegcode

@@ -33,6 +33,11 @@ bool same(const ToolBeam& a, const ToolBeam& b) {
          a.spindle_n_per_um == b.spindle_n_per_um;
 }
 
+// For loads that are weighed by their height.
+void prepare(FluteSet& set) {
+  for (ChipTable& table : set.tables) table.prepare_twice();
+}
+
 // Cuts pieces so short that the beam's influence is nearly a straight line along each: the one through its Gauss
 // points, under which an even load of any cubic has no error.
 template <class Influence>
@@ -377,6 +382,7 @@ double MillingForce::peak_deflection_um(std::span<const EngagedArc> arcs, double
     impl.check_below_clamp(beam.overhang_mm);
     weighted_pieces(
         impl.pieces, beam.overhang_mm, [&](double z) { return tip_compliance_um_per_n(beam, z); }, impl.weighted);
+    prepare(impl.set);
     impl.bent.build(impl.set, impl.pieces, impl.weighted);
     impl.bent_beam = beam;
     impl.bent_built = true;
@@ -393,6 +399,7 @@ Eigen::Vector2d MillingForce::deflection_um(std::span<const EngagedArc> arcs, do
   std::vector<EngagedPiece> weighted;
   weighted_pieces(
       impl.pieces, beam.overhang_mm, [&](double z) { return compliance_um_per_n(beam, height_mm, z); }, weighted);
+  prepare(impl.set);
   return impl.weighted_force(weighted, impl.mix(), turned_rad);
 }
 
@@ -410,6 +417,7 @@ Eigen::Vector2d MillingForce::force_centre_mm(std::span<const EngagedArc> arcs, 
   std::vector<EngagedPiece> weighted;
   weighted_pieces(
       impl.pieces, 0.25 * overhang_mm, [&](double z) { return overhang_mm - z; }, weighted);
+  prepare(impl.set);
   const Eigen::Vector2d moment = impl.weighted_force(weighted, m, turned_rad);
   return {force.x() != 0.0 ? moment.x() / force.x() : none, force.y() != 0.0 ? moment.y() / force.y() : none};
 }
