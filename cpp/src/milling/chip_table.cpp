@@ -36,34 +36,26 @@ Direction direction_at(double y) {
 
 }  // namespace
 
-// Directions of the nodes and of two Gauss points per cell: the same for every table.
+// Directions of the nodes and of the middles between them: the same for every table.
 struct ChipTable::Grid {
-  struct Point {
-    Direction direction;
-    double weight;
-  };
   explicit Grid(std::size_t count) : cells(count) {
-    const double side = 0.5 / std::sqrt(3.0);
     const double step = 1.0 / static_cast<double>(count);
-    for (std::size_t i = 0; i <= count; ++i) node.push_back(direction_at(static_cast<double>(i) * step));
-    for (std::size_t i = 0; i < count; ++i) {
-      for (const double at : {0.5 - side, 0.5 + side}) {
-        const double y = (static_cast<double>(i) + at) * step;
-        inside.push_back({direction_at(y), 0.5 * step * std::numbers::pi * y});
-      }
+    for (std::size_t i = 0; i <= count; ++i) {
+      node.push_back(direction_at(static_cast<double>(i) * step));
+      middle.push_back(direction_at((static_cast<double>(i) + 0.5) * step));
     }
   }
 
   std::size_t cells;
   std::vector<Direction> node;
-  std::vector<Point> inside;
+  std::vector<Direction> middle;  // of the cell above each node
 
   static const Grid& fine() {
     static const Grid grid(512);
     return grid;
   }
   static const Grid& quick() {
-    static const Grid grid(96);
+    static const Grid grid(64);
     return grid;
   }
 };
@@ -111,17 +103,19 @@ ChipTable::ChipTable(const ChipPowers& powers, ChipProfile profile, double feed_
   }
   std::sort(kinks_.begin(), kinks_.end());
   Values sum{};
-  Values slope{};
+  Values here{};
+  Values above{};
   const double per_cell = -std::numbers::pi / static_cast<double>(grid_.cells * grid_.cells);
   for (std::size_t node = grid_.cells + 1; node-- > 0;) {
-    if (node < grid_.cells) integrate(node, sum);
-    values(grid_.node[node].sine, grid_.node[node].cosine, slope);
+    values(grid_.node[node].sine, grid_.node[node].cosine, here);
+    if (node < grid_.cells) integrate(node, here, above, sum);
     const double fall = per_cell * static_cast<double>(node);  // of azimuth
     double* to = nodes_.data() + node * size_ * 2;
     for (std::size_t k = 0; k < size_; ++k) {
       to[2 * k] = sum[k];
-      to[2 * k + 1] = fall * slope[k];
+      to[2 * k + 1] = fall * here[k];
     }
+    above = here;
   }
 }
 
@@ -156,17 +150,22 @@ void ChipTable::integrate_stretch(double from, double to, Values& sum) const {
   }
 }
 
-// Adds what lies between the nodes of a cell.
-void ChipTable::integrate(std::size_t cell, Values& sum) const {
+// Adds what lies between the nodes of a cell, from the integrands there: Simpson's rule but where a kink or the end
+// lies.
+void ChipTable::integrate(std::size_t cell, const Values& lower, const Values& upper, Values& sum) const {
   const double step = 1.0 / static_cast<double>(grid_.cells);
   double from = static_cast<double>(cell) * step;
   const double end = from + step;
   auto kink = std::upper_bound(kinks_.begin(), kinks_.end(), from);
   if (cell > 0 && (kink == kinks_.end() || *kink >= end)) {
-    Values value{};
-    for (const Grid::Point* point = &grid_.inside[2 * cell]; point != &grid_.inside[2 * cell] + 2; ++point) {
-      values(point->direction.sine, point->direction.cosine, value);
-      for (std::size_t k = 0; k < size_; ++k) sum[k] += point->weight * value[k];
+    Values middle{};
+    values(grid_.middle[cell].sine, grid_.middle[cell].cosine, middle);
+    const double share = std::numbers::pi * step / 6.0;
+    const double at_lower = share * from;
+    const double at_middle = share * 4.0 * (from + 0.5 * step);
+    const double at_upper = share * end;
+    for (std::size_t k = 0; k < size_; ++k) {
+      sum[k] += at_lower * lower[k] + at_middle * middle[k] + at_upper * upper[k];
     }
     return;
   }
