@@ -4378,6 +4378,10 @@ class Material:
         """
     def __len__(self) -> int:
         ...
+    def compact(self) -> None:
+        """
+        Gives back the memory of what is uniform by now.
+        """
     def copy(self) -> Material:
         """
         The material as it is now; the two are independent from here on.
@@ -5429,7 +5433,7 @@ def largest_feeds(force: MillingForce, track: EngagementTrack, limits: FeedLimit
     """
 def layer_borders(paths: collections.abc.Sequence[Path], bottom_mm: typing.SupportsFloat | typing.SupportsIndex, top_mm: typing.SupportsFloat | typing.SupportsIndex, ramp_step_mm: typing.SupportsFloat | typing.SupportsIndex) -> list[float]:
     """
-    Heights between layers for these paths in a stock from bottom to top, mm: where the tool cuts on a level, the lowest points of ramps and plunges, and steps of at most `ramp_step_mm` where ramps and helices pass (a tenth of the tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.
+    Heights between layers for these paths in a stock from bottom to top, mm: where the tool moves on a level, the lowest points of ramps and plunges, and steps of at most `ramp_step_mm` where ramps and helices pass (a tenth of the tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.
     """
 def line_sections(path: Path, ranges: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]]) -> list[PathSection]:
     """

@@ -85,14 +85,18 @@ def survey(
         StockError: the stock does not suit the program.
     """
     walk = _Walk(program, tools)
+    cutters = walk.tools_of_regions()
     reasons = [_why_not_swept(region, program) for region in program.regions]
-    paths = [region.path for region, reason in zip(program.regions, reasons, strict=True) if not reason]
-    if not paths:
-        why = f": {reasons[0]}" if reasons else ""
+    swept = [index for index, reason in enumerate(reasons) if not reason and cutters[index] is not None]
+    if not swept:
+        why = next((f": {reason}" for reason in reasons if reason), "")
         raise _core.ArgumentError(f"{program.source}: no cutting moves whose engagement can be computed{why}")
     smallest = min(tools, key=lambda tool: tool.radius_mm)
     resolution = resolution_mm or _RESOLUTION_RATIO * smallest.tool.diameter_mm
-    material = build_material(stock, paths, smallest, resolution, machine)
+    # The walls of an allowance are those that the finishing tool leaves.
+    walls = [program.regions[index].path for index in swept if cutters[index] is smallest]
+    others = [program.regions[index].path for index in swept if cutters[index] is not smallest]
+    material = build_material(stock, walls, smallest, resolution, machine, others=[*others, *walk.cuts_elsewhere()])
     regions: list[SurveyedRegion] = []
     total = len(program.core.steps)
     for done, (kind, index, line) in enumerate(program.core.steps):
@@ -178,6 +182,25 @@ class _Walk:
         if number <= 0 and len(self._tools) == 1:  # a program for one tool need not name it
             return next(iter(self._tools.values()))
         return self._tools.get(number)
+
+    def tools_of_regions(self) -> list[Tool | None]:
+        """What cuts each region; the walk stands at the program's start again afterwards."""
+        found: list[Tool | None] = []
+        for kind, index, _ in self._program.core.steps:
+            if kind == _core.StepKind.function:
+                self.function(index)
+            elif kind == _core.StepKind.region:
+                found.append(self._tool)
+        self._sense, self._ready, self._number = None, -1, -1
+        return found
+
+    def cuts_elsewhere(self) -> list[_core.Path]:
+        """Cutting moves outside of the regions, each as a path."""
+        return [
+            _core.Path([segment])
+            for segment, dwell_s in self._moves
+            if segment.kind != _core.SegmentKind.rapid and not dwell_s > 0.0 and segment.length_mm > 0.0
+        ]
 
     def sweep_other(self, material: _core.Material, index: int, line: int) -> None:
         """A rapid, or a cutting move outside of the regions."""
