@@ -243,7 +243,6 @@ TEST_CASE("cutting force: figures against a finely sampled revolution, at random
     worst_flute = std::max(worst_flute, std::abs(f.peak_flute_n / flute - 1.0));
     CHECK(apart(curve.force_n.colwise().mean(), f.mean_n) < 1e-3 * f.peak_resultant_n);
   }
-  MESSAGE("peak ", worst_peak, ", mean ", worst_mean, ", torque ", worst_torque, ", flute ", worst_flute);
   CHECK(worst_peak < 1e-3);
   CHECK(worst_torque < 1e-3);
   CHECK(worst_flute < 1e-3);
@@ -343,6 +342,29 @@ TEST_CASE("cutting force: nothing met, no feed, and a whole track") {
   CHECK(shapegcode::figures_of(force, track, feeds, &beam)(2, 8) ==
         force.peak_deflection_um(track.arcs_of(2), 240.0, beam));
   CHECK_THROWS_AS((void)shapegcode::figures_of(force, track, std::vector<double>{1.0}), Error);
+}
+
+TEST_CASE("cutting force: layers that meet the tool alike are one") {
+  for (const double helix : {0.0, 0.6}) {
+    MillingForce force({.diameter_mm = 8.0, .flutes = 3, .helix_rad = helix}, local(aluminium), 1800.0);
+    const Arcs one{{-1.2, -0.1, 0.0, 6.0}, {0.4, 0.9, 1.0, 6.0}};
+    Arcs layers;
+    for (int i = 0; i < 6; ++i) {
+      layers.push_back({-1.2, -0.1, 1.0 * i, 1.0 * i + 1.0});
+      if (i > 0) layers.push_back({0.4, 0.9, 1.0 * i, 1.0 * i + 1.0});
+    }
+    Arcs apart_by_a_little = layers;  // as a coarse model would have them: each for itself, and nearly the same
+    for (std::size_t i = 0; i < apart_by_a_little.size(); ++i) {
+      apart_by_a_little[i].to_rad += 1e-7 * static_cast<double>(i);
+    }
+    const ForceFigures a = force.figures(one, 300.0);
+    for (const Arcs& arcs : {layers, apart_by_a_little}) {
+      const ForceFigures b = force.figures(arcs, 300.0);
+      CHECK(b.peak_resultant_n == doctest::Approx(a.peak_resultant_n).epsilon(1e-5));
+      CHECK(b.mean_resultant_n == doctest::Approx(a.mean_resultant_n).epsilon(1e-4));
+      CHECK(b.mean_torque_nm == doctest::Approx(a.mean_torque_nm).epsilon(1e-5));
+    }
+  }
 }
 
 TEST_CASE("cutting force: frame of the machine") {

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double half_pi = 0.5 * std::numbers::pi;
 constexpr double arc_slack_rad = 1e-9;
+constexpr double same_end_rad = 1e-9;
 constexpr double pieces_per_overhang = 10.0;  // of a load on the beam
 
 [[noreturn]] void refuse(const std::string& message) { throw Error(ErrorKind::argument, message); }
@@ -181,12 +182,24 @@ struct MillingForce::Impl {
       const double to = std::min(mirrored ? -arc.from_rad : arc.to_rad, half_pi);
       const double height = arc.top_mm - arc.bottom_mm;
       if (!(to > from) || !(height > 0.0)) continue;
-      pieces.push_back({from, to, arc.bottom_mm, arc.top_mm});
+      join({from, to, arc.bottom_mm, arc.top_mm});
       cosine += height * (std::sin(to) - std::sin(from));
       extent += height * (to - from);
     }
     mean_cosine = extent > 0.0 ? cosine / extent : 0.0;
     if (mean_cosine <= 0.0) pieces.clear();  // too narrow to tell from nothing
+  }
+
+  // Layers of a material model that meet the tool alike are one piece.
+  void join(const EngagedPiece& piece) {
+    for (EngagedPiece& below : pieces) {
+      if (below.top_mm == piece.bottom_mm && std::abs(below.from_rad - piece.from_rad) < same_end_rad &&
+          std::abs(below.to_rad - piece.to_rad) < same_end_rad) {
+        below.top_mm = piece.top_mm;
+        return;
+      }
+    }
+    pieces.push_back(piece);
   }
 
   [[nodiscard]] ChipMix mix() const {
@@ -420,24 +433,6 @@ Eigen::Vector2d MillingForce::force_centre_mm(std::span<const EngagedArc> arcs, 
   prepare(impl.set);
   const Eigen::Vector2d moment = impl.weighted_force(weighted, m, turned_rad);
   return {force.x() != 0.0 ? moment.x() / force.x() : none, force.y() != 0.0 ? moment.y() / force.y() : none};
-}
-
-Eigen::MatrixXd figures_of(MillingForce& force, const EngagementTrack& track, std::span<const double> feed_mm_per_min,
-                           const ToolBeam* beam) {
-  if (feed_mm_per_min.size() != track.size()) {
-    refuse("feeds are " + std::to_string(feed_mm_per_min.size()) + " for a track of " + std::to_string(track.size()) +
-           " samples");
-  }
-  Eigen::MatrixXd table(static_cast<Eigen::Index>(track.size()), force_columns);
-  for (std::size_t i = 0; i < track.size(); ++i) {
-    const auto arcs = track.arcs_of(i);
-    const double feed = feed_mm_per_min[i] * track.horizontal[i];
-    const ForceFigures f = force.quick_figures(arcs, feed);
-    const double deflection = beam != nullptr && !arcs.empty() ? force.peak_deflection_um(arcs, feed, *beam) : 0.0;
-    table.row(static_cast<Eigen::Index>(i)) << f.mean_n.x(), f.mean_n.y(), f.mean_resultant_n, f.peak_resultant_n,
-        f.peak_torque_nm, f.mean_torque_nm, f.mean_power_w, f.peak_chip_mm, deflection;
-  }
-  return table;
 }
 
 }  // namespace shapegcode

@@ -88,23 +88,26 @@ void Revolution::place_angles(const FluteSet& set, std::span<const EngagedPiece>
     }
   }
   std::sort(kinks_.begin(), kinks_.end());
-  kinks_.erase(std::unique(kinks_.begin(), kinks_.end(), [](double a, double b) { return b - a < same_kink_rad; }),
-               kinks_.end());
-  if (kinks_.size() > 1 && kinks_.front() + set.pitch_rad - kinks_.back() < same_kink_rad) kinks_.pop_back();
-  if (!kinks_.empty()) kinks_.push_back(kinks_.front() + set.pitch_rad);
+  // Kinks that are nearly the same are one, with no angle between them; a stretch leads from its last to the next's
+  // first.
+  stretch_ends_.clear();
+  for (std::size_t i = 0; i < kinks_.size(); ++i) {
+    const double next = i + 1 < kinks_.size() ? kinks_[i + 1] : kinks_.front() + set.pitch_rad;
+    if (next - kinks_[i] >= same_kink_rad) stretch_ends_.emplace_back(kinks_[i], next);
+  }
 
   angle_.clear();
   weight_.clear();
   stretches_.clear();
-  for (std::size_t i = 0; i + 1 < kinks_.size(); ++i) {
+  for (const auto& [first, last] : stretch_ends_) {
     stretches_.push_back(angle_.size());
-    const double length = kinks_[i + 1] - kinks_[i];
+    const double length = last - first;
     const auto steps = 2 * static_cast<std::size_t>(std::ceil(length / panel_rad));
     const double step = length / static_cast<double>(steps);
     for (std::size_t k = 0; k <= steps; ++k) {
       const bool end = k == 0 || k == steps;
       const double inwards = k == 0 ? inside_rad : (k == steps ? -inside_rad : 0.0);
-      angle_.push_back(kinks_[i] + step * static_cast<double>(k) + inwards);
+      angle_.push_back(first + step * static_cast<double>(k) + inwards);
       weight_.push_back(step / 3.0 * (end ? 1.0 : (k % 2 == 1 ? 4.0 : 2.0)) / set.pitch_rad);
     }
   }
