@@ -17,7 +17,7 @@ constexpr double level_mm = 1e-6;  // a move that climbs by less stays on its le
 constexpr double same_height_mm = 1e-3;
 constexpr double least_slope = 1e-3;  // horizontal share below which a move is a plunge
 constexpr double megabyte = 1e6;
-constexpr std::size_t first_compaction_tiles = 4096;
+constexpr std::size_t least_growth_tiles = 32;
 
 [[noreturn]] void refuse(const std::string& message) { throw Error(ErrorKind::argument, message); }
 
@@ -167,10 +167,11 @@ void Material::compact() {
   plan_compaction();
 }
 
-/// Looks for uniform tiles again when those with values have doubled, but not beyond what the limit allows.
+/// Looks for uniform tiles again when those with values have grown by a quarter: uniform ones are passed over quickly,
+/// and the search costs little beside what made them.
 void Material::plan_compaction() {
   const std::size_t most = memory_limit_ / MaterialLayer::tile_bytes;
-  compact_at_tiles_ = std::min(std::max(first_compaction_tiles, 2 * tiles_), std::max(most, tiles_ + 1));
+  compact_at_tiles_ = std::min(tiles_ + tiles_ / 4 + least_growth_tiles, std::max(most, tiles_ + 1));
 }
 
 void Material::check_memory(std::size_t needed) const {
