@@ -142,8 +142,9 @@ TEST_CASE("a step takes away the distance from a line or an arc") {
     }
     const ToolStep start(from, from);
     const ToolStep step(from, to, curvature);
-    layer.remove(start, radius, false);
-    layer.remove(step, radius, true);
+    CHECK(layer.remove(start, radius, false));
+    CHECK(layer.remove(step, radius, true));
+    CHECK_FALSE(layer.remove(step, radius, false));
     MaterialLayer at_once(std::vector<Ring>{box(-10, -10, 10, 10)}, h);
     at_once.remove(step, radius, false);
     MaterialLayer compacted = layer;

@@ -10,6 +10,8 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr std::int64_t edge = MaterialLayer::tile_nodes;
+constexpr float least_change = 1e-5F;  // mm; less is rounding
+constexpr std::size_t least_growth_tiles = 32;
 
 double distance_to_edge(const Vector2d& place, const Vector2d& a, const Vector2d& b) noexcept {
   const Vector2d along = b - a;
@@ -219,18 +221,21 @@ bool MaterialLayer::is_empty_around(double x_mm, double y_mm, double radius_mm) 
   return true;
 }
 
-std::size_t MaterialLayer::remove(const ToolStep& step, double tool_radius_mm, bool continues) {
+bool MaterialLayer::remove(const ToolStep& step, double tool_radius_mm, bool continues) {
   const Sweep sweep(step, tool_radius_mm, band_, spacing_, {x0_, y0_}, continues);
-  const std::size_t before = tiles();
   const auto rows = static_cast<double>(rows_ * edge);
   const std::int64_t end = first_at(sweep.middle.y() + sweep.reach, rows);
-  for (std::int64_t j = first_at(sweep.middle.y() - sweep.reach, rows); j < end; ++j) remove_in_row(sweep, j);
-  return tiles() - before;
+  bool changed = false;
+  for (std::int64_t j = first_at(sweep.middle.y() - sweep.reach, rows); j < end; ++j) {
+    changed |= remove_in_row(sweep, j);
+  }
+  if (tiles() > compact_at_tiles_) compact();
+  return changed;
 }
 
 /// Finds the nodes of a grid row whose distance may change: those near the step but not behind its start, nor deep in
 /// the disc that was swept there.
-void MaterialLayer::remove_in_row(const Sweep& sweep, std::int64_t j) {
+bool MaterialLayer::remove_in_row(const Sweep& sweep, std::int64_t j) {
   const auto y = static_cast<double>(j);
   const auto nodes = static_cast<double>(columns_ * edge);
   const double from_middle = y - sweep.middle.y();
@@ -238,8 +243,7 @@ void MaterialLayer::remove_in_row(const Sweep& sweep, std::int64_t j) {
   double low = sweep.middle.x() - half;
   double high = sweep.middle.x() + half;
   if (!sweep.continues) {
-    remove_nodes(sweep, j, first_at(low, nodes), first_at(high, nodes));
-    return;
+    return remove_nodes(sweep, j, first_at(low, nodes), first_at(high, nodes));
   }
   const double dy = y - sweep.from.y();
   const double rest = -sweep.behind - dy * sweep.ahead.y();  // ahead: (x - from.x) ahead.x > rest
@@ -248,18 +252,20 @@ void MaterialLayer::remove_in_row(const Sweep& sweep, std::int64_t j) {
   } else if (sweep.ahead.x() < 0.0) {
     high = std::min(high, sweep.from.x() + rest * sweep.per_ahead_x);
   } else if (rest > 0.0) {
-    return;
+    return false;
   }
   const double inner = std::sqrt(std::max(0.0, sweep.inner * sweep.inner - dy * dy));
   const double gap_low = std::clamp(sweep.from.x() - inner, low, std::max(low, high));
   const double gap_high = std::clamp(sweep.from.x() + inner, low, std::max(low, high));
-  if (low < gap_low) remove_nodes(sweep, j, first_at(low, nodes), first_at(gap_low, nodes));
-  if (gap_high < high) remove_nodes(sweep, j, first_at(gap_high, nodes), first_at(high, nodes));
+  bool changed = false;
+  if (low < gap_low) changed = remove_nodes(sweep, j, first_at(low, nodes), first_at(gap_low, nodes));
+  if (gap_high < high) changed |= remove_nodes(sweep, j, first_at(gap_high, nodes), first_at(high, nodes));
+  return changed;
 }
 
 /// Lowers the distances of the nodes first ... last - 1 of a row, tile by tile, in whole packets: a neighbour whose
 /// distance is taken as well only stays what it is.
-void MaterialLayer::remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_t first, std::int64_t last) {
+bool MaterialLayer::remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_t first, std::int64_t last) {
   constexpr std::int64_t packet = 4;
   const auto band = static_cast<float>(band_);
   const auto spacing = static_cast<float>(spacing_);
@@ -267,6 +273,7 @@ void MaterialLayer::remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_
   const auto y = static_cast<float>(y_of(j) - sweep.start_mm.y());
   const ToolStep::Shape<float> shape = sweep.shape;
   std::int32_t* const tiles_of_row = index_.data() + j / edge * columns_;
+  int changed = 0;
   while (first < last) {
     const std::int64_t column = first / edge;
     const std::int64_t left = column * edge;
@@ -283,16 +290,21 @@ void MaterialLayer::remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_
     if (shape.curvature == 0.0F) {
       for (int k = 0; k < packets * packet; ++k) {
         const float squared = shape.parts(x + spacing * static_cast<float>(k), y).squared(1.0F);
-        values[k] = std::min(values[k], std::max(std::sqrt(squared) - radius, -band));
+        const float value = std::min(values[k], std::max(std::sqrt(squared) - radius, -band));
+        changed |= static_cast<int>(values[k] - value > least_change);
+        values[k] = value;
       }
     } else {
       for (int k = 0; k < packets * packet; ++k) {
         const auto parts = shape.parts(x + spacing * static_cast<float>(k), y);
         const float squared = parts.squared(std::sqrt(parts.square));
-        values[k] = std::min(values[k], std::max(std::sqrt(squared) - radius, -band));
+        const float value = std::min(values[k], std::max(std::sqrt(squared) - radius, -band));
+        changed |= static_cast<int>(values[k] - value > least_change);
+        values[k] = value;
       }
     }
   }
+  return changed != 0;
 }
 
 bool MaterialLayer::has_material() const noexcept {
@@ -347,6 +359,9 @@ void MaterialLayer::compact() {
     free_.push_back(tile);
     tile = *high > -limit ? full : empty;
   }
+  // Next time when those with values have grown by a quarter: uniform ones are passed over quickly, and the search
+  // costs little beside what made them.
+  compact_at_tiles_ = tiles() + tiles() / 4 + least_growth_tiles;
 }
 
 std::size_t MaterialLayer::bytes() const noexcept {

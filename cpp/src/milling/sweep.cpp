@@ -211,7 +211,9 @@ class Sweeper {
       // Nor is there anything above: see `sample`.
       if (field.is_empty_around(middle.x(), middle.y(), radius_ + half + field.band_mm())) break;
       const bool continues = piece.continues && layer >= piece.predecessor_lowest;
-      if (half > 0.0 || !continues) material_.remove(layer, piece.step, radius_, continues);
+      if (half == 0.0 && continues) continue;
+      // Where nothing is left to take away, nothing is above; only the layers that the tool has just reached are new.
+      if (!material_.remove(layer, piece.step, radius_, continues) && continues) break;
     }
     pending_.pop_front();
   }
