@@ -89,7 +89,7 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
     Vector2d a;
     Vector2d b;
   };
-  std::vector<std::vector<Edge>> near(index_.size());
+  std::vector<std::pair<std::int64_t, Edge>> near;                                     // to which tiles
   std::vector<std::vector<double>> crossings(static_cast<std::size_t>(rows_ * edge));  // of the boundary, per grid row
   const double tile_mm = spacing_ * edge;
   const double tile_reach = tile_mm * std::sqrt(0.5) + band_;
@@ -105,7 +105,7 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
         for (std::int64_t column = tile_of(low.x(), columns_); column <= tile_of(high.x(), columns_); ++column) {
           const Vector2d centre(x_of(column * edge) + 0.5 * tile_mm, y_of(row * edge) + 0.5 * tile_mm);
           if (distance_to_edge(centre, e.a, e.b) <= tile_reach) {
-            near[static_cast<std::size_t>(row * columns_ + column)].push_back(e);
+            near.emplace_back(row * columns_ + column, e);
           }
         }
       }
@@ -120,15 +120,18 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
     }
   }
   for (std::vector<double>& row : crossings) std::sort(row.begin(), row.end());
+  std::sort(near.begin(), near.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  auto next = near.cbegin();
   const auto inside = [&](std::int64_t i, std::int64_t j) {
     const std::vector<double>& row = crossings[static_cast<std::size_t>(j)];
     return (std::upper_bound(row.begin(), row.end(), x_of(i)) - row.begin()) % 2 == 1;
   };
   for (std::int64_t t = 0; t < columns_ * rows_; ++t) {
-    const std::vector<Edge>& edges = near[static_cast<std::size_t>(t)];
+    const auto first = next;
+    while (next != near.cend() && next->first == t) ++next;
     const std::int64_t i0 = t % columns_ * edge;
     const std::int64_t j0 = t / columns_ * edge;
-    if (edges.empty()) {
+    if (first == next) {
       index_[static_cast<std::size_t>(t)] = inside(i0, j0) ? full : empty;
       continue;
     }
@@ -139,7 +142,9 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
       const std::int64_t j = j0 + n / edge;
       const Vector2d place(x_of(i), y_of(j));
       double distance = band_;
-      for (const Edge& e : edges) distance = std::min(distance, distance_to_edge(place, e.a, e.b));
+      for (auto k = first; k != next; ++k) {
+        distance = std::min(distance, distance_to_edge(place, k->second.a, k->second.b));
+      }
       tile[static_cast<std::size_t>(n)] = static_cast<float>(inside(i, j) ? distance : -distance);
     }
   }
@@ -205,6 +210,7 @@ double MaterialLayer::distance_mm(double x_mm, double y_mm) const noexcept {
 }
 
 bool MaterialLayer::is_empty_around(double x_mm, double y_mm, double radius_mm) const noexcept {
+  if (!std::isfinite(x_mm + y_mm + radius_mm)) return true;
   const double tile_mm = spacing_ * edge;
   const auto clamped = [&](double from_origin, std::int64_t count) {
     return static_cast<std::int64_t>(std::clamp(std::floor(from_origin / tile_mm), -1.0, static_cast<double>(count)));
