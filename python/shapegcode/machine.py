@@ -1,8 +1,8 @@
 """The machine file: what shapegcode knows about a machine tool and its controller.
 
 A machine file is TOML. :class:`Machine` is its model; it and its tables (machine_axes, machine_drive,
-machine_controller, machine_input, machine_output) are the only place in the project that holds defaults: every other
-module takes the values from here. Each key carries its unit, its meaning and, where the number is
+machine_controller, machine_input, machine_feed, machine_output) are the only place that holds defaults for it: every
+other module takes the values from here. Each key carries its unit, its meaning and, where the number is
 not known for real machines, the remark *assumed*; :func:`key_documentation` turns that into
 ``docs/machine.md``.
 """
@@ -10,18 +10,19 @@ not known for real machines, the remark *assumed*; :func:`key_documentation` tur
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, Strict, ValidationError, model_validator
+from pydantic import Field, Strict, model_validator
 
 from shapegcode.machine_axes import Axes, Axis, Mode
 from shapegcode.machine_controller import Controller, PowerOn, Times
 from shapegcode.machine_drive import Drive
-from shapegcode.machine_errors import MachineError, Problem, problems_of, syntax_problem
+from shapegcode.machine_errors import KeyProblem, MachineError, Problem
+from shapegcode.machine_feed import FeedControl
+from shapegcode.machine_file import parsed, read_text, validated
 from shapegcode.machine_input import Input
 from shapegcode.machine_keys import KeyInfo, KeyValue, PerAxis, Table, Text, key, toml
 from shapegcode.machine_output import Emission, Shaping, Tolerance, Verdict
@@ -33,6 +34,7 @@ __all__ = [
     "Controller",
     "Drive",
     "Emission",
+    "FeedControl",
     "Input",
     "KeyInfo",
     "KeyValue",
@@ -62,6 +64,7 @@ class Machine(Table):
     times: Times = key("what takes time beside the motion", default={})
     power_on: PowerOn = key("modal state before the first block", default={})
     input: Input = key("how programs are read", default={})
+    feed_control: FeedControl = key("how the controller follows changes of the feed", default={})
     emission: Emission = key("how shaped programs are written", default={})
     shaping: Shaping = key("what is shaped, and how", default={})
     tolerance: Tolerance = key("when an emitted program is good", default={})
@@ -75,15 +78,15 @@ class Machine(Table):
         tick = self.controller.interpolation_period_s
         ratio = period / tick
         if round(ratio) < 1 or not math.isclose(ratio, round(ratio), rel_tol=0, abs_tol=1e-6):
-            raise ValueError(
-                f"emission.block_period_s = {toml(period)}: must be a whole multiple of "
-                f"controller.interpolation_period_s = {toml(tick)}"
+            raise KeyProblem(
+                "emission.block_period_s",
+                period,
+                f"must be a whole multiple of controller.interpolation_period_s = {toml(tick)}",
             )
         shortest = self.controller.block_time_s
         if period < shortest * (1 - 1e-9):
-            raise ValueError(
-                f"emission.block_period_s = {toml(period)}: must not be below "
-                f"controller.block_time_s = {toml(shortest)}"
+            raise KeyProblem(
+                "emission.block_period_s", period, f"must not be below controller.block_time_s = {toml(shortest)}"
             )
         return self
 
@@ -105,13 +108,7 @@ class Machine(Table):
             names = ", ".join(cls.builtin_names())
             problem = Problem("", "", f"no such file and no built-in machine; built in: {names}")
             raise MachineError(str(path), (problem,))
-        try:
-            text = path.read_bytes().decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            line = error.object[: error.start].count(b"\n") + 1
-            problem = Problem("", "", f"not UTF-8 text (byte 0x{error.object[error.start]:02x})", line)
-            raise MachineError(str(path), (problem,)) from error
-        return cls.from_toml(text, str(path))
+        return cls.from_toml(read_text(path, MachineError), str(path))
 
     @classmethod
     def from_toml(cls, text: str, source: str = "<text>") -> Machine:
@@ -120,11 +117,7 @@ class Machine(Table):
         Raises:
             MachineError: not TOML, or wrong keys or values; every problem is listed.
         """
-        try:
-            data = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise MachineError(source, (syntax_problem(str(error), text),)) from error
-        return cls.from_data(data, source, text)
+        return cls.from_data(parsed(text, source, MachineError), source, text)
 
     @classmethod
     def from_data(cls, data: dict[str, Any], source: str = "<data>", text: str = "") -> Machine:
@@ -133,10 +126,7 @@ class Machine(Table):
         Raises:
             MachineError: wrong keys or values; every problem is listed.
         """
-        try:
-            return cls.model_validate(data)
-        except ValidationError as error:
-            raise MachineError(source, problems_of(error, cls, data, text)) from error
+        return validated(cls, data, source, text, MachineError)
 
     @staticmethod
     def builtin_names() -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What is wrong in a machine file, in words that name the key, the value, the limit and the line."""
+"""What is wrong in a file of settings, in words that name the key, the value, the limit and the line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from shapegcode.machine_keys import Table, facts, table_type, toml, toml_key
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing wrong in a machine file.
+    """One thing wrong in a file of settings.
 
     Attributes:
         key: dotted name of the key, for example ``axes.x.max_feed_mm_per_min``; empty if the file is bad.
@@ -36,11 +36,22 @@ class Problem:
         return f"{subject}: {self.limit}" if subject else self.limit
 
 
-class MachineError(ValueError):
-    """A machine file that cannot be used; the message lists every problem, one line each.
+class KeyProblem(ValueError):
+    """What a validator raises of a key that does not fit another one: found again in the file by its name."""
+
+    def __init__(self, key: str, value: object, limit: str) -> None:
+        """Name the key, dotted, from the table of the validator on; its value; what it must be."""
+        self.key = key
+        self.value = value
+        self.limit = limit
+        super().__init__(f"{key} = {toml(value)}: {limit}")
+
+
+class FileError(ValueError):
+    """A file of settings that cannot be used; the message lists every problem, one line each.
 
     Attributes:
-        file: name of the file (or of the built-in machine).
+        file: name of the file (or of what is built in).
         problems: what is wrong, in the order of the keys.
     """
 
@@ -54,6 +65,10 @@ class MachineError(ValueError):
                 for problem in problems
             )
         )
+
+
+class MachineError(FileError):
+    """A machine file that cannot be used."""
 
 
 def syntax_problem(message: str, text: str) -> Problem:
@@ -77,12 +92,15 @@ def problems_of(error: ValidationError, model: type[Table], data: dict[str, Any]
     problems: list[Problem] = []
     for detail in error.errors(include_url=False):
         location, value = _locate(detail["loc"], data, detail["type"])
+        if detail["type"] == "too_short" and isinstance(value, list) and len(value) >= detail["ctx"]["min_length"]:
+            continue  # short only of its bad items, which are listed themselves
         # A list counts from 0 in pydantic, from 1 for people.
         key = ".".join(str(part + 1) if isinstance(part, int) else toml_key(part) for part in location)
         limit = _limit(detail["type"], detail.get("ctx", {}), detail["msg"])
-        if detail["type"] == "value_error" and not location:
-            found = re.fullmatch(r"(\S+) = (\S+): (.*)", limit)
-            problem = Problem(found[1], found[2], found[3]) if found else Problem("", "", limit)
+        cause = detail.get("ctx", {}).get("error")
+        if isinstance(cause, KeyProblem):
+            name = f"{key}.{cause.key}" if key else cause.key
+            problem = Problem(name, _short(cause.value), cause.limit)
         elif detail["type"] == "extra_forbidden":
             problem = Problem(key, _short(value), "unknown key" + _suggestion(model, location))
         elif detail["type"] == "missing":
@@ -94,7 +112,7 @@ def problems_of(error: ValidationError, model: type[Table], data: dict[str, Any]
             problem = Problem(key, _short(value), f"malformed; {field.description if field else limit}")
         else:
             problem = Problem(key, _short(value), limit + _unit_remark(model, location))
-        problem = Problem(problem.key, problem.value, problem.limit, _line_of(problem.key, text))
+        problem = Problem(problem.key, problem.value, problem.limit, line_of(problem.key, text))
         if problem not in problems:
             problems.append(problem)
     return tuple(problems)
@@ -131,6 +149,10 @@ def _limit(kind: str, context: Mapping[str, Any], message: str) -> str:
             return f"must be {context['expected']}".replace("'", '"')
         case "model_type" | "model_attributes_type" | "dict_type":
             return "must be a table"
+        case "too_short":
+            return f"must have {context['min_length']} or more values"
+        case "too_long":
+            return f"must have {context['max_length']} or fewer values"
         case "tuple_type" | "list_type":
             return "must be a list"
         case "value_error":
@@ -198,10 +220,14 @@ def _suggestion(root: type[Table], location: tuple[int | str, ...]) -> str:
 _HEADER = re.compile(r"\s*\[{1,2}\s*([^\[\]]+?)\s*\]{1,2}\s*(?:#.*)?")
 
 
-def _line_of(key: str, text: str) -> int | None:
-    """Line of a dotted key in the plain layout ``[table]`` / ``key = value``; None if not found there."""
+def line_of(key: str, text: str) -> int | None:
+    """Line of a dotted key in a text of the plain layout ``[table]`` / ``key = value``; None if not found there."""
     table, counts = "", dict[str, int]()
+    inside = 0  # depth of the brackets of a list that goes over several lines
     for number, line in enumerate(text.splitlines(), start=1):
+        if inside:
+            inside += _open_brackets(line)
+            continue
         header = _HEADER.fullmatch(line)
         if header:
             table = re.sub(r"\s*\.\s*", ".", header[1])
@@ -216,4 +242,11 @@ def _line_of(key: str, text: str) -> int | None:
             name = f"{table}.{assignment[1]}" if table else assignment[1]
             if key == name or key.startswith(name + "."):
                 return number
+            inside = _open_brackets(line[assignment.end() :])
     return None
+
+
+def _open_brackets(line: str) -> int:
+    """How many more lists begin in a line than end in it; texts and comments do not count."""
+    bare = re.sub(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|#.*', "", line)
+    return bare.count("[") - bare.count("]")

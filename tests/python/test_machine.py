@@ -394,6 +394,8 @@ def test_every_key_has_a_meaning_and_every_dimensioned_key_a_unit_that_agrees_wi
         "_n_s_per_m": "N s/m",
         "_n_m_s_per_rad": "N m s/rad",
         "_n_m": "N m",
+        "_nm": "N m",
+        "_w": "W",
         "_mm_per_s": "mm/s",
         "_hz": "Hz",
         "_um": "µm",

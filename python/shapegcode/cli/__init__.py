@@ -64,6 +64,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("convert", "convert a CNC program into an input-shaped FANUC program, and check the result"),
     Command("shaper", "compare input shapers for some vibration modes, and recommend one"),
     Command("simulate", "play a program on the machine's model: cycle time, vibration, contour error"),
+    Command("feed", "set the feeds of a program so that cutting force and deflection stay within the tool's limits"),
     Command("expand", "write the plain program that calls, macros and coordinate modes come to"),
     Command("measure", "measure the part that programs would cut: contour, radius, walls, roughness, vibration"),
     Command("time", "predict the cycle time of a program and show where the time goes"),
@@ -71,6 +72,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("machine", "write or explain a machine file, or import one from the control's parameters"),
     Command("characterize", "measure a controller with test programs, and fit the machine file to the results"),
     Command("identify", "find vibration modes in a tap test or decay, and put them into the machine file"),
+    Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
     Command("demo", "repeat the figures of a paper beside the published ones"),
 )
 """Every sub-command, in the order of the help text. A new one needs a row here and a module of its name."""
@@ -122,7 +124,7 @@ def _expected(error: Exception) -> bool:
     """
     if isinstance(error, OSError):
         return True
-    families = (("shapegcode._core", "ShapegcodeError"), ("shapegcode.machine", "MachineError"))
+    families = (("shapegcode._core", "ShapegcodeError"), ("shapegcode.machine_errors", "FileError"))
     for module, name in families:
         family = getattr(sys.modules.get(module), name, None)
         if isinstance(family, type) and isinstance(error, family):

@@ -1,0 +1,1 @@
+"""Milling: files that describe tool, stock and work material."""
