@@ -120,8 +120,8 @@ def met_by_circle(edge: Callable[[Array], Array], x: Array, radius: float, lengt
 
     By trying points of the front half, on stations between which is interpolated.
     """
-    stations = np.arange(x.min() - 0.02, x.max() + 0.04, 0.02)
-    t = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 4001)
+    stations = np.arange(x.min() - 0.04, x.max() + 0.08, 0.04)
+    t = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 3001)
     begin, end = np.zeros(len(stations)), np.zeros(len(stations))
     for k, at in enumerate(stations):
         px, py = at + radius * np.cos(t), radius + radius * np.sin(t)

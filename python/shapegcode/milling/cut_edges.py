@@ -18,7 +18,7 @@ __all__ = ["Edge", "left_edge", "on_increments", "reduced", "tool_path", "unroll
 
 Array = npt.NDArray[np.float64]
 
-_GRID_MM = 0.01
+_GRID_MM = 0.004
 _CHORD_MM = 1e-4
 _MOVED = 9  # increments
 
