@@ -175,7 +175,7 @@ def test_the_programs_raise_nothing(tmp_path: Path, kind: str, capsys: pytest.Ca
     assert text.isascii()
     assert max(map(len, text.splitlines())) <= 60
     head = text[: text.index("G21")]
-    for said in ("ZERO G54", "STOCK:", "2200 HZ", "TOOL IN SPINDLE: D8 MM, 6 FLUTES", "KEEP IT FREE OF CLAMPS"):
+    for said in ("ZERO G54", "STOCK:", "2220 HZ", "TOOL IN SPINDLE: D8 MM, 6 FLUTES", "KEEP IT FREE OF CLAMPS"):
         assert said in head
 
 
@@ -209,7 +209,7 @@ def simulated(
     each: dict[str, Any],
     edge: Callable[[Array], Array],
     *,
-    rate: float = 900.0,
+    rate: float = 1013.0,
     noise: float = 0.05,
     override: float = 1.0,
     spindle: float = SPINDLE,
@@ -290,7 +290,7 @@ def test_chatter_is_left_out_and_told(tmp_path: Path) -> None:
     side = write(tmp_path, "taper", "--length", "40", "-F", "432,864")
     files = []
     for k, each in enumerate(side["passes"]):
-        time, x, force = simulated(each, taper_edge, rate=1800.0, noise=0.02, seed=k)
+        time, x, force = simulated(each, taper_edge, rate=1913.0, noise=0.02, seed=k)
         if k == 0:
             swing = (x > 22.0) & (x < 27.0)
             force[swing] *= 1.0 + 1.5 * np.sin(2.0 * math.pi * 760.0 * time[swing])[:, None]
@@ -301,6 +301,13 @@ def test_chatter_is_left_out_and_told(tmp_path: Path) -> None:
     assert min(each["from_mm"] for each in stretches) == pytest.approx(22.0, abs=1.0)
     assert max(each["to_mm"] for each in stretches) == pytest.approx(27.0, abs=1.0)
     assert abs(report["cutting"]["specific_exponent"] + 0.153) < 0.01
+
+
+def test_samples_in_step_with_the_teeth_are_told(tmp_path: Path) -> None:
+    side = write(tmp_path, "corner")
+    time, _, force = simulated(side["passes"][0], corner_edge(side), rate=900.0, noise=0.02)
+    file = saved(tmp_path / "a.csv", time_s=time, fx_n=force[:, 0], fy_n=force[:, 1])
+    assert any("5.0 samples per tooth" in note for note in fitted(tmp_path, file)["notes"])
 
 
 def mean_rows(depth: Array, feed: float, noise: float, seed: int) -> Array:
@@ -370,7 +377,7 @@ def interval_files(folder: Path, lag_s: float, *, position: bool = False) -> lis
     side = write(folder, "interval")
     files = []
     for k, each in enumerate(side["passes"]):
-        time, x, force = simulated(each, lambda x: np.full(len(x), 0.8), noise=0.03, lag_s=lag_s, seed=k)
+        time, x, force = simulated(each, lambda x: np.full(len(x), 0.8), rate=2219.0, noise=0.03, lag_s=lag_s, seed=k)
         place = {"position_mm": x} if position else {}
         files.append(saved(folder / f"{k}.csv", time_s=time, **place, fx_n=force[:, 0], fy_n=force[:, 1]))
     return files

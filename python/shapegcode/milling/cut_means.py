@@ -19,6 +19,7 @@ _PER_MINUTE = 60.0
 #: Samples per revolution from which on a file is a record and not a table of means.
 FEWEST_SAMPLES = 6.0
 _LEAST_AIR_REVS = 5
+_FEW_PER_TOOTH, _IN_STEP = 16.0, 0.01
 _TELL_SPEED, _TELL_FEED = 0.002, 0.005
 _GUARD_REVS = 2
 #: Of the noise in the air, and of the largest force: what is more is a cut.
@@ -178,6 +179,12 @@ def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, shape: S
     if told and abs(speed / cut.spindle_rev_per_min - 1.0) > _TELL_SPEED:
         notes.append(f"the spindle turned at {speed:.1f} rev/min, {cut.spindle_rev_per_min:g} were commanded")
     samples = _PER_MINUTE / speed / period
+    per_tooth = samples / cut.tool.flutes
+    if per_tooth < _FEW_PER_TOOTH and abs(per_tooth - round(per_tooth)) < _IN_STEP:
+        notes.append(
+            f"{per_tooth:.1f} samples per tooth fall on the same angles over and over: means may be off by some "
+            "percent; record with more samples, or with a rate that is no multiple of the tooth passing frequency"
+        )
     force, offset, drift = _without_offset(record.force_n, begin, end, round(_GUARD_REVS * samples))
     torque = None
     if record.torque_nm is not None:
