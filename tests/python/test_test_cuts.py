@@ -345,7 +345,9 @@ def test_means_at_positions_are_laid_over_the_taper(tmp_path: Path) -> None:
         begin, end = reference.met_by_circle(taper_edge, x, RADIUS, 40.0)
         pitch = each["feeds"][0][1] / SPINDLE / FLUTES
         force = -reference.mean_force(begin, end, pitch, FLUTES, AXIAL, reference.PAPER)
-        files.append(saved(tmp_path / f"{k}.csv", position_mm=x, fx_n=force[:, 0], fy_n=force[:, 1]))
+        torque = pitch * FLUTES * (np.sin(end) - np.sin(begin)) * AXIAL / (2.0 * math.pi) * RADIUS * 1e-3
+        torque *= 221.3 * reference.mean_chip(begin, end, pitch) ** -0.153
+        files.append(saved(tmp_path / f"{k}.csv", position_mm=x, fx_n=force[:, 0], fy_n=force[:, 1], torque_nm=-torque))
     cutting = fitted(tmp_path, *files)["cutting"]
     for name, true in reference.PAPER.items():
         assert cutting[name] == pytest.approx(true, rel=5e-3)
