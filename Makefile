@@ -105,7 +105,8 @@ fuzz-merge: build/fuzz/tests/fuzz/fuzz_reader
 # A default argument that is an object of ours has no spelling in a stub and becomes `...`.
 stubs: package dev
 	$(BIN)/pybind11-stubgen shapegcode._core --output-dir python --exit-code \
-	  --ignore-invalid-expressions '<shapegcode\._core\..*>'
+	  --ignore-invalid-expressions '<shapegcode\._core\..*>' \
+	  --enum-class-locations '(ChipThickness|SpindleSense):shapegcode._core'
 
 format: test-packages dev
 	clang-format -i $(CPP_FILES)

@@ -40,6 +40,17 @@ py::array polyline(const Path& path, double step_rad) {
   return take(std::move(matrix));
 }
 
+// One number per segment.
+template <typename Value>
+auto of_segments(const Path& path, Value value) {
+  using Number = decltype(value(std::size_t{0}));
+  py::array_t<Number> column(static_cast<py::ssize_t>(path.size()));
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    column.mutable_data()[i] = value(i);
+  }
+  return column;
+}
+
 }  // namespace
 
 void register_path(py::module_& module) {
@@ -144,6 +155,26 @@ void register_path(py::module_& module) {
             return largest;
           },
           "Largest sweep of any arc, rad; 0 without arcs.")
+      .def_property_readonly(
+          "segment_ends_mm",
+          [](const Path& self) { return of_segments(self, [&](std::size_t i) { return self.distance_mm(i + 1); }); },
+          "Distance of each segment's end from the start, (n,), mm.")
+      .def_property_readonly(
+          "segment_feeds_mm_per_s",
+          [](const Path& self) { return of_segments(self, [&](std::size_t i) { return self[i].feed_mm_per_s; }); },
+          "Programmed feed of each segment, (n,), mm/s.")
+      .def_property_readonly(
+          "segment_lines",
+          [](const Path& self) { return of_segments(self, [&](std::size_t i) { return self[i].line; }); },
+          "Source line of each segment, (n,), from 1.")
+      .def_property_readonly(
+          "arcs_in_xy",
+          [](const Path& self) {
+            return std::all_of(self.segments().begin(), self.segments().end(), [](const Segment& segment) {
+              return segment.kind != SegmentKind::arc || segment.normal == 2;
+            });
+          },
+          "Whether every arc lies in the XY plane (G17).")
       .def("polyline", &polyline, py::arg("step_rad") = 0.05,
            "Points along the path, (n, 3), mm: segment ends, arcs in steps of `step_rad`.");
 }

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LinearPlant', 'Material', 'MetrologyOptions', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolOffset', 'ToolTime', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'layer_borders', 'line_sections', 'linear_model', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'time_program', 'wilson_theta', 'worst_residual', 'write_blocks', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -591,6 +591,11 @@ class Path:
         Points along the path, (n, 3), mm: segment ends, arcs in steps of `step_rad`.
         """
     @property
+    def arcs_in_xy(self) -> bool:
+        """
+        Whether every arc lies in the XY plane (G17).
+        """
+    @property
     def end_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         End, shape (3,), mm.
@@ -614,6 +619,21 @@ class Path:
     def programmed_time_s(self) -> float:
         """
         Time at the programmed feeds without any acceleration, s.
+        """
+    @property
+    def segment_ends_mm(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Distance of each segment's end from the start, (n,), mm.
+        """
+    @property
+    def segment_feeds_mm_per_s(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Programmed feed of each segment, (n,), mm/s.
+        """
+    @property
+    def segment_lines(self) -> numpy.typing.NDArray[numpy.uint32]:
+        """
+        Source line of each segment, (n,), from 1.
         """
     @property
     def slowest_feed_mm_per_s(self) -> float:
@@ -4358,6 +4378,10 @@ class Material:
         """
     def __len__(self) -> int:
         ...
+    def compact(self) -> None:
+        """
+        Gives back the memory of what is uniform by now.
+        """
     def copy(self) -> Material:
         """
         The material as it is now; the two are independent from here on.
@@ -4584,6 +4608,522 @@ class CornerCut:
         """
         Through which the path turns, rad.
         """
+class ChipThickness:
+    """
+    Which chip thickness the specific cutting force belongs to.
+    
+    Members:
+    
+      mean : Of the whole engagement, as paper 001 fits its coefficients.
+    
+      local : Of each element of a flute.
+    """
+    __members__: typing.ClassVar[dict[str, ChipThickness]]
+    local: typing.ClassVar[ChipThickness]
+    mean: typing.ClassVar[ChipThickness]
+    @typing.overload
+    def __eq__(self, other: ChipThickness) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: ChipThickness) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class CuttingCoefficients:
+    """
+    Power laws of the cutting force (paper 001 eq. 2, 3, 8, 9), with edge forces.
+    
+    Per mm of a flute's height, t being the chip thickness in mm: tangential k1 t + K_te, radial k2 k1 t + K_re in N/mm,
+    with k1 = specific_n_per_mm2 * t**specific_exponent, k2 = ratio * t**ratio_exponent.
+    """
+    def __init__(self, specific_n_per_mm2: typing.SupportsFloat | typing.SupportsIndex, specific_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.0, ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, ratio_exponent: typing.SupportsFloat | typing.SupportsIndex = 0.0, tangential_edge_n_per_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0, radial_edge_n_per_mm: typing.SupportsFloat | typing.SupportsIndex = 0.0, thickness: ChipThickness = ChipThickness.mean) -> None:
+        """
+        Raises ArgumentError on a value that is not finite, a force below 0, or an exponent (tangential, or sum of both) of -1 or less.
+        """
+    @property
+    def radial_edge_n_per_mm(self) -> float:
+        """
+        K_re, N/mm.
+        """
+    @property
+    def ratio(self) -> float:
+        """
+        k2 at a chip of 1 mm.
+        """
+    @property
+    def ratio_exponent(self) -> float:
+        """
+        Of k2.
+        """
+    @property
+    def specific_exponent(self) -> float:
+        """
+        Of k1.
+        """
+    @property
+    def specific_n_per_mm2(self) -> float:
+        """
+        k1 at a chip of 1 mm, N/mm2.
+        """
+    @property
+    def tangential_edge_n_per_mm(self) -> float:
+        """
+        K_te, N/mm.
+        """
+    @property
+    def thickness(self) -> ChipThickness:
+        """
+        Mean or local.
+        """
+class ToolBeam:
+    """
+    An end mill as a beam clamped at its overhang: shank, and a fluted part that is as stiff as a round bar of an effective diameter. Heights count from the tip.
+    """
+    def __init__(self, overhang_mm: typing.SupportsFloat | typing.SupportsIndex, fluted_length_mm: typing.SupportsFloat | typing.SupportsIndex, effective_diameter_mm: typing.SupportsFloat | typing.SupportsIndex, shank_diameter_mm: typing.SupportsFloat | typing.SupportsIndex, young_modulus_gpa: typing.SupportsFloat | typing.SupportsIndex, holder_n_per_um: typing.SupportsFloat | typing.SupportsIndex = ..., spindle_n_per_um: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
+        """
+        Lengths and diameters in mm, modulus in GPa, springs between the clamped end and the frame in N/um (inf: rigid). Raises ArgumentError on a value that is not positive.
+        """
+    def compliance_um_per_n(self, at_mm: typing.SupportsFloat | typing.SupportsIndex, load_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Deflection at one height under 1 N across the axis at another, um/N (both count from the tip).
+        """
+    @property
+    def effective_diameter_mm(self) -> float:
+        """
+        Of the fluted part, mm.
+        """
+    @property
+    def fluted_length_mm(self) -> float:
+        """
+        From the tip, mm.
+        """
+    @property
+    def holder_n_per_um(self) -> float:
+        """
+        N/um.
+        """
+    @property
+    def overhang_mm(self) -> float:
+        """
+        Tip to clamped end, mm.
+        """
+    @property
+    def shank_diameter_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def spindle_n_per_um(self) -> float:
+        """
+        N/um.
+        """
+    @property
+    def young_modulus_gpa(self) -> float:
+        """
+        GPa.
+        """
+class ForceFigures:
+    """
+    Figures over one revolution; forces on the tool, x along the feed and y to its left.
+    """
+    @property
+    def mean_n(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+        """
+        Mean of the vector, (2,), N.
+        """
+    @property
+    def mean_power_w(self) -> float:
+        """
+        Mean torque times angular speed, W.
+        """
+    @property
+    def mean_resultant_n(self) -> float:
+        """
+        Mean of the magnitude, N.
+        """
+    @property
+    def mean_torque_nm(self) -> float:
+        """
+        N m.
+        """
+    @property
+    def peak_chip_mm(self) -> float:
+        """
+        Thickest chip, mm.
+        """
+    @property
+    def peak_flute_n(self) -> float:
+        """
+        Largest magnitude on a single flute, N.
+        """
+    @property
+    def peak_resultant_n(self) -> float:
+        """
+        Largest magnitude, N.
+        """
+    @property
+    def peak_torque_nm(self) -> float:
+        """
+        N m.
+        """
+class ForceCurve:
+    """
+    Forces on the tool over one revolution, in the frame of the tool.
+    """
+    @property
+    def flute_n(self) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]]:
+        """
+        Of each flute, (n_angles, 2), N.
+        """
+    @property
+    def force_n(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 2]"]:
+        """
+        (n_angles, 2), N.
+        """
+    @property
+    def torque_nm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (n_angles,), N m.
+        """
+    @property
+    def turned_rad(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Angle of the spindle in its own sense, (n_angles,); at 0 the first flute's tip looks along the feed.
+        """
+class MillingForce:
+    """
+    Forces of an end mill at one engagement; make one and keep it.
+    
+    The chip at azimuth p is feed per tooth * cos p thick (paper 001 eq. 1); with runout that of flute i is the least of
+    m * feed per tooth * cos p + r_i - r_(i-m), m >= 1, and not below 0. A counter-clockwise spindle mirrors everything,
+    helix included. `arcs`: (n_arcs, 4): from and to in rad from the direction of feed, positive to its left, bottom and top
+    in mm above the tip. `feed_mm_per_min`: along the path. Not for several threads at a time.
+    
+    Raises:
+        ArgumentError: A speed that is not positive; in all members also an arc beyond -pi/2 ... pi/2 or below the tip, or a
+            feed that is negative or not finite.
+    """
+    def __init__(self, tool: EndMill, coefficients: CuttingCoefficients, spindle_rev_per_min: typing.SupportsFloat | typing.SupportsIndex, sense: SpindleSense = SpindleSense.clockwise) -> None:
+        """
+        Spindle speed in 1/min. Raises ArgumentError unless it is positive.
+        """
+    def curve(self, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, angles: typing.SupportsInt | typing.SupportsIndex = 360) -> ForceCurve:
+        """
+        Forces at equal steps of the spindle. Raises ArgumentError on angles < 1.
+        """
+    def deflection_um(self, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, turned_rad: typing.SupportsFloat | typing.SupportsIndex, height_mm: typing.SupportsFloat | typing.SupportsIndex, beam: ToolBeam) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+        """
+        Deflection at a height above the tip and an angle of the spindle (as in ForceCurve), (2,), um, frame of the tool.
+        """
+    def figures(self, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex) -> ForceFigures:
+        """
+        Figures over one revolution: means exact, peaks and mean of the magnitude to 0.1 %; zeros where nothing is cut.
+        """
+    def figures_of(self, track: EngagementTrack, feed_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], beam: ToolBeam | None = None) -> dict:
+        """
+        Figures of a whole track, a feed along the path for each sample.
+        
+        Returns:
+            Arrays (n_samples,) by name: mean_x_n, mean_y_n (frame of the tool), mean_resultant_n, peak_resultant_n,
+            peak_torque_nm, mean_torque_nm, mean_power_w, peak_chip_mm, peak_deflection_um (of the tip; 0 without a beam).
+        
+        Raises:
+            ArgumentError: Another number of feeds, or as the class.
+        """
+    def force_centre_mm(self, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, turned_rad: typing.SupportsFloat | typing.SupportsIndex, overhang_mm: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+        """
+        Centre of the force along x and along y (paper 001 eq. 6), distance from the clamped end, (2,), mm; NaN where that force is 0.
+        """
+    def peak_deflection_um(self, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, beam: ToolBeam) -> float:
+        """
+        Largest deflection of the tip over one revolution, um, quasi-static. Raises ArgumentError also where the engagement lies above the overhang.
+        """
+    @property
+    def coefficients(self) -> CuttingCoefficients:
+        """
+        The power laws.
+        """
+    @property
+    def sense(self) -> SpindleSense:
+        """
+        M03 or M04.
+        """
+    @property
+    def spindle_rev_per_min(self) -> float:
+        """
+        1/min.
+        """
+    @property
+    def tool(self) -> EndMill:
+        """
+        The cutter.
+        """
+class FeedLimit:
+    """
+    What bounds a feed.
+    
+    Members:
+    
+      none : The highest feed asked for is within all limits.
+    
+      resultant : Resultant force, mean or peak.
+    
+      deflection : Peak deflection of the tip.
+    
+      torque : Peak torque.
+    
+      power : Mean power.
+    
+      chip_load : Feed per tooth or thickest chip.
+    """
+    __members__: typing.ClassVar[dict[str, FeedLimit]]
+    chip_load: typing.ClassVar[FeedLimit]
+    deflection: typing.ClassVar[FeedLimit]
+    none: typing.ClassVar[FeedLimit]
+    power: typing.ClassVar[FeedLimit]
+    resultant: typing.ClassVar[FeedLimit]
+    torque: typing.ClassVar[FeedLimit]
+    @typing.overload
+    def __eq__(self, other: FeedLimit) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: FeedLimit) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class FeedLimits:
+    """
+    What bounds a feed over one revolution; inf: no limit.
+    """
+    def __init__(self, *, mean_resultant_n: typing.SupportsFloat | typing.SupportsIndex = ..., peak_resultant_n: typing.SupportsFloat | typing.SupportsIndex = ..., peak_deflection_um: typing.SupportsFloat | typing.SupportsIndex = ..., peak_torque_nm: typing.SupportsFloat | typing.SupportsIndex = ..., mean_power_w: typing.SupportsFloat | typing.SupportsIndex = ..., feed_per_tooth_mm: typing.SupportsFloat | typing.SupportsIndex = ..., peak_chip_mm: typing.SupportsFloat | typing.SupportsIndex = ..., beam: ToolBeam | None = None) -> None:
+        """
+        Raises ArgumentError on a limit that is not positive, or a limit of deflection without a beam.
+        """
+    @property
+    def beam(self) -> ToolBeam | None:
+        """
+        The tool as a beam, or None.
+        """
+    @property
+    def feed_per_tooth_mm(self) -> float:
+        """
+        mm.
+        """
+    @property
+    def mean_power_w(self) -> float:
+        """
+        W.
+        """
+    @property
+    def mean_resultant_n(self) -> float:
+        """
+        Mean of the magnitude of the XY force, N.
+        """
+    @property
+    def peak_chip_mm(self) -> float:
+        """
+        Thickest chip, mm.
+        """
+    @property
+    def peak_deflection_um(self) -> float:
+        """
+        Of the tip, um.
+        """
+    @property
+    def peak_resultant_n(self) -> float:
+        """
+        Largest magnitude, N.
+        """
+    @property
+    def peak_torque_nm(self) -> float:
+        """
+        N m.
+        """
+class LimitedFeed:
+    """
+    A feed and what bounds it.
+    """
+    @property
+    def feed_mm_per_min(self) -> float:
+        """
+        mm/min.
+        """
+    @property
+    def limit(self) -> FeedLimit:
+        """
+        The limit that is reached first.
+        """
+    @property
+    def within(self) -> bool:
+        """
+        False: even the lowest feed, which this is, is beyond the limit.
+        """
+class WallSide:
+    """
+    The wall that a tool finishes beside its way, seen along the feed.
+    
+    Members:
+    
+      right : Down milling with a clockwise spindle.
+    
+      left : Up milling with a clockwise spindle.
+    """
+    __members__: typing.ClassVar[dict[str, WallSide]]
+    left: typing.ClassVar[WallSide]
+    right: typing.ClassVar[WallSide]
+    @typing.overload
+    def __eq__(self, other: WallSide) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: WallSide) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class FeedStretch:
+    """
+    A stretch of one feed.
+    """
+    def __init__(self, begin_mm: typing.SupportsFloat | typing.SupportsIndex, end_mm: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def begin_mm(self) -> float:
+        """
+        Along the path, mm.
+        """
+    @property
+    def end_mm(self) -> float:
+        """
+        Along the path, mm.
+        """
+    @property
+    def feed_mm_per_min(self) -> float:
+        """
+        mm/min.
+        """
+class FeedWriterOptions:
+    """
+    How new feeds are written into a region's blocks.
+    """
+    def __init__(self, increment_mm: typing.SupportsFloat | typing.SupportsIndex, unit_mm: typing.SupportsFloat | typing.SupportsIndex, position_decimals: typing.SupportsInt | typing.SupportsIndex, absolute_centres: bool) -> None:
+        """
+        Least increment, mm; unit of position words and of the length in F, mm; decimals of a position; whether I J K are positions.
+        """
+class RefedRegion:
+    """
+    A region's text with other feeds.
+    """
+    @property
+    def blocks(self) -> int:
+        """
+        Blocks with a cutting move.
+        """
+    @property
+    def lines(self) -> list[int]:
+        """
+        Per block its line, counted from the text's first one = 0.
+        """
+    @property
+    def text(self) -> bytes:
+        """
+        Whole lines.
+        """
+class Travel:
+    """
+    How a path is really travelled, per stretch between two stations.
+    """
+    @property
+    def duration_s(self) -> float:
+        """
+        Until the set-points rest, s.
+        """
+    @property
+    def highest_mm_per_s(self) -> numpy.ndarray:
+        """
+        Largest distance covered within a window, over the window, (n,), mm/s.
+        """
+    @property
+    def time_s(self) -> numpy.ndarray:
+        """
+        Time on each stretch, (n,), s.
+        """
 def acceleration_filters(model: ControllerModel) -> list[Fir]:
     """
     Filters behind interpolation in order, none, one or two.
@@ -4669,6 +5209,10 @@ def count_slowed_blocks(blocks: Path, corner_speed_difference_mm_per_s: typing.A
 def csv_rows(word: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], words: collections.abc.Sequence[str], table: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.f_contiguous"]) -> bytes:
     """
     Rows of a CSV file: the row's word, (k,), and the numbers of its row in the table, (k, c), each as the shortest text that reads back as the same number. Raises ArgumentError on unequal lengths or a word that does not exist.
+    """
+def divisible_segments(program: ProgramText, region: Region, options: FeedWriterOptions) -> list[bool]:
+    """
+    Which segments of a region's path may be divided into several blocks.
     """
 def equivalent_mass_bisection(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], response: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.SupportsFloat | typing.SupportsIndex, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, low_kg: typing.SupportsFloat | typing.SupportsIndex = 0.001, high_kg: typing.SupportsFloat | typing.SupportsIndex = 1000.0, tolerance: typing.SupportsFloat | typing.SupportsIndex = 0.01, most_halvings: typing.SupportsInt | typing.SupportsIndex = 100, quantity: str = 'acceleration', theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, impulse_n_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> EquivalentMass:
     """
@@ -4879,9 +5423,17 @@ def interpolate_program(program: ProgramText, model: ControllerModel) -> Interpo
     """
     The same by full interpolation, every set-point of every step. Raises ArgumentError on a model that no controller can have, or a program of more than 4e9 set-points.
     """
+def largest_feed(force: MillingForce, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], limits: FeedLimits, lowest: typing.SupportsFloat | typing.SupportsIndex, highest: typing.SupportsFloat | typing.SupportsIndex) -> LimitedFeed:
+    """
+    Highest feed between `lowest` and `highest` (mm/min) within all limits: never above, and within 0.1 % of the one that binds. Raises ArgumentError unless 0 < lowest <= highest.
+    """
+def largest_feeds(force: MillingForce, track: EngagementTrack, limits: FeedLimits, lowest: typing.SupportsFloat | typing.SupportsIndex, highest: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.bool]]:
+    """
+    The same for every sample of a track, along the path: (feed_mm_per_min, limit as FeedLimit number, within), each (n_samples,). The highest where nothing is met or the tool only plunges.
+    """
 def layer_borders(paths: collections.abc.Sequence[Path], bottom_mm: typing.SupportsFloat | typing.SupportsIndex, top_mm: typing.SupportsFloat | typing.SupportsIndex, ramp_step_mm: typing.SupportsFloat | typing.SupportsIndex) -> list[float]:
     """
-    Heights between layers for these paths in a stock from bottom to top, mm: where the tool cuts on a level, the lowest points of ramps and plunges, and steps of at most `ramp_step_mm` where ramps and helices pass (a tenth of the tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.
+    Heights between layers for these paths in a stock from bottom to top, mm: where the tool moves on a level, the lowest points of ramps and plunges, and steps of at most `ramp_step_mm` where ramps and helices pass (a tenth of the tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.
     """
 def line_sections(path: Path, ranges: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]]) -> list[PathSection]:
     """
@@ -4901,6 +5453,14 @@ def linear_model(parameters: FeedDriveParameters) -> tuple[typing.Annotated[nump
     
     Raises:
         ArgumentError: The drive is not linear.
+    """
+def look_ahead_on_load(stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reach_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+    """
+    The feeds (n,), mm/min, lowered before each slower station over the way that a controller needs for the change: `reach_s` (n,) times the feed there.
+    """
+def machine_frame(tool_frame: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], direction_rad: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+    """
+    A force (2,) in the frame of the tool, in the frame of the machine (paper 001 eq. 4, 5); direction of feed from +X towards +Y.
     """
 def matrix_exponential(matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
     """
@@ -5160,6 +5720,10 @@ def repeated_zv(mode: Mode, zeros: typing.SupportsInt | typing.SupportsIndex) ->
     
     Source: Singer and Seering 1990.
     """
+def schedule_feed(block_ends_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], kept_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], divisible: collections.abc.Sequence[bool], stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], least_length_mm: typing.SupportsFloat | typing.SupportsIndex = 0.6, most_change_mm_per_min: typing.SupportsFloat | typing.SupportsIndex = ..., resolution_mm_per_min: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> list[FeedStretch]:
+    """
+    Feeds of a path in the shortest time that the stations allow: stretches not shorter than the least length, each at the lowest feed of its stations. Per block its end (n,), the feed that it keeps (0: it may change) and whether it may be divided; feeds (m,) hold up to their station. Raises ArgumentError on values that do not ascend or are not above 0.
+    """
 def sensitivity_curve(shaper: Shaper, damping_ratio: typing.SupportsFloat | typing.SupportsIndex, frequencies_hz: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> list[float]:
     """
     Residual ratio over the natural frequency.
@@ -5213,6 +5777,37 @@ def time_program(program: ProgramText, model: ControllerModel, per_block: bool =
     """
     Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in look-ahead. Raises ArgumentError on a model that no controller can have.
     """
+def travel_blocks(blocks: Path, path: Path, block_end: BlockEnd, stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, filters: collections.abc.Sequence[Fir] = [], window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Travel:
+    """
+    How blocks at their feed are travelled, followed along `path`; else as travel_path.
+    """
+def travel_path(path: Path, profile: SpeedProfile, stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, filters: collections.abc.Sequence[Fir] = [], window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Travel:
+    """
+    How a path under a speed profile is travelled; `stations_mm` (n,) ascend to its length, `filters` stand behind the set-points, speeds are taken over `window_s`. Raises ArgumentError on stations that do not ascend.
+    """
+def wall_error_um(force: MillingForce, beam: ToolBeam, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, side: WallSide, height_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], tolerance_rad: typing.SupportsFloat | typing.SupportsIndex = 0.02) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    Form error of the wall across itself at heights above the tip (paper 001, section 2.3).
+    
+    Args:
+        force: The force model.
+        beam: The tool as a beam.
+        arcs: (n_arcs, 4): from and to in rad, bottom and top in mm.
+        feed_mm_per_min: Along the path.
+        side: Which wall.
+        height_mm: (n,), mm above the tip.
+        tolerance_rad: An arc that ends this close to +-pi/2 reaches the wall.
+    
+    Returns:
+        (n,), um: + material is left standing, - the wall is cut too deep; NaN where the engagement does not reach it.
+    
+    Raises:
+        ArgumentError: A height below the tip, or an engagement above the overhang.
+    """
+def wall_errors_um(force: MillingForce, beam: ToolBeam, track: EngagementTrack, feed_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], side: WallSide, height_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], tolerance_rad: typing.SupportsFloat | typing.SupportsIndex = 0.02) -> numpy.ndarray:
+    """
+    The same along a track, a feed for each sample: (n_samples, n_heights), um, read-only. Raises ArgumentError as wall_error_um, and on another number of feeds.
+    """
 def wilson_theta(mass_kg: typing.SupportsFloat | typing.SupportsIndex, damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex, stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex, force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, displacement_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """
     Step-by-step integration of m x'' + c x' + k x = force by the Wilson theta method.
@@ -5234,6 +5829,10 @@ def wilson_theta(mass_kg: typing.SupportsFloat | typing.SupportsIndex, damping_n
         ArgumentError: A value outside its range.
     
     Source: paper 003, section 2.2; K.-J. Bathe, Finite Element Procedures, 9.2.
+    """
+def with_feeds(path: Path, stretches: collections.abc.Sequence[FeedStretch]) -> Path:
+    """
+    The path with other feeds: segments are divided where a stretch ends within one. Raises ArgumentError if the stretches do not cover it.
     """
 def worst_residual(shaper: Shaper, mode: Mode, lowest_hz: typing.SupportsFloat | typing.SupportsIndex, highest_hz: typing.SupportsFloat | typing.SupportsIndex) -> WorstResidual:
     """
@@ -5257,6 +5856,10 @@ def worst_residual(shaper: Shaper, mode: Mode, lowest_hz: typing.SupportsFloat |
 def write_blocks(blocks: FittedBlocks, start: typing.Annotated[collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"], marks: collections.abc.Sequence[BlockMark], options: WriterOptions) -> tuple[bytes, int, int]:
     """
     (text as bytes, motion code, plane) of fitted blocks; `start` in increments.
+    """
+def write_feeds(program: ProgramText, region: Region, stretches: collections.abc.Sequence[FeedStretch], options: FeedWriterOptions) -> RefedRegion:
+    """
+    The region's lines with the feeds of stretches that cover its path; what else stands in them stays. Raises ArgumentError if they do not cover it, or end within a block that cannot be divided.
     """
 def zv(mode: Mode) -> Shaper:
     """

@@ -75,6 +75,11 @@ class Conversion:
         )
 
 
+def marked_out_of_tolerance(text: bytes) -> bytes:
+    """An emitted program that misses a limit which only its caller knows of, with the verdict in its header."""
+    return text.replace(_VERDICT_GOOD, _VERDICT_BAD, 1)
+
+
 def written_by_shapegcode(program: Program) -> bool:
     """Whether the header comment of this tool stands in the program."""
     return _HEADER_MARK in program.core.slice(0, _HEADER_REACH)

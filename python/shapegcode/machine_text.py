@@ -148,23 +148,36 @@ def documentation(model: type[Table], builtin_names: Sequence[str]) -> str:
         "it. The FANUC column names the parameter that corresponds to a key; numbers differ between series,",
         "so check your manual.",
     ]
+    return "\n".join([*lines, *key_tables(model)]) + "\n"
+
+
+def key_tables(model: type[Table], *, fanuc: bool = True, heading: str = "##") -> list[str]:
+    """The keys of a file as Markdown: a heading and a table for each of its tables, a line each.
+
+    Args:
+        model: the table that the file is read as.
+        fanuc: with the column of FANUC parameters.
+        heading: what a heading begins with.
+    """
+    lines: list[str] = []
+    columns = ("key", "unit", "default", "FANUC", "meaning") if fanuc else ("key", "unit", "default", "meaning")
     for table, meaning, infos in _documented(model, ""):
-        lines += ["", f"## {_heading(table)}", ""]
+        lines += ["", f"{heading} {_heading(table)}", ""]
         if meaning:
             lines += [f"{meaning[:1].upper()}{meaning[1:]}.", ""]
-        lines += ["| key | unit | default | FANUC | meaning |", "|---|---|---|---|---|"]
+        lines += [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
         for info in infos:
             name = info.key.removeprefix(f"{table}.")
             default = info.default if info.default in ("required", "not set") else f"`{info.default}`"
-            cells = (
-                f"`{name}`",
-                info.unit or "–",
-                default + (" **assumed**" if info.assumed else ""),
-                info.fanuc or "–",
-                info.meaning,
-            )
-            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-    return "\n".join(lines) + "\n"
+            cells = {
+                "key": f"`{name}`",
+                "unit": info.unit or "–",
+                "default": default + (" **assumed**" if info.assumed else ""),
+                "FANUC": info.fanuc or "–",
+                "meaning": info.meaning,
+            }
+            lines.append("| " + " | ".join(cells[column].replace("|", "\\|") for column in columns) + " |")
+    return lines
 
 
 def _documented(model: type[Table], prefix: str) -> Iterator[tuple[str, str, list[KeyInfo]]]:

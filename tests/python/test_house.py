@@ -24,7 +24,7 @@ ALLOWED_FOLDERS: dict[str, set[str]] = {
     "gcode": {"path"},
     "path": set(),
     "motion": {"path", "filter"},
-    "emission": {"path", "filter", "motion", "gcode", "shaping", "plant"},
+    "emission": {"path", "filter", "motion", "gcode", "shaping", "plant", "milling"},
     "simulation": {"path", "filter", "motion", "plant", "metrology", "gcode"},
     "filter": set(),
     "shaping": {"filter", "plant"},
@@ -131,11 +131,28 @@ def test_only_pictures_import_matplotlib() -> None:
         "canvas.py",
         "identification/tap_picture.py",
         "metrology_picture.py",
+        "milling/feed_picture.py",
         "motion_picture.py",
         "plotting.py",
         "shaper_picture.py",
         "time_picture.py",
     }
+
+
+def test_only_files_of_settings_import_pydantic() -> None:
+    users = {
+        file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py") if "pydantic" in imported_modules(file)
+    }
+    tables = {name for name in users if re.fullmatch(r"machine(_[a-z]+)?\.py", name)}
+    assert users - tables == {"milling/cutting_materials.py", "milling/stock_file.py", "milling/tool_file.py"}
+
+
+def test_only_shapes_of_the_stock_import_shapely() -> None:
+    users = {
+        file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py") if "shapely" in imported_modules(file)
+    }
+    assert users == {"milling/offset_shapes.py", "milling/stock_shape.py"}
+    assert "shapely" not in loaded_after("import shapegcode.milling.stock_material, shapegcode.milling.stock_shape")
 
 
 def loaded_after(statement: str) -> set[str]:

@@ -105,7 +105,8 @@ ChipTable::ChipTable(const ChipPowers& powers, ChipProfile profile, double feed_
       feed_mm_(feed_per_tooth_mm),
       size_(3U + (powers.one_power() ? 0U : 2U) + (powers.edges ? 3U : 0U)),
       grid_(quick ? Grid::quick() : Grid::fine()),
-      nodes_((grid_.cells + 1) * size_ * 2) {
+      nodes_((grid_.cells + 1) * size_ * 2),
+      twice_(nodes_.size()) {
   for (const double u : profile_.kinks()) {
     if (u < feed_mm_) kinks_.push_back(coordinate_of(std::acos(u / feed_mm_)));
   }
@@ -116,10 +117,20 @@ ChipTable::ChipTable(const ChipPowers& powers, ChipProfile profile, double feed_
   for (std::size_t node = grid_.cells + 1; node-- > 0;) {
     if (node < grid_.cells) integrate(node, sum);
     values(grid_.node[node].sine, grid_.node[node].cosine, slope);
+    const double fall = -std::numbers::pi * static_cast<double>(node) / (cells * cells);  // of azimuth, per cell
     double* to = nodes_.data() + node * size_ * 2;
+    double* twice = twice_.data() + node * size_ * 2;
     for (std::size_t k = 0; k < size_; ++k) {
       to[2 * k] = sum[k];
-      to[2 * k + 1] = -std::numbers::pi * static_cast<double>(node) / cells * slope[k] / cells;
+      to[2 * k + 1] = fall * slope[k];
+      twice[2 * k + 1] = fall * sum[k];
+      if (node == grid_.cells) continue;
+      const double* next = to + 2 * size_;  // Simpson's rule, its middle from the cubic
+      const double y = static_cast<double>(node) / cells;
+      const double middle = 0.5 * (to[2 * k] + next[2 * k]) + 0.125 * (to[2 * k + 1] - next[2 * k + 1]);
+      twice[2 * k] = twice[2 * k + 2 * size_] +
+                     std::numbers::pi / (6.0 * cells) *
+                         (y * to[2 * k] + 4.0 * (y + 0.5 / cells) * middle + (y + 1.0 / cells) * next[2 * k]);
     }
   }
 }
@@ -184,7 +195,11 @@ void ChipTable::values(double sine, double cosine, Values& out) const noexcept {
   }
 }
 
-void ChipTable::cumulated(double azimuth, Values& out) const noexcept {
+void ChipTable::cumulated(double azimuth, Values& out) const noexcept { look_up(nodes_, azimuth, false, out); }
+
+void ChipTable::cumulated_twice(double azimuth, Values& out) const noexcept { look_up(twice_, azimuth, true, out); }
+
+void ChipTable::look_up(const std::vector<double>& nodes, double azimuth, bool odd_sines, Values& out) const noexcept {
   const double at = coordinate_of(std::abs(azimuth)) * static_cast<double>(grid_.cells);
   const auto cell = std::min(static_cast<std::size_t>(at), grid_.cells - 1);
   const double x = at - static_cast<double>(cell);
@@ -194,23 +209,28 @@ void ChipTable::cumulated(double azimuth, Values& out) const noexcept {
   const double s0 = x * y * y;
   const double v1 = x * x * (3.0 - 2.0 * x);
   const double s1 = -x * x * y;
-  const double* left = nodes_.data() + cell * size_ * 2;
+  const double* left = nodes.data() + cell * size_ * 2;
   const double* right = left + size_ * 2;
   for (std::size_t k = 0; k < size_; ++k) {
     out[k] = v0 * left[2 * k] + s0 * left[2 * k + 1] + v1 * right[2 * k] + s1 * right[2 * k + 1];
   }
-  if (azimuth < 0.0) {  // all but those over the sine are odd
-    out[1] = -out[1];
-    out[2] = -out[2];
-    std::size_t k = 3;
-    if (!powers_.one_power()) {
-      out[k + 1] = -out[k + 1];
-      k += 2;
-    }
-    if (powers_.edges) {
-      out[k + 1] = -out[k + 1];
-      out[k + 2] = -out[k + 2];
-    }
+  if (azimuth >= 0.0) return;
+  // Integrals over a sine are even, all others odd; integrated once more it is the other way round.
+  const double sine = odd_sines ? -1.0 : 1.0;
+  const auto turn = [&out, sine](std::size_t k) {
+    out[k] *= sine;
+    out[k + 1] *= -sine;
+  };
+  turn(0);
+  out[2] *= -sine;
+  std::size_t k = 3;
+  if (!powers_.one_power()) {
+    turn(k);
+    k += 2;
+  }
+  if (powers_.edges) {
+    turn(k);
+    out[k + 2] *= -sine;
   }
 }
 

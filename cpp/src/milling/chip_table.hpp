@@ -61,6 +61,8 @@ class ChipTable {
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   /// The integrals from 0 to an azimuth within -pi/2 ... pi/2.
   void cumulated(double azimuth, Values& out) const noexcept;
+  /// The integrals of those integrals.
+  void cumulated_twice(double azimuth, Values& out) const noexcept;
   /// The integrands.
   void density(double azimuth, Values& out) const noexcept;
   /// Thickness of the chip at an azimuth, mm.
@@ -68,6 +70,7 @@ class ChipTable {
 
  private:
   struct Grid;
+  void look_up(const std::vector<double>& nodes, double azimuth, bool odd_sines, Values& out) const noexcept;
   void values(double sine, double cosine, Values& out) const noexcept;
   void integrate_stretch(double from, double to, Values& sum) const;
   void integrate(std::size_t cell, Values& sum) const;
@@ -79,6 +82,7 @@ class ChipTable {
   const Grid& grid_;
   std::vector<double> kinks_;  // grid coordinate 0 ... 1 of the profile's kinks
   std::vector<double> nodes_;  // value and slope by grid coordinate of each integral, node by node
+  std::vector<double> twice_;  // the same of their integrals
 };
 
 }  // namespace shapegcode

@@ -12,6 +12,8 @@ constexpr double panel_rad = 8.0 / 180.0 * std::numbers::pi;  // of Simpson's ru
 constexpr double same_kink_rad = 1e-6;
 // A force without helix jumps where an arc begins: both sides are looked at from a little inside.
 constexpr double inside_rad = 1e-9;
+// A weighted load along less azimuth than this stands at its middle.
+constexpr double short_rad = 1e-2;
 
 }  // namespace
 
@@ -34,12 +36,37 @@ void FluteSet::add(const EngagedPiece& piece, const ChipTable& table, double azi
   ChipTable::Values lower;
   table.cumulated(low, lower);
   table.cumulated(high, upper);
-  double weight = piece.weight;
-  if (piece.slope_per_mm != 0.0) {
-    weight += piece.slope_per_mm * ((0.5 * (low + high) - azimuth) / lag_rad_per_mm - piece.centre_mm);
+  add_between(piece, table, azimuth, low, lower, high, upper, sum);
+}
+
+void FluteSet::add_between(const EngagedPiece& piece, const ChipTable& table, double azimuth, double low,
+                           const ChipTable::Values& lower, double high, const ChipTable::Values& upper,
+                           ChipTable::Values& sum) const noexcept {
+  const double share = 1.0 / lag_rad_per_mm;
+  if (piece.slope_per_mm == 0.0) {
+    const double weight = piece.weight * share;
+    for (std::size_t k = 0; k < table.size(); ++k) sum[k] += weight * (upper[k] - lower[k]);
+    return;
   }
-  weight /= lag_rad_per_mm;
-  for (std::size_t k = 0; k < table.size(); ++k) sum[k] += weight * (upper[k] - lower[k]);
+  const auto weight_at = [&](double p) {
+    return piece.weight + piece.slope_per_mm * ((p - azimuth) * share - piece.centre_mm);
+  };
+  if (high - low < short_rad) {
+    const double weight = weight_at(0.5 * (low + high)) * share;
+    for (std::size_t k = 0; k < table.size(); ++k) sum[k] += weight * (upper[k] - lower[k]);
+    return;
+  }
+  // By parts: the weight is a straight line.
+  ChipTable::Values lower_twice;
+  ChipTable::Values upper_twice;
+  table.cumulated_twice(low, lower_twice);
+  table.cumulated_twice(high, upper_twice);
+  const double at_low = weight_at(low) * share;
+  const double at_high = weight_at(high) * share;
+  const double slope = piece.slope_per_mm * share * share;
+  for (std::size_t k = 0; k < table.size(); ++k) {
+    sum[k] += at_high * upper[k] - at_low * lower[k] - slope * (upper_twice[k] - lower_twice[k]);
+  }
 }
 
 void Revolution::place_angles(const FluteSet& set, std::span<const EngagedPiece> arcs) {
@@ -123,13 +150,10 @@ void Revolution::add(const FluteSet& set, const EngagedPiece& piece, std::size_t
       if (top_inside) table.cumulated(top, upper);
       const ChipTable::Values& low = tip_inside ? lower : at_from;
       const ChipTable::Values& high = top_inside ? upper : at_to;
-      double weight = piece.weight;
-      if (piece.slope_per_mm != 0.0) {
-        const double middle = 0.5 * ((tip_inside ? tip : piece.from_rad) + (top_inside ? top : piece.to_rad));
-        weight += piece.slope_per_mm * ((middle - azimuth) / lag - piece.centre_mm);
-      }
-      weight /= lag;
-      for (std::size_t k = 0; k < size_; ++k) to[k * n + j] += weight * (high[k] - low[k]);
+      ChipTable::Values value{};
+      set.add_between(piece, table, azimuth, tip_inside ? tip : piece.from_rad, low, top_inside ? top : piece.to_rad,
+                      high, value);
+      for (std::size_t k = 0; k < size_; ++k) to[k * n + j] += value[k];
     }
   }
 }

@@ -10,8 +10,8 @@
 
 namespace shapegcode {
 
-/// Part of the engagement, seen with a clockwise spindle. Its force counts `weight` times, and by `slope_per_mm` more
-/// for each mm that its middle lies above `centre_mm`.
+/// Part of the engagement, seen with a clockwise spindle. Its force counts `weight` times at `centre_mm`, and
+/// `slope_per_mm` more for each mm above.
 struct EngagedPiece {
   double from_rad;
   double to_rad;
@@ -40,6 +40,10 @@ struct FluteSet {
   [[nodiscard]] bool straight(const EngagedPiece& piece) const noexcept {
     return lag_rad_per_mm * (piece.top_mm - piece.bottom_mm) < 1e-6;
   }
+  /// Adds the force between two azimuths of a piece, the flute's tip at `azimuth`, from the integrals at both ends.
+  void add_between(const EngagedPiece& piece, const ChipTable& table, double azimuth, double low,
+                   const ChipTable::Values& lower, double high, const ChipTable::Values& upper,
+                   ChipTable::Values& sum) const noexcept;
   /// Adds what a flute whose tip stands at `azimuth` has in a piece.
   void add(const EngagedPiece& piece, const ChipTable& table, double azimuth, ChipTable::Values& sum) const noexcept;
 };

@@ -64,6 +64,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("convert", "convert a CNC program into an input-shaped FANUC program, and check the result"),
     Command("shaper", "compare input shapers for some vibration modes, and recommend one"),
     Command("simulate", "play a program on the machine's model: cycle time, vibration, contour error"),
+    Command("feed", "set the feeds of a program so that cutting force and deflection stay within the tool's limits"),
     Command("expand", "write the plain program that calls, macros and coordinate modes come to"),
     Command("measure", "measure the part that programs would cut: contour, radius, walls, roughness, vibration"),
     Command("time", "predict the cycle time of a program and show where the time goes"),

@@ -6,14 +6,17 @@ import argparse
 import importlib
 import threading
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from shapegcode.cli.console import add_json_argument
+from shapegcode.cli.feed import add_cutting_arguments
 from shapegcode.cli.options import (
     add_machine_argument,
     add_plots_argument,
     add_program_argument,
     load_machine,
     micrometres,
+    output_file,
     positive,
     ratio,
     refuse_same_file,
@@ -21,6 +24,13 @@ from shapegcode.cli.options import (
     size,
     with_values,
 )
+
+if TYPE_CHECKING:
+    from shapegcode.budget import Budget
+    from shapegcode.cli.console import ProgressBar
+    from shapegcode.converter import Conversion
+    from shapegcode.machine import Machine
+    from shapegcode.program import Program
 
 __all__ = ["add_arguments", "run"]
 
@@ -117,6 +127,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="blocks that the control reads per second; as --baud",
     )
+    parser.add_argument(
+        "--feed-schedule",
+        action="store_true",
+        help="first set the feeds so that the cut of the shaped program keeps the tool's limits, as `shapegcode feed`; "
+        "needs --tool and --stock",
+    )
+    add_cutting_arguments(parser, required=False)
     add_program_argument(parser)
     add_plots_argument(parser)
     add_json_argument(parser)
@@ -137,11 +154,7 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.compensation import read_for_conversion
     from shapegcode.converter import convert
 
-    if args.output == "-":
-        raise ArgumentError("-o - : the program needs a file of its own; --json - writes the report to standard output")
-    output = Path(args.output)
-    if not output.name or output.is_dir():
-        raise ArgumentError(f"-o {args.output}: the output must be a file, not a folder")
+    output = output_file(args.output)
     limits = (args.max_bytes, args.baud, args.max_blocks_per_second)
     budget = None if limits == (None, None, None) else Budget(*limits)
     machine = load_machine(args)
@@ -156,7 +169,10 @@ def run(args: argparse.Namespace) -> int:
         ("shaping.part_mass_kg", args.part_mass),
     )
     failed = output.with_name(output.name + machine.emission.failed_suffix)
-    read = [Path(args.input), Path(args.machine)]
+    cutting = [Path(name) for name in (*(args.tool or ()), *([args.stock] if args.stock else ()))]
+    if args.feed_schedule != bool(args.tool and args.stock) or bool(args.tool) != bool(args.stock):
+        raise ArgumentError("--feed-schedule, --tool and --stock belong together: give all three or none")
+    read = [Path(args.input), Path(args.machine), *cutting]
     refuse_same_file([output, failed], read)
     if args.json not in (None, "-"):
         refuse_same_file([Path(args.json)], [*read, output, failed])
@@ -164,16 +180,20 @@ def run(args: argparse.Namespace) -> int:
     threading.Thread(target=importlib.import_module, args=("shapegcode.shaping",), daemon=True).start()
     with progress(f"converting {args.input}", args.json) as bar:
         program = read_for_conversion(args.input, machine, program_number=args.program)
-        stages = {"shaping": 0.0, "shaping again, slower": 0.0, "round trip": 0.5}
-        conversion = convert(
-            program,
-            machine,
-            arc_feed_ratio=args.arc_feed,
-            block_period_s=args.block_period,
-            budget=budget,
-            on_progress=lambda stage, done, total: bar.update(stages[stage] + 0.5 * done / total),
-        )
-        target = output if conversion.within_tolerance else failed
+        if args.feed_schedule:
+            conversion, within = _convert_scheduled(args, program, machine, budget, bar)
+        else:
+            stages = {"shaping": 0.0, "shaping again, slower": 0.0, "round trip": 0.5}
+            conversion = convert(
+                program,
+                machine,
+                arc_feed_ratio=args.arc_feed,
+                block_period_s=args.block_period,
+                budget=budget,
+                on_progress=lambda stage, done, total: bar.update(stages[stage] + 0.5 * done / total),
+            )
+            within = conversion.within_tolerance
+        target = output if within else failed
         report = {**conversion.report, "output": str(target)}
         if args.plots is not None:
             from shapegcode.pictures import write_pictures
@@ -185,9 +205,38 @@ def run(args: argparse.Namespace) -> int:
         write_bytes(target, conversion.text)
     if args.json == "-":
         write_json(report, args.json)
-    print_before_after(report, args.json)
     console = output_console(args.json)
+    if args.feed_schedule:
+        from shapegcode.milling.feed_table import feed_tables
+
+        for table in feed_tables(report["feed_schedule"]):
+            console.print(table)
+    print_before_after(report, args.json)
     console.print(f"wrote {target}", markup=False, soft_wrap=True)
     if target == failed and output.exists():
         console.print(f"{output} is of an earlier run and was left alone", markup=False, soft_wrap=True)
-    return ExitCode.OK if conversion.within_tolerance else ExitCode.OUT_OF_TOLERANCE
+    return ExitCode.OK if within else ExitCode.OUT_OF_TOLERANCE
+
+
+def _convert_scheduled(
+    args: argparse.Namespace, program: Program, machine: Machine, budget: Budget | None, bar: ProgressBar
+) -> tuple[Conversion, bool]:
+    """Feeds and shaping in one go, and whether tolerances and limits are kept."""
+    from shapegcode.milling.schedule import MARGIN
+    from shapegcode.milling.shaped_schedule import convert_scheduled
+    from shapegcode.milling.stock_file import Stock
+    from shapegcode.milling.tool_file import Tool
+
+    scheduled = convert_scheduled(
+        program,
+        machine,
+        [Tool.load(name) for name in args.tool],
+        Stock.load(args.stock),
+        margin=MARGIN if args.margin is None else args.margin,
+        resolution_mm=None if args.resolution is None else args.resolution * 1e-3,
+        arc_feed_ratio=args.arc_feed,
+        block_period_s=args.block_period,
+        budget=budget,
+        on_progress=bar.update,
+    )
+    return scheduled.conversion, scheduled.within_tolerance

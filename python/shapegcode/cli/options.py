@@ -143,6 +143,22 @@ def _toml_value(text: str) -> Any:
         return text
 
 
+def output_file(name: str) -> Path:
+    """The file of ``-o``.
+
+    Raises:
+        ArgumentError: it is standard output or a folder.
+    """
+    from shapegcode._core import ArgumentError
+
+    if name == "-":
+        raise ArgumentError("-o - : the program needs a file of its own; --json - writes the report to standard output")
+    path = Path(name)
+    if not path.name or path.is_dir():
+        raise ArgumentError(f"-o {name}: the output must be a file, not a folder")
+    return path
+
+
 def refuse_same_file(targets: Iterable[Path], others: Iterable[Path]) -> None:
     """Refuse to write a file that is read, or written otherwise, in the same run.
 

@@ -34,14 +34,16 @@ class Material(Table):
     tangential_edge_n_per_mm: NonNegative = key("tangential force of the edge per length of it", unit="N/mm")
     radial_edge_n_per_mm: NonNegative = key("radial force of the edge per length of it", unit="N/mm")
     chip_thickness: Literal["mean", "local"] = key("which chip thickness the exponents belong to")
-    chip_mm: tuple[Positive, Positive] = key("chip thickness from ... to for which this holds", unit="mm")
+    chip_mm: tuple[Positive, Positive] | None = key(
+        "chip thickness from ... to for which this holds; left out: the source does not say", unit="mm", default=None
+    )
     cutter: Text = key("what cut it")
     source: Text = key("where the values come from")
     assumed: Text = key("what the source does not say and is assumed here; empty: nothing")
 
     @model_validator(mode="after")
     def _range_ascends(self) -> Material:
-        if self.chip_mm[0] >= self.chip_mm[1]:
+        if self.chip_mm is not None and self.chip_mm[0] >= self.chip_mm[1]:
             raise KeyProblem("chip_mm", self.chip_mm, "the lower end comes first")
         return self
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from shapegcode import _core
 from shapegcode.machine_keys import toml
+from shapegcode.milling.offset_shapes import chord_angle_rad, grown, swept
 from shapegcode.milling.stock_file import Allowance, Box, Polygon, Solid, Stock, StockError
 
 if TYPE_CHECKING:
@@ -22,10 +23,10 @@ __all__ = ["StockPiece", "stock_polygons"]
 
 Points = NDArray[np.float64]
 
-# Chords of circles leave them by less than this.
-_SAGITTA_MM = 1e-4
 # Points of a program nearer than this are the same.
 _SAME_MM = 2e-3
+# A run is a closed contour with its lead-in and lead-out if so much of its length closes upon itself.
+_CLOSED_RATIO = 0.5
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,10 @@ def _polygon(stock: Stock, polygon: Polygon, key: str) -> list[StockPiece]:
         if not hole.is_valid or hole.area == 0:
             reason = shapely.is_valid_reason(hole)
             raise stock.error(f"{key}.holes_mm.{number}", "", f"must go round an area: {reason}")
-    return _pieces(outline.difference(shapely.union_all(holes)), polygon.z_mm)
+    pieces = _pieces(outline.difference(shapely.union_all(holes)), polygon.z_mm)
+    if not pieces:
+        raise stock.error(f"{key}.holes_mm", "", "must leave something of the polygon")
+    return pieces
 
 
 def _pieces(area: Area | MultiPolygon, z_mm: tuple[float, float]) -> list[StockPiece]:
@@ -93,8 +97,8 @@ def _pieces(area: Area | MultiPolygon, z_mm: tuple[float, float]) -> list[StockP
 
     pieces = []
     for part in shapely.get_parts(area):
-        if part.geom_type != "Polygon" or part.is_empty:
-            continue  # a line in which two shapes touch
+        if part.geom_type != "Polygon" or part.area < _SAME_MM * _SAME_MM:
+            continue  # where two shapes touch, up to rounding
         ordered = shapely.orient_polygons(part)
         rings = (ordered.exterior, *ordered.interiors)
         pieces.append(StockPiece(tuple(np.asarray(ring.coords)[:-1] for ring in rings), *z_mm))
@@ -112,9 +116,8 @@ class _Allowance:
                 "corner_radius_mm",
                 f"tool bigger than the corner: must not be below the tool's radius, {radius_mm:g} mm",
             )
-        reach = max(radius_mm + allowance.width_mm, allowance.allowance_mm + corner)
         self._reach = radius_mm + allowance.width_mm
-        self._quarter = math.ceil(math.pi / (4 * math.acos(1 - _SAGITTA_MM / max(reach, 2 * _SAGITTA_MM))))
+        self._rough = allowance.allowance_mm + corner
 
     def area(self, paths: Sequence[_core.Path]) -> Area | MultiPolygon:
         """The area of the stock in the plane XY."""
@@ -124,31 +127,32 @@ class _Allowance:
         walls, swept = [], []
         for points in self._runs(paths):
             loops, rest = _loops(_with_touched(points))
-            for loop in loops:
-                wall, gone = self._closed(loop)
-                walls.append(wall)
-                swept.append(gone)
-            if not loops:
-                wall, gone = self._open(rest)
+            closed, whole = sum(_length(np.vstack([loop, loop[:1]])) for loop in loops), _length(points)
+            if loops and closed < _CLOSED_RATIO * whole:
+                raise self._error(
+                    "wall",
+                    f"only {closed:.4g} of {whole:.4g} mm of a run of cutting moves close upon themselves: is that the "
+                    "wall? Describe the stock as [polygon]",
+                )
+            for wall, gone in map(self._closed, loops) if loops else [self._open(rest)]:
                 walls.append(wall)
                 swept.append(gone)
         if not walls:
             raise self._error("z_mm", "no cutting move of the program goes below the top")
         part = shapely.union_all(walls).difference(shapely.union_all(swept))
+        if part.is_empty:
+            raise self._error("wall", "the tool's sweep leaves nothing behind the walls: wrong side?")
         # What roughing with corner_radius_mm leaves of the layer: its path keeps allowance and radius off the part.
-        return self._grown(self._grown(part, keys.allowance_mm + keys.corner_radius_mm), -keys.corner_radius_mm)
+        return grown(grown(part, self._rough), -keys.corner_radius_mm)
 
     def _error(self, key: str, limit: str) -> StockError:
         return self._stock.error(f"allowance.{key}", toml(getattr(self._keys, key)), limit)
-
-    def _grown(self, shape: Area | MultiPolygon, distance_mm: float) -> Area | MultiPolygon:
-        return shape.buffer(distance_mm, quad_segs=self._quarter)
 
     def _runs(self, paths: Sequence[_core.Path]) -> Iterator[Points]:
         """Stretches of the paths below the top of the stock, in the plane, without points that repeat."""
         top = self._keys.z_mm[1] - 1e-9
         for path in paths:
-            points = path.polyline(_step_rad(path))
+            points = path.polyline(self._step_rad(path))
             below = np.concatenate([[False], points[:, 2] < top, [False]])
             edges = np.flatnonzero(below[1:] != below[:-1])
             for first, last in zip(edges[::2], edges[1::2], strict=True):
@@ -158,6 +162,11 @@ class _Allowance:
                 if len(plane) > 1:
                     yield plane
 
+    def _step_rad(self, path: _core.Path) -> float:
+        """Angle of the chords of a path's arcs: fine enough for what is offset from them."""
+        radius = max((path[index].radius_mm for index in range(len(path))), default=0.0)
+        return chord_angle_rad(radius + self._reach + self._rough)
+
     def _closed(self, loop: Points) -> tuple[Area, Area]:
         """The part behind the wall of a closed contour, and what is gone in front of it."""
         import shapely
@@ -166,23 +175,23 @@ class _Allowance:
         if not ring.is_valid:
             reason = shapely.is_valid_reason(ring)
             raise self._error("wall", f"the closed contour crosses itself ({reason}): describe the stock as [polygon]")
-        sweep = self._grown(ring.exterior, self._radius)
+        sweep = swept(np.vstack([loop, loop[:1]]), self._radius)
         is_inside = (_signed_area(loop) > 0) == (self._keys.wall == "left")
         if is_inside:
-            if ring.difference(sweep).is_empty:
+            part = ring.difference(sweep)
+            if part.is_empty:
                 raise self._error("wall", "the tool's sweep leaves nothing inside the closed contour: wrong side?")
-            inner = ring.buffer(-self._reach, quad_segs=self._quarter)
-            return ring.difference(inner), sweep
-        pocket = self._grown(ring, self._radius)
-        roughed = pocket.buffer(-self._keys.allowance_mm - self._keys.corner_radius_mm, quad_segs=self._quarter)
-        if roughed.is_empty:
-            room = 2 * shapely.maximum_inscribed_circle(pocket, tolerance=0.01).length
+            return part.difference(grown(part, -self._keys.width_mm)), sweep
+        pocket = ring.union(sweep)
+        # The offset of GEOS, off by some micrometres, is good enough for this question and quick.
+        if pocket.buffer(-self._rough).is_empty:
+            room = 2 * shapely.maximum_inscribed_circle(pocket, tolerance=1e-3).length
             raise self._error(
                 "corner_radius_mm",
                 f"roughing tool bigger than the pocket: with allowance_mm on both sides it needs "
-                f"{2 * (self._keys.allowance_mm + self._keys.corner_radius_mm):g} mm, the pocket is {room:.4g} mm wide",
+                f"{2 * self._rough:g} mm, the pocket is {room:.4g} mm wide",
             )
-        return self._grown(pocket, self._keys.width_mm), pocket
+        return grown(pocket, self._keys.width_mm), pocket
 
     def _open(self, points: Points) -> tuple[Area | MultiPolygon, Area]:
         """The part behind the wall of a contour that does not close, and what the tool takes."""
@@ -197,18 +206,19 @@ class _Allowance:
             )
         points = np.asarray(substring(wall, start, end).coords)
         # Beyond its ends the wall goes on straight, as far as the tool reaches there.
-        beyond = 2 * self._radius + self._keys.allowance_mm + self._keys.corner_radius_mm
-        line = shapely.LineString(_extended(points, beyond))
+        beyond = 2 * self._radius + self._rough
+        straight = _extended(points, beyond)
+        line = shapely.LineString(straight)
         if not line.is_simple:
             raise self._error(
                 "wall",
                 "the path crosses itself or the straight continuation of its ends: describe the stock as [polygon]",
             )
-        band = line.buffer(self._reach, quad_segs=self._quarter, cap_style="flat")
-        cut = shapely.LineString(_extended(np.asarray(line.coords), _SAME_MM))
+        band = swept(straight, self._reach, round_ends=False)
+        cut = shapely.LineString(_extended(straight, _SAME_MM))
         faces = shapely.get_parts(shapely.polygonize([shapely.union_all([band.boundary, cut])]))
-        behind = self._behind(faces, points)
-        return shapely.union_all(behind), self._grown(line, self._radius)
+        behind = self._behind(faces, straight)
+        return shapely.union_all(behind), swept(straight, self._radius)
 
     def _behind(self, faces: NDArray[np.object_], points: Points) -> list[Area]:
         """Those of the faces beside a path that lie on the side of the wall."""
@@ -228,10 +238,8 @@ class _Allowance:
         return behind
 
 
-def _step_rad(path: _core.Path) -> float:
-    """Angle of the chords of a path's arcs."""
-    radius = max((path[index].radius_mm for index in range(len(path))), default=0.0)
-    return 2 * math.acos(1 - _SAGITTA_MM / max(radius, 2 * _SAGITTA_MM))
+def _length(points: Points) -> float:
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())
 
 
 def _signed_area(loop: Points) -> float:

@@ -193,7 +193,7 @@ class Limits(Table):
     resultant: Literal["peak", "mean"] = key(
         'what resultant_n limits: the "peak" of the resultant over one revolution or its "mean"', default="peak"
     )
-    deflection_um: Positive | None = key("deflection of the tool that the finished wall shows", unit="µm", default=None)
+    deflection_um: Positive | None = key("peak deflection of the tool at its tip", unit="µm", default=None)
     torque_nm: Positive | None = key("peak torque about the axis of the tool", unit="N m", default=None)
     power_w: Positive | None = key("mean power of the cut", unit="W", default=None)
     feed_per_tooth_min_mm: Positive | None = key(

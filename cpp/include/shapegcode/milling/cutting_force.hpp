@@ -118,7 +118,7 @@ class MillingForce {
 };
 
 /// Figures of a whole track, a row per sample: mean_x_n, mean_y_n, mean_resultant_n, peak_resultant_n, peak_torque_nm,
-/// mean_torque_nm, mean_power_w, peak_chip_mm; forces in the frame of the tool.
+/// mean_torque_nm, mean_power_w, peak_chip_mm, peak_deflection_um; forces in the frame of the tool.
 enum class ForceColumn : std::uint8_t {
   mean_x_n,
   mean_y_n,
@@ -128,12 +128,13 @@ enum class ForceColumn : std::uint8_t {
   mean_torque_nm,
   mean_power_w,
   peak_chip_mm,
+  peak_deflection_um,
 };
-inline constexpr int force_columns = 8;
+inline constexpr int force_columns = 9;
 
 /// `feed_mm_per_min`: along the path, one per sample; the chip comes from its horizontal part. Throws as
-/// MillingForce::figures, and on another number of feeds.
+/// MillingForce::figures, and on another number of feeds. The deflection of the tip is 0 without a beam.
 [[nodiscard]] Eigen::MatrixXd figures_of(MillingForce& force, const EngagementTrack& track,
-                                         std::span<const double> feed_mm_per_min);
+                                         std::span<const double> feed_mm_per_min, const ToolBeam* beam = nullptr);
 
 }  // namespace shapegcode

@@ -18,7 +18,7 @@ class Material {
   /// `rings`: outlines of the stock, holes included (even-odd rule); `borders_mm`: heights in Z between the layers,
   /// ascending, from the bottom of the stock to its top; `resolution_mm`: grid, a hundredth of the tool's diameter is
   /// a good choice. Throws Error(argument) if there is no ring, a ring has fewer than 3 points or encloses nothing
-  /// with the others, a number is not finite, fewer than two borders or not ascending ones, a resolution that is not
+  /// at this resolution, a number is not finite, fewer than two borders or not ascending ones, a resolution that is not
   /// positive, or a grid that needs more than `memory_limit_bytes`.
   Material(std::span<const Ring> rings, std::span<const double> borders_mm, double resolution_mm,
            std::size_t memory_limit_bytes = default_memory_limit_bytes);
@@ -65,6 +65,7 @@ class Material {
 
  private:
   void check_memory(std::size_t needed) const;
+  void plan_compaction();
 
   std::vector<double> borders_;
   std::vector<double> middles_;
@@ -72,13 +73,13 @@ class Material {
   Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
   Eigen::Vector2d high_ = Eigen::Vector2d::Zero();
   std::size_t memory_limit_;
-  std::size_t tiles_ = 0;         // that carry values, of all layers
-  std::size_t compact_at_tiles_;  // look for uniform ones
+  std::size_t tiles_ = 0;             // that carry values, of all layers
+  std::size_t compact_at_tiles_ = 0;  // look for uniform ones
 };
 
-/// Heights between layers for these paths in a stock from `bottom_mm` to `top_mm`: the heights at which the tool cuts
-/// on a level (taken as one within 1 um), the lowest points of ramps and plunges, and steps of at most `ramp_step_mm`
-/// wherever a ramp or helix passes. Throws Error(argument) unless bottom < top and the step is positive.
+/// Heights between layers for these paths in a stock from `bottom_mm` to `top_mm`: the heights at which the tool moves
+/// on a level (taken as one within 1 um), the lowest points of ramps and plunges that cut, and steps of at most
+/// `ramp_step_mm` wherever a ramp or helix passes. Throws Error(argument) unless bottom < top and the step is positive.
 [[nodiscard]] std::vector<double> layer_borders(std::span<const Path* const> paths, double bottom_mm, double top_mm,
                                                 double ramp_step_mm);
 

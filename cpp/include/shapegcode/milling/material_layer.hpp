@@ -36,6 +36,9 @@ class MaterialLayer {
   /// before, so that only what lies ahead of it is looked at. Returns how many tiles got values of their own.
   std::size_t remove(const ToolStep& step, double tool_radius_mm, bool continues);
 
+  /// Whether any node is in material.
+  [[nodiscard]] bool has_material() const noexcept;
+
   /// Area of material, mm2.
   [[nodiscard]] double area_mm2() const noexcept;
 
@@ -61,7 +64,7 @@ class MaterialLayer {
   static constexpr std::int32_t full = -1;
   static constexpr std::int32_t empty = -2;
 
-  struct Sweep;  // a step and its reach
+  struct Sweep;
 
   void remove_in_row(const Sweep& sweep, std::int64_t j);
   void remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_t first, std::int64_t last);

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "shapegcode/path/path.hpp"
+
+namespace shapegcode {
+
+/// How fast a path may be run: `feed_mm_per_min[i]` holds on the stretch that ends at `s_mm[i]` and begins at the
+/// station before it (0 before the first). Ascending; the last one is the path's end.
+struct FeedStations {
+  std::vector<double> s_mm;
+  std::vector<double> feed_mm_per_min;
+};
+
+/// What a block is to the scheduler.
+struct FeedBlock {
+  double end_mm = 0.0;           ///< of the block, along the path
+  double kept_mm_per_min = 0.0;  ///< it keeps this feed; 0: it may get another one
+  bool divisible = false;        ///< may be divided into several blocks
+};
+
+struct FeedScheduleOptions {
+  double least_length_mm = 0.6;  ///< over which a feed stays, and of a piece of a divided block
+  /// From one feed to the next, as far as feeds that are kept allow.
+  double most_change_mm_per_min = std::numeric_limits<double>::infinity();
+  double resolution_mm_per_min = 0.1;  ///< feeds are whole multiples, rounded down
+};
+
+/// A stretch of one feed.
+struct FeedStretch {
+  double begin_mm = 0.0;
+  double end_mm = 0.0;
+  double feed_mm_per_min = 0.0;
+};
+
+/// Feeds of a path in the shortest time that the stations allow: stretches that begin and end where a block does or
+/// within a divisible one, none shorter than the least length (but where kept blocks leave no more room), each at the
+/// lowest feed of its stations. The borders are chosen together (dynamic programming), with a charge for each of one
+/// percent of the shortest stretch's time, so that none is made for nothing. O(stations + length).
+///
+/// Throws Error(argument) on stations or blocks that do not ascend to one end, a feed that is not above 0, or options
+/// outside their range.
+[[nodiscard]] std::vector<FeedStretch> schedule_feed(std::span<const FeedBlock> blocks, const FeedStations& stations,
+                                                     const FeedScheduleOptions& options);
+
+/// The path with other feeds: segments are divided where a stretch ends within one. Throws Error(argument) if the
+/// stretches do not cover the path.
+[[nodiscard]] Path with_feeds(const Path& path, std::span<const FeedStretch> stretches);
+
+/// Lowers the feeds before each slower station, over the way on which a controller that needs `reach_s` for a change of
+/// feed would still be too fast: reach_s times the feed there. One entry of `reach_s` per station.
+void look_ahead_on_load(FeedStations& stations, std::span<const double> reach_s);
+
+}  // namespace shapegcode

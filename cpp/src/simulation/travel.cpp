@@ -1,0 +1,128 @@
+#include "shapegcode/simulation/travel.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+
+#include "filter_chain.hpp"
+#include "shapegcode/error.hpp"
+#include "shapegcode/metrology/contour.hpp"
+#include "shapegcode/motion/interpolator.hpp"
+
+namespace shapegcode {
+namespace {
+
+// Follows set-points along a path and keeps what happened between two stations.
+class Follower {
+ public:
+  Follower(const Path& path, std::span<const double> stations, const TravelOptions& options)
+      : stations_(stations), options_(options), filters_(options.axis_filters), tracker_(path) {
+    if (!(options.period_s > 0.0) || !(options.window_s >= 0.0)) {
+      throw Error(ErrorKind::argument, "a travel needs a period above 0 and a window of at least 0");
+    }
+    double before = 0.0;
+    for (const double s : stations) {
+      if (!(s >= before)) {
+        throw Error(ErrorKind::argument, "station at " + std::to_string(s) + " mm: stations must ascend");
+      }
+      before = s;
+    }
+    if (stations.empty() || std::abs(before - path.length_mm()) > 1e-6) {
+      throw Error(ErrorKind::argument, "the stations end at " + std::to_string(before) + " mm, the path at " +
+                                           std::to_string(path.length_mm()) + " mm");
+    }
+    const auto window = static_cast<std::size_t>(std::lround(options.window_s / options.period_s));
+    covered_.assign(std::max<std::size_t>(window, 1), 0.0);
+    result_.highest_mm_per_s.assign(stations.size(), 0.0);
+    result_.time_s.assign(stations.size(), 0.0);
+  }
+
+  void add(Vector3 setpoint) {
+    if (!started_) {
+      filters_.reset(setpoint);
+      last_ = setpoint;
+      started_ = true;
+    }
+    filters_.step(setpoint);
+    const double step = (setpoint - last_).norm();
+    last_ = setpoint;
+    tracker_.step(setpoint);
+    ++count_;
+    if (step > 0.0) {
+      moved_ = count_;
+    }
+    // A sum that is made anew each time the ring turns over does not collect rounding errors.
+    double& oldest = covered_[next_];
+    within_ += step - oldest;
+    oldest = step;
+    next_ = next_ + 1 == covered_.size() ? 0 : next_ + 1;
+    if (next_ == 0) {
+      within_ = 0.0;
+      for (const double part : covered_) {
+        within_ += part;
+      }
+    }
+    const double speed = within_ / (static_cast<double>(covered_.size()) * options_.period_s);
+    const std::size_t from = station_;
+    while (station_ + 1 < stations_.size() && stations_[station_] < tracker_.s_mm()) {
+      ++station_;
+    }
+    for (std::size_t i = from; i <= station_; ++i) {
+      result_.highest_mm_per_s[i] = std::max(result_.highest_mm_per_s[i], speed);
+    }
+    if (step > 0.0) {
+      result_.time_s[station_] += options_.period_s;
+    }
+  }
+
+  Travel finish(const Vector3& end) {
+    for (int i = 0; i < filters_.tail(); ++i) {
+      add(end);
+    }
+    result_.duration_s = moved_ > 0 ? static_cast<double>(moved_ - 1) * options_.period_s : 0.0;
+    return std::move(result_);
+  }
+
+ private:
+  std::span<const double> stations_;
+  const TravelOptions& options_;
+  detail::FilterChain filters_;
+  ContourTracker tracker_;
+  Travel result_;
+  std::vector<double> covered_;  // distance of each period in the window, a ring
+  std::size_t next_ = 0;
+  double within_ = 0.0;
+  std::size_t station_ = 0;
+  std::size_t count_ = 0;
+  std::size_t moved_ = 0;
+  bool started_ = false;
+  Vector3 last_ = Vector3::Zero();
+};
+
+template <typename Player>
+Travel follow(Player& player, const Path& path, const Vector3& end, std::span<const double> stations,
+              const TravelOptions& options) {
+  Follower follower(path, stations, options);
+  Vector3 position = Vector3::Zero();
+  while (player.step(position)) {
+    follower.add(position);
+  }
+  return follower.finish(end);
+}
+
+}  // namespace
+
+Travel travel_path(const std::shared_ptr<const Path>& path, const std::shared_ptr<const SpeedProfile>& profile,
+                   std::span<const double> stations_mm, const TravelOptions& options) {
+  Interpolator interpolator(path, profile, options.period_s);
+  return follow(interpolator, *path, path->segments().back().end_mm, stations_mm, options);
+}
+
+Travel travel_blocks(std::span<const Segment> blocks, const Path& path, BlockEnd block_end,
+                     std::span<const double> stations_mm, const TravelOptions& options) {
+  BlockPlayer player(blocks, options.period_s, block_end);
+  return follow(player, path, blocks.back().end_mm, stations_mm, options);
+}
+
+}  // namespace shapegcode

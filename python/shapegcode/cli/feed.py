@@ -1,0 +1,127 @@
+"""``shapegcode feed``: feeds that keep force, deflection, torque, power and chip within the tool's limits."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from shapegcode.cli.console import add_json_argument
+from shapegcode.cli.options import (
+    add_input_arguments,
+    add_plots_argument,
+    load_machine,
+    micrometres,
+    output_file,
+    ratio,
+    refuse_same_file,
+)
+
+__all__ = ["add_arguments", "add_cutting_arguments", "run"]
+
+
+def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    """Declare what a feed schedule needs beside program and machine: tool, stock, margin, resolution."""
+    parser.add_argument(
+        "--tool",
+        metavar="T.toml",
+        action="append",
+        required=required,
+        help="tool file: end mill, cutting force, limits (docs/tool_files.md); may be repeated, then each file needs "
+        "its T number",
+    )
+    parser.add_argument(
+        "--stock",
+        metavar="S.toml",
+        required=required,
+        help="stock file: what is there before the first block (docs/tool_files.md)",
+    )
+    parser.add_argument(
+        "--margin",
+        metavar="RATIO",
+        type=ratio,
+        default=None,
+        help="share of each limit that is left free, for example 3%% (default: 1.5%%)",
+    )
+    parser.add_argument(
+        "--resolution",
+        metavar="LENGTH",
+        type=micrometres,
+        default=None,
+        help="grid of the material, for example 50um (default: a hundredth of the tool's diameter)",
+    )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.description = (
+        "Sweeps the tool through the stock, computes the cutting force of the feed that the machine really runs, and "
+        "writes the program with the highest feeds that keep the tool's limits. Blocks are divided where the load "
+        "changes within them; everything else stays as it is. Exit code 0: every limit is kept; 1: written, but "
+        "somewhere a limit is not kept (the report says where and why); 2: bad input."
+    )
+    parser.epilog = "example: shapegcode feed part.nc -m vx500 --tool T8.toml --stock block.toml -o part-feed.nc"
+    add_input_arguments(parser)
+    add_cutting_arguments(parser, required=True)
+    parser.add_argument("-o", "--output", metavar="OUT", required=True, help="program to write")
+    add_plots_argument(
+        parser,
+        "write pictures (PNG and SVG) into this folder: force, feed and engagement along the path, the path coloured "
+        "by force before and after, the error of the wall",
+    )
+    add_json_argument(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Schedule the feeds of one program.
+
+    Raises:
+        ProgramError, MachineError, ToolError, StockError, ArgumentError: bad input.
+        OSError: a file cannot be read or written.
+    """
+    from shapegcode.cli import ExitCode
+    from shapegcode.cli.console import output_console, progress, write_bytes, write_json
+    from shapegcode.compensation import read_for_conversion
+    from shapegcode.milling.feed_table import feed_tables, next_step
+    from shapegcode.milling.schedule import MARGIN, schedule_feed
+    from shapegcode.milling.stock_file import Stock
+    from shapegcode.milling.tool_file import Tool
+    from shapegcode.report import warning_table
+
+    output = output_file(args.output)
+    machine = load_machine(args)
+    read = [Path(name) for name in (args.input, args.machine, args.stock, *args.tool)]
+    refuse_same_file([output], read)
+    if args.json not in (None, "-"):
+        refuse_same_file([Path(args.json)], [*read, output])
+    tools = [Tool.load(name) for name in args.tool]
+    stock = Stock.load(args.stock)
+    with progress(f"scheduling {args.input}", args.json) as bar:
+        program = read_for_conversion(args.input, machine, program_number=args.program)
+        result = schedule_feed(
+            program,
+            machine,
+            tools,
+            stock,
+            margin=MARGIN if args.margin is None else args.margin,
+            resolution_mm=None if args.resolution is None else args.resolution * 1e-3,
+            on_progress=bar.update,
+        )
+        report = {**result.report, "output": str(output)}
+        if args.plots is not None:
+            from shapegcode.milling.feed_picture import write_feed_pictures
+
+            report["plots"] = write_feed_pictures(result, args.plots)
+        if args.json not in (None, "-"):
+            write_json(report, args.json)
+        # Last of all, so that no program stands there when something else could not be written.
+        write_bytes(output, result.text)
+    if args.json == "-":
+        write_json(report, args.json)
+    console = output_console(args.json)
+    for table in feed_tables(report):
+        console.print(table)
+    if report["warnings"]:
+        console.print(warning_table(report["warnings"]))
+    console.print(f"wrote {output}", markup=False, soft_wrap=True)
+    console.print(f"next: {next_step(report)}", markup=False)
+    return ExitCode.OK if result.within_limits else ExitCode.OUT_OF_TOLERANCE

@@ -1,0 +1,244 @@
+"""What the tool meets on its way through a program: the stock is swept move by move, in the order of the program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.milling.stock_file import Stock
+from shapegcode.milling.stock_material import build_material
+from shapegcode.milling.tool_file import Tool
+from shapegcode.program import Program
+
+__all__ = ["Survey", "SurveyedRegion", "survey"]
+
+_RESOLUTION_RATIO = 0.01  # of the smallest tool's diameter
+_SHOWN_COLLISIONS = 5
+_TOOL_CHANGE, _CLOCKWISE, _COUNTER_CLOCKWISE = 6, 3, 4
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class SurveyedRegion:
+    """A run of cutting moves between two stops, and what the tool meets on it.
+
+    Attributes:
+        region: of the program.
+        index: of the region.
+        tool: the tool that cuts it; None: one without a tool file.
+        track: what the tool meets; None where it is not known.
+        spindle_rev_per_min: speed of the spindle, 0 where it is not known.
+        sense: in which it turns.
+        kept: why the feeds of the region stay as they are; empty if they may change.
+    """
+
+    region: _core.Region
+    index: int
+    tool: Tool | None
+    track: _core.EngagementTrack | None
+    spindle_rev_per_min: float
+    sense: _core.SpindleSense
+    kept: str
+
+
+@dataclass(frozen=True)
+class Survey:
+    """A program swept through its stock.
+
+    Attributes:
+        program: what was swept.
+        regions: its regions in order.
+        material: what is left.
+        warnings: what was noticed on the way, each with its place.
+    """
+
+    program: Program
+    regions: tuple[SurveyedRegion, ...]
+    material: _core.Material
+    warnings: tuple[str, ...]
+
+
+def survey(
+    program: Program,
+    machine: Machine,
+    tools: Sequence[Tool],
+    stock: Stock,
+    *,
+    resolution_mm: float | None = None,
+    on_progress: Progress = lambda _done, _total: None,
+) -> Survey:
+    """Sweep a program through a stock.
+
+    Args:
+        program: the program.
+        machine: whose controller runs it.
+        tools: what cuts; several need their T numbers.
+        stock: what is there before the first block.
+        resolution_mm: grid of the material; None: a hundredth of the smallest tool's diameter.
+        on_progress: called with steps done and steps in all.
+
+    Raises:
+        ArgumentError: tools that cannot be told apart, no cutting move, or a grid that does not fit into memory.
+        StockError: the stock does not suit the program.
+    """
+    walk = _Walk(program, tools)
+    cutters = walk.tools_of_regions()
+    reasons = [_why_not_swept(region, program) for region in program.regions]
+    swept = [index for index, reason in enumerate(reasons) if not reason and cutters[index] is not None]
+    if not swept:
+        why = next((f": {reason}" for reason in reasons if reason), "")
+        raise _core.ArgumentError(f"{program.source}: no cutting moves whose engagement can be computed{why}")
+    smallest = min(tools, key=lambda tool: tool.radius_mm)
+    resolution = resolution_mm or _RESOLUTION_RATIO * smallest.tool.diameter_mm
+    # The walls of an allowance are those that the finishing tool leaves.
+    walls = [program.regions[index].path for index in swept if cutters[index] is smallest]
+    others = [program.regions[index].path for index in swept if cutters[index] is not smallest]
+    material = build_material(stock, walls, smallest, resolution, machine, others=[*others, *walk.cuts_elsewhere()])
+    regions: list[SurveyedRegion] = []
+    total = len(program.core.steps)
+    for done, (kind, index, line) in enumerate(program.core.steps):
+        if kind == _core.StepKind.function:
+            walk.function(index)
+        elif kind == _core.StepKind.move:
+            walk.sweep_other(material, index, line)
+        else:
+            regions.append(walk.sweep_region(material, index))
+        on_progress(done + 1, total)
+    if not any(region.track is not None and len(region.track) and region.track.section_mm2.any() for region in regions):
+        walk.warnings.append(
+            f"{program.source}: the tool never touches the stock: see where it lies, in the program's own coordinates"
+        )
+    return Survey(program, tuple(regions), material, tuple(walk.warnings))
+
+
+def _why_not_swept(region: _core.Region, program: Program) -> str:
+    """Why what the tool meets on a region cannot be told; empty if it can."""
+    first = program.regions[0].exit
+    if (region.exit.coordinate_system, region.exit.coordinate_number) != (
+        first.coordinate_system,
+        first.coordinate_number,
+    ):
+        return "it is cut in other work coordinates than the first cutting move, in whose the stock lies"
+    if region.incremental:
+        return "its place is not known"
+    if not region.path.arcs_in_xy:
+        return "it holds arcs that are not in the XY plane (G17)"
+    return ""
+
+
+class _Walk:
+    """The state of the spindle and its tool along a program."""
+
+    def __init__(self, program: Program, tools: Sequence[Tool]) -> None:
+        self.warnings: list[str] = []
+        self._program = program
+        self._functions = program.core.functions
+        self._moves = program.core.other_moves
+        self._sense: _core.SpindleSense | None = None
+        self._ready = -1  # T before its M06
+        self._number = -1
+        self._collisions = 0
+        # Where a program moves from places that are not known, neither are those of its rapids.
+        self._adrift = any(region.incremental for region in program.regions)
+        self._tools: dict[int, Tool] = {}
+        self._any: Tool | None = None
+        for tool in tools:
+            number = tool.tool.number
+            if number is None:
+                if len(tools) > 1:
+                    raise _core.ArgumentError(f"{len(tools)} tools: each needs its T number (tool.number)")
+                self._any = tool
+            elif number in self._tools:
+                raise _core.ArgumentError(f"two tools have the number T{number}")
+            else:
+                self._tools[number] = tool
+        used = {tool for _, tool, _ in self._functions if tool > 0}
+        if self._any is not None and len(used) > 1:
+            self.warnings.append(
+                f"{program.source}: uses the tools {', '.join(f'T{n}' for n in sorted(used))}: all are taken as "
+                f"{self._any.tool.name}; give tool.number to tell them apart"
+            )
+
+    def function(self, index: int) -> None:
+        """A block with M, S or T words."""
+        m_codes, tool, _ = self._functions[index]
+        if tool > 0:
+            self._ready = tool
+        if _TOOL_CHANGE in m_codes and self._ready > 0:
+            self._number = self._ready
+        if _CLOCKWISE in m_codes:
+            self._sense = _core.SpindleSense.clockwise
+        if _COUNTER_CLOCKWISE in m_codes:
+            self._sense = _core.SpindleSense.counter_clockwise
+
+    @property
+    def _tool(self) -> Tool | None:
+        if self._any is not None:
+            return self._any
+        number = self._number if self._number > 0 else self._ready
+        if number <= 0 and len(self._tools) == 1:  # a program for one tool need not name it
+            return next(iter(self._tools.values()))
+        return self._tools.get(number)
+
+    def tools_of_regions(self) -> list[Tool | None]:
+        """What cuts each region; the walk stands at the program's start again afterwards."""
+        found: list[Tool | None] = []
+        for kind, index, _ in self._program.core.steps:
+            if kind == _core.StepKind.function:
+                self.function(index)
+            elif kind == _core.StepKind.region:
+                found.append(self._tool)
+        self._sense, self._ready, self._number = None, -1, -1
+        return found
+
+    def cuts_elsewhere(self) -> list[_core.Path]:
+        """Cutting moves outside of the regions, each as a path."""
+        return [
+            _core.Path([segment])
+            for segment, dwell_s in self._moves
+            if segment.kind != _core.SegmentKind.rapid and not dwell_s > 0.0 and segment.length_mm > 0.0
+        ]
+
+    def sweep_other(self, material: _core.Material, index: int, line: int) -> None:
+        """A rapid, or a cutting move outside of the regions."""
+        segment, dwell_s = self._moves[index]
+        tool = self._tool
+        if tool is None or dwell_s > 0.0 or not segment.length_mm > 0.0:
+            return
+        if segment.kind == _core.SegmentKind.arc and segment.normal != 2:
+            return
+        if segment.kind == _core.SegmentKind.rapid and self._adrift:
+            return
+        track = _core.sweep(material, _core.Path([segment]), tool.tool.diameter_mm)
+        if segment.kind == _core.SegmentKind.rapid and (track.section_mm2.any() or track.plunged_mm2.any()):
+            self._collisions += 1
+            if self._collisions <= _SHOWN_COLLISIONS:
+                self.warnings.append(
+                    f"{self._program.place(line)}: rapid into material: the stock file or the program is wrong"
+                )
+
+    def sweep_region(self, material: _core.Material, index: int) -> SurveyedRegion:
+        """A region."""
+        region = self._program.regions[index]
+        tool = self._tool
+        kept = _why_not_swept(region, self._program)
+        if tool is None:
+            number = self._number if self._number > 0 else self._ready
+            kept = f"no tool file describes T{number}" if number > 0 else "the program names no tool before it"
+        speed = region.entry.spindle_rev_per_min
+        if tool is not None and not speed > 0.0:
+            speed = tool.feed.spindle_rev_per_min or 0.0
+        track = None
+        if tool is not None and not kept:
+            track = _core.sweep(material, region.path, tool.tool.diameter_mm)
+            if not speed > 0.0:
+                kept = "no spindle speed: neither S in the program nor feed.spindle_rev_per_min in the tool file"
+            elif region.exit.feed_mode != 94:
+                kept = f"its feeds are not per minute (G{region.exit.feed_mode})"
+            elif region.entry.units != region.exit.units:
+                kept = "it changes between inch and mm"
+        sense = _core.SpindleSense.clockwise if tool is None else tool.sense(self._sense)
+        return SurveyedRegion(region, index, tool, track, speed, sense, kept)
