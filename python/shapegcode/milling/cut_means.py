@@ -30,7 +30,7 @@ _FEWEST_FOR_SPEED = 20.0
 _LARGEST_SHIFT_MM = 1.0
 _SHIFT_STEPS = 81
 #: The cut may last so much longer or shorter: at another feed override; where the place or the feeds are stated.
-_OTHER_FEED, _OTHER_LENGTH = 0.6, 0.15
+_OTHER_FEED, _OTHER_LENGTH = 0.6, 0.03
 _CHATTER, _CHATTER_LEAST = 8.0, 0.02  # times the median deviation; the least that counts as one, of the median
 _CHATTER_ROUNDS = 12
 
