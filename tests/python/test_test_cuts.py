@@ -303,9 +303,7 @@ def test_chatter_is_left_out_and_told(tmp_path: Path) -> None:
     assert abs(report["cutting"]["specific_exponent"] + 0.153) < 0.01
 
 
-def test_another_override_is_refused_where_the_feed_changes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_another_override_is_refused_where_the_feed_changes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     side = write(tmp_path, "corner")
     time, _, force = simulated(side["passes"][1], corner_edge(side), override=0.9)
     file = saved(tmp_path / "a.csv", time_s=time, fx_n=force[:, 0], fy_n=force[:, 1])

@@ -149,7 +149,7 @@ def spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: int
             bent = left - 2.0 * mid + right
             fine = 0.5 * (left - right) / bent if bent < 0.0 else 0.0
             best = height, (low + peak + fine) * step * _PER_MINUTE / order
-    return (commanded, False) if best is None else (best[1], True)
+    return (commanded, False) if best is None else (float(best[1]), True)
 
 
 def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, shape: Shape) -> PlacedRecord:
