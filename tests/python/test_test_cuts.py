@@ -399,7 +399,7 @@ def test_a_controller_that_follows_at_once_follows_every_interval(tmp_path: Path
     assert all(each["lag_s"] < 0.02 for each in report["passes"])
 
 
-@pytest.mark.parametrize("position", [False, True])
+@pytest.mark.parametrize("position", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_lagging_controller_needs_longer_intervals(tmp_path: Path, position: bool) -> None:
     report = fitted(tmp_path, *interval_files(tmp_path, 0.1, position=position), "--plots", str(tmp_path / "plots"))
     assert report["interval_mm"] in (0.4, 0.6)
