@@ -80,7 +80,7 @@ def points_at(run: list[Move], s_mm: npt.NDArray[np.float64]) -> npt.NDArray[np.
 
 
 @settings(
-    max_examples=40, deadline=None, phases=(Phase.explicit, Phase.generate), suppress_health_check=list(HealthCheck)
+    max_examples=15, deadline=None, phases=(Phase.explicit, Phase.generate), suppress_health_check=list(HealthCheck)
 )
 @given(text=programs(cycles=False), seed=st.integers(0, 2**32 - 1))
 def test_other_feeds_leave_the_path_where_it_is(text: str, seed: int) -> None:

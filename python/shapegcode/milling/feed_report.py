@@ -162,7 +162,7 @@ def feed_report(
         "regions": regions,
         "excess_ratio": excess,
         "within_limits": not any(region["misses"] for region in regions),
-        "warnings": warnings,
+        "warnings": list(dict.fromkeys(warnings)),
     }
 
 
