@@ -141,6 +141,7 @@ void register_material(py::module_& module) {
            "bottom to top, mm (see layer_borders); distance of the grid's nodes, mm (a hundredth of the tool's "
            "diameter is a good choice). Raises ArgumentError on an outline or heights that enclose nothing, or a grid "
            "that needs more memory than the limit.")
+      .def("compact", &Material::compact, "Gives back the memory of what is uniform by now.")
       .def(
           "copy", [](const Material& self) { return std::make_shared<Material>(self); },
           "The material as it is now; the two are independent from here on.")
@@ -183,7 +184,7 @@ void register_material(py::module_& module) {
         return layer_borders(pointers, bottom, top, ramp_step);
       },
       py::arg("paths"), py::arg("bottom_mm"), py::arg("top_mm"), py::arg("ramp_step_mm"),
-      "Heights between layers for these paths in a stock from bottom to top, mm: where the tool cuts on a level, the "
+      "Heights between layers for these paths in a stock from bottom to top, mm: where the tool moves on a level, the "
       "lowest points of ramps and plunges, and steps of at most `ramp_step_mm` where ramps and helices pass (a tenth "
       "of the tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.");
 }

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "arrays.hpp"
@@ -13,6 +14,7 @@
 #include "shapegcode/milling/cutting_force.hpp"
 #include "shapegcode/milling/deflection.hpp"
 #include "shapegcode/milling/feed_limit.hpp"
+#include "shapegcode/milling/surface.hpp"
 
 namespace py = pybind11;
 
@@ -31,9 +33,9 @@ std::vector<EngagedArc> arcs_from(const MatrixArray& arcs) {
   return out;
 }
 
-std::span<const double> feeds_from(const VectorArray& feeds) {
-  if (feeds.ndim() != 1) throw Error(ErrorKind::argument, "feeds must have the shape (n_samples,)");
-  return {feeds.data(), static_cast<std::size_t>(feeds.size())};
+std::span<const double> span_of(const VectorArray& values) {
+  if (values.ndim() != 1) throw Error(ErrorKind::argument, "feeds and heights must have the shape (n,)");
+  return {values.data(), static_cast<std::size_t>(values.size())};
 }
 
 py::dict columns(const Eigen::MatrixXd& table) {
@@ -195,7 +197,7 @@ Raises:
           "figures_of",
           [](MillingForce& self, const EngagementTrack& track, const VectorArray& feed_mm_per_min,
              const std::optional<ToolBeam>& beam) {
-            const auto feeds = feeds_from(feed_mm_per_min);
+            const auto feeds = span_of(feed_mm_per_min);
             Eigen::MatrixXd table;
             {
               const py::gil_scoped_release release;
@@ -291,6 +293,53 @@ void define_limits(py::module_& module) {
       "(n_samples,). The highest where nothing is met or the tool only plunges.");
 }
 
+void define_surface(py::module_& module) {
+  py::enum_<WallSide>(module, "WallSide", "The wall that a tool finishes beside its way, seen along the feed.")
+      .value("right", WallSide::right, "Down milling with a clockwise spindle.")
+      .value("left", WallSide::left, "Up milling with a clockwise spindle.");
+  module.def(
+      "wall_error_um",
+      [](MillingForce& force, const ToolBeam& beam, const MatrixArray& arcs, double feed_mm_per_min, WallSide side,
+         const VectorArray& height_mm, double tolerance_rad) {
+        return wall_error_um(force, beam, arcs_from(arcs), feed_mm_per_min, side, span_of(height_mm), tolerance_rad);
+      },
+      py::arg("force"), py::arg("beam"), py::arg("arcs"), py::arg("feed_mm_per_min"), py::arg("side"),
+      py::arg("height_mm"), py::arg("tolerance_rad") = wall_tolerance_rad,
+      R"(Form error of the wall across itself at heights above the tip (paper 001, section 2.3).
+
+Args:
+    force: The force model.
+    beam: The tool as a beam.
+    arcs: (n_arcs, 4): from and to in rad, bottom and top in mm.
+    feed_mm_per_min: Along the path.
+    side: Which wall.
+    height_mm: (n,), mm above the tip.
+    tolerance_rad: An arc that ends this close to +-pi/2 reaches the wall.
+
+Returns:
+    (n,), um: + material is left standing, - the wall is cut too deep; NaN where the engagement does not reach it.
+
+Raises:
+    ArgumentError: A height below the tip, or an engagement above the overhang.)");
+  module.def(
+      "wall_errors_um",
+      [](MillingForce& force, const ToolBeam& beam, const EngagementTrack& track, const VectorArray& feed_mm_per_min,
+         WallSide side, const VectorArray& height_mm, double tolerance_rad) {
+        const auto feeds = span_of(feed_mm_per_min);
+        const auto heights = span_of(height_mm);
+        Eigen::MatrixXd map;
+        {
+          const py::gil_scoped_release release;
+          map = wall_errors_um(force, beam, track, feeds, side, heights, tolerance_rad);
+        }
+        return take(std::move(map));
+      },
+      py::arg("force"), py::arg("beam"), py::arg("track"), py::arg("feed_mm_per_min"), py::arg("side"),
+      py::arg("height_mm"), py::arg("tolerance_rad") = wall_tolerance_rad,
+      "The same along a track, a feed for each sample: (n_samples, n_heights), um, read-only. Raises ArgumentError as "
+      "wall_error_um, and on another number of feeds.");
+}
+
 }  // namespace
 
 void register_milling(py::module_& module) {
@@ -299,6 +348,7 @@ void register_milling(py::module_& module) {
   define_figures(module);
   define_force(module);
   define_limits(module);
+  define_surface(module);
 }
 
 }  // namespace shapegcode::bindings

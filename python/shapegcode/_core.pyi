@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'time_program', 'travel_blocks', 'travel_path', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -4378,6 +4378,10 @@ class Material:
         """
     def __len__(self) -> int:
         ...
+    def compact(self) -> None:
+        """
+        Gives back the memory of what is uniform by now.
+        """
     def copy(self) -> Material:
         """
         The material as it is now; the two are independent from here on.
@@ -5006,6 +5010,53 @@ class LimitedFeed:
         """
         False: even the lowest feed, which this is, is beyond the limit.
         """
+class WallSide:
+    """
+    The wall that a tool finishes beside its way, seen along the feed.
+    
+    Members:
+    
+      right : Down milling with a clockwise spindle.
+    
+      left : Up milling with a clockwise spindle.
+    """
+    __members__: typing.ClassVar[dict[str, WallSide]]
+    left: typing.ClassVar[WallSide]
+    right: typing.ClassVar[WallSide]
+    @typing.overload
+    def __eq__(self, other: WallSide) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: WallSide) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
 class FeedStretch:
     """
     A stretch of one feed.
@@ -5382,7 +5433,7 @@ def largest_feeds(force: MillingForce, track: EngagementTrack, limits: FeedLimit
     """
 def layer_borders(paths: collections.abc.Sequence[Path], bottom_mm: typing.SupportsFloat | typing.SupportsIndex, top_mm: typing.SupportsFloat | typing.SupportsIndex, ramp_step_mm: typing.SupportsFloat | typing.SupportsIndex) -> list[float]:
     """
-    Heights between layers for these paths in a stock from bottom to top, mm: where the tool cuts on a level, the lowest points of ramps and plunges, and steps of at most `ramp_step_mm` where ramps and helices pass (a tenth of the tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.
+    Heights between layers for these paths in a stock from bottom to top, mm: where the tool moves on a level, the lowest points of ramps and plunges, and steps of at most `ramp_step_mm` where ramps and helices pass (a tenth of the tool's diameter is a good choice). Raises ArgumentError unless bottom < top and the step is positive.
     """
 def line_sections(path: Path, ranges: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.SupportsInt | typing.SupportsIndex]]) -> list[PathSection]:
     """
@@ -5733,6 +5784,29 @@ def travel_blocks(blocks: Path, path: Path, block_end: BlockEnd, stations_mm: ty
 def travel_path(path: Path, profile: SpeedProfile, stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, filters: collections.abc.Sequence[Fir] = [], window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Travel:
     """
     How a path under a speed profile is travelled; `stations_mm` (n,) ascend to its length, `filters` stand behind the set-points, speeds are taken over `window_s`. Raises ArgumentError on stations that do not ascend.
+    """
+def wall_error_um(force: MillingForce, beam: ToolBeam, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, side: WallSide, height_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], tolerance_rad: typing.SupportsFloat | typing.SupportsIndex = 0.02) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    Form error of the wall across itself at heights above the tip (paper 001, section 2.3).
+    
+    Args:
+        force: The force model.
+        beam: The tool as a beam.
+        arcs: (n_arcs, 4): from and to in rad, bottom and top in mm.
+        feed_mm_per_min: Along the path.
+        side: Which wall.
+        height_mm: (n,), mm above the tip.
+        tolerance_rad: An arc that ends this close to +-pi/2 reaches the wall.
+    
+    Returns:
+        (n,), um: + material is left standing, - the wall is cut too deep; NaN where the engagement does not reach it.
+    
+    Raises:
+        ArgumentError: A height below the tip, or an engagement above the overhang.
+    """
+def wall_errors_um(force: MillingForce, beam: ToolBeam, track: EngagementTrack, feed_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], side: WallSide, height_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], tolerance_rad: typing.SupportsFloat | typing.SupportsIndex = 0.02) -> numpy.ndarray:
+    """
+    The same along a track, a feed for each sample: (n_samples, n_heights), um, read-only. Raises ArgumentError as wall_error_um, and on another number of feeds.
     """
 def wilson_theta(mass_kg: typing.SupportsFloat | typing.SupportsIndex, damping_n_s_per_m: typing.SupportsFloat | typing.SupportsIndex, stiffness_n_per_m: typing.SupportsFloat | typing.SupportsIndex, force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, theta: typing.SupportsFloat | typing.SupportsIndex = 1.4, displacement_m: typing.SupportsFloat | typing.SupportsIndex = 0.0, velocity_m_per_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
     """

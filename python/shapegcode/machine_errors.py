@@ -92,6 +92,8 @@ def problems_of(error: ValidationError, model: type[Table], data: dict[str, Any]
     problems: list[Problem] = []
     for detail in error.errors(include_url=False):
         location, value = _locate(detail["loc"], data, detail["type"])
+        if detail["type"] == "too_short" and isinstance(value, list) and len(value) >= detail["ctx"]["min_length"]:
+            continue  # short only of its bad items, which are listed themselves
         # A list counts from 0 in pydantic, from 1 for people.
         key = ".".join(str(part + 1) if isinstance(part, int) else toml_key(part) for part in location)
         limit = _limit(detail["type"], detail.get("ctx", {}), detail["msg"])
@@ -147,6 +149,10 @@ def _limit(kind: str, context: Mapping[str, Any], message: str) -> str:
             return f"must be {context['expected']}".replace("'", '"')
         case "model_type" | "model_attributes_type" | "dict_type":
             return "must be a table"
+        case "too_short":
+            return f"must have {context['min_length']} or more values"
+        case "too_long":
+            return f"must have {context['max_length']} or fewer values"
         case "tuple_type" | "list_type":
             return "must be a list"
         case "value_error":

@@ -24,6 +24,8 @@ from shapegcode.milling.stock_shape import StockPiece
 DATA = resources.files("shapegcode") / "data" / "milling"
 RADIUS = 4.0  # of the tool
 Z = -5.0
+NEAR_MM = 5e-4  # as docs/tool_files.md says
+NEAR_MM2 = 5e-3  # between outlines some 100 mm long
 
 
 def line(start: Sequence[float], end: Sequence[float], z: float = Z) -> _core.Segment:
@@ -59,6 +61,13 @@ def allowance(text: str = "", **values: object) -> Stock:
 
 def area(pieces: Sequence[StockPiece]) -> shapely.Geometry:
     return shapely.union_all([shapely.Polygon(piece.rings[0], piece.rings[1:]) for piece in pieces])
+
+
+def within_reach(shape: shapely.Polygon, core: shapely.Polygon, reach: float) -> None:
+    """The shape is what lies within a distance of a rectangle, point by point and in its size."""
+    distances = shapely.distance(core, shapely.points(shapely.segmentize(shape.exterior, 0.05).coords))
+    assert distances == pytest.approx(reach, abs=NEAR_MM)
+    assert shape.area == pytest.approx(core.area + core.length * reach + math.pi * reach**2, rel=2e-5)
 
 
 def complaint(text: str) -> str:
@@ -133,12 +142,12 @@ def test_the_corner_of_paper_001() -> None:
     # Rough walls 0.8 mm in front of the finished ones, joined by a radius of 8 about (-0.8, 4.8).
     centre = np.array([8 - 0.8 - 8, -4 + 0.8 + 8])
     for x in (-30, -10, centre[0]):
-        assert rough.distance(shapely.Point(x, -3.2)) < 1e-4
+        assert rough.distance(shapely.Point(x, -3.2)) < NEAR_MM
     for y in (centre[1], 20, 34):
-        assert rough.distance(shapely.Point(7.2, y)) < 1e-4
+        assert rough.distance(shapely.Point(7.2, y)) < NEAR_MM
     for degrees in np.linspace(270, 360, 37):
         direction = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
-        assert rough.distance(shapely.Point(centre + 8 * direction)) < 1.5e-4
+        assert rough.distance(shapely.Point(centre + 8 * direction)) < NEAR_MM
     # Nothing in front of the wall, the part behind it.
     stock_area = area([piece])
     assert not stock_area.intersects(shapely.Point(0, 4))
@@ -172,7 +181,7 @@ def test_wide_corners_keep_their_radius_less_the_allowance() -> None:
     rough = shapely.LinearRing(piece.rings[0])
     for degrees in np.linspace(270, 360, 19):
         direction = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
-        assert rough.distance(shapely.Point(np.array([0, 16]) + 19.2 * direction)) < 3e-4
+        assert rough.distance(shapely.Point(np.array([0, 16]) + 19.2 * direction)) < NEAR_MM
 
 
 def test_outside_corners_get_the_allowance_all_round() -> None:
@@ -183,15 +192,15 @@ def test_outside_corners_get_the_allowance_all_round() -> None:
     rough = shapely.LinearRing(piece.rings[0])
     for degrees in np.linspace(0, 90, 10):
         direction = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
-        assert rough.distance(shapely.Point(edge + 0.8 * direction)) < 2e-4
+        assert rough.distance(shapely.Point(edge + 0.8 * direction)) < NEAR_MM
 
 
 def test_a_straight_wall_is_a_plain_layer_that_goes_on_beyond_its_ends() -> None:
     stock = allowance(width_mm=6.0)
     result = area(stock.polygons([_core.Path([line((0, 0), (50, 0))])], RADIUS))
     inside = result.intersection(shapely.box(-2 * RADIUS, -30, 50 + 2 * RADIUS, 30))
-    assert inside.area == pytest.approx((50 + 4 * RADIUS) * (6.0 + 2 * 0.8), rel=1e-9)  # it grows to the back as well
-    assert inside.bounds == pytest.approx((-8, -4 - 6.8, 58, -3.2), abs=1e-6)
+    assert inside.area == pytest.approx((50 + 4 * RADIUS) * (6.0 + 2 * 0.8), rel=1e-5)  # it grows to the back as well
+    assert inside.bounds == pytest.approx((-8, -4 - 6.8, 58, -3.2), abs=NEAR_MM)
 
 
 def test_the_wall_may_be_on_the_left() -> None:
@@ -199,7 +208,7 @@ def test_the_wall_may_be_on_the_left() -> None:
     right = area(allowance().polygons([path], RADIUS))
     left = area(allowance(wall='"left"').polygons([path], RADIUS))
     mirrored = shapely.transform(right, lambda points: points * [1, -1])
-    assert left.symmetric_difference(mirrored).area < 1e-6
+    assert left.symmetric_difference(mirrored).area < NEAR_MM2
 
 
 def test_a_pocket() -> None:
@@ -207,8 +216,7 @@ def test_a_pocket() -> None:
     (piece,) = allowance(wall='"right"').polygons([_core.Path(rectangle(40, 20))], RADIUS)
     assert len(piece.rings) == 2
     hole = shapely.Polygon(piece.rings[1])
-    expected = shapely.box(-24 + 0.8 + 8, -14 + 0.8 + 8, 24 - 0.8 - 8, 14 - 0.8 - 8).buffer(8, quad_segs=500)
-    assert hole.hausdorff_distance(expected) < 3e-4
+    within_reach(hole, shapely.box(-24 + 0.8 + 8, -14 + 0.8 + 8, 24 - 0.8 - 8, 14 - 0.8 - 8), 8)
     assert hole.area == pytest.approx((48 - 1.6) * (28 - 1.6) - (4 - math.pi) * 64, rel=1e-5)
 
 
@@ -216,8 +224,7 @@ def test_a_boss() -> None:
     """The same path, the other way round: the part is 32 x 12 and has an even layer, rounded at its corners."""
     (piece,) = allowance(wall='"left"', width_mm=30).polygons([_core.Path(rectangle(40, 20))], RADIUS)
     assert len(piece.rings) == 1
-    expected = shapely.box(-16, -6, 16, 6).buffer(0.8, quad_segs=500)
-    assert shapely.Polygon(piece.rings[0]).hausdorff_distance(expected) < 2e-4
+    within_reach(shapely.Polygon(piece.rings[0]), shapely.box(-16, -6, 16, 6), 0.8)
 
 
 def test_a_pocket_ran_clockwise_has_its_wall_on_the_left() -> None:
@@ -225,7 +232,7 @@ def test_a_pocket_ran_clockwise_has_its_wall_on_the_left() -> None:
     path = _core.Path([line(a, b) for a, b in pairwise(corners)])
     clockwise = area(allowance(wall='"left"').polygons([path], RADIUS))
     counter = area(allowance().polygons([_core.Path(rectangle(40, 20))], RADIUS))
-    assert clockwise.symmetric_difference(counter).area < 1e-6
+    assert clockwise.symmetric_difference(counter).area < NEAR_MM2
 
 
 def test_what_leads_to_a_closed_contour_is_no_wall() -> None:
@@ -236,7 +243,7 @@ def test_what_leads_to_a_closed_contour_is_no_wall() -> None:
         *rectangle(40, 20),
         line((0, -10), (3, -7)),
     ]
-    assert area(allowance().polygons([_core.Path(led)], RADIUS)).symmetric_difference(plain).area < 1e-6
+    assert area(allowance().polygons([_core.Path(led)], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
 
 
 def test_a_contour_may_run_on_over_its_beginning() -> None:
@@ -247,7 +254,22 @@ def test_a_contour_may_run_on_over_its_beginning() -> None:
     through = [lead_in, *rectangle(40, 20)[:-1], line((-20, -10), (2, -10)), line((2, -10), (2, -8))]
     for segments in ([lead_in, *overlapping], through):
         result = area(allowance().polygons([_core.Path(segments)], RADIUS))
-        assert result.symmetric_difference(plain).area < 1e-6
+        assert result.symmetric_difference(plain).area < NEAR_MM2
+
+
+def test_a_wall_of_thousands_of_short_moves_is_one_piece() -> None:
+    """A wavy wall, as CAM writes it: the layer is even where the waves are wider than the roughing tool."""
+    along = np.linspace(0, 120, 2001)
+    points = np.column_stack([along, 3 * np.sin(along / 15)])
+    path = _core.Path([line(a, b) for a, b in pairwise(points)])
+    (piece,) = allowance(allowance_mm=0.5, corner_radius_mm=6.0).polygons([path], RADIUS)
+    assert len(piece.rings) == 1
+    outline = shapely.LineString(piece.rings[0])
+    inner = outline.intersection(shapely.box(10, -20, 110, 20))
+    front = shapely.get_coordinates(inner)
+    front = front[front[:, 1] > 3 * np.sin(front[:, 0] / 15) - 6]
+    distances = shapely.distance(shapely.LineString(points), shapely.points(front))
+    assert distances == pytest.approx(RADIUS - 0.5, abs=NEAR_MM)
 
 
 def test_several_levels_of_one_contour_are_one_wall() -> None:
@@ -257,14 +279,14 @@ def test_several_levels_of_one_contour_are_one_wall() -> None:
     twice = [*once, down]
     corners = [(0, -10), (20, -10), (20, 10), (-20, 10), (-20, -10), (0, -10)]
     twice += [line(a, b, 2 * Z) for a, b in pairwise(corners)]
-    assert area(allowance().polygons([_core.Path(twice)], RADIUS)).symmetric_difference(plain).area < 1e-6
-    assert area(allowance().polygons([_core.Path(once)] * 2, RADIUS)).symmetric_difference(plain).area < 1e-6
+    assert area(allowance().polygons([_core.Path(twice)], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
+    assert area(allowance().polygons([_core.Path(once)] * 2, RADIUS)).symmetric_difference(plain).area < NEAR_MM2
 
 
 def test_moves_above_the_stock_do_not_count() -> None:
     above = _core.Path([line((-60, 5), (60, 5), 1.0)])
     plain = area(allowance().polygons([corner()], RADIUS))
-    assert area(allowance().polygons([above, corner()], RADIUS)).symmetric_difference(plain).area < 1e-9
+    assert area(allowance().polygons([above, corner()], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
     assert unsuited(allowance(), above) == (
         "s.toml:5: allowance.z_mm = [-15.0, 0.0]: no cutting move of the program goes below the top"
     )
@@ -283,7 +305,7 @@ def test_lead_in_and_lead_out_of_an_open_wall_are_left_out() -> None:
         ]
     )
     stock = allowance(lead_in_mm=length, lead_out_mm=math.hypot(7, 6))
-    assert area(stock.polygons([led], RADIUS)).symmetric_difference(plain).area < 1e-3
+    assert area(stock.polygons([led], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
     assert "no wall is left" in unsuited(allowance(lead_in_mm=60, lead_out_mm=60), led)
 
 
@@ -293,7 +315,7 @@ def test_a_thin_wall_between_two_pockets_is_no_stock_inside_either() -> None:
     second = [_core.Segment.line(one.start_mm + aside, one.end_mm + aside, 10.0) for one in rectangle(40, 20)]
     result = area(allowance().polygons([_core.Path(rectangle(40, 20)), _core.Path(second)], RADIUS))
     between = result.intersection(shapely.LineString([(0, 0), (shift, 0)]))
-    assert between.length == pytest.approx(4 + 2 * 0.8, abs=1e-3)
+    assert between.length == pytest.approx(4 + 2 * 0.8, abs=NEAR_MM)
 
 
 # --- What does not fit ------------------------------------------------------------------------------------------------
@@ -316,6 +338,13 @@ def test_a_contour_with_nothing_inside() -> None:
     assert "leaves nothing inside the closed contour" in unsuited(allowance(wall='"left"'), _core.Path(rectangle(8, 8)))
 
 
+def test_a_small_loop_on_a_long_wall_is_not_taken_for_the_wall() -> None:
+    loop = [line((50, 0), (52, 0)), line((52, 0), (52, 2)), line((52, 2), (50, 2)), line((50, 2), (50, 0))]
+    path = _core.Path([line((0, 0), (50, 0)), *loop, line((50, 0), (50, -40))])
+    message = unsuited(allowance(), path)
+    assert "only 8 of 98 mm of a run of cutting moves close upon themselves" in message
+
+
 def test_a_path_that_crosses_itself_is_refused() -> None:
     loop = _core.Path(
         [line((0, 0), (20, 0)), line((20, 0), (20, 10)), line((20, 10), (10, 10)), line((10, 10), (10, -15))]
@@ -336,13 +365,19 @@ def test_a_path_that_crosses_itself_is_refused() -> None:
             "[box]\nx_mm = [0, 1]\ny_mm = [2, 2]\nz_mm = [0, 1]\n",
             "s.toml:3: box.y_mm = [2.0, 2.0]: the smaller number comes first, and the two must differ",
         ),
-        ("[box]\nx_mm = [0, 1, 2]\ny_mm = [0, 2]\nz_mm = [0, 1]\n", "s.toml:2: box.x_mm"),
+        (
+            "[box]\nx_mm = [0, 1, 2]\ny_mm = [0, 2]\nz_mm = [0, 1]\n",
+            "s.toml:2: box.x_mm = [0, 1, 2]: must have 2 or fewer values",
+        ),
         (
             "[box]\nx_mm = [0, inf]\ny_mm = [0, 2]\nz_mm = [0, 1]\n",
             "s.toml:2: box.x_mm.2 = inf: must be a finite number",
         ),
         ("[box]\nx_mm = [0, 1]\nz_mm = [0, 1]\n", "s.toml: box.y_mm: required, but missing (unit: mm)"),
-        ("[polygon]\npoints_mm = [[0,0],[1,0]]\nz_mm = [0,1]\n", "s.toml:2: polygon.points_mm"),
+        (
+            "[polygon]\npoints_mm = [[0,0],[1,0]]\nz_mm = [0,1]\n",
+            "s.toml:2: polygon.points_mm = [[0, 0], [1, 0]]: must have 3 or more values",
+        ),
         ("[circle]\nr = 1\n", "s.toml:1: circle = {...}: unknown key; known here: box, polygon, allowance, program"),
         (
             '[allowance]\nallowance_mm = 0.5\ncorner_radius_mm = 8\nwall = "inside"\nz_mm = [-1, 0]\n',
@@ -356,6 +391,11 @@ def test_a_path_that_crosses_itself_is_refused() -> None:
 )
 def test_a_bad_value_is_named_with_its_line_and_limit(text: str, expected: str) -> None:
     assert expected in complaint(text)
+
+
+def test_a_bad_point_is_the_only_problem_of_its_list() -> None:
+    text = '[polygon]\npoints_mm = [\n  [0, 0],\n  [1, "a"],\n  [1, 1]\n]\nz_mm = [0, 1]\n'
+    assert complaint(text) == 's.toml:2: polygon.points_mm.2.2 = "a": must be a number (unit: mm)'
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,13 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "shapegcode/error.hpp"
+#include "shapegcode/milling/tool_step.hpp"
 
 namespace shapegcode {
 namespace {
@@ -74,18 +77,18 @@ struct Entry {
   bool in_corner;
 };
 
-/// Where the front of the tool crosses the rough boundary. As the rough corner is not sharper than the tool, its
-/// circle crosses the boundary twice at most: once in front.
-Entry entry_of(const CornerCut& cut, const Geometry& g, const Place& tool) {
+/// Where the front of the tool, looked along from the finished wall, first crosses the rough boundary, if it does. (At
+/// a narrow corner the other wall may lie further on; there the tool has been.)
+std::optional<Entry> entry_of(const CornerCut& cut, const Geometry& g, const Place& tool) {
   const double radius = cut.tool_radius_mm;
-  Entry best{tool.centre - radius * Geometry::left_of(tool.direction), false};
-  double furthest = -2.0;  // sine of the azimuth
+  std::optional<Entry> best;
+  double lowest = 2.0;  // sine of the azimuth
   const auto consider = [&](const Vector2d& place, bool in_corner) {
     const Vector2d arm = (place - tool.centre) / radius;
     const double sine = arm.dot(Geometry::left_of(tool.direction));
-    if (arm.dot(tool.direction) > -1e-12 && sine > furthest) {
-      furthest = sine;
-      best = {place, in_corner};
+    if (arm.dot(tool.direction) > -1e-12 && sine < lowest) {
+      lowest = sine;
+      best = Entry{place, in_corner};
     }
   };
   for (std::size_t wall = 0; wall < 2; ++wall) {
@@ -116,6 +119,19 @@ Entry entry_of(const CornerCut& cut, const Geometry& g, const Place& tool) {
   return best;
 }
 
+/// How far a place lies from where the tool's axis has been before.
+double distance_from_way(const CornerCut& cut, const Geometry& g, const Place& tool, const Vector2d& place) {
+  if (tool.leg == 0) return cut.tool_radius_mm;  // on a straight nothing in front has been swept
+  const Vector2d start = place_at(cut, g, 0.0, false).centre;
+  const Vector2d corner = place_at(cut, g, cut.before_mm, false).centre;
+  double distance = ToolStep(start, corner).distance_mm(place);
+  if (g.arc_length > 0.0) {
+    const Vector2d end = tool.leg == 1 ? tool.centre : place_at(cut, g, cut.before_mm + g.arc_length, false).centre;
+    distance = std::min(distance, ToolStep(corner, end, 1.0 / g.path_radius).distance_mm(place));
+  }
+  return distance;
+}
+
 Vector2d turned_over(const CornerCut& cut, const Vector2d& v) { return cut.mirrored ? Vector2d(v.x(), -v.y()) : v; }
 
 Vector3 at_height(const Vector2d& v, double z) { return {v.x(), v.y(), z}; }
@@ -142,6 +158,13 @@ void check(const CornerCut& cut) {
   if (!(cut.turn_rad >= degree && cut.turn_rad <= 179.0 * degree)) {
     refuse("the corner turns by " + std::to_string(cut.turn_rad / degree) + " degrees, must be 1 to 179");
   }
+  // Left between both boundaries on the bisector, times cos(turn / 2).
+  const double cosine = std::cos(0.5 * cut.turn_rad);
+  const double left = cut.allowance_mm + (cut.rough_radius_mm - cut.finish_radius_mm) * (1.0 - cosine);
+  if (!(left > 0.0)) {
+    refuse("a rough corner radius of " + length(cut.rough_radius_mm) + " cuts into the finished corner of " +
+           length(cut.finish_radius_mm) + " by " + length(-left / cosine));
+  }
   for (const double straight : {cut.before_mm, cut.after_mm}) {
     if (!(straight >= 0.0) || !std::isfinite(straight)) {
       refuse("a straight at the corner is " + length(straight) + ", must be at least 0");
@@ -161,7 +184,14 @@ CornerEngagement corner_engagement(const CornerCut& cut, double s_mm, bool behin
   }
   const Geometry g(cut);
   const Place tool = place_at(cut, g, std::clamp(s_mm, 0.0, length), behind_vertex);
-  const Entry entry = entry_of(cut, g, tool);
+  const std::optional<Entry> met = entry_of(cut, g, tool);
+  if (!met || distance_from_way(cut, g, tool, met->place) < cut.tool_radius_mm - place_tolerance_mm) {
+    refuse("at " + std::to_string(s_mm) +
+           " mm the tool meets the rough pocket only where it has been itself: " + "no closed form for a turn of " +
+           std::to_string(cut.turn_rad / degree) + " degrees from a rough radius of " +
+           std::to_string(cut.rough_radius_mm) + " mm to " + std::to_string(cut.finish_radius_mm) + " mm");
+  }
+  const Entry& entry = *met;
   const Vector2d arm = entry.place - tool.centre;
   const double across = arm.dot(Geometry::left_of(tool.direction));
   const double azimuth = std::atan2(across, std::max(arm.dot(tool.direction), 0.0));

@@ -11,8 +11,8 @@ namespace shapegcode {
 namespace {
 
 // Accepted share of the binding limit, and the one that is aimed at, so that a step lands on the safe side.
-constexpr double accepted = 1.0 - 5e-4;
-constexpr double aimed = 1.0 - 2e-4;
+constexpr double accepted = 1.0 - 2e-4;
+constexpr double aimed = 1.0 - 8e-5;
 constexpr double first_exponent = 0.85;  // of a force against the feed, before anything is known
 constexpr double narrow = 1e-7;          // bracket, relative
 constexpr int most_steps = 80;
@@ -24,13 +24,14 @@ struct Load {
 
 class Search {
  public:
-  Search(MillingForce& force, std::span<const EngagedArc> arcs, const FeedLimits& limits)
-      : force_(force), arcs_(arcs), limits_(limits) {
+  Search(MillingForce& force, const FeedLimits& limits) : force_(force), limits_(limits) {
     const auto bounded = [](double limit) { return limit < FeedLimits::none; };
     forces_ = bounded(limits.mean_resultant_n) || bounded(limits.peak_resultant_n) || bounded(limits.peak_torque_nm) ||
               bounded(limits.mean_power_w) || bounded(limits.peak_chip_mm);
     deflection_ = bounded(limits.peak_deflection_um);
   }
+
+  void look_at(std::span<const EngagedArc> arcs) { arcs_ = arcs; }
 
   [[nodiscard]] Load at(double feed) const {
     Load load;
@@ -52,44 +53,44 @@ class Search {
     return load;
   }
 
-  // Secant of the logarithms, kept within a bracket whose lower end is within the limits.
-  [[nodiscard]] LimitedFeed run(double lowest, double highest) const {
-    double high = highest;
-    Load above = at(high);
-    if (above.share <= 1.0) return {highest, FeedLimit::none, true};
+  // Secant of the logarithms within a bracket, from `start` on; every feed within the limits that is met is kept.
+  [[nodiscard]] LimitedFeed run(double lowest, double highest, double start) {
     double low = lowest;
-    Load below;
+    double high = highest;
     bool low_known = false;
-    double exponent = first_exponent;
-    double feed = highest;  // of the last evaluation
-    double share = above.share;
+    bool high_known = false;
+    Load below;
+    Load above;
+    double last_feed = 0.0;
+    double last_share = 0.0;
+    double next = std::clamp(start, lowest, highest);
     for (int step = 0; step < most_steps; ++step) {
-      double next = feed * std::pow(aimed / share, 1.0 / exponent);
-      if (low_known && !(next > low && next < high)) next = std::sqrt(low * high);
-      if (!low_known && !(next > low && next < high)) next = low;
       const Load load = at(next);
-      const double slope = std::log(load.share / share) / std::log(next / feed);
-      if (std::isfinite(slope)) exponent = std::clamp(slope, 0.05, 20.0);
-      feed = next;
-      share = std::max(load.share, 1e-12);
       if (load.share <= 1.0) {
+        if (next >= highest) return {highest, FeedLimit::none, true};
+        if (load.share >= accepted) return {next, load.limit, true};
         low = next;
         below = load;
         low_known = true;
-        if (load.share >= accepted) break;
       } else {
-        if (next == lowest) return {lowest, load.limit, false};
+        if (next <= lowest) return {lowest, load.limit, false};
         high = next;
         above = load;
+        high_known = true;
       }
-      if (low_known && high - low <= narrow * high) break;
+      if (low_known && high_known && high - low <= narrow * high) break;
+      const double slope = std::log(load.share / last_share) / std::log(next / last_feed);
+      if (step > 0 && std::isfinite(slope)) exponent_ = std::clamp(slope, 0.1, 10.0);
+      last_feed = next;
+      last_share = load.share;
+      next = load.share > 0.0 ? next * std::pow(aimed / load.share, 1.0 / exponent_) : highest;
+      // Towards an end that has not been tried the step goes there at most; within a bracket it must stay inside.
+      if (next >= high) next = high_known ? std::sqrt(low * high) : high;
+      if (next <= low) next = low_known ? std::sqrt(low * high) : low;
     }
-    if (!low_known) {
-      const Load load = at(lowest);
-      return {lowest, load.limit, load.share <= 1.0};
-    }
-    // A feed below the limits without reaching one: the load jumps there.
-    return {low, below.share >= accepted ? below.limit : above.limit, true};
+    if (!low_known) return {lowest, above.limit, at(lowest).share <= 1.0};
+    // A feed below the limits that does not reach one: the load jumps there.
+    return {low, high_known ? above.limit : below.limit, true};
   }
 
  private:
@@ -98,6 +99,7 @@ class Search {
   const FeedLimits& limits_;
   bool forces_ = false;
   bool deflection_ = false;
+  double exponent_ = first_exponent;  // of the load against the feed
 };
 
 void check_range(double lowest, double highest) {
@@ -140,7 +142,9 @@ LimitedFeed largest_feed(MillingForce& force, std::span<const EngagedArc> arcs, 
                          double highest) {
   check(limits);
   check_range(lowest, highest);
-  return Search(force, arcs, limits).run(lowest, highest);
+  Search search(force, limits);
+  search.look_at(arcs);
+  return search.run(lowest, highest, highest);
 }
 
 std::vector<LimitedFeed> largest_feeds(MillingForce& force, const EngagementTrack& track, const FeedLimits& limits,
@@ -149,6 +153,8 @@ std::vector<LimitedFeed> largest_feeds(MillingForce& force, const EngagementTrac
   check_range(lowest, highest);
   std::vector<LimitedFeed> feeds;
   feeds.reserve(track.size());
+  Search search(force, limits);
+  double start = highest;  // the feed of the sample before is near
   for (std::size_t i = 0; i < track.size(); ++i) {
     const auto arcs = track.arcs_of(i);
     const double level = track.horizontal[i];
@@ -160,7 +166,9 @@ std::vector<LimitedFeed> largest_feeds(MillingForce& force, const EngagementTrac
       feeds.push_back(feeds.back());
       continue;
     }
-    LimitedFeed feed = Search(force, arcs, limits).run(lowest * level, highest * level);
+    search.look_at(arcs);
+    LimitedFeed feed = search.run(lowest * level, highest * level, start * level);
+    start = feed.feed_mm_per_min / level;
     feed.feed_mm_per_min = std::clamp(feed.feed_mm_per_min / level, lowest, highest);
     feeds.push_back(feed);
   }

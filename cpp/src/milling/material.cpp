@@ -17,7 +17,6 @@ constexpr double level_mm = 1e-6;  // a move that climbs by less stays on its le
 constexpr double same_height_mm = 1e-3;
 constexpr double least_slope = 1e-3;  // horizontal share below which a move is a plunge
 constexpr double megabyte = 1e6;
-constexpr std::size_t first_compaction_tiles = 4096;
 
 [[noreturn]] void refuse(const std::string& message) { throw Error(ErrorKind::argument, message); }
 
@@ -59,9 +58,7 @@ void check_borders(std::span<const double> borders) {
 
 Material::Material(std::span<const Ring> rings, std::span<const double> borders_mm, double resolution_mm,
                    std::size_t memory_limit_bytes)
-    : borders_(borders_mm.begin(), borders_mm.end()),
-      memory_limit_(memory_limit_bytes),
-      compact_at_tiles_(first_compaction_tiles) {
+    : borders_(borders_mm.begin(), borders_mm.end()), memory_limit_(memory_limit_bytes) {
   check_rings(rings);
   check_borders(borders_mm);
   if (!(resolution_mm > 0.0) || !std::isfinite(resolution_mm)) {
@@ -91,8 +88,9 @@ Material::Material(std::span<const Ring> rings, std::span<const double> borders_
   for (std::size_t i = 1; i < borders_.size(); ++i) middles_.push_back(0.5 * (borders_[i - 1] + borders_[i]));
   layers_.assign(middles_.size(), MaterialLayer(rings, resolution_mm));
   for (const MaterialLayer& layer : layers_) tiles_ += layer.tiles();
-  compact_at_tiles_ = std::max(first_compaction_tiles, 2 * tiles_);
-  if (!(volume_mm3() > 0.0)) refuse("the outlines of the stock enclose no material");
+  if (!layers_.front().has_material()) {
+    refuse("the outlines of the stock enclose no material at a resolution of " + std::to_string(resolution_mm) + " mm");
+  }
 }
 
 std::size_t Material::lowest_cut(double tip_mm) const noexcept {
@@ -152,9 +150,12 @@ std::size_t Material::bytes() const noexcept {
   return sum;
 }
 
-void Material::remove(std::size_t layer, const ToolStep& step, double tool_radius_mm, bool continues) {
-  tiles_ += layers_[layer].remove(step, tool_radius_mm, continues);
-  if (tiles_ > compact_at_tiles_) compact();
+bool Material::remove(std::size_t layer, const ToolStep& step, double tool_radius_mm, bool continues) {
+  tiles_ -= layers_[layer].tiles();
+  const bool changed = layers_[layer].remove(step, tool_radius_mm, continues);
+  tiles_ += layers_[layer].tiles();
+  if (tiles_ * MaterialLayer::tile_bytes > memory_limit_) compact();
+  return changed;
 }
 
 void Material::compact() {
@@ -164,9 +165,6 @@ void Material::compact() {
     tiles_ += layer.tiles();
   }
   check_memory(tiles_ * MaterialLayer::tile_bytes);
-  // Next time when they have doubled, but not beyond what the limit allows.
-  const std::size_t most = memory_limit_ / MaterialLayer::tile_bytes;
-  compact_at_tiles_ = std::min(std::max(first_compaction_tiles, 2 * tiles_), std::max(most, tiles_ + 1));
 }
 
 void Material::check_memory(std::size_t needed) const {
@@ -194,10 +192,9 @@ std::vector<double> layer_borders(std::span<const Path* const> paths, double bot
       const double climb = segment.end_mm.z() - segment.start_mm.z();
       if (falls && !(cuts && climb < -level_mm)) levels.push_back(segment.start_mm.z());
       falls = cuts && climb < -level_mm;
-      if (!cuts) continue;
       if (std::abs(climb) <= level_mm) {
         levels.push_back(segment.start_mm.z());
-      } else if (std::abs(climb) < segment.length_mm * std::sqrt(1.0 - least_slope * least_slope)) {
+      } else if (cuts && std::abs(climb) < segment.length_mm * std::sqrt(1.0 - least_slope * least_slope)) {
         ramps.push_back(std::minmax(segment.start_mm.z(), segment.end_mm.z()));
       }
     }

@@ -10,6 +10,8 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr std::int64_t edge = MaterialLayer::tile_nodes;
+constexpr float least_change = 1e-5F;  // mm; less is rounding
+constexpr std::size_t least_growth_tiles = 32;
 
 double distance_to_edge(const Vector2d& place, const Vector2d& a, const Vector2d& b) noexcept {
   const Vector2d along = b - a;
@@ -31,29 +33,34 @@ double coverage(double distance, double spacing) noexcept { return std::clamp(di
 
 }  // namespace
 
+/// A step and how far it reaches. Lengths and places are in nodes of the grid but for the shape and the radius.
 struct MaterialLayer::Sweep {
-  Sweep(const ToolStep& step, double tool_radius, double band, bool goes_on)
+  Sweep(const ToolStep& step, double radius_mm, double band_mm, double spacing, const Vector2d& origin, bool goes_on)
       : shape(step),
-        from(step.from()),
-        middle(step.from() + 0.5 * step.chord()),
+        start_mm(step.from()),
+        from((step.from() - origin) / spacing),
+        middle((step.from() + 0.5 * step.chord() - origin) / spacing),
         ahead(step.start_tangent()),
-        radius(tool_radius),
-        reach(tool_radius + band + 0.5 * step.chord().norm()),
-        inner(tool_radius - band),
+        radius(static_cast<float>(radius_mm)),
+        reach((radius_mm + band_mm + 0.5 * step.chord().norm()) / spacing),
+        inner(std::max(0.0, radius_mm - band_mm) / spacing),
         continues(goes_on) {
     // Behind an arc's start its end may still be nearer, in a wedge of half the angle that the arc turns through.
     const double half_turn = std::asin(std::min(1.0, 0.5 * step.chord().norm() * std::abs(step.curvature())));
-    behind = (tool_radius + band) * std::tan(std::min(half_turn, 1.5));
+    behind = (radius_mm + band_mm) / spacing * std::tan(std::min(half_turn, 1.5));
+    per_ahead_x = ahead.x() != 0.0 ? 1.0 / ahead.x() : 0.0;
   }
 
   ToolStep::Shape<float> shape;
+  Vector2d start_mm;
   Vector2d from;
   Vector2d middle;
-  Vector2d ahead;
-  double radius;
-  double reach;   // nothing changes further from the middle
-  double inner;   // within, the disc at the start has swept everything
-  double behind;  // nothing changes further behind the start
+  Vector2d ahead;  // direction at the start
+  double per_ahead_x = 0.0;
+  float radius;         // mm
+  double reach;         // nothing changes further from the middle
+  double inner;         // within, the disc at the start has swept everything
+  double behind = 0.0;  // nothing changes further behind the start
   bool continues;
 };
 
@@ -82,7 +89,7 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
     Vector2d a;
     Vector2d b;
   };
-  std::vector<std::vector<Edge>> near(index_.size());
+  std::vector<std::pair<std::int64_t, Edge>> near;                                     // to which tiles
   std::vector<std::vector<double>> crossings(static_cast<std::size_t>(rows_ * edge));  // of the boundary, per grid row
   const double tile_mm = spacing_ * edge;
   const double tile_reach = tile_mm * std::sqrt(0.5) + band_;
@@ -98,7 +105,7 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
         for (std::int64_t column = tile_of(low.x(), columns_); column <= tile_of(high.x(), columns_); ++column) {
           const Vector2d centre(x_of(column * edge) + 0.5 * tile_mm, y_of(row * edge) + 0.5 * tile_mm);
           if (distance_to_edge(centre, e.a, e.b) <= tile_reach) {
-            near[static_cast<std::size_t>(row * columns_ + column)].push_back(e);
+            near.emplace_back(row * columns_ + column, e);
           }
         }
       }
@@ -113,15 +120,18 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
     }
   }
   for (std::vector<double>& row : crossings) std::sort(row.begin(), row.end());
+  std::sort(near.begin(), near.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  auto next = near.cbegin();
   const auto inside = [&](std::int64_t i, std::int64_t j) {
     const std::vector<double>& row = crossings[static_cast<std::size_t>(j)];
     return (std::upper_bound(row.begin(), row.end(), x_of(i)) - row.begin()) % 2 == 1;
   };
   for (std::int64_t t = 0; t < columns_ * rows_; ++t) {
-    const std::vector<Edge>& edges = near[static_cast<std::size_t>(t)];
+    const auto first = next;
+    while (next != near.cend() && next->first == t) ++next;
     const std::int64_t i0 = t % columns_ * edge;
     const std::int64_t j0 = t / columns_ * edge;
-    if (edges.empty()) {
+    if (first == next) {
       index_[static_cast<std::size_t>(t)] = inside(i0, j0) ? full : empty;
       continue;
     }
@@ -132,7 +142,9 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
       const std::int64_t j = j0 + n / edge;
       const Vector2d place(x_of(i), y_of(j));
       double distance = band_;
-      for (const Edge& e : edges) distance = std::min(distance, distance_to_edge(place, e.a, e.b));
+      for (auto k = first; k != next; ++k) {
+        distance = std::min(distance, distance_to_edge(place, k->second.a, k->second.b));
+      }
       tile[static_cast<std::size_t>(n)] = static_cast<float>(inside(i, j) ? distance : -distance);
     }
   }
@@ -198,6 +210,7 @@ double MaterialLayer::distance_mm(double x_mm, double y_mm) const noexcept {
 }
 
 bool MaterialLayer::is_empty_around(double x_mm, double y_mm, double radius_mm) const noexcept {
+  if (!std::isfinite(x_mm + y_mm + radius_mm)) return true;
   const double tile_mm = spacing_ * edge;
   const auto clamped = [&](double from_origin, std::int64_t count) {
     return static_cast<std::int64_t>(std::clamp(std::floor(from_origin / tile_mm), -1.0, static_cast<double>(count)));
@@ -214,95 +227,98 @@ bool MaterialLayer::is_empty_around(double x_mm, double y_mm, double radius_mm) 
   return true;
 }
 
-std::size_t MaterialLayer::remove(const ToolStep& step, double tool_radius_mm, bool continues) {
-  const Sweep sweep(step, tool_radius_mm, band_, continues);
-  const std::size_t before = tiles();
-  const auto last_row = static_cast<double>(rows_ * edge);
-  const std::int64_t end = first_at((sweep.middle.y() + sweep.reach - y0_) / spacing_, last_row);
-  for (std::int64_t j = first_at((sweep.middle.y() - sweep.reach - y0_) / spacing_, last_row); j < end; ++j) {
-    remove_in_row(sweep, j);
+bool MaterialLayer::remove(const ToolStep& step, double tool_radius_mm, bool continues) {
+  const Sweep sweep(step, tool_radius_mm, band_, spacing_, {x0_, y0_}, continues);
+  const auto rows = static_cast<double>(rows_ * edge);
+  const std::int64_t end = first_at(sweep.middle.y() + sweep.reach, rows);
+  bool changed = false;
+  for (std::int64_t j = first_at(sweep.middle.y() - sweep.reach, rows); j < end; ++j) {
+    changed |= remove_in_row(sweep, j);
   }
-  return tiles() - before;
+  if (tiles() > compact_at_tiles_) compact();
+  return changed;
 }
 
 /// Finds the nodes of a grid row whose distance may change: those near the step but not behind its start, nor deep in
 /// the disc that was swept there.
-void MaterialLayer::remove_in_row(const Sweep& sweep, std::int64_t j) {
-  const double y = y_of(j);
+bool MaterialLayer::remove_in_row(const Sweep& sweep, std::int64_t j) {
+  const auto y = static_cast<double>(j);
+  const auto nodes = static_cast<double>(columns_ * edge);
   const double from_middle = y - sweep.middle.y();
-  const double half_squared = sweep.reach * sweep.reach - from_middle * from_middle;
-  if (half_squared <= 0.0) return;
-  const double half = std::sqrt(half_squared);
+  const double half = std::sqrt(std::max(0.0, sweep.reach * sweep.reach - from_middle * from_middle));
   double low = sweep.middle.x() - half;
   double high = sweep.middle.x() + half;
-  const auto nodes = static_cast<double>(columns_ * edge);
-  const auto index_from = [&](double x) { return first_at((x - x0_) / spacing_, nodes); };
   if (!sweep.continues) {
-    remove_nodes(sweep, j, index_from(low), index_from(high));
-    return;
+    return remove_nodes(sweep, j, first_at(low, nodes), first_at(high, nodes));
   }
   const double dy = y - sweep.from.y();
   const double rest = -sweep.behind - dy * sweep.ahead.y();  // ahead: (x - from.x) ahead.x > rest
   if (sweep.ahead.x() > 0.0) {
-    low = std::max(low, sweep.from.x() + rest / sweep.ahead.x());
+    low = std::max(low, sweep.from.x() + rest * sweep.per_ahead_x);
   } else if (sweep.ahead.x() < 0.0) {
-    high = std::min(high, sweep.from.x() + rest / sweep.ahead.x());
+    high = std::min(high, sweep.from.x() + rest * sweep.per_ahead_x);
   } else if (rest > 0.0) {
-    return;
+    return false;
   }
-  if (low >= high) return;
-  const std::int64_t first = index_from(low);
-  const std::int64_t last = index_from(high);
-  const double inner_squared = sweep.inner > 0.0 ? sweep.inner * sweep.inner - dy * dy : 0.0;
-  if (inner_squared > 0.0) {
-    const double inner = std::sqrt(inner_squared);
-    const std::int64_t gap = index_from(sweep.from.x() - inner);
-    remove_nodes(sweep, j, first, std::min(last, gap));
-    remove_nodes(sweep, j, std::max({first, gap, index_from(sweep.from.x() + inner)}), last);
-  } else {
-    remove_nodes(sweep, j, first, last);
-  }
+  const double inner = std::sqrt(std::max(0.0, sweep.inner * sweep.inner - dy * dy));
+  const double gap_low = std::clamp(sweep.from.x() - inner, low, std::max(low, high));
+  const double gap_high = std::clamp(sweep.from.x() + inner, low, std::max(low, high));
+  bool changed = false;
+  if (low < gap_low) changed = remove_nodes(sweep, j, first_at(low, nodes), first_at(gap_low, nodes));
+  if (gap_high < high) changed |= remove_nodes(sweep, j, first_at(gap_high, nodes), first_at(high, nodes));
+  return changed;
 }
 
-/// Lowers the distances of the nodes first ... last - 1 of a row, tile by tile.
-void MaterialLayer::remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_t first, std::int64_t last) {
-  using Row = Eigen::Array<float, tile_nodes, 1>;
+/// Lowers the distances of the nodes first ... last - 1 of a row, tile by tile, in whole packets: a neighbour whose
+/// distance is taken as well only stays what it is.
+bool MaterialLayer::remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_t first, std::int64_t last) {
+  constexpr std::int64_t packet = 4;
   const auto band = static_cast<float>(band_);
   const auto spacing = static_cast<float>(spacing_);
-  const auto radius = static_cast<float>(sweep.radius);
-  const auto y = static_cast<float>(y_of(j) - sweep.from.y());
+  const float radius = sweep.radius;
+  const auto y = static_cast<float>(y_of(j) - sweep.start_mm.y());
   const ToolStep::Shape<float> shape = sweep.shape;
-  std::int32_t* tiles_of_row = index_.data() + j / edge * columns_;
+  std::int32_t* const tiles_of_row = index_.data() + j / edge * columns_;
+  int changed = 0;
   while (first < last) {
     const std::int64_t column = first / edge;
-    const std::int64_t next = std::min(last, (column + 1) * edge);
+    const std::int64_t left = column * edge;
+    const std::int64_t begin = first - left;
+    const std::int64_t end = std::min(last - left, edge);
+    first = left + edge;
     std::int32_t& tile = tiles_of_row[column];
-    const std::int64_t begin = std::exchange(first, next);
     if (tile == empty) continue;
     if (tile == full) tile = new_tile(band);
-    const auto count = static_cast<int>(next - begin);
-    const int padded = (count + 3) / 4 * 4;  // whole packets: what is computed too much is not used
-    const auto x = static_cast<float>(x_of(begin) - sweep.from.x());
-    Row squared;
+    const std::int64_t first_packet = begin / packet;
+    const auto packets = static_cast<int>((end - 1) / packet - first_packet + 1);
+    float* const values = pool_[static_cast<std::size_t>(tile)].data() + j % edge * edge + first_packet * packet;
+    const auto x = static_cast<float>(x_of(left + first_packet * packet) - sweep.start_mm.x());
     if (shape.curvature == 0.0F) {
-      for (int k = 0; k < padded; ++k) {
-        const auto p = shape.parts(x + spacing * static_cast<float>(k), y);
-        squared[k] = p.beside ? 0.25F * p.offset * p.offset : p.end;
+      for (int k = 0; k < packets * packet; ++k) {
+        const float squared = shape.parts(x + spacing * static_cast<float>(k), y).squared(1.0F);
+        const float value = std::min(values[k], std::max(std::sqrt(squared) - radius, -band));
+        changed |= static_cast<int>(values[k] - value > least_change);
+        values[k] = value;
       }
     } else {
-      Row root;
-      for (int k = 0; k < padded; ++k) root[k] = shape.parts(x + spacing * static_cast<float>(k), y).square;
-      root.head(padded) = root.head(padded).sqrt();
-      for (int k = 0; k < padded; ++k) {
-        const auto p = shape.parts(x + spacing * static_cast<float>(k), y);
-        const float beside = p.offset / (1.0F + root[k]);
-        squared[k] = p.beside ? beside * beside : p.end;
+      for (int k = 0; k < packets * packet; ++k) {
+        const auto parts = shape.parts(x + spacing * static_cast<float>(k), y);
+        const float squared = parts.squared(std::sqrt(parts.square));
+        const float value = std::min(values[k], std::max(std::sqrt(squared) - radius, -band));
+        changed |= static_cast<int>(values[k] - value > least_change);
+        values[k] = value;
       }
     }
-    squared.head(padded) = squared.head(padded).sqrt();
-    float* values = pool_[static_cast<std::size_t>(tile)].data() + j % edge * edge + begin % edge;
-    for (int k = 0; k < count; ++k) values[k] = std::min(values[k], std::max(squared[k] - radius, -band));
   }
+  return changed != 0;
+}
+
+bool MaterialLayer::has_material() const noexcept {
+  return std::any_of(index_.begin(), index_.end(), [&](std::int32_t tile) {
+    if (tile < 0) return tile == full;
+    const Tile& values = pool_[static_cast<std::size_t>(tile)];
+    return std::any_of(values.begin(), values.end(), [](float value) { return value > 0.0F; });
+  });
 }
 
 double MaterialLayer::area_mm2() const noexcept {
@@ -349,6 +365,9 @@ void MaterialLayer::compact() {
     free_.push_back(tile);
     tile = *high > -limit ? full : empty;
   }
+  // Next time when those with values have grown by a quarter: uniform ones are passed over quickly, and the search
+  // costs little beside what made them.
+  compact_at_tiles_ = tiles() + tiles() / 4 + least_growth_tiles;
 }
 
 std::size_t MaterialLayer::bytes() const noexcept {

@@ -9,9 +9,12 @@ namespace shapegcode {
 namespace {
 
 constexpr double panel_rad = 8.0 / 180.0 * std::numbers::pi;  // of Simpson's rule, two steps each
+constexpr double brief_rad = 1.0 / 180.0 * std::numbers::pi;  // between kinks: a straight line will do
 constexpr double same_kink_rad = 1e-6;
 // A force without helix jumps where an arc begins: both sides are looked at from a little inside.
 constexpr double inside_rad = 1e-9;
+// A weighted load along less azimuth than this stands at its middle.
+constexpr double short_rad = 1e-2;
 
 }  // namespace
 
@@ -34,12 +37,37 @@ void FluteSet::add(const EngagedPiece& piece, const ChipTable& table, double azi
   ChipTable::Values lower;
   table.cumulated(low, lower);
   table.cumulated(high, upper);
-  double weight = piece.weight;
-  if (piece.slope_per_mm != 0.0) {
-    weight += piece.slope_per_mm * ((0.5 * (low + high) - azimuth) / lag_rad_per_mm - piece.centre_mm);
+  add_between(piece, table, azimuth, low, lower, high, upper, sum);
+}
+
+void FluteSet::add_between(const EngagedPiece& piece, const ChipTable& table, double azimuth, double low,
+                           const ChipTable::Values& lower, double high, const ChipTable::Values& upper,
+                           ChipTable::Values& sum) const noexcept {
+  const double share = 1.0 / lag_rad_per_mm;
+  if (piece.slope_per_mm == 0.0) {
+    const double weight = piece.weight * share;
+    for (std::size_t k = 0; k < table.size(); ++k) sum[k] += weight * (upper[k] - lower[k]);
+    return;
   }
-  weight /= lag_rad_per_mm;
-  for (std::size_t k = 0; k < table.size(); ++k) sum[k] += weight * (upper[k] - lower[k]);
+  const auto weight_at = [&](double p) {
+    return piece.weight + piece.slope_per_mm * ((p - azimuth) * share - piece.centre_mm);
+  };
+  if (high - low < short_rad) {
+    const double weight = weight_at(0.5 * (low + high)) * share;
+    for (std::size_t k = 0; k < table.size(); ++k) sum[k] += weight * (upper[k] - lower[k]);
+    return;
+  }
+  // By parts: the weight is a straight line.
+  ChipTable::Values lower_twice;
+  ChipTable::Values upper_twice;
+  table.cumulated_twice(low, lower_twice);
+  table.cumulated_twice(high, upper_twice);
+  const double at_low = weight_at(low) * share;
+  const double at_high = weight_at(high) * share;
+  const double slope = piece.slope_per_mm * share * share;
+  for (std::size_t k = 0; k < table.size(); ++k) {
+    sum[k] += at_high * upper[k] - at_low * lower[k] - slope * (upper_twice[k] - lower_twice[k]);
+  }
 }
 
 void Revolution::place_angles(const FluteSet& set, std::span<const EngagedPiece> arcs) {
@@ -61,24 +89,28 @@ void Revolution::place_angles(const FluteSet& set, std::span<const EngagedPiece>
     }
   }
   std::sort(kinks_.begin(), kinks_.end());
-  kinks_.erase(std::unique(kinks_.begin(), kinks_.end(), [](double a, double b) { return b - a < same_kink_rad; }),
-               kinks_.end());
-  if (kinks_.size() > 1 && kinks_.front() + set.pitch_rad - kinks_.back() < same_kink_rad) kinks_.pop_back();
-  if (!kinks_.empty()) kinks_.push_back(kinks_.front() + set.pitch_rad);
+  // Kinks that are nearly the same are one, with no angle between them; a stretch leads from its last to the next's
+  // first.
+  stretch_ends_.clear();
+  for (std::size_t i = 0; i < kinks_.size(); ++i) {
+    const double next = i + 1 < kinks_.size() ? kinks_[i + 1] : kinks_.front() + set.pitch_rad;
+    if (next - kinks_[i] >= same_kink_rad) stretch_ends_.emplace_back(kinks_[i], next);
+  }
 
   angle_.clear();
   weight_.clear();
   stretches_.clear();
-  for (std::size_t i = 0; i + 1 < kinks_.size(); ++i) {
+  for (const auto& [first, last] : stretch_ends_) {
     stretches_.push_back(angle_.size());
-    const double length = kinks_[i + 1] - kinks_[i];
-    const auto steps = 2 * static_cast<std::size_t>(std::ceil(length / panel_rad));
+    const double length = last - first;
+    const bool brief = length < brief_rad;
+    const auto steps = brief ? 1 : 2 * static_cast<std::size_t>(std::ceil(length / panel_rad));
     const double step = length / static_cast<double>(steps);
     for (std::size_t k = 0; k <= steps; ++k) {
       const bool end = k == 0 || k == steps;
       const double inwards = k == 0 ? inside_rad : (k == steps ? -inside_rad : 0.0);
-      angle_.push_back(kinks_[i] + step * static_cast<double>(k) + inwards);
-      weight_.push_back(step / 3.0 * (end ? 1.0 : (k % 2 == 1 ? 4.0 : 2.0)) / set.pitch_rad);
+      angle_.push_back(first + step * static_cast<double>(k) + inwards);
+      weight_.push_back(step / (brief ? 2.0 : 3.0) * (end ? 1.0 : (k % 2 == 1 ? 4.0 : 2.0)) / set.pitch_rad);
     }
   }
   stretches_.push_back(angle_.size());
@@ -123,13 +155,10 @@ void Revolution::add(const FluteSet& set, const EngagedPiece& piece, std::size_t
       if (top_inside) table.cumulated(top, upper);
       const ChipTable::Values& low = tip_inside ? lower : at_from;
       const ChipTable::Values& high = top_inside ? upper : at_to;
-      double weight = piece.weight;
-      if (piece.slope_per_mm != 0.0) {
-        const double middle = 0.5 * ((tip_inside ? tip : piece.from_rad) + (top_inside ? top : piece.to_rad));
-        weight += piece.slope_per_mm * ((middle - azimuth) / lag - piece.centre_mm);
-      }
-      weight /= lag;
-      for (std::size_t k = 0; k < size_; ++k) to[k * n + j] += weight * (high[k] - low[k]);
+      ChipTable::Values value{};
+      set.add_between(piece, table, azimuth, tip_inside ? tip : piece.from_rad, low, top_inside ? top : piece.to_rad,
+                      high, value);
+      for (std::size_t k = 0; k < size_; ++k) to[k * n + j] += value[k];
     }
   }
 }

@@ -4,14 +4,15 @@
 #include <array>
 #include <cstddef>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "milling/chip_table.hpp"
 
 namespace shapegcode {
 
-/// Part of the engagement, seen with a clockwise spindle. Its force counts `weight` times, and by `slope_per_mm` more
-/// for each mm that its middle lies above `centre_mm`.
+/// Part of the engagement, seen with a clockwise spindle. Its force counts `weight` times at `centre_mm`, and
+/// `slope_per_mm` more for each mm above.
 struct EngagedPiece {
   double from_rad;
   double to_rad;
@@ -40,6 +41,10 @@ struct FluteSet {
   [[nodiscard]] bool straight(const EngagedPiece& piece) const noexcept {
     return lag_rad_per_mm * (piece.top_mm - piece.bottom_mm) < 1e-6;
   }
+  /// Adds the force between two azimuths of a piece, the flute's tip at `azimuth`, from the integrals at both ends.
+  void add_between(const EngagedPiece& piece, const ChipTable& table, double azimuth, double low,
+                   const ChipTable::Values& lower, double high, const ChipTable::Values& upper,
+                   ChipTable::Values& sum) const noexcept;
   /// Adds what a flute whose tip stands at `azimuth` has in a piece.
   void add(const EngagedPiece& piece, const ChipTable& table, double azimuth, ChipTable::Values& sum) const noexcept;
 };
@@ -70,6 +75,7 @@ class Revolution {
   std::size_t kinds_ = 0;   // different flutes
   double pitch_ = 0.0;
   std::vector<double> kinks_;
+  std::vector<std::pair<double, double>> stretch_ends_;
   std::vector<double> angle_;           // of the tip of the first flute, within a pitch
   std::vector<double> weight_;          // of Simpson's rule
   std::vector<std::size_t> stretches_;  // first angle of each stretch between kinks, and the end

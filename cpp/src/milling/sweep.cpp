@@ -36,6 +36,7 @@ constexpr std::size_t samples_between_reports = 1024;
 struct Piece {
   ToolStep step;
   std::size_t lowest;
+  std::uint32_t segment;
   double end_mm;                   // along the path
   bool continues;                  // its predecessor ends where it starts...
   std::size_t predecessor_lowest;  // ...and swept these layers
@@ -54,7 +55,7 @@ class Sweeper {
         step_(options.step_mm > 0.0 ? options.step_mm : diameter / steps_per_diameter),
         options_(options) {
     const double h = material.resolution_mm();
-    const double look = std::min(2.0 * h / radius_, widest_look_rad);
+    const double look = std::min(h / radius_, widest_look_rad);
     const auto looks = static_cast<std::size_t>(std::ceil(2.0 * half_pi / look));
     for (std::size_t k = 0; k <= looks; ++k) {
       const double share = 2.0 * static_cast<double>(k) / static_cast<double>(looks) - 1.0;
@@ -65,13 +66,13 @@ class Sweeper {
     grid_error_ = std::max(1e-6, h * h / (8.0 * radius_));
     touch_ = std::max(options.touch_mm, 4.0 * grid_error_);
     kept_mm_ = exact_share * radius_;
+    longest_piece_mm_ = 2.0 * kept_mm_;
   }
 
   EngagementTrack run(const Path& path) {
     track_.first_arc.push_back(0);
     for (std::size_t i = 0; i < path.size(); ++i) run_segment(path[i], path.distance_mm(i), i);
     while (!pending_.empty()) sweep_oldest();
-    material_.compact();
     return std::move(track_);
   }
 
@@ -129,16 +130,17 @@ class Sweeper {
   void stand_at(const Vector3& place) {
     last_point_ = place.head<2>();
     last_lowest_ = material_.lowest_cut(place.z());
-    pending_.push_back({ToolStep(last_point_, last_point_), last_lowest_, 0.0, false, 0});
+    pending_.push_back({ToolStep(last_point_, last_point_), last_lowest_, index_, 0.0, false, 0});
   }
 
   void sample(const Segment& segment, double begin_mm, double to_mm, std::size_t lowest) {
     const Vector3 place = point_at(segment, to_mm);
     const Vector3 tangent = tangent_at(segment, to_mm);
     const Vector2d point = place.head<2>();
-    const double horizontal = std::min(1.0, tangent.head<2>().norm());
-    const bool travels = horizontal > least_horizontal;
-    const Vector2d direction = travels ? Vector2d(tangent.head<2>() / horizontal) : Vector2d::Zero();
+    const double along = tangent.head<2>().norm();
+    const bool travels = along > least_horizontal;
+    const double horizontal = tangent.z() == 0.0 ? 1.0 : (travels ? std::min(1.0, along) : 0.0);
+    const Vector2d direction = travels ? Vector2d(tangent.head<2>() / along) : Vector2d::Zero();
 
     double area = 0.0;
     widths_.clear();
@@ -158,21 +160,14 @@ class Sweeper {
     track_.x_mm.push_back(point.x());
     track_.y_mm.push_back(point.y());
     track_.direction_rad.push_back(travels ? std::atan2(direction.y(), direction.x()) : 0.0);
-    track_.horizontal.push_back(travels ? horizontal : 0.0);
+    track_.horizontal.push_back(horizontal);
     track_.segment.push_back(index_);
     track_.radial_depth_mm.push_back(union_width());
     track_.section_mm2.push_back(horizontal * area + std::max(0.0, -tangent.z()) * plunged);
     track_.plunged_mm2.push_back(plunged);
     track_.first_arc.push_back(static_cast<std::uint32_t>(track_.arcs.size()));
 
-    double curvature = 0.0;
-    if (segment.kind == SegmentKind::arc) {
-      // Start and end radius may differ a little: the arc through both ends of the step.
-      const Vector2d centre = segment.centre_mm.head<2>();
-      const double radius = 0.5 * ((last_point_ - centre).norm() + (point - centre).norm());
-      curvature = (segment.sweep_rad > 0.0 ? 1.0 : -1.0) / radius;
-    }
-    pending_.push_back({ToolStep(last_point_, point, curvature), lowest, begin_mm + to_mm, true, last_lowest_});
+    travel(segment, point, lowest, begin_mm + to_mm);
     last_point_ = point;
     last_lowest_ = lowest;
     if (travels) {
@@ -185,12 +180,40 @@ class Sweeper {
     if (options_.progress && track_.size() % samples_between_reports == 0) options_.progress(begin_mm + to_mm);
   }
 
+  /// Adds the way to a place to what is pending; on one segment to the latest piece, so that the grid has less to do.
+  void travel(const Segment& segment, const Vector2d& point, std::size_t lowest, double end_mm) {
+    double curvature = 0.0;
+    if (segment.kind == SegmentKind::arc) {
+      // Start and end radius may differ a little: the arc through both ends of the step.
+      const Vector2d centre = segment.centre_mm.head<2>();
+      const double radius = 0.5 * ((last_point_ - centre).norm() + (point - centre).norm());
+      curvature = (segment.sweep_rad > 0.0 ? 1.0 : -1.0) / radius;
+    }
+    if (!pending_.empty() && pending_.back().continues && pending_.back().segment == index_ &&
+        pending_.back().lowest == lowest) {
+      Piece& latest = pending_.back();
+      const double chord = (point - latest.step.from()).norm();
+      if (chord < longest_piece_mm_ && chord * std::abs(curvature) < 2.0 * largest_turn_rad) {
+        latest.step = ToolStep(latest.step.from(), point, curvature);
+        latest.end_mm = end_mm;
+        return;
+      }
+    }
+    pending_.push_back({ToolStep(last_point_, point, curvature), lowest, index_, end_mm, true, last_lowest_});
+  }
+
   void sweep_oldest() {
     const Piece& piece = pending_.front();
-    const bool moves = piece.step.chord() != Vector2d::Zero();
+    const double half = 0.5 * piece.step.chord().norm();
+    const Vector2d middle = piece.step.from() + 0.5 * piece.step.chord();
     for (std::size_t layer = piece.lowest; layer < material_.size(); ++layer) {
+      const MaterialLayer& field = material_.layer(layer);
+      // Nor is there anything above: see `sample`.
+      if (field.is_empty_around(middle.x(), middle.y(), radius_ + half + field.band_mm())) break;
       const bool continues = piece.continues && layer >= piece.predecessor_lowest;
-      if (moves || !continues) material_.remove(layer, piece.step, radius_, continues);
+      if (half == 0.0 && continues) continue;
+      // Where nothing is left to take away, nothing is above; only the layers that the tool has just reached are new.
+      if (!material_.remove(layer, piece.step, radius_, continues) && continues) break;
     }
     pending_.pop_front();
   }
@@ -243,13 +266,13 @@ class Sweeper {
       const double fc = at(Vector2d(std::cos(c), std::sin(c)));
       if (fc == 0.0) return c;
       if ((fc > 0.0) == (fb > 0.0)) {
-        if (c == b) break;
+        if (c == b) return c;
         b = c;
         fb = fc;
         if (kept == -1) fa *= 0.5;
         kept = -1;
       } else {
-        if (c == a) break;
+        if (c == a) return c;
         a = c;
         fa = fc;
         if (kept == 1) fb *= 0.5;
@@ -325,6 +348,7 @@ class Sweeper {
   double touch_ = 0.0;
   double in_grid_ = 0.0;  // the latest distance, without the newest way: tells how deep a contact is at any step
   double kept_mm_ = 0.0;
+  double longest_piece_mm_ = 0.0;
   std::vector<Look> looks_;
   std::deque<Piece> pending_;  // not yet in the grid, oldest first
   std::vector<double> places_;

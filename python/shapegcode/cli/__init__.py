@@ -72,6 +72,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("machine", "write or explain a machine file, or import one from the control's parameters"),
     Command("characterize", "measure a controller with test programs, and fit the machine file to the results"),
     Command("identify", "find vibration modes in a tap test or decay, and put them into the machine file"),
+    Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
     Command("demo", "repeat the figures of a paper beside the published ones"),
 )
 """Every sub-command, in the order of the help text. A new one needs a row here and a module of its name."""

@@ -17,18 +17,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "name",
         metavar="NAME",
-        choices=("path", "cycle-time", "shaper", "metrology", "tap"),
+        choices=("path", "cycle-time", "shaper", "metrology", "tap", "corner"),
         help="path: line, arc, line of paper 000 at both feeds and reductions; "
         "cycle-time: a test piece with the features of ISO 10791-7 with both sets of constants of paper 004; "
         "shaper: the two-mode shapers of paper 002, figures 2 to 6, and its test on a stage; "
         "metrology: the specimens of paper 000, measured on the model; "
-        "tap: the equivalent systems of paper 003, and what end mill and collet deflect",
+        "tap: the equivalent systems of paper 003, and what end mill and collet deflect; "
+        "corner: the cornering cuts of paper 001, its feeds and the scheduler's",
     )
     parser.add_argument(
         "--plots",
         metavar="DIR",
         default=None,
-        help=f"folder for the pictures of `shaper`, `metrology` and `tap` (PNG and SVG; default: {_FOLDER})",
+        help=f"folder for the pictures of `shaper`, `metrology`, `tap` and `corner` (PNG and SVG; default: {_FOLDER})",
     )
     add_json_argument(parser)
 
@@ -40,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
         ArgumentError: pictures of a demonstration that has none.
         OSError: the JSON file or a picture cannot be written.
     """
-    drawing = {"shaper": _shaper, "metrology": _metrology, "tap": _tap}
+    drawing = {"shaper": _shaper, "metrology": _metrology, "tap": _tap, "corner": _corner}
     if args.name in drawing:
         return drawing[args.name](args.json, args.plots or _FOLDER)
     if args.plots is not None:
@@ -109,6 +110,38 @@ def _tap(json_target: str | None, folder: str) -> int:
     console.print(result["remark"], markup=False)
     console.print(f"pictures: {folder}/paper003-*", markup=False)
     console.print("next: shapegcode identify --tap-plan", markup=False)
+    return ExitCode.OK if result["agrees"] else ExitCode.OUT_OF_TOLERANCE
+
+
+def _corner(json_target: str | None, folder: str) -> int:
+    from rich.table import Table
+
+    from shapegcode.cli import ExitCode
+    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.milling.corner_demo import corner_demo
+    from shapegcode.milling.corner_demo_picture import write_corner_pictures
+
+    with progress("paper 001", json_target) as bar:
+        demo = corner_demo(bar.update)
+        bar.wait()
+        pictures = write_corner_pictures(demo, folder)
+    result = demo.report
+    if json_target is not None:
+        write_json({**result, "pictures": pictures}, json_target)
+    console = output_console(json_target)
+    table = Table(title="Paper 001: cornering cut with an 8 mm end mill, 0.12 mm/rev, 15 mm deep, 0.8 mm wide")
+    table.add_column("case", no_wrap=True)
+    for column in ("what", "paper", "here", "agrees", "note"):
+        table.add_column(column, overflow="fold")
+    verdicts = {True: "yes", False: "NO", None: ""}
+    for row in result["rows"]:
+        table.add_row(
+            str(row["case"]), row["what"], row["paper"], row["here"], verdicts[row["agrees"]], row["note"]
+        )  # fmt: skip
+    console.print(table)
+    console.print(result["remark"], markup=False)
+    console.print(f"pictures: {folder}/paper001-*", markup=False)
+    console.print("next: shapegcode feed YOUR.NC -m vx500 --tool T.toml --stock S.toml -o OUT.NC", markup=False)
     return ExitCode.OK if result["agrees"] else ExitCode.OUT_OF_TOLERANCE
 
 

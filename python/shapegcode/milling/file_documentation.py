@@ -81,8 +81,9 @@ _INTRODUCTION = """\
 <!-- Generated: python -m shapegcode.milling.file_documentation > docs/tool_files.md -->
 
 A tool file says what cuts, how large the forces are and what must not be exceeded; a stock file says what material is
-there before the first block. Both are TOML. An unknown key, a number that is not finite or a value outside its limits
-is an error, and all errors of a file are listed at once, each with its line.
+there before the first block. `shapegcode feed` reads both; what the machine allows stands in its own file
+([feed_control](machine.md#feed_control)). Both are TOML. An unknown key, a number that is not finite or a value
+outside its limits is an error, and all errors of a file are listed at once, each with its line.
 
 A default marked **assumed** is not known for real tools in general: look it up or measure it.
 
@@ -109,9 +110,9 @@ wall along which a circle of that radius could roll at that distance. All of it 
 
 A contour that closes upon itself is a pocket or a boss, by `wall` and its sense; what leads to it and away from it is
 left out. An open one is a wall from its beginning to its end and goes on straight beyond both; state `lead_in_mm` and
-`lead_out_mm` where the run of cutting moves begins before the wall. Only moves below the top of the stock count, and
-curves are polygons within 0.1 µm. Where a path crosses itself or both of its sides are walls, describe the stock as a
-`[polygon]` instead: the message says so.
+`lead_out_mm` where the run of cutting moves begins before the wall. Only moves below the top of the stock count.
+Where a path crosses itself or both of its sides are walls, describe the stock as a `[polygon]` instead: the message
+says so. Outlines are right within half a micrometre.
 """
 
 

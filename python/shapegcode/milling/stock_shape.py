@@ -25,6 +25,8 @@ Points = NDArray[np.float64]
 
 # Points of a program nearer than this are the same.
 _SAME_MM = 2e-3
+# A run is a closed contour with its lead-in and lead-out if so much of its length closes upon itself.
+_CLOSED_RATIO = 0.5
 
 
 @dataclass(frozen=True)
@@ -125,17 +127,21 @@ class _Allowance:
         walls, swept = [], []
         for points in self._runs(paths):
             loops, rest = _loops(_with_touched(points))
-            for loop in loops:
-                wall, gone = self._closed(loop)
-                walls.append(wall)
-                swept.append(gone)
-            if not loops:
-                wall, gone = self._open(rest)
+            closed, whole = sum(_length(np.vstack([loop, loop[:1]])) for loop in loops), _length(points)
+            if loops and closed < _CLOSED_RATIO * whole:
+                raise self._error(
+                    "wall",
+                    f"only {closed:.4g} of {whole:.4g} mm of a run of cutting moves close upon themselves: is that the "
+                    "wall? Describe the stock as [polygon]",
+                )
+            for wall, gone in map(self._closed, loops) if loops else [self._open(rest)]:
                 walls.append(wall)
                 swept.append(gone)
         if not walls:
             raise self._error("z_mm", "no cutting move of the program goes below the top")
         part = shapely.union_all(walls).difference(shapely.union_all(swept))
+        if part.is_empty:
+            raise self._error("wall", "the tool's sweep leaves nothing behind the walls: wrong side?")
         # What roughing with corner_radius_mm leaves of the layer: its path keeps allowance and radius off the part.
         return grown(grown(part, self._rough), -keys.corner_radius_mm)
 
@@ -211,7 +217,7 @@ class _Allowance:
         band = swept(straight, self._reach, round_ends=False)
         cut = shapely.LineString(_extended(straight, _SAME_MM))
         faces = shapely.get_parts(shapely.polygonize([shapely.union_all([band.boundary, cut])]))
-        behind = self._behind(faces, points)
+        behind = self._behind(faces, straight)
         return shapely.union_all(behind), swept(straight, self._radius)
 
     def _behind(self, faces: NDArray[np.object_], points: Points) -> list[Area]:
@@ -230,6 +236,10 @@ class _Allowance:
             if at_wall:
                 behind.append(face)
         return behind
+
+
+def _length(points: Points) -> float:
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())
 
 
 def _signed_area(loop: Points) -> float:

@@ -22,7 +22,8 @@ struct CornerCut {
 };
 
 /// Throws Error(argument) on a tool radius or allowance that is not positive, an allowance above the tool's radius, a
-/// rough or finish radius below the tool's, a turn outside of 1 to 179 degrees, or a straight below 0.
+/// rough or finish radius below the tool's, a rough corner that leaves nothing of the finished one, a turn outside of 1
+/// to 179 degrees, or a straight below 0.
 void check(const CornerCut& cut);
 
 /// Sections of the path of paper 001.
@@ -49,7 +50,9 @@ struct CornerEngagement {
 [[nodiscard]] double corner_length_mm(const CornerCut& cut);
 
 /// Engagement at a distance along the path, 0 <= s <= corner_length_mm. At a sharp vertex `behind_vertex` chooses the
-/// direction after the turn. Throws Error(argument) on an s outside, or what `check` refuses.
+/// direction after the turn. Throws Error(argument) on an s outside, what `check` refuses, or where the tool's front
+/// leaves the material only where the tool has been itself: so it may be at sharp turns far beyond 90 degrees, or where
+/// a rough radius of many tool radii leaves a corner full of material.
 [[nodiscard]] CornerEngagement corner_engagement(const CornerCut& cut, double s_mm, bool behind_vertex = false);
 
 /// The tool's path: line, arc (if finish and tool radius differ), line at a height.

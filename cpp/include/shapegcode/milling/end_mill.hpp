@@ -17,7 +17,7 @@ struct EndMill {
   int flutes = 0;
   double helix_rad = 0.0;  ///< of a right-hand helix on a right-hand cutter: the tip enters first
   /// How far each flute stands out beyond the mean radius, in the order in which they cut; empty: no runout.
-  std::vector<double> runout_mm;
+  std::vector<double> runout_mm = {};
 
   [[nodiscard]] double radius_mm() const noexcept { return 0.5 * diameter_mm; }
 };

@@ -23,7 +23,7 @@ struct FeedLimits {
   double mean_power_w = none;
   double feed_per_tooth_mm = none;  ///< chip load as tool makers state it
   double peak_chip_mm = none;       ///< thickest chip, which a light radial cut makes thinner than the feed per tooth
-  std::optional<ToolBeam> beam;
+  std::optional<ToolBeam> beam = {};
 };
 
 /// Throws Error(argument) on a limit that is not positive, a beam that `check` refuses, or a limit of deflection
@@ -46,7 +46,7 @@ struct LimitedFeed {
 };
 
 /// The highest feed between `lowest` and `highest` (mm/min) that stays within all limits. Never above a limit, and
-/// where a limit binds within 0.1 % of it. Throws Error(argument) on limits or an engagement that `check` or `figures`
+/// where a limit binds within 0.02 % of it. Throws Error(argument) on limits or an engagement that `check` or `figures`
 /// refuse, or unless 0 < lowest <= highest.
 [[nodiscard]] LimitedFeed largest_feed(MillingForce& force, std::span<const EngagedArc> arcs, const FeedLimits& limits,
                                        double lowest, double highest);

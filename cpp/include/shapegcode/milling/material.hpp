@@ -18,7 +18,7 @@ class Material {
   /// `rings`: outlines of the stock, holes included (even-odd rule); `borders_mm`: heights in Z between the layers,
   /// ascending, from the bottom of the stock to its top; `resolution_mm`: grid, a hundredth of the tool's diameter is
   /// a good choice. Throws Error(argument) if there is no ring, a ring has fewer than 3 points or encloses nothing
-  /// with the others, a number is not finite, fewer than two borders or not ascending ones, a resolution that is not
+  /// at this resolution, a number is not finite, fewer than two borders or not ascending ones, a resolution that is not
   /// positive, or a grid that needs more than `memory_limit_bytes`.
   Material(std::span<const Ring> rings, std::span<const double> borders_mm, double resolution_mm,
            std::size_t memory_limit_bytes = default_memory_limit_bytes);
@@ -54,9 +54,10 @@ class Material {
   /// Memory in use.
   [[nodiscard]] std::size_t bytes() const noexcept;
 
-  /// Takes away what a tool sweeps on a step in one layer; see MaterialLayer::remove. Throws Error(argument) where that
-  /// needs more memory than the limit.
-  void remove(std::size_t layer, const ToolStep& step, double tool_radius_mm, bool continues);
+  /// Takes away what a tool sweeps on a step in one layer; see MaterialLayer::remove. What is taken from a layer must
+  /// be taken from all above as well: `sweep` relies on it. Throws Error(argument) where that needs more memory than
+  /// the limit.
+  bool remove(std::size_t layer, const ToolStep& step, double tool_radius_mm, bool continues);
 
   /// Gives back the memory of what is uniform by now.
   void compact();
@@ -72,13 +73,12 @@ class Material {
   Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
   Eigen::Vector2d high_ = Eigen::Vector2d::Zero();
   std::size_t memory_limit_;
-  std::size_t tiles_ = 0;         // that carry values, of all layers
-  std::size_t compact_at_tiles_;  // look for uniform ones
+  std::size_t tiles_ = 0;  // that carry values, of all layers
 };
 
-/// Heights between layers for these paths in a stock from `bottom_mm` to `top_mm`: the heights at which the tool cuts
-/// on a level (taken as one within 1 um), the lowest points of ramps and plunges, and steps of at most `ramp_step_mm`
-/// wherever a ramp or helix passes. Throws Error(argument) unless bottom < top and the step is positive.
+/// Heights between layers for these paths in a stock from `bottom_mm` to `top_mm`: the heights at which the tool moves
+/// on a level (taken as one within 1 um), the lowest points of ramps and plunges that cut, and steps of at most
+/// `ramp_step_mm` wherever a ramp or helix passes. Throws Error(argument) unless bottom < top and the step is positive.
 [[nodiscard]] std::vector<double> layer_borders(std::span<const Path* const> paths, double bottom_mm, double top_mm,
                                                 double ramp_step_mm);
 

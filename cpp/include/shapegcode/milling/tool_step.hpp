@@ -33,15 +33,22 @@ class ToolStep {
   [[nodiscard]] double curvature() const noexcept { return curvature_; }
   [[nodiscard]] const Eigen::Vector2d& start_tangent() const noexcept { return start_tangent_; }
 
-  /// What the distance is made of at a place (x, y) from the start. Beside the arc it is |offset / (1 + sqrt(square))|,
-  /// where `square` is the squared ratio of the place's distance from the arc's centre to its radius; elsewhere it is
-  /// the root of `end`, the squared distance of the nearer end.
+  /// What the distance is made of at a place (x, y) from the start. Beside the arc (weight 1) it is
+  /// |offset / (1 + sqrt(square))|, where `square` is the squared ratio of the place's distance from the arc's centre
+  /// to its radius; elsewhere (weight 0) it is the root of `end`, the squared distance of the nearer end. In between,
+  /// for 1 nm, both are the same. A weight instead of a choice keeps rows of a grid free of branches.
   template <typename Scalar>
   struct Parts {
     Scalar offset;
     Scalar square;
     Scalar end;
-    bool beside;
+    Scalar beside;
+
+    /// The squared distance; `root` is that of `square`, 1 on a line.
+    [[nodiscard]] Scalar squared(Scalar root) const noexcept {
+      const Scalar aside = offset / (Scalar(1) + root);
+      return end + beside * (aside * aside - end);
+    }
   };
 
   /// The constants of a step as the kernels want them: double for single places, float for rows of a grid.
@@ -61,9 +68,10 @@ class ToolStep {
       const Scalar ex = x - cx;
       const Scalar ey = y - cy;
       const Scalar offset = curvature * squared - Scalar(2) * (y * t0x - x * t0y);
-      const Scalar square = std::max(Scalar(1) + curvature * offset, Scalar(0));
+      const Scalar square = std::abs(Scalar(1) + curvature * offset);  // below 0 by rounding only
       const Scalar end = std::min(squared, ex * ex + ey * ey);
-      const bool beside = (x * t0x + y * t0y >= Scalar(0)) & (ex * t1x + ey * t1y <= Scalar(0));
+      const Scalar within = std::min(x * t0x + y * t0y, -(ex * t1x + ey * t1y));  // mm from the nearer end's normal
+      const Scalar beside = std::min(std::max(within * Scalar(1e6), Scalar(0)), Scalar(1));
       return {offset, square, end, beside};
     }
 
@@ -74,7 +82,7 @@ class ToolStep {
   [[nodiscard]] double distance_mm(const Eigen::Vector2d& place) const noexcept {
     const Eigen::Vector2d v = place - from_;
     const Parts<double> p = Shape<double>(*this).parts(v.x(), v.y());
-    return p.beside ? std::abs(p.offset) / (1.0 + std::sqrt(p.square)) : std::sqrt(p.end);
+    return std::sqrt(p.squared(std::sqrt(p.square)));
   }
 
  private:

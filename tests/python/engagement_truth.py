@@ -1,0 +1,106 @@
+"""Engagement without a grid: places on the tool's circumference against everything the tool has swept before.
+
+Written from the definition: a place is in material if it lies within the stock and nowhere within a radius of the way
+of the tool's axis so far, as far as that way ran deep enough.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode._core import EngagementTrack, Path, Segment, SegmentKind
+
+Array = npt.NDArray[np.float64]
+
+
+def random_program(rng: np.random.Generator, levels: list[float], moves: int) -> Path:
+    """Lines and arcs on random levels within +-14 mm, with plunges, ramps and retracts in between."""
+    here = np.array([*rng.uniform(-14, 14, 2), 2.0])
+    segments: list[Segment] = []
+
+    def line(to: Array) -> None:
+        nonlocal here
+        segments.append(Segment.line(here, to, 10.0))
+        here = to
+
+    while len(segments) < moves:
+        line(np.array([here[0], here[1], rng.choice(levels)]))
+        for _ in range(rng.integers(3, 7)):
+            if rng.uniform() < 0.4:
+                centre = here + np.array([*rng.uniform(-7, 7, 2), 0.0])
+                sweep = rng.uniform(0.3, 5.0) * rng.choice([-1.0, 1.0])
+                arm = here - centre
+                turn = np.array([[np.cos(sweep), -np.sin(sweep)], [np.sin(sweep), np.cos(sweep)]])
+                to = np.array([*(centre[:2] + turn @ arm[:2]), here[2]])
+                segments.append(Segment.arc(here, to, centre, sweep, 10.0))
+                here = to
+            else:
+                line(np.array([*rng.uniform(-14, 14, 2), here[2]]))
+        line(np.array([here[0], here[1], 2.0]))
+        line(np.array([*rng.uniform(-14, 14, 2), 2.0]))
+    return Path(segments)
+
+
+def _from_line(places: Array, start: Array, end: Array) -> Array:
+    """Distances of places (n, 2) from a line."""
+    along = end - start
+    squared = float(along @ along)
+    share = np.clip((places - start) @ along / squared, 0.0, 1.0) if squared > 0 else np.zeros(len(places))
+    result: Array = np.linalg.norm(places - start - share[:, None] * along, axis=1)
+    return result
+
+
+def _from_arc(places: Array, segment: Segment, share: float) -> Array:
+    """Distances of places (n, 2) from the first part of an arc, by the angle about its centre."""
+    centre = segment.centre_mm[:2]
+    arm = segment.start_mm[:2] - centre
+    sweep = segment.sweep_rad * share
+    sense = np.sign(segment.sweep_rad)
+    turned = np.mod(sense * (np.arctan2(*(places - centre).T[::-1]) - np.arctan2(arm[1], arm[0])), 2 * np.pi)
+    ends = [segment.start_mm[:2], segment.point_at(share * segment.length_mm)[:2]]
+    distance = np.min([np.linalg.norm(places - end, axis=1) for end in ends], axis=0)
+    beside = np.abs(np.linalg.norm(places - centre, axis=1) - segment.radius_mm)
+    return np.where(turned <= abs(sweep), np.minimum(beside, distance), distance)
+
+
+def section_mm2(path: Path, track: EngagementTrack, sample: int, rings: list[Array], borders: list[float],
+                tool_radius_mm: float, places: int = 1080) -> float:  # fmt: skip
+    """Area of material that the front of the tool meets at a sample, without what is below its end."""
+    if track.horizontal[sample] == 0.0:
+        return 0.0
+    azimuth = (np.arange(places) + 0.5) / places * np.pi - np.pi / 2
+    angle = track.direction_rad[sample] + azimuth
+    centre = np.array([track.x_mm[sample], track.y_mm[sample]])
+    rim = centre + tool_radius_mm * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    last = int(track.segment[sample])
+    begin = sum(path[i].length_mm for i in range(last))
+    tip = path[last].point_at(track.s_mm[sample] - begin)[2]
+    inside = np.zeros(places, dtype=bool)
+    for ring in rings:
+        for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+            spans = (a[1] > rim[:, 1]) != (b[1] > rim[:, 1])
+            with np.errstate(divide="ignore", invalid="ignore"):
+                crossing = a[0] + (rim[:, 1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+            inside ^= spans & (rim[:, 0] < crossing)
+    area = 0.0
+    for bottom, top in pairwise(borders):
+        middle = 0.5 * (bottom + top)
+        if middle <= tip:
+            continue
+        left = inside.copy()
+        for i in range(last + 1):
+            share = 1.0 if i < last else (track.s_mm[sample] - begin) / path[i].length_mm
+            segment = path[i]
+            from_z, to_z = segment.start_mm[2], segment.point_at(share * segment.length_mm)[2]
+            if min(from_z, to_z) >= middle:
+                continue
+            if segment.kind == SegmentKind.arc:
+                distance = _from_arc(rim, segment, share)
+            else:
+                distance = _from_line(rim, segment.start_mm[:2], segment.point_at(share * segment.length_mm)[:2])
+            left &= distance > tool_radius_mm - 1e-9
+        area += (top - max(bottom, tip)) * tool_radius_mm * np.sum(np.cos(azimuth[left])) * np.pi / places
+    return area
