@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +15,9 @@ from shapegcode.milling.schedule import FeedSchedule
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-__all__ = ["plot_along_path", "plot_path", "plot_surface", "plot_walls", "write_feed_pictures"]
+__all__ = ["plot_along_path", "plot_path", "plot_surface", "wall_figure", "write_feed_pictures"]
 
 Vector = npt.NDArray[np.float64]
 
@@ -261,20 +262,27 @@ def plot_surface(file: str | Path, walls: WallMaps, part: str) -> None:
         ValueError: a wrong ending.
         OSError: the file cannot be written.
     """
-    plot_walls(
-        file, walls.edges_mm, walls.height_mm, {"before": walls.before, "after": walls.after},
-        "Form error of the wall; +: material is left standing", part,
-    )  # fmt: skip
+    figure, last = wall_figure(
+        walls.edges_mm, walls.height_mm, {"before": walls.before, "after": walls.after}, (_BEFORE, _AFTER)
+    )
+    last.set_xlabel("distance along the cutting path in mm")
+    canvas.heading(figure, "Form error of the wall; +: material is left standing", part)
+    canvas.save(figure, file)
 
 
-def plot_walls(
-    file: str | Path, edges_mm: Vector, height_mm: Vector, maps: dict[str, Vector], title: str, part: str
-) -> None:
-    """Maps of the wall's error, µm, (columns, heights), below each other in one scale, and the largest per column.
+def wall_figure(
+    edges_mm: Vector, height_mm: Vector, maps: Mapping[str, Vector], colours: Sequence[str]
+) -> tuple[Figure, Axes]:
+    """Maps of the wall's error below each other in one scale, and in the last panel the largest of each column.
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Args:
+        edges_mm: of the columns, (m + 1,).
+        height_mm: above the tip, evenly spaced, (h,).
+        maps: error in µm by name, (m, h); NaN: no wall.
+        colours: of their curves in the last panel.
+
+    Returns:
+        The picture without its title, and its last panel.
     """
     everything = np.concatenate([each[np.isfinite(each)] for each in maps.values()])
     low, high = min(float(everything.min()), 0.0), max(float(everything.max()), 0.0)
@@ -295,7 +303,7 @@ def plot_walls(
         panel.set_title(f"{name}: up to {worst:.3g} µm", loc="left", fontsize=10)
     figure.colorbar(mesh, ax=grid[:-1], pad=0.01, label="error of the wall in µm")
     last = grid[-1]
-    for (name, values), colour in zip(maps.items(), (_BEFORE, _AFTER, canvas.COLOURS[2]), strict=False):
+    for (name, values), colour in zip(maps.items(), colours, strict=True):
         made = np.isfinite(values).any(axis=1)
         largest = np.full(len(values), np.nan)
         largest[made] = np.nanmax(np.abs(values[made]), axis=1)
@@ -305,8 +313,6 @@ def plot_walls(
     last.spines[["top", "right"]].set_visible(False)
     last.margins(x=0.0)
     last.set_ylabel("largest over\nthe height in µm")
-    last.set_xlabel("distance along the cutting path in mm")
     canvas.legend_above(last)
-    canvas.heading(figure, title, part)
     figure.align_ylabels(grid)
-    canvas.save(figure, file)
+    return figure, last
