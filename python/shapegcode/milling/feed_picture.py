@@ -26,7 +26,10 @@ _LIMIT = "#000000"
 _BANDS = 1500
 _PIECES = 20000
 _LOGARITHMIC = 8.0  # ratio of the largest feed to the least in material from which on the axis is logarithmic
+_MINOR = "235"  # first digits of the numbers that a logarithmic axis shows between powers of ten
 _AIR_MM2 = 1e-9
+_STACKED = 1.9  # width over height of the part from which on the two paths stand below each other
+_MARGIN = 0.03  # around the part, of its longer side
 _GROUND = 300  # cells of the ground along the longer side
 _LOADS = (
     ("peak_resultant_n", "resultant, peak\nin N", "N"),
@@ -131,6 +134,7 @@ def _feed_axis(panel: Axes, feeds: Vector) -> None:
         panel.set_yscale("log")
         panel.set_ylim(0.7 * least, 1.4 * largest)
         panel.yaxis.set_major_formatter("{x:g}")
+        panel.yaxis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:g}"[0] in _MINOR else "")
     else:
         panel.set_ylim(0.0, 1.08 * largest)
     panel.set_ylabel("feed\nin mm/min")
@@ -183,8 +187,10 @@ def plot_path(file: str | Path, traces: FeedTraces, material: _core.Material, pa
     lines, first = _pieces(traces)
     low, high = (each(traces.xy_mm, axis=0) for each in (np.min, np.max))
     low, high = np.minimum(low, material.low_mm), np.maximum(high, material.high_mm)
-    size = np.maximum(high - low, 1e-3)
-    wide = bool(size[0] > 1.3 * size[1])
+    margin = _MARGIN * max(float((high - low).max()), 1e-3)
+    low, high = low - margin, high + margin
+    size = high - low
+    wide = bool(size[0] > _STACKED * size[1])
     ratio = float(np.clip(size[1] / size[0], 0.25, 3.0))
     figure = canvas.figure(9.5, 2.0 + 2 * 8.0 * ratio) if wide else canvas.figure(12.0, 1.2 + 4.9 * ratio)
     grid: Any = figure.subplots(2 if wide else 1, 1 if wide else 2, sharex=True, sharey=True, squeeze=False)
@@ -199,12 +205,12 @@ def plot_path(file: str | Path, traces: FeedTraces, material: _core.Material, pa
         order, empty = order[force[order] >= 0.0], order[force[order] < 0.0]
         panel.add_collection(LineCollection(list(lines[empty]), colors=canvas.GREY, linewidths=0.7, rasterized=True))
         coloured = LineCollection(
-            lines[order], array=force[order], cmap="plasma_r", norm=norm, linewidths=2.2, rasterized=True,
+            list(lines[order]), array=force[order], cmap="plasma_r", norm=norm, linewidths=2.2, rasterized=True,
             capstyle="round",
         )  # fmt: skip
         panel.add_collection(coloured)
-        panel.set_xlim(low[0] - 0.03 * size.max(), high[0] + 0.03 * size.max())
-        panel.set_ylim(low[1] - 0.03 * size.max(), high[1] + 0.03 * size.max())
+        panel.set_xlim(low[0], high[0])
+        panel.set_ylim(low[1], high[1])
         panel.set_aspect("equal")
         panel.set_title(
             f"{when}: up to {max(float(values['peak_resultant_n'].max()), 0.0):.3g} N", loc="left", fontsize=10
