@@ -316,6 +316,7 @@ def wall_figure(
         last.stairs(largest, edges_mm, baseline=None, color=colour, linewidth=1.1, label=name)
     last.set_ylim(bottom=0.0)
     last.grid(True, color="#e4e4e4", linewidth=0.6)
+    last.set_axisbelow(True)
     last.spines[["top", "right"]].set_visible(False)
     last.margins(x=0.0)
     last.set_ylabel("largest over\nthe height in µm")
