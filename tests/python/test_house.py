@@ -131,6 +131,7 @@ def test_only_pictures_import_matplotlib() -> None:
         "canvas.py",
         "identification/tap_picture.py",
         "metrology_picture.py",
+        "milling/corner_demo_picture.py",
         "milling/feed_picture.py",
         "motion_picture.py",
         "plotting.py",
