@@ -31,7 +31,9 @@ void register_travel(py::module_& module) {
   py::class_<Travel>(module, "Travel", "How a path is really travelled, per stretch between two stations.")
       .def_property_readonly(
           "highest_mm_per_s", [](const Travel& self) { return column(self.highest_mm_per_s); },
-          "Largest distance covered within a window, over the window, (n,), mm/s.")
+          "Largest travel within a window, over the window, (n,), mm/s: what was travelled in the present direction "
+          "and "
+          "in XY, as a way along the path.")
       .def_property_readonly(
           "time_s", [](const Travel& self) { return column(self.time_s); }, "Time on each stretch, (n,), s.")
       .def_readonly("duration_s", &Travel::duration_s, "Until the set-points rest, s.");
@@ -108,14 +110,14 @@ void register_feed_schedule(py::module_& module) {
       "stretches do not cover it.");
   module.def(
       "look_ahead_on_load",
-      [](const VectorArray& stations, const VectorArray& feeds, const VectorArray& reach_s) {
+      [](const VectorArray& stations, const VectorArray& feeds, const VectorArray& load, const VectorArray& reach_s) {
         FeedStations at{numbers(stations), numbers(feeds)};
-        look_ahead_on_load(at, numbers(reach_s));
+        look_ahead_on_load(at, numbers(load), numbers(reach_s));
         return column(at.feed_mm_per_min);
       },
-      py::arg("stations_mm"), py::arg("feeds_mm_per_min"), py::arg("reach_s"),
-      "The feeds (n,), mm/min, lowered before each slower station over the way that a controller needs for the change: "
-      "`reach_s` (n,) times the feed there.");
+      py::arg("stations_mm"), py::arg("feeds_mm_per_min"), py::arg("load_mm_per_min"), py::arg("reach_s"),
+      "The feeds (n,), mm/min, lowered before each station whose load allows less (`load_mm_per_min`, (n,)), over the "
+      "way that a controller needs for the change: `reach_s` (n,) times the feed there.");
 
   py::class_<FeedWriterOptions>(module, "FeedWriterOptions", "How new feeds are written into a region's blocks.")
       .def(py::init([](double increment_mm, double unit_mm, int position_decimals, bool absolute_centres) {
@@ -136,6 +138,11 @@ void register_feed_schedule(py::module_& module) {
       },
       py::arg("program"), py::arg("region"), py::arg("options"),
       "Which segments of a region's path may be divided into several blocks.");
+  module.def(
+      "feeds_per_minute",
+      [](const Program& program, const Region& region) { return feeds_per_minute(program, region); },
+      py::arg("program"), py::arg("region"),
+      "Whether F is a feed per minute in every block of a region, in one unit of length.");
   module.def(
       "write_feeds",
       [](const Program& program, const Region& region, const std::vector<FeedStretch>& stretches,

@@ -82,6 +82,12 @@ if TYPE_CHECKING:
     from shapegcode.machine import MachineError as MachineError
     from shapegcode.metrology import Measurement as Measurement
     from shapegcode.metrology import measure as measure
+    from shapegcode.milling.schedule import FeedSchedule as FeedSchedule
+    from shapegcode.milling.schedule import schedule_feed as schedule_feed
+    from shapegcode.milling.shaped_schedule import ScheduledConversion as ScheduledConversion
+    from shapegcode.milling.shaped_schedule import convert_scheduled as convert_scheduled
+    from shapegcode.milling.stock_file import Stock as Stock
+    from shapegcode.milling.tool_file import Tool as Tool
     from shapegcode.played import stream as stream
     from shapegcode.program import Program as Program
     from shapegcode.shaping import (
@@ -124,6 +130,10 @@ _HOME = {
     "ReadOptions": "identification.read",
     **dict.fromkeys(("Record", "RecordError"), "identification.record"),
     "identify": "identification.tap_test",
+    **dict.fromkeys(("FeedSchedule", "schedule_feed"), "milling.schedule"),
+    **dict.fromkeys(("ScheduledConversion", "convert_scheduled"), "milling.shaped_schedule"),
+    "Stock": "milling.stock_file",
+    "Tool": "milling.tool_file",
     "plant_response": "linear_response",
     **dict.fromkeys(
         ("ModeBand", "Recommendation", "choose_block_period", "choose_shaper", "shortest_non_negative"), "shaping"

@@ -136,10 +136,20 @@ TEST_CASE("the load is looked ahead on over the reach of a change") {
   FeedStations stations = even_stations(
       10.0, 0.1, +[](double s) { return s > 5.05 ? 60.0 : 600.0; });
   const std::vector<double> reach(stations.s_mm.size(), 0.05);  // 0.05 s at 10 mm/s: 0.5 mm
-  look_ahead_on_load(stations, reach);
+  look_ahead_on_load(stations, stations.feed_mm_per_min, reach);
   for (std::size_t i = 0; i < stations.s_mm.size(); ++i) {
     CHECK(stations.feed_mm_per_min[i] == (stations.s_mm[i] > 4.45 ? 60.0 : 600.0));
   }
+}
+
+TEST_CASE("a feed that is low without need is not looked ahead on") {
+  FeedStations stations = even_stations(
+      10.0, 0.1, +[](double s) { return s > 5.05 ? 60.0 : 600.0; });
+  const std::vector<double> load(stations.s_mm.size(), 300.0);
+  look_ahead_on_load(stations, load, std::vector<double>(stations.s_mm.size(), 0.01));
+  CHECK(stations.feed_mm_per_min.front() == 300.0);
+  CHECK(stations.feed_mm_per_min[49] == 300.0);
+  CHECK(stations.feed_mm_per_min.back() == 60.0);
 }
 
 TEST_CASE("a path with other feeds has the same points") {

@@ -58,8 +58,13 @@ def chips(cutter: Cutter, feed_per_tooth_mm: float, azimuth: Array) -> Array:
     return thickness
 
 
-def turn(cutter: Cutter, arcs: Array, feed_per_tooth_mm: float, *, angles: int = 720, discs: int = 60) -> Turn:
-    """Forces at equal angles of the spindle; `arcs` (m, 4): from, to in rad, bottom, top in mm."""
+def turn(
+    cutter: Cutter, arcs: Array, feed_per_tooth_mm: float, *, angles: int = 720, discs: int = 60, whole: bool = False
+) -> Turn:
+    """Forces at equal angles of the spindle; `arcs` (m, 4): from, to in rad, bottom, top in mm.
+
+    `whole`: a disc cuts wholly or not at all, as its middle does.
+    """
     turned = 2.0 * np.pi * np.arange(angles) / angles
     lag = np.tan(cutter.helix_rad) / (0.5 * cutter.diameter_mm)
     extent = sum((b - a) * (top - bottom) for a, b, bottom, top in arcs)
@@ -80,6 +85,9 @@ def turn(cutter: Cutter, arcs: Array, feed_per_tooth_mm: float, *, angles: int =
             # Of a disc that an arc's end passes only the part within it cuts.
             half = max(0.5 * lag * dz, 1e-12)
             low, high = np.maximum(azimuth - half, start), np.minimum(azimuth + half, end)
+            if whole:
+                inside = (azimuth > start) & (azimuth < end)
+                low, high = np.where(inside, azimuth - half, 0.0), np.where(inside, azimuth + half, 0.0)
             azimuth = 0.5 * (low + high)
             chip = chips(cutter, feed_per_tooth_mm, azimuth)[flute]
             cutting = (high > low) & (chip > 1e-15)

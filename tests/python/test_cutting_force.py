@@ -170,6 +170,28 @@ def test_paper_001() -> None:
     local = model(CASES["paper, local chip"])
     ratio = local.figures(entry, 216.0).mean_resultant_n / local.figures(deepest, 216.0).mean_resultant_n
     assert 216.0 * ratio == pytest.approx(90.55, abs=0.05)
+    # The wall, 2.5 mm above the tip, with an overhang that the paper does not state.
+    beam = ToolBeam(30.0, 20.0, 6.4, 8.0, 600.0)
+    walls = [
+        _core.wall_error_um(force, beam, arcs, feed, WallSide.right, np.array([2.5]))[0]
+        for arcs, feed in ((entry, 216.0), (deepest, 216.0), (deepest, 90.8), (deepest, 80.75))
+    ]
+    np.testing.assert_allclose(walls, [1.58, 3.97, 1.96, 1.78], atol=0.02)
+
+
+@pytest.mark.parametrize(("discs", "whole", "held"), [(50, True, 81.7), (150, True, 80.0), (60, False, 80.75)])
+def test_feed_that_holds_the_peak_depends_on_discs(discs: int, whole: bool, held: float) -> None:
+    """Spec 7 has 81.3: whole discs scatter about it."""
+
+    def peak(radial_depth: float, feed: float) -> float:
+        arcs = np.array([[-pi / 2, asin(radial_depth / 4 - 1), 0.0, 15.0]])
+        cut = turn(CASES["paper"], arcs, feed / (6 * SPEED), angles=360, discs=discs, whole=whole)
+        return float(np.hypot(*cut.force.T).max())
+
+    target, feed = peak(0.8, 216.0), 80.0
+    for _ in range(4):
+        feed *= (target / peak(2.103, feed)) ** (1 / 0.847)
+    assert feed == pytest.approx(held, abs=0.08)
 
 
 def test_whole_track() -> None:

@@ -24,7 +24,7 @@ ALLOWED_FOLDERS: dict[str, set[str]] = {
     "gcode": {"path"},
     "path": set(),
     "motion": {"path", "filter"},
-    "emission": {"path", "filter", "motion", "gcode", "shaping", "plant"},
+    "emission": {"path", "filter", "motion", "gcode", "shaping", "plant", "milling"},
     "simulation": {"path", "filter", "motion", "plant", "metrology", "gcode"},
     "filter": set(),
     "shaping": {"filter", "plant"},

@@ -322,6 +322,22 @@ class Writer {
 
 }  // namespace
 
+bool feeds_per_minute(const Program& program, const Region& region) {
+  bool same = region.entry.feed_mode == 94 || region.exit.feed_mode == 94;
+  double units = 0.0;
+  for_each_line(program, region, [&](const SourceLine& line, const Block& block) {
+    for (const Word& word : block) {
+      same = same && !is_g(word, 93.0) && !is_g(word, 95.0);
+      if (is_g(word, 20.0) || is_g(word, 21.0)) {
+        // Before the first move it only says what holds.
+        same = same && (units == 0.0 || units == word.value) && (line.first == 0 || word.value == region.entry.units);
+        units = word.value;
+      }
+    }
+  });
+  return same && region.exit.feed_mode == 94;
+}
+
 std::vector<bool> divisible_segments(const Program& program, const Region& region, const FeedWriterOptions& options) {
   std::vector<bool> result(region.path->size(), false);
   for_each_line(program, region, [&](const SourceLine& line, const Block& block) {

@@ -36,34 +36,26 @@ Direction direction_at(double y) {
 
 }  // namespace
 
-// Directions of the nodes and of two Gauss points per cell: the same for every table.
+// Directions of the nodes and of the middles between them: the same for every table.
 struct ChipTable::Grid {
-  struct Point {
-    Direction direction;
-    double weight;
-  };
   explicit Grid(std::size_t count) : cells(count) {
-    const double side = 0.5 / std::sqrt(3.0);
     const double step = 1.0 / static_cast<double>(count);
-    for (std::size_t i = 0; i <= count; ++i) node.push_back(direction_at(static_cast<double>(i) * step));
-    for (std::size_t i = 0; i < count; ++i) {
-      for (const double at : {0.5 - side, 0.5 + side}) {
-        const double y = (static_cast<double>(i) + at) * step;
-        inside.push_back({direction_at(y), 0.5 * step * std::numbers::pi * y});
-      }
+    for (std::size_t i = 0; i <= count; ++i) {
+      node.push_back(direction_at(static_cast<double>(i) * step));
+      middle.push_back(direction_at((static_cast<double>(i) + 0.5) * step));
     }
   }
 
   std::size_t cells;
   std::vector<Direction> node;
-  std::vector<Point> inside;
+  std::vector<Direction> middle;  // of the cell above each node
 
   static const Grid& fine() {
     static const Grid grid(512);
     return grid;
   }
   static const Grid& quick() {
-    static const Grid grid(96);
+    static const Grid grid(64);
     return grid;
   }
 };
@@ -105,32 +97,44 @@ ChipTable::ChipTable(const ChipPowers& powers, ChipProfile profile, double feed_
       feed_mm_(feed_per_tooth_mm),
       size_(3U + (powers.one_power() ? 0U : 2U) + (powers.edges ? 3U : 0U)),
       grid_(quick ? Grid::quick() : Grid::fine()),
-      nodes_((grid_.cells + 1) * size_ * 2),
-      twice_(nodes_.size()) {
+      nodes_((grid_.cells + 1) * size_ * 2) {
   for (const double u : profile_.kinks()) {
     if (u < feed_mm_) kinks_.push_back(coordinate_of(std::acos(u / feed_mm_)));
   }
   std::sort(kinks_.begin(), kinks_.end());
-  const auto cells = static_cast<double>(grid_.cells);
   Values sum{};
-  Values slope{};
+  Values here{};
+  Values above{};
+  const double per_cell = -std::numbers::pi / static_cast<double>(grid_.cells * grid_.cells);
   for (std::size_t node = grid_.cells + 1; node-- > 0;) {
-    if (node < grid_.cells) integrate(node, sum);
-    values(grid_.node[node].sine, grid_.node[node].cosine, slope);
-    const double fall = -std::numbers::pi * static_cast<double>(node) / (cells * cells);  // of azimuth, per cell
+    values(grid_.node[node].sine, grid_.node[node].cosine, here);
+    if (node < grid_.cells) integrate(node, here, above, sum);
+    const double fall = per_cell * static_cast<double>(node);  // of azimuth
     double* to = nodes_.data() + node * size_ * 2;
-    double* twice = twice_.data() + node * size_ * 2;
     for (std::size_t k = 0; k < size_; ++k) {
       to[2 * k] = sum[k];
-      to[2 * k + 1] = fall * slope[k];
-      twice[2 * k + 1] = fall * sum[k];
+      to[2 * k + 1] = fall * here[k];
+    }
+    above = here;
+  }
+}
+
+// Simpson's rule, its middle from the cubic.
+void ChipTable::prepare_twice() {
+  if (!twice_.empty()) return;
+  twice_.resize(nodes_.size());
+  const double step = 1.0 / static_cast<double>(grid_.cells);
+  for (std::size_t node = grid_.cells + 1; node-- > 0;) {
+    const double y = static_cast<double>(node) * step;
+    const double* at = nodes_.data() + node * size_ * 2;
+    double* to = twice_.data() + node * size_ * 2;
+    for (std::size_t k = 0; k < 2 * size_; k += 2) {
+      to[k + 1] = -std::numbers::pi * y * step * at[k];
       if (node == grid_.cells) continue;
-      const double* next = to + 2 * size_;  // Simpson's rule, its middle from the cubic
-      const double y = static_cast<double>(node) / cells;
-      const double middle = 0.5 * (to[2 * k] + next[2 * k]) + 0.125 * (to[2 * k + 1] - next[2 * k + 1]);
-      twice[2 * k] = twice[2 * k + 2 * size_] +
-                     std::numbers::pi / (6.0 * cells) *
-                         (y * to[2 * k] + 4.0 * (y + 0.5 / cells) * middle + (y + 1.0 / cells) * next[2 * k]);
+      const double* next = at + 2 * size_;
+      const double middle = 0.5 * (at[k] + next[k]) + 0.125 * (at[k + 1] - next[k + 1]);
+      to[k] = to[k + 2 * size_] +
+              std::numbers::pi / 6.0 * step * (y * at[k] + 4.0 * (y + 0.5 * step) * middle + (y + step) * next[k]);
     }
   }
 }
@@ -146,17 +150,22 @@ void ChipTable::integrate_stretch(double from, double to, Values& sum) const {
   }
 }
 
-// Adds what lies between the nodes of a cell.
-void ChipTable::integrate(std::size_t cell, Values& sum) const {
+// Adds what lies between the nodes of a cell, from the integrands there: Simpson's rule but where a kink or the end
+// lies.
+void ChipTable::integrate(std::size_t cell, const Values& lower, const Values& upper, Values& sum) const {
   const double step = 1.0 / static_cast<double>(grid_.cells);
   double from = static_cast<double>(cell) * step;
   const double end = from + step;
   auto kink = std::upper_bound(kinks_.begin(), kinks_.end(), from);
   if (cell > 0 && (kink == kinks_.end() || *kink >= end)) {
-    Values value{};
-    for (const Grid::Point* point = &grid_.inside[2 * cell]; point != &grid_.inside[2 * cell] + 2; ++point) {
-      values(point->direction.sine, point->direction.cosine, value);
-      for (std::size_t k = 0; k < size_; ++k) sum[k] += point->weight * value[k];
+    Values middle{};
+    values(grid_.middle[cell].sine, grid_.middle[cell].cosine, middle);
+    const double share = std::numbers::pi * step / 6.0;
+    const double at_lower = share * from;
+    const double at_middle = share * 4.0 * (from + 0.5 * step);
+    const double at_upper = share * end;
+    for (std::size_t k = 0; k < size_; ++k) {
+      sum[k] += at_lower * lower[k] + at_middle * middle[k] + at_upper * upper[k];
     }
     return;
   }

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double half_pi = 0.5 * std::numbers::pi;
 constexpr double arc_slack_rad = 1e-9;
+constexpr double same_end_rad = 1e-9;
 constexpr double pieces_per_overhang = 10.0;  // of a load on the beam
 
 [[noreturn]] void refuse(const std::string& message) { throw Error(ErrorKind::argument, message); }
@@ -31,6 +32,11 @@ bool same(const ToolBeam& a, const ToolBeam& b) {
          a.effective_diameter_mm == b.effective_diameter_mm && a.shank_diameter_mm == b.shank_diameter_mm &&
          a.young_modulus_gpa == b.young_modulus_gpa && a.holder_n_per_um == b.holder_n_per_um &&
          a.spindle_n_per_um == b.spindle_n_per_um;
+}
+
+// For loads that are weighed by their height.
+void prepare(FluteSet& set) {
+  for (ChipTable& table : set.tables) table.prepare_twice();
 }
 
 // Cuts pieces so short that the beam's influence is nearly a straight line along each: the one through its Gauss
@@ -176,12 +182,24 @@ struct MillingForce::Impl {
       const double to = std::min(mirrored ? -arc.from_rad : arc.to_rad, half_pi);
       const double height = arc.top_mm - arc.bottom_mm;
       if (!(to > from) || !(height > 0.0)) continue;
-      pieces.push_back({from, to, arc.bottom_mm, arc.top_mm});
+      join({from, to, arc.bottom_mm, arc.top_mm});
       cosine += height * (std::sin(to) - std::sin(from));
       extent += height * (to - from);
     }
     mean_cosine = extent > 0.0 ? cosine / extent : 0.0;
     if (mean_cosine <= 0.0) pieces.clear();  // too narrow to tell from nothing
+  }
+
+  // Layers of a material model that meet the tool alike are one piece.
+  void join(const EngagedPiece& piece) {
+    for (EngagedPiece& below : pieces) {
+      if (below.top_mm == piece.bottom_mm && std::abs(below.from_rad - piece.from_rad) < same_end_rad &&
+          std::abs(below.to_rad - piece.to_rad) < same_end_rad) {
+        below.top_mm = piece.top_mm;
+        return;
+      }
+    }
+    pieces.push_back(piece);
   }
 
   [[nodiscard]] ChipMix mix() const {
@@ -377,6 +395,7 @@ double MillingForce::peak_deflection_um(std::span<const EngagedArc> arcs, double
     impl.check_below_clamp(beam.overhang_mm);
     weighted_pieces(
         impl.pieces, beam.overhang_mm, [&](double z) { return tip_compliance_um_per_n(beam, z); }, impl.weighted);
+    prepare(impl.set);
     impl.bent.build(impl.set, impl.pieces, impl.weighted);
     impl.bent_beam = beam;
     impl.bent_built = true;
@@ -393,6 +412,7 @@ Eigen::Vector2d MillingForce::deflection_um(std::span<const EngagedArc> arcs, do
   std::vector<EngagedPiece> weighted;
   weighted_pieces(
       impl.pieces, beam.overhang_mm, [&](double z) { return compliance_um_per_n(beam, height_mm, z); }, weighted);
+  prepare(impl.set);
   return impl.weighted_force(weighted, impl.mix(), turned_rad);
 }
 
@@ -410,26 +430,9 @@ Eigen::Vector2d MillingForce::force_centre_mm(std::span<const EngagedArc> arcs, 
   std::vector<EngagedPiece> weighted;
   weighted_pieces(
       impl.pieces, 0.25 * overhang_mm, [&](double z) { return overhang_mm - z; }, weighted);
+  prepare(impl.set);
   const Eigen::Vector2d moment = impl.weighted_force(weighted, m, turned_rad);
   return {force.x() != 0.0 ? moment.x() / force.x() : none, force.y() != 0.0 ? moment.y() / force.y() : none};
-}
-
-Eigen::MatrixXd figures_of(MillingForce& force, const EngagementTrack& track, std::span<const double> feed_mm_per_min,
-                           const ToolBeam* beam) {
-  if (feed_mm_per_min.size() != track.size()) {
-    refuse("feeds are " + std::to_string(feed_mm_per_min.size()) + " for a track of " + std::to_string(track.size()) +
-           " samples");
-  }
-  Eigen::MatrixXd table(static_cast<Eigen::Index>(track.size()), force_columns);
-  for (std::size_t i = 0; i < track.size(); ++i) {
-    const auto arcs = track.arcs_of(i);
-    const double feed = feed_mm_per_min[i] * track.horizontal[i];
-    const ForceFigures f = force.quick_figures(arcs, feed);
-    const double deflection = beam != nullptr && !arcs.empty() ? force.peak_deflection_um(arcs, feed, *beam) : 0.0;
-    table.row(static_cast<Eigen::Index>(i)) << f.mean_n.x(), f.mean_n.y(), f.mean_resultant_n, f.peak_resultant_n,
-        f.peak_torque_nm, f.mean_torque_nm, f.mean_power_w, f.peak_chip_mm, deflection;
-  }
-  return table;
 }
 
 }  // namespace shapegcode

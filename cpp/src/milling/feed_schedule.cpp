@@ -252,19 +252,21 @@ Path with_feeds(const Path& path, std::span<const FeedStretch> stretches) {
   return Path(std::move(pieces));
 }
 
-void look_ahead_on_load(FeedStations& stations, std::span<const double> reach_s) {
-  if (reach_s.size() != stations.s_mm.size() || stations.feed_mm_per_min.size() != stations.s_mm.size()) {
-    refuse("a look-ahead on the load needs one time per station");
+void look_ahead_on_load(FeedStations& stations, std::span<const double> load_mm_per_min,
+                        std::span<const double> reach_s) {
+  const std::size_t count = stations.s_mm.size();
+  if (reach_s.size() != count || load_mm_per_min.size() != count || stations.feed_mm_per_min.size() != count) {
+    refuse("a look-ahead on the load needs one load and one time per station");
   }
   // Each station by the feed that it has for its own sake, so that the reach of one does not add to that of the next.
   const std::vector<double> own = stations.feed_mm_per_min;
-  for (std::size_t i = own.size(); i-- > 1;) {
+  for (std::size_t i = count; i-- > 1;) {
     const double begin = stations.s_mm[i - 1];  // of the stretch for which station i speaks
-    for (std::size_t k = i; k-- > 0 && own[k] > own[i];) {
+    for (std::size_t k = i; k-- > 0 && own[k] > load_mm_per_min[i];) {
       if ((begin - stations.s_mm[k]) * seconds_per_minute > reach_s[i] * own[k]) {
         break;
       }
-      stations.feed_mm_per_min[k] = std::min(stations.feed_mm_per_min[k], own[i]);
+      stations.feed_mm_per_min[k] = std::min(stations.feed_mm_per_min[k], load_mm_per_min[i]);
     }
   }
 }

@@ -9,6 +9,7 @@ namespace shapegcode {
 namespace {
 
 constexpr double panel_rad = 8.0 / 180.0 * std::numbers::pi;  // of Simpson's rule, two steps each
+constexpr double brief_rad = 1.0 / 180.0 * std::numbers::pi;  // between kinks: a straight line will do
 constexpr double same_kink_rad = 1e-6;
 // A force without helix jumps where an arc begins: both sides are looked at from a little inside.
 constexpr double inside_rad = 1e-9;
@@ -88,24 +89,28 @@ void Revolution::place_angles(const FluteSet& set, std::span<const EngagedPiece>
     }
   }
   std::sort(kinks_.begin(), kinks_.end());
-  kinks_.erase(std::unique(kinks_.begin(), kinks_.end(), [](double a, double b) { return b - a < same_kink_rad; }),
-               kinks_.end());
-  if (kinks_.size() > 1 && kinks_.front() + set.pitch_rad - kinks_.back() < same_kink_rad) kinks_.pop_back();
-  if (!kinks_.empty()) kinks_.push_back(kinks_.front() + set.pitch_rad);
+  // Kinks that are nearly the same are one, with no angle between them; a stretch leads from its last to the next's
+  // first.
+  stretch_ends_.clear();
+  for (std::size_t i = 0; i < kinks_.size(); ++i) {
+    const double next = i + 1 < kinks_.size() ? kinks_[i + 1] : kinks_.front() + set.pitch_rad;
+    if (next - kinks_[i] >= same_kink_rad) stretch_ends_.emplace_back(kinks_[i], next);
+  }
 
   angle_.clear();
   weight_.clear();
   stretches_.clear();
-  for (std::size_t i = 0; i + 1 < kinks_.size(); ++i) {
+  for (const auto& [first, last] : stretch_ends_) {
     stretches_.push_back(angle_.size());
-    const double length = kinks_[i + 1] - kinks_[i];
-    const auto steps = 2 * static_cast<std::size_t>(std::ceil(length / panel_rad));
+    const double length = last - first;
+    const bool brief = length < brief_rad;
+    const auto steps = brief ? 1 : 2 * static_cast<std::size_t>(std::ceil(length / panel_rad));
     const double step = length / static_cast<double>(steps);
     for (std::size_t k = 0; k <= steps; ++k) {
       const bool end = k == 0 || k == steps;
       const double inwards = k == 0 ? inside_rad : (k == steps ? -inside_rad : 0.0);
-      angle_.push_back(kinks_[i] + step * static_cast<double>(k) + inwards);
-      weight_.push_back(step / 3.0 * (end ? 1.0 : (k % 2 == 1 ? 4.0 : 2.0)) / set.pitch_rad);
+      angle_.push_back(first + step * static_cast<double>(k) + inwards);
+      weight_.push_back(step / (brief ? 2.0 : 3.0) * (end ? 1.0 : (k % 2 == 1 ? 4.0 : 2.0)) / set.pitch_rad);
     }
   }
   stretches_.push_back(angle_.size());

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "milling/chip_table.hpp"
@@ -74,6 +75,7 @@ class Revolution {
   std::size_t kinds_ = 0;   // different flutes
   double pitch_ = 0.0;
   std::vector<double> kinks_;
+  std::vector<std::pair<double, double>> stretch_ends_;
   std::vector<double> angle_;           // of the tip of the first flute, within a pitch
   std::vector<double> weight_;          // of Simpson's rule
   std::vector<std::size_t> stretches_;  // first angle of each stretch between kinks, and the end

@@ -13,11 +13,14 @@
 namespace shapegcode {
 namespace {
 
+constexpr double same_place_mm = 1e-6;
+constexpr double steepest = 0.05;  // share of the path in XY below which it counts as a plunge
+
 // Follows set-points along a path and keeps what happened between two stations.
 class Follower {
  public:
   Follower(const Path& path, std::span<const double> stations, const TravelOptions& options)
-      : stations_(stations), options_(options), filters_(options.axis_filters), tracker_(path) {
+      : stations_(stations), options_(options), filters_(options.axis_filters), tracker_(path), path_(path) {
     if (!(options.period_s > 0.0) || !(options.window_s >= 0.0)) {
       throw Error(ErrorKind::argument, "a travel needs a period above 0 and a window of at least 0");
     }
@@ -33,7 +36,7 @@ class Follower {
                                            std::to_string(path.length_mm()) + " mm");
     }
     const auto window = static_cast<std::size_t>(std::lround(options.window_s / options.period_s));
-    covered_.assign(std::max<std::size_t>(window, 1), 0.0);
+    steps_.assign(std::max<std::size_t>(window, 1), Vector3::Zero());
     result_.highest_mm_per_s.assign(stations.size(), 0.0);
     result_.time_s.assign(stations.size(), 0.0);
   }
@@ -45,33 +48,33 @@ class Follower {
       started_ = true;
     }
     filters_.step(setpoint);
-    const double step = (setpoint - last_).norm();
+    const Vector3 step = setpoint - last_;
     last_ = setpoint;
     tracker_.step(setpoint);
     ++count_;
-    if (step > 0.0) {
+    const bool moves = step.squaredNorm() > 0.0;
+    if (moves) {
       moved_ = count_;
     }
-    // A sum that is made anew each time the ring turns over does not collect rounding errors.
-    double& oldest = covered_[next_];
+    Vector3& oldest = steps_[next_];
     within_ += step - oldest;
     oldest = step;
-    next_ = next_ + 1 == covered_.size() ? 0 : next_ + 1;
-    if (next_ == 0) {
-      within_ = 0.0;
-      for (const double part : covered_) {
+    next_ = next_ + 1 == steps_.size() ? 0 : next_ + 1;
+    if (next_ == 0) {  // a sum that is made anew each time the ring turns over does not collect rounding errors
+      within_ = Vector3::Zero();
+      for (const Vector3& part : steps_) {
         within_ += part;
       }
     }
-    const double speed = within_ / (static_cast<double>(covered_.size()) * options_.period_s);
+    const double speed = moves ? chip_travel(step) / (static_cast<double>(steps_.size()) * options_.period_s) : 0.0;
     const std::size_t from = station_;
-    while (station_ + 1 < stations_.size() && stations_[station_] < tracker_.s_mm()) {
+    while (station_ + 1 < stations_.size() && stations_[station_] + same_place_mm < tracker_.s_mm()) {
       ++station_;
     }
     for (std::size_t i = from; i <= station_; ++i) {
       result_.highest_mm_per_s[i] = std::max(result_.highest_mm_per_s[i], speed);
     }
-    if (step > 0.0) {
+    if (moves) {
       result_.time_s[station_] += options_.period_s;
     }
   }
@@ -85,14 +88,30 @@ class Follower {
   }
 
  private:
+  // Travel within the window in the direction of the present step, as a way along the path: a chip is cut by the way in
+  // XY alone, and what was travelled before a corner does not make it thicker.
+  [[nodiscard]] double chip_travel(const Vector3& step) const noexcept {
+    const std::size_t i = tracker_.segment();
+    const double level = tangent_at(path_[i], tracker_.s_mm() - path_.distance_mm(i)).head<2>().norm();
+    const double step_xy = step.head<2>().norm();
+    if (level < steepest) {
+      return std::max(0.0, within_.dot(step) / step.norm());
+    }
+    if (!(step_xy > 0.0)) {
+      return 0.0;
+    }
+    return std::max(0.0, within_.head<2>().dot(step.head<2>()) / step_xy / level);
+  }
+
   std::span<const double> stations_;
   const TravelOptions& options_;
   detail::FilterChain filters_;
   ContourTracker tracker_;
   Travel result_;
-  std::vector<double> covered_;  // distance of each period in the window, a ring
+  std::vector<Vector3> steps_;  // of each period in the window, a ring
   std::size_t next_ = 0;
-  double within_ = 0.0;
+  Vector3 within_ = Vector3::Zero();  // their sum
+  const Path& path_;
   std::size_t station_ = 0;
   std::size_t count_ = 0;
   std::size_t moved_ = 0;

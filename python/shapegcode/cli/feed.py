@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.cli.console import output_console, progress, write_bytes, write_json
     from shapegcode.compensation import read_for_conversion
     from shapegcode.milling.feed_table import feed_tables, next_step
-    from shapegcode.milling.schedule import MARGIN, schedule
+    from shapegcode.milling.schedule import MARGIN, schedule_feed
     from shapegcode.milling.stock_file import Stock
     from shapegcode.milling.tool_file import Tool
     from shapegcode.report import warning_table
@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
     stock = Stock.load(args.stock)
     with progress(f"scheduling {args.input}", args.json) as bar:
         program = read_for_conversion(args.input, machine, program_number=args.program)
-        result = schedule(
+        result = schedule_feed(
             program,
             machine,
             tools,

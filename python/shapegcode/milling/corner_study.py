@@ -15,7 +15,7 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.milling.feed_plan import tool_beam
 from shapegcode.milling.feed_report import scaled_stations
-from shapegcode.milling.schedule import FeedSchedule, schedule
+from shapegcode.milling.schedule import FeedSchedule, schedule_feed
 from shapegcode.milling.stock_file import Stock
 from shapegcode.milling.tool_file import Tool
 from shapegcode.milling.travel import OrdinaryMotion
@@ -253,7 +253,7 @@ def _scheduled(
     )
     stock = Stock.from_toml(_stock_text(case), "paper001_stock.toml")
     text = corner_program(case, cut, case.feed_mm_per_min)
-    result = schedule(Program.from_text(text, machine, source=_source(case)), machine, tool, stock)
+    result = schedule_feed(Program.from_text(text, machine, source=_source(case)), machine, tool, stock)
     window_s = 60.0 / (tool.tool.flutes * case.spindle_rev_per_min)
     stations = np.asarray(track.s_mm)
     motion = OrdinaryMotion(machine)

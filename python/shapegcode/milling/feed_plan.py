@@ -18,7 +18,8 @@ __all__ = ["AIR", "KEPT", "MINIMUM", "PROGRAMMED", "FeedPlan", "limits_of", "mil
 
 _ATTEMPTS = 12
 _LOWERING = 3  # attempts that only slow down earlier, before feeds are lowered too
-_TOO_FAST = 1e-6  # relative
+_LEAST_SHARE = 0.9  # of a feed that is lowered once
+_TOO_FAST = 1e-4  # relative: rounding of the travel, far below the margin
 _DEEPER_PLUNGE = 0.01  # of the tool's end in material: a ramp cuts with its end
 _AIR_MM2 = 1e-9
 _STEEPEST_AIR = 0.7  # share of the travel in XY from which on a move in air is no plunge
@@ -111,18 +112,47 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Motion, divi
     path = region.path
     segment = np.asarray(track.segment)
     programmed = path.segment_feeds_mm_per_s * 60.0
-    lowest = max((tool.limits.feed_per_tooth_min_mm or 0.0) * teeth_per_min, machine.controller.minimum_feed_mm_per_min)
-    kept = _kept_segments(surveyed, programmed, lowest, tool)
-    limit, holds = _limits_along(surveyed, programmed[segment], lowest, machine, margin)
+    least = max((tool.limits.feed_per_tooth_min_mm or 0.0) * teeth_per_min, machine.controller.minimum_feed_mm_per_min)
+    lowest = feed_unit_mm_per_min * math.ceil(least / feed_unit_mm_per_min - 1e-9)  # what F can say
+    kept = _kept_segments(surveyed, programmed, least, tool)
+    limit, holds, load = _limits_along(surveyed, programmed[segment], lowest, machine, margin)
     at_minimum = holds == MINIMUM
     frozen = np.array([bool(reason) for reason in kept])
     limit = np.where(frozen[segment], programmed[segment], limit)
     holds[frozen[segment]] = KEPT
-    stretches = _stretches_that_keep(
-        path, np.asarray(track.s_mm), limit, frozen, programmed, divisible, machine, motion, 60.0 / teeth_per_min,
-        feed_unit_mm_per_min, segment,
-    )  # fmt: skip
-    return FeedPlan(surveyed, limit, holds, kept, tuple(stretches), at_minimum, 60.0 / teeth_per_min)
+    window_s = 60.0 / teeth_per_min
+    task = _Task(
+        path=path,
+        stations_mm=np.asarray(track.s_mm),
+        segment=segment,
+        limit=limit,
+        load=load,
+        kept=np.where(frozen, programmed, 0.0),
+        programmed=programmed,
+        divisible=divisible,
+        lowest=lowest,
+        feed_unit=feed_unit_mm_per_min,
+        window_s=window_s,
+    )
+    stretches = _stretches_that_keep(task, machine, motion)
+    return FeedPlan(surveyed, limit, holds, kept, tuple(stretches), at_minimum, window_s)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What the stretches of a region are chosen for."""
+
+    path: _core.Path
+    stations_mm: Vector
+    segment: npt.NDArray[np.uint32]  # of each station
+    limit: Vector  # at each station: what is wanted
+    load: Vector  # at each station: what the load allows, and the least feed where it allows less
+    kept: Vector  # per segment the feed that stays, 0: it may change
+    programmed: Vector  # per segment
+    divisible: list[bool]
+    lowest: float
+    feed_unit: float
+    window_s: float
 
 
 def _kept_segments(surveyed: SurveyedRegion, programmed: Vector, lowest: float, tool: Tool) -> tuple[str, ...]:
@@ -140,8 +170,8 @@ def _kept_segments(surveyed: SurveyedRegion, programmed: Vector, lowest: float, 
 
 def _limits_along(
     surveyed: SurveyedRegion, programmed: Vector, lowest: float, machine: Machine, margin: float
-) -> tuple[Vector, npt.NDArray[np.str_]]:
-    """Largest feed on the stretch before each station, and what holds it."""
+) -> tuple[Vector, npt.NDArray[np.str_], Vector]:
+    """Wanted feed on the stretch before each station, what holds it, and what the load allows there."""
     tool, track = surveyed.tool, surveyed.track
     assert tool is not None and track is not None
     axes = machine.axes
@@ -151,34 +181,37 @@ def _limits_along(
     raised = tool.limits.feed_per_tooth_max_mm is not None or tool.feed.max_feed_mm_per_min is not None
     ceiling = np.full(len(programmed), fastest) if raised else np.minimum(programmed, fastest)
     force = milling_force(tool, surveyed)
+    highest = max(fastest, float(ceiling.max()))
     # Searched to far below the least feed: what needs less than that is told apart from what just reaches it.
-    bound, limit, _ = _core.largest_feeds(
-        force, track, limits_of(tool, machine, margin), 1e-3 * lowest, float(ceiling.max())
-    )
+    bound, limit, _ = _core.largest_feeds(force, track, limits_of(tool, machine, margin), 1e-3 * lowest, highest)
     holds = np.where(bound < ceiling, _LIMIT_NAMES[limit], PROGRAMMED)
     feeds = np.minimum(bound, ceiling)
+    load = np.where(bound < highest, np.maximum(bound, lowest), np.inf)
     low = feeds < lowest
     feeds[low] = np.minimum(lowest, ceiling[low])
     holds[low] = MINIMUM
     air = np.asarray(track.section_mm2) <= _AIR_MM2
     feeds[air] = programmed[air]
+    load[air] = np.inf
     holds[air] = AIR
     # A station speaks for the stretch before it, on which the load changes from what the last one met.
     segment = np.asarray(track.segment)
     same = (segment[1:] == segment[:-1]) & ~air[1:] & ~air[:-1]
     before = np.where(same & (feeds[:-1] < feeds[1:]), np.arange(len(feeds) - 1), np.arange(1, len(feeds)))
     feeds[1:], holds[1:] = feeds[before], holds[before]
+    load[1:] = np.where(same, np.minimum(load[1:], load[:-1]), load[1:])
     if tool.feed.air_feed_mm_per_min is not None:
         level = np.asarray(track.horizontal) > _STEEPEST_AIR  # nobody wants a tool to come down faster than he said
         clear = air & level & ~_near_material(np.asarray(track.s_mm), air, tool.feed.approach_mm)
         feeds[clear] = np.maximum(programmed[clear], min(tool.feed.air_feed_mm_per_min, fastest))
-    return feeds, holds
+    return feeds, holds, load
 
 
 def _stepped(limit: Vector, programmed: Vector) -> Vector:
     """Feeds rounded down to steps of half a percent below the programmed one, or the largest if that is more."""
-    steps = np.ceil(np.log(programmed / limit) / math.log1p(_STEP) - 1e-9)
-    down: Vector = programmed * (1.0 + _STEP) ** -steps
+    top = np.where(limit > programmed, limit.max(initial=0.0), programmed)
+    steps = np.ceil(np.log(top / limit) / math.log1p(_STEP) - 1e-9)
+    down: Vector = top * (1.0 + _STEP) ** -steps
     return down
 
 
@@ -190,37 +223,27 @@ def _near_material(s_mm: Vector, air: npt.NDArray[np.bool_], approach_mm: float)
     return near
 
 
-def _stretches_that_keep(
-    path: _core.Path,
-    stations: Vector,
-    limit: Vector,
-    frozen: npt.NDArray[np.bool_],
-    programmed: Vector,
-    divisible: list[bool],
-    machine: Machine,
-    motion: Motion,
-    window_s: float,
-    feed_unit: float,
-    segment: npt.NDArray[np.uint32],
-) -> list[_core.FeedStretch]:
+def _stretches_that_keep(task: _Task, machine: Machine, motion: Motion) -> list[_core.FeedStretch]:
     """Plan, travel, and slow down earlier or more where the travel is still too fast."""
     control = machine.feed_control
-    kept = np.where(frozen, programmed, 0.0)
-    planned = _stepped(limit, programmed[segment])
-    reach = np.full(len(stations), motion.reach_s + window_s)
-    free = ~frozen[segment]
+    most_change = math.inf if control.max_change_mm_per_min is None else control.max_change_mm_per_min
+    floor = np.minimum(task.limit, task.lowest)
+    planned = np.maximum(_stepped(task.limit, task.programmed[task.segment]), floor)
+    reach = np.full(len(planned), motion.reach_s + task.window_s)
+    free = task.kept[task.segment] == 0.0
     stretches: list[_core.FeedStretch] = []
     for attempt in range(_ATTEMPTS):
-        feeds = _core.look_ahead_on_load(stations, planned, reach)
+        feeds = _core.look_ahead_on_load(task.stations_mm, planned, task.load, reach)
         stretches = _core.schedule_feed(
-            path.segment_ends_mm, kept, divisible, stations, feeds, control.interval_mm,
-            np.inf if control.max_change_mm_per_min is None else control.max_change_mm_per_min, feed_unit,
+            task.path.segment_ends_mm, task.kept, task.divisible, task.stations_mm, feeds, control.interval_mm,
+            most_change, task.feed_unit,
         )  # fmt: skip
-        travelled = motion.travel(_core.with_feeds(path, stretches), stations, window_s)
-        over = free & (travelled.feed_mm_per_min > limit * (1.0 + _TOO_FAST))
+        run = motion.travel(_core.with_feeds(task.path, stretches), task.stations_mm, task.window_s).feed_mm_per_min
+        over = free & (run > task.load * (1.0 + _TOO_FAST))
         if not over.any():
             break
-        reach[over] = 1.5 * reach[over] + motion.reach_s / 4.0 + window_s
+        reach[over] = 1.5 * reach[over] + motion.reach_s / 4.0 + task.window_s
         if attempt >= _LOWERING:
-            planned[over] *= limit[over] / travelled.feed_mm_per_min[over]
+            planned[over] *= np.maximum(task.load[over] / run[over], _LEAST_SHARE)
+            planned = np.maximum(planned, floor)
     return stretches

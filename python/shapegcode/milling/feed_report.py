@@ -113,8 +113,8 @@ def feed_report(
     program = surveyed.program
     warnings = [*program.warnings, *surveyed.warnings]
     for tool in {id(part.tool): part.tool for part in surveyed.regions if part.tool is not None}.values():
-        limits = limits_of(tool, machine, 0.0)
-        if not any(np.isfinite(getattr(limits, name)) for _, name, *_ in _LIMITED):
+        own = limits_of(tool, machine, 0.0)
+        if not any(np.isfinite(getattr(own, name)) for _, name, *_ in _LIMITED):
             warnings.append(
                 f"tool {tool.tool.name}: no limit of force, deflection, torque or power is set, so nothing slows "
                 "its feed: set one of [limits] in its file; the column before shows what it takes now"
@@ -162,7 +162,7 @@ def feed_report(
         "regions": regions,
         "excess_ratio": excess,
         "within_limits": not any(region["misses"] for region in regions),
-        "warnings": warnings,
+        "warnings": list(dict.fromkeys(warnings)),
     }
 
 

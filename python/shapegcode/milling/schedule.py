@@ -22,7 +22,7 @@ from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.timing import cycle_time
 from shapegcode.verify import RoundTripError
 
-__all__ = ["MARGIN", "FeedSchedule", "schedule", "schedule_survey"]
+__all__ = ["MARGIN", "FeedSchedule", "schedule_feed", "schedule_survey"]
 
 MARGIN = 0.015
 """Share of each limit that a schedule leaves free: for what model and position of the load are off by."""
@@ -65,7 +65,7 @@ class FeedSchedule:
         return f"<FeedSchedule of {self.report['program']}: {len(self.text)} bytes, {verdict}>"
 
 
-def schedule(
+def schedule_feed(
     program: Program | str | Path,
     machine: Machine,
     tools: Tool | Sequence[Tool],
@@ -126,7 +126,7 @@ def schedule_survey(
     margin: float = MARGIN,
     on_progress: Progress = lambda _done: None,
 ) -> FeedSchedule:
-    """As :func:`schedule`, for a program whose engagement is known already.
+    """As :func:`schedule_feed`, for a program whose engagement is known already.
 
     Raises:
         ArgumentError: a margin outside its range.

@@ -66,7 +66,7 @@ def convert_scheduled(
     Args:
         program: what to convert, or its file.
         machine: controller, modes, tolerances.
-        tools: as :func:`shapegcode.milling.schedule.schedule`.
+        tools: as :func:`shapegcode.milling.schedule.schedule_feed`.
         stock: likewise.
         margin: likewise.
         resolution_mm: likewise.

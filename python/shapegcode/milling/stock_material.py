@@ -21,7 +21,13 @@ _RAMP_STEP_RATIO = 0.1  # of the tool's diameter
 
 
 def build_material(
-    stock: Stock, paths: Sequence[_core.Path], tool: Tool, resolution_mm: float, machine: Machine
+    stock: Stock,
+    paths: Sequence[_core.Path],
+    tool: Tool,
+    resolution_mm: float,
+    machine: Machine,
+    *,
+    others: Sequence[_core.Path] = (),
 ) -> _core.Material:
     """The material before the first block of a program.
 
@@ -29,10 +35,11 @@ def build_material(
 
     Args:
         stock: the stock file.
-        paths: cutting moves of the program; the material gets its layers at their heights.
-        tool: that the program runs with; of several the smallest.
+        paths: cutting moves of the tool; the material gets its layers at their heights.
+        tool: that makes them; of several the smallest.
         resolution_mm: grid of the material.
         machine: whose controller runs the programs.
+        others: further cutting moves, which take part in the layers but not in the walls of an allowance.
 
     Raises:
         StockError: the stock does not suit the program, or its roughing program cannot be swept.
@@ -46,10 +53,10 @@ def build_material(
     rings = [ring for piece in pieces for ring in piece.rings]
     step = _RAMP_STEP_RATIO * tool.tool.diameter_mm
     if stock.program is None:
-        return _core.Material(rings, _core.layer_borders(paths, bottom, top, step), resolution_mm)
+        return _core.Material(rings, _core.layer_borders([*paths, *others], bottom, top, step), resolution_mm)
     rough = Tool.load(stock.beside(stock.program.tool))
     moves = _moves(stock, stock.program, machine)
-    borders = _core.layer_borders([*moves, *paths], bottom, top, step)
+    borders = _core.layer_borders([*moves, *paths, *others], bottom, top, step)
     material = _core.Material(rings, borders, resolution_mm)
     for path in moves:
         _core.sweep(material, path, rough.tool.diameter_mm)

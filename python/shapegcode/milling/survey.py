@@ -85,14 +85,18 @@ def survey(
         StockError: the stock does not suit the program.
     """
     walk = _Walk(program, tools)
+    cutters = walk.tools_of_regions()
     reasons = [_why_not_swept(region, program) for region in program.regions]
-    paths = [region.path for region, reason in zip(program.regions, reasons, strict=True) if not reason]
-    if not paths:
-        why = f": {reasons[0]}" if reasons else ""
+    swept = [index for index, reason in enumerate(reasons) if not reason and cutters[index] is not None]
+    if not swept:
+        why = next((f": {reason}" for reason in reasons if reason), "")
         raise _core.ArgumentError(f"{program.source}: no cutting moves whose engagement can be computed{why}")
     smallest = min(tools, key=lambda tool: tool.radius_mm)
     resolution = resolution_mm or _RESOLUTION_RATIO * smallest.tool.diameter_mm
-    material = build_material(stock, paths, smallest, resolution, machine)
+    # The walls of an allowance are those that the finishing tool leaves.
+    walls = [program.regions[index].path for index in swept if cutters[index] is smallest]
+    others = [program.regions[index].path for index in swept if cutters[index] is not smallest]
+    material = build_material(stock, walls, smallest, resolution, machine, others=[*others, *walk.cuts_elsewhere()])
     regions: list[SurveyedRegion] = []
     total = len(program.core.steps)
     for done, (kind, index, line) in enumerate(program.core.steps):
@@ -103,6 +107,7 @@ def survey(
         else:
             regions.append(walk.sweep_region(material, index))
         on_progress(done + 1, total)
+    walk.tell_collisions()
     if not any(region.track is not None and len(region.track) and region.track.section_mm2.any() for region in regions):
         walk.warnings.append(
             f"{program.source}: the tool never touches the stock: see where it lies, in the program's own coordinates"
@@ -136,7 +141,7 @@ class _Walk:
         self._sense: _core.SpindleSense | None = None
         self._ready = -1  # T before its M06
         self._number = -1
-        self._collisions = 0
+        self._collisions: list[str] = []
         # Where a program moves from places that are not known, neither are those of its rapids.
         self._adrift = any(region.incremental for region in program.regions)
         self._tools: dict[int, Tool] = {}
@@ -179,6 +184,25 @@ class _Walk:
             return next(iter(self._tools.values()))
         return self._tools.get(number)
 
+    def tools_of_regions(self) -> list[Tool | None]:
+        """What cuts each region; the walk stands at the program's start again afterwards."""
+        found: list[Tool | None] = []
+        for kind, index, _ in self._program.core.steps:
+            if kind == _core.StepKind.function:
+                self.function(index)
+            elif kind == _core.StepKind.region:
+                found.append(self._tool)
+        self._sense, self._ready, self._number = None, -1, -1
+        return found
+
+    def cuts_elsewhere(self) -> list[_core.Path]:
+        """Cutting moves outside of the regions, each as a path."""
+        return [
+            _core.Path([segment])
+            for segment, dwell_s in self._moves
+            if segment.kind != _core.SegmentKind.rapid and not dwell_s > 0.0 and segment.length_mm > 0.0
+        ]
+
     def sweep_other(self, material: _core.Material, index: int, line: int) -> None:
         """A rapid, or a cutting move outside of the regions."""
         segment, dwell_s = self._moves[index]
@@ -191,11 +215,15 @@ class _Walk:
             return
         track = _core.sweep(material, _core.Path([segment]), tool.tool.diameter_mm)
         if segment.kind == _core.SegmentKind.rapid and (track.section_mm2.any() or track.plunged_mm2.any()):
-            self._collisions += 1
-            if self._collisions <= _SHOWN_COLLISIONS:
-                self.warnings.append(
-                    f"{self._program.place(line)}: rapid into material: the stock file or the program is wrong"
-                )
+            self._collisions.append(self._program.place(line))
+
+    def tell_collisions(self) -> None:
+        """A warning for each place at which a rapid runs into material; of many the first ones."""
+        places = list(dict.fromkeys(self._collisions))
+        for place in places[:_SHOWN_COLLISIONS]:
+            self.warnings.append(f"{place}: rapid into material: the stock file or the program is wrong")
+        if len(places) > _SHOWN_COLLISIONS:
+            self.warnings.append(f"{self._program.source}: {len(places) - _SHOWN_COLLISIONS} more rapids into material")
 
     def sweep_region(self, material: _core.Material, index: int) -> SurveyedRegion:
         """A region."""
@@ -213,9 +241,7 @@ class _Walk:
             track = _core.sweep(material, region.path, tool.tool.diameter_mm)
             if not speed > 0.0:
                 kept = "no spindle speed: neither S in the program nor feed.spindle_rev_per_min in the tool file"
-            elif region.exit.feed_mode != 94:
-                kept = f"its feeds are not per minute (G{region.exit.feed_mode})"
-            elif region.entry.units != region.exit.units:
-                kept = "it changes between inch and mm"
+            elif not _core.feeds_per_minute(self._program.core, region):
+                kept = "not all of its feeds are per minute (G94) in one unit"
         sense = _core.SpindleSense.clockwise if tool is None else tool.sense(self._sense)
         return SurveyedRegion(region, index, tool, track, speed, sense, kept)

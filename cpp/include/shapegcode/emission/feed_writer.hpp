@@ -25,6 +25,10 @@ struct RefedRegion {
   std::vector<std::uint32_t> lines;  ///< per block, ascending: its line, counted from the text's first one = 0
 };
 
+/// Whether F is a feed per minute in every block of a region, in one unit of length: what other feeds can be written
+/// for.
+[[nodiscard]] bool feeds_per_minute(const Program& program, const Region& region);
+
 /// Which segments of a region's path may be divided into several blocks: lines, and arcs in the XY plane, that have a
 /// source line of their own without one-shot codes, whose words are the positions of the path.
 [[nodiscard]] std::vector<bool> divisible_segments(const Program& program, const Region& region,

@@ -50,8 +50,11 @@ struct FeedStretch {
 /// stretches do not cover the path.
 [[nodiscard]] Path with_feeds(const Path& path, std::span<const FeedStretch> stretches);
 
-/// Lowers the feeds before each slower station, over the way on which a controller that needs `reach_s` for a change of
-/// feed would still be too fast: reach_s times the feed there. One entry of `reach_s` per station.
-void look_ahead_on_load(FeedStations& stations, std::span<const double> reach_s);
+/// Lowers the feeds before each station that the load holds, over the way on which a controller that needs `reach_s`
+/// for a change of feed would still be too fast there: reach_s times the feed on the way. `load_mm_per_min`: the
+/// largest feed that the load at a station allows, which may be above what is wanted there. One entry of both per
+/// station.
+void look_ahead_on_load(FeedStations& stations, std::span<const double> load_mm_per_min,
+                        std::span<const double> reach_s);
 
 }  // namespace shapegcode

@@ -22,7 +22,7 @@ struct TravelOptions {
 
 /// How a path is really travelled, per stretch that ends at a station and begins at the one before it.
 struct Travel {
-  std::vector<double> highest_mm_per_s;  ///< largest distance covered within a window, over the window
+  std::vector<double> highest_mm_per_s;  ///< largest travel within a window, over the window
   std::vector<double> time_s;            ///< spent on the stretch; 0 where one period passes over all of it
   double duration_s = 0.0;               ///< until the set-points rest
 };
