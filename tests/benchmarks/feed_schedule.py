@@ -24,7 +24,7 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.milling.corner_study import CASES, study_corner
 from shapegcode.milling.feed_plan import limits_of, milling_force
-from shapegcode.milling.schedule import FeedSchedule, schedule
+from shapegcode.milling.schedule import FeedSchedule, schedule_feed
 from shapegcode.milling.stock_file import Stock
 from shapegcode.milling.survey import SurveyedRegion, survey
 from shapegcode.milling.tool_file import Tool
@@ -60,9 +60,9 @@ def pocket(machine: Machine, samples: int) -> dict[str, Any]:
     """The pocket: two levels with sharp inner corners, slots and air moves, then the walls."""
     tool, stock = Tool.load(FEED / "pocket_tool.toml"), Stock.load(FEED / "pocket_stock.toml")
     program = Program.read(FEED / "POCKET.NC", machine)
-    result = schedule(program, machine, tool, stock)
+    result = schedule_feed(program, machine, tool, stock)
     limit = float(tool.limits.resultant_n or np.inf)
-    written = Program.from_text(result.text, machine, source="scheduled POCKET.NC", emitted=True)
+    written = result.written
     constant = _constant_feed(result, tool, machine)
     text = re.sub(r"F1500\.", f"F{constant:.1f}", (FEED / "POCKET.NC").read_text(encoding="ascii"))
     times = [cycle_time(each, machine).total_s for each in (written, Program.from_text(text, machine))]

@@ -13,7 +13,7 @@ from shapegcode import _core, canvas
 from shapegcode.machine import Machine
 from shapegcode.milling.feed_picture import write_feed_pictures
 from shapegcode.milling.feed_traces import LOADS, envelope, feed_traces, groups, wall_maps
-from shapegcode.milling.schedule import FeedSchedule, schedule
+from shapegcode.milling.schedule import FeedSchedule, schedule_feed
 from shapegcode.milling.stock_file import Stock
 from shapegcode.milling.tool_file import Tool
 
@@ -22,7 +22,7 @@ FEED = Path(__file__).parents[1] / "golden" / "feed"
 
 @pytest.fixture(scope="module")
 def pocket() -> FeedSchedule:
-    return schedule(
+    return schedule_feed(
         FEED / "POCKET.NC", Machine.load("vx500"), Tool.load(FEED / "pocket_tool.toml"),
         Stock.load(FEED / "pocket_stock.toml"), resolution_mm=0.16,
     )  # fmt: skip
