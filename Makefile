@@ -84,6 +84,7 @@ bench: package dev
 	$(BIN)/python tests/benchmarks/linear_plants.py
 	$(BIN)/python tests/benchmarks/feed_drives.py
 	$(BIN)/python tests/benchmarks/identification.py
+	$(BIN)/python tests/benchmarks/engagement.py
 	$(BIN)/python tests/benchmarks/simulate_program.py
 	$(BIN)/python tests/benchmarks/feed_schedule.py
 	$(BIN)/python tests/benchmarks/milling_force.py

@@ -40,27 +40,29 @@ void register_travel(py::module_& module) {
 
   module.def(
       "travel_path",
-      [](const std::shared_ptr<Path>& path, const std::shared_ptr<SpeedProfile>& profile, const VectorArray& stations,
-         double period_s, const std::vector<Fir>& filters, double window_s) {
+      [](const std::shared_ptr<Path>& path, const std::shared_ptr<SpeedProfile>& profile,
+         const std::shared_ptr<Path>& along, const VectorArray& stations, double period_s,
+         const std::vector<Fir>& filters, double window_s) {
         const std::vector<double> s = numbers(stations);
         const py::gil_scoped_release release;
-        return travel_path(path, profile, s, {period_s, filters, window_s});
+        return travel_path(path, profile, *along, s, {period_s, filters, window_s});
       },
-      py::arg("path"), py::arg("profile"), py::arg("stations_mm"), py::arg("period_s"),
+      py::arg("path"), py::arg("profile"), py::arg("along"), py::arg("stations_mm"), py::arg("period_s"),
       py::arg("filters") = std::vector<Fir>{}, py::arg("window_s") = 0.0,
-      "How a path under a speed profile is travelled; `stations_mm` (n,) ascend to its length, `filters` stand behind "
+      "How a path under a speed profile is travelled, followed along another one of which it is made, or along itself; "
+      "`stations_mm` (n,) ascend to the length of that, `filters` stand behind "
       "the set-points, speeds are taken over `window_s`. Raises ArgumentError on stations that do not ascend.");
   module.def(
       "travel_blocks",
-      [](const std::shared_ptr<Path>& blocks, const std::shared_ptr<Path>& path, BlockEnd block_end,
+      [](const std::shared_ptr<Path>& blocks, const std::shared_ptr<Path>& along, BlockEnd block_end,
          const VectorArray& stations, double period_s, const std::vector<Fir>& filters, double window_s) {
         const std::vector<double> s = numbers(stations);
         const py::gil_scoped_release release;
-        return travel_blocks(blocks->segments(), *path, block_end, s, {period_s, filters, window_s});
+        return travel_blocks(blocks->segments(), *along, block_end, s, {period_s, filters, window_s});
       },
-      py::arg("blocks"), py::arg("path"), py::arg("block_end"), py::arg("stations_mm"), py::arg("period_s"),
+      py::arg("blocks"), py::arg("along"), py::arg("block_end"), py::arg("stations_mm"), py::arg("period_s"),
       py::arg("filters") = std::vector<Fir>{}, py::arg("window_s") = 0.0,
-      "How blocks at their feed are travelled, followed along `path`; else as travel_path.");
+      "How blocks at their feed are travelled, followed along `along`; else as travel_path.");
 }
 
 }  // namespace

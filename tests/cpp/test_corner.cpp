@@ -180,7 +180,9 @@ TEST_CASE("the field agrees with the closed form: entry within half a degree at 
   // What is held here is much better than asked: boundaries are known to h^2 / (8 r), not to h.
   for (const Case& asked : {Case{0.02, 0.01, 0.0005}, Case{0.1, 0.05, 0.003}}) {
     for (const double turn : {60.0, 90.0, 105.0}) {
-      for (const auto& [rough, finish] : {std::pair{8.0, 8.0}, {4.0, 4.0}, {8.0, 4.0}}) {
+      for (const auto& radii : {std::pair{8.0, 8.0}, {4.0, 4.0}, {8.0, 4.0}}) {
+        const double rough = radii.first;
+        const double finish = radii.second;
         const CornerCut cut{4.0, rough, finish, 0.8, turn * degree, 6.0, 8.0, rough == 4.0};
         Material material(std::vector<Ring>{corner_stock(cut, 6.0)}, std::vector<double>{-15.0, 0.0},
                           asked.resolution_mm);

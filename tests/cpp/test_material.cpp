@@ -116,6 +116,7 @@ TEST_CASE("volume, heights and places of a block with a hole") {
   CHECK(heights(0, 1) == doctest::Approx(0.0));
   CHECK(std::isnan(heights(0, 2)));
   CHECK(heights(1, 2) == doctest::Approx(0.0));
+  CHECK(material.volume_in_cylinder_mm3(std::nan(""), 5.0, 3.0, -4.0, 1.0) == 0.0);
   CHECK(material.low_mm() == Vector2d(0.0, 0.0));
   CHECK(material.high_mm() == Vector2d(20.0, 10.0));
 }
@@ -142,8 +143,9 @@ TEST_CASE("a step takes away the distance from a line or an arc") {
     }
     const ToolStep start(from, from);
     const ToolStep step(from, to, curvature);
-    layer.remove(start, radius, false);
-    layer.remove(step, radius, true);
+    CHECK(layer.remove(start, radius, false));
+    CHECK(layer.remove(step, radius, true));
+    CHECK_FALSE(layer.remove(step, radius, false));
     MaterialLayer at_once(std::vector<Ring>{box(-10, -10, 10, 10)}, h);
     at_once.remove(step, radius, false);
     MaterialLayer compacted = layer;

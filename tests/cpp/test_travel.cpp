@@ -62,7 +62,7 @@ TEST_CASE("a path with look-ahead is slow enough where a slower segment begins")
   MotionLimits limits;
   limits.time_constant_s = 0.05;
   const auto profile = std::make_shared<const SpeedProfile>(plan_speed(*path, limits));
-  const Travel travel = travel_path(path, profile, stations(), {0.001, {}, 0.0});
+  const Travel travel = travel_path(path, profile, *path, stations(), {0.001, {}, 0.0});
   CHECK(travel.highest_mm_per_s[20] == doctest::Approx(10.0).epsilon(1e-6));
   for (std::size_t i = 40; i < travel.highest_mm_per_s.size(); ++i) {
     CHECK(travel.highest_mm_per_s[i] <= 5.0 * 1.02);  // the step that passes the border began before it

@@ -6,6 +6,7 @@ Forces on the tool, x along the feed, y to its left, clockwise spindle. A tooth 
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -84,18 +85,23 @@ def record(
             lag = z * math.tan(math.radians(helix_deg)) / (0.5 * diameter)
             t = turned + 2.0 * math.pi * flute / flutes + lag
             t = (t + math.pi) % (2.0 * math.pi) - math.pi
-            left = np.min([j * pitch * np.cos(t) + more for j, more in (ahead if runout_mm else ahead[:1])], axis=0)
-            thick = np.where((t > begin) & (t < end), np.maximum(left, 0.0), 0.0)
-            tangential, radial = k1 * thick * dz, k1 * k2 * thick * dz
-            force[:, 0] += -tangential * np.sin(t) - radial * np.cos(t)
-            force[:, 1] += tangential * np.cos(t) - radial * np.sin(t)
+            cuts = np.flatnonzero((t > begin) & (t < end))
+            sine, cosine = np.sin(t[cuts]), np.cos(t[cuts])
+            left = np.min([j * pitch[cuts] * cosine + more for j, more in (ahead if runout_mm else ahead[:1])], axis=0)
+            tangential = k1[cuts] * np.maximum(left, 0.0) * dz
+            radial = k2[cuts] * tangential
+            force[cuts, 0] -= tangential * sine + radial * cosine
+            force[cuts, 1] += tangential * cosine - radial * sine
     return force
 
 
 def rows(columns: Mapping[str, Any]) -> str:
     """CSV text of columns."""
-    table = np.column_stack(list(columns.values()))
-    return ",".join(columns) + "\n" + "\n".join(",".join(f"{value:.7g}" for value in row) for row in table) + "\n"
+    text = io.StringIO()
+    np.savetxt(
+        text, np.column_stack(list(columns.values())), "%.7g", delimiter=",", header=",".join(columns), comments=""
+    )
+    return text.getvalue()
 
 
 def local_mean_force(
@@ -120,8 +126,8 @@ def met_by_circle(edge: Callable[[Array], Array], x: Array, radius: float, lengt
 
     By trying points of the front half, on stations between which is interpolated.
     """
-    stations = np.arange(x.min() - 0.02, x.max() + 0.04, 0.02)
-    t = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 4001)
+    stations = np.arange(x.min() - 0.08, x.max() + 0.16, 0.08)
+    t = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 3001)
     begin, end = np.zeros(len(stations)), np.zeros(len(stations))
     for k, at in enumerate(stations):
         px, py = at + radius * np.cos(t), radius + radius * np.sin(t)
@@ -131,7 +137,7 @@ def met_by_circle(edge: Callable[[Array], Array], x: Array, radius: float, lengt
     return np.interp(x, stations, begin), np.interp(x, stations, end)
 
 
-def lagging_way(blocks: list[tuple[float, float]], start: float, lag_s: float, step_s: float = 2e-4) -> Array:
+def lagging_way(blocks: list[tuple[float, float]], start: float, lag_s: float, step_s: float = 5e-4) -> Array:
     """Way over time at the feeds of blocks (end, mm/min), followed with a first-order lag: rows of time and X."""
     x, speed, time, rows = start, blocks[0][1] / 60.0, 0.0, [(0.0, start)]
     for end, feed in blocks:

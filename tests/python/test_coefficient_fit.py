@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -129,6 +130,20 @@ def test_the_local_chip_thickness_is_another_law() -> None:
     data = MeanForces(Engagement(-end, -begin, depth), feed, SPINDLE * ones, force, ones, np.zeros(len(depth), int))
     np.testing.assert_allclose(values(fit_coefficients(data, TOOL, AXIAL, thickness="local")), TRUE, rtol=2e-3)
     assert abs(values(fit_coefficients(data, TOOL, AXIAL))[0] / TRUE[0] - 1.0) > 0.005
+
+
+def test_a_torque_narrows_the_intervals() -> None:
+    data = drawn(np.random.default_rng(8), np.linspace(0.4, 2.8, 40), (108.0, 432.0), 0.05)
+    begin, end = data.met.from_rad, data.met.to_rad
+    chip = reference.mean_chip(begin, end, data.feed_mm_per_min / SPINDLE / 6)
+    # Tangential force k1 t dz of all that is engaged, times the radius.
+    torque = 6 * AXIAL / (2.0 * math.pi) * (end - begin) * 221.3 * chip ** (1.0 - 0.153) * 4.0e-3
+    with_torque = fit_coefficients(dataclasses.replace(data, torque_nm=torque), TOOL, AXIAL)
+    without = fit_coefficients(data, TOOL, AXIAL)
+    widths = [fit.coefficients[1].high - fit.coefficients[1].low for fit in (with_torque, without)]
+    assert widths[0] < 0.5 * widths[1]
+    assert abs(values(with_torque)[1] - TRUE[1]) < 2e-3
+    assert with_torque.predicted_n.shape == (80, 2)
 
 
 def test_outliers_are_found_and_left_out() -> None:

@@ -22,7 +22,7 @@ from shapegcode.milling.tool_file import Tool
 Array = npt.NDArray[np.float64]
 
 RADIUS, AXIAL, SPINDLE, FLUTES = 4.0, 15.0, 1800.0, 6
-FINE = 0.0025  # of what is tried point by point, mm
+FINE = 0.004  # of what is tried point by point, mm
 TOOL = """
 [tool]
 name = "EM8"
@@ -78,13 +78,13 @@ def moves(text: str) -> list[list[tuple[float, float, float, float]]]:
 def edge_behind(lines: list[tuple[float, float, float, float]], x: Array, side: float) -> Array:
     """Outermost height of the material at each X that circles along lines leave; *side* -1: material towards -Y."""
     centres = np.vstack(
-        [np.linspace((a, b), (c, d), max(2, math.ceil(math.hypot(c - a, d - b) / 0.004) + 1)) for a, b, c, d in lines]
+        [np.linspace((a, b), (c, d), max(2, math.ceil(math.hypot(c - a, d - b) / 0.01) + 1)) for a, b, c, d in lines]
     )
     order = np.argsort(centres[:, 0])
     cx, cy = centres[order, 0], -side * centres[order, 1]
     height = np.empty(len(x))
-    for k, at in enumerate(x):
-        low, high = np.searchsorted(cx, [at - RADIUS, at + RADIUS])
+    bounds = np.searchsorted(cx, np.column_stack([x - RADIUS, x + RADIUS]))
+    for k, (at, (low, high)) in enumerate(zip(x, bounds, strict=True)):
         height[k] = np.min(cy[low:high] - np.sqrt(np.maximum(RADIUS**2 - (cx[low:high] - at) ** 2, 0.0)))
     return height
 
@@ -136,7 +136,7 @@ def test_the_unrolled_corner_has_the_corners_radial_depth(tmp_path: Path, capsys
     assert min(feeds) == pytest.approx(90.8, abs=0.05)  # paper 001: 91
     assert {feed for _, feed in side["passes"][0]["feeds"]} == {216.0}
     deeper = about["deeper_than_corner"]
-    assert "0.218 mm more" in capsys.readouterr().out
+    assert re.search(r"up to 0\.2[12]\d mm more than the corner", capsys.readouterr().out)
     at = np.arange(2.0, 34.0, 0.11)
     corner = _core.CornerCut(4.0, 8.0, 8.0, 0.8, before_mm=40.0, after_mm=40.0)
     # The tool's front, sqrt(4² - 3.2²) = 2.4 before its axis, reaches the rough arc 8.8 before the corner of the walls;
@@ -175,7 +175,7 @@ def test_the_programs_raise_nothing(tmp_path: Path, kind: str, capsys: pytest.Ca
     assert text.isascii()
     assert max(map(len, text.splitlines())) <= 60
     head = text[: text.index("G21")]
-    for said in ("ZERO G54", "STOCK:", "2200 HZ", "TOOL IN SPINDLE: D8 MM, 6 FLUTES", "KEEP IT FREE OF CLAMPS"):
+    for said in ("ZERO G54", "STOCK:", "2220 HZ", "TOOL IN SPINDLE: D8 MM, 6 FLUTES", "KEEP IT FREE OF CLAMPS"):
         assert said in head
 
 
@@ -209,7 +209,7 @@ def simulated(
     each: dict[str, Any],
     edge: Callable[[Array], Array],
     *,
-    rate: float = 2200.0,
+    rate: float = 1013.0,
     noise: float = 0.05,
     override: float = 1.0,
     spindle: float = SPINDLE,
@@ -237,7 +237,7 @@ def simulated(
         axial_mm=AXIAL,
         law=reference.PAPER,
         runout_mm=runout,
-        slices=10,
+        slices=8,
     )
     force *= 1.0 + noise * rng.standard_normal(force.shape)
     force += [18.0, -7.0] + np.outer(times / times[-1], [9.0, 4.0]) + 0.3 * rng.standard_normal(force.shape)
@@ -290,7 +290,7 @@ def test_chatter_is_left_out_and_told(tmp_path: Path) -> None:
     side = write(tmp_path, "taper", "--length", "40", "-F", "432,864")
     files = []
     for k, each in enumerate(side["passes"]):
-        time, x, force = simulated(each, taper_edge, seed=k)
+        time, x, force = simulated(each, taper_edge, rate=1913.0, noise=0.02, seed=k)
         if k == 0:
             swing = (x > 22.0) & (x < 27.0)
             force[swing] *= 1.0 + 1.5 * np.sin(2.0 * math.pi * 760.0 * time[swing])[:, None]
@@ -301,6 +301,21 @@ def test_chatter_is_left_out_and_told(tmp_path: Path) -> None:
     assert min(each["from_mm"] for each in stretches) == pytest.approx(22.0, abs=1.0)
     assert max(each["to_mm"] for each in stretches) == pytest.approx(27.0, abs=1.0)
     assert abs(report["cutting"]["specific_exponent"] + 0.153) < 0.01
+
+
+def test_another_override_is_refused_where_the_feed_changes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    side = write(tmp_path, "corner")
+    time, _, force = simulated(side["passes"][1], corner_edge(side), override=0.9)
+    file = saved(tmp_path / "a.csv", time_s=time, fx_n=force[:, 0], fy_n=force[:, 1])
+    assert main(["testcut", "fit", f"2={file}", "--cut", str(tmp_path / "CUT.json")]) == 2
+    assert "was the feed override 100 %?" in capsys.readouterr().err
+
+
+def test_samples_in_step_with_the_teeth_are_told(tmp_path: Path) -> None:
+    side = write(tmp_path, "corner")
+    time, _, force = simulated(side["passes"][0], corner_edge(side), rate=900.0, noise=0.02)
+    file = saved(tmp_path / "a.csv", time_s=time, fx_n=force[:, 0], fy_n=force[:, 1])
+    assert any("5.0 samples per tooth" in note for note in fitted(tmp_path, file)["notes"])
 
 
 def mean_rows(depth: Array, feed: float, noise: float, seed: int) -> Array:
@@ -338,7 +353,9 @@ def test_means_at_positions_are_laid_over_the_taper(tmp_path: Path) -> None:
         begin, end = reference.met_by_circle(taper_edge, x, RADIUS, 40.0)
         pitch = each["feeds"][0][1] / SPINDLE / FLUTES
         force = -reference.mean_force(begin, end, pitch, FLUTES, AXIAL, reference.PAPER)
-        files.append(saved(tmp_path / f"{k}.csv", position_mm=x, fx_n=force[:, 0], fy_n=force[:, 1]))
+        torque = pitch * FLUTES * (np.sin(end) - np.sin(begin)) * AXIAL / (2.0 * math.pi) * RADIUS * 1e-3
+        torque *= 221.3 * reference.mean_chip(begin, end, pitch) ** -0.153
+        files.append(saved(tmp_path / f"{k}.csv", position_mm=x, fx_n=force[:, 0], fy_n=force[:, 1], torque_nm=-torque))
     cutting = fitted(tmp_path, *files)["cutting"]
     for name, true in reference.PAPER.items():
         assert cutting[name] == pytest.approx(true, rel=5e-3)
@@ -362,7 +379,7 @@ def test_the_corner_shows_what_the_modified_feed_does(tmp_path: Path, capsys: py
     assert 0.4 < report["ratio"]["measured"] < 0.6  # paper 001: about half
     first = report["peaks"][0]
     assert first["measured_mean_n"] == pytest.approx(1.2 * first["expected_mean_n"], rel=0.04)
-    assert "1.20 times the expected" in capsys.readouterr().out
+    assert re.search(r"is 1\.(19|20|21) times the expected", capsys.readouterr().out)
     assert (tmp_path / "plots" / "testcut-corner.svg").exists()
 
 
@@ -370,7 +387,7 @@ def interval_files(folder: Path, lag_s: float, *, position: bool = False) -> lis
     side = write(folder, "interval")
     files = []
     for k, each in enumerate(side["passes"]):
-        time, x, force = simulated(each, lambda x: np.full(len(x), 0.8), noise=0.03, lag_s=lag_s, seed=k)
+        time, x, force = simulated(each, lambda x: np.full(len(x), 0.8), rate=2219.0, noise=0.03, lag_s=lag_s, seed=k)
         place = {"position_mm": x} if position else {}
         files.append(saved(folder / f"{k}.csv", time_s=time, **place, fx_n=force[:, 0], fy_n=force[:, 1]))
     return files
@@ -382,7 +399,7 @@ def test_a_controller_that_follows_at_once_follows_every_interval(tmp_path: Path
     assert all(each["lag_s"] < 0.02 for each in report["passes"])
 
 
-@pytest.mark.parametrize("position", [False, True])
+@pytest.mark.parametrize("position", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_lagging_controller_needs_longer_intervals(tmp_path: Path, position: bool) -> None:
     report = fitted(tmp_path, *interval_files(tmp_path, 0.1, position=position), "--plots", str(tmp_path / "plots"))
     assert report["interval_mm"] in (0.4, 0.6)

@@ -17,7 +17,6 @@ constexpr double level_mm = 1e-6;  // a move that climbs by less stays on its le
 constexpr double same_height_mm = 1e-3;
 constexpr double least_slope = 1e-3;  // horizontal share below which a move is a plunge
 constexpr double megabyte = 1e6;
-constexpr std::size_t first_compaction_tiles = 4096;
 
 [[noreturn]] void refuse(const std::string& message) { throw Error(ErrorKind::argument, message); }
 
@@ -89,7 +88,6 @@ Material::Material(std::span<const Ring> rings, std::span<const double> borders_
   for (std::size_t i = 1; i < borders_.size(); ++i) middles_.push_back(0.5 * (borders_[i - 1] + borders_[i]));
   layers_.assign(middles_.size(), MaterialLayer(rings, resolution_mm));
   for (const MaterialLayer& layer : layers_) tiles_ += layer.tiles();
-  plan_compaction();
   if (!layers_.front().has_material()) {
     refuse("the outlines of the stock enclose no material at a resolution of " + std::to_string(resolution_mm) + " mm");
   }
@@ -152,9 +150,12 @@ std::size_t Material::bytes() const noexcept {
   return sum;
 }
 
-void Material::remove(std::size_t layer, const ToolStep& step, double tool_radius_mm, bool continues) {
-  tiles_ += layers_[layer].remove(step, tool_radius_mm, continues);
-  if (tiles_ > compact_at_tiles_) compact();
+bool Material::remove(std::size_t layer, const ToolStep& step, double tool_radius_mm, bool continues) {
+  tiles_ -= layers_[layer].tiles();
+  const bool changed = layers_[layer].remove(step, tool_radius_mm, continues);
+  tiles_ += layers_[layer].tiles();
+  if (tiles_ * MaterialLayer::tile_bytes > memory_limit_) compact();
+  return changed;
 }
 
 void Material::compact() {
@@ -164,13 +165,6 @@ void Material::compact() {
     tiles_ += layer.tiles();
   }
   check_memory(tiles_ * MaterialLayer::tile_bytes);
-  plan_compaction();
-}
-
-/// Looks for uniform tiles again when those with values have doubled, but not beyond what the limit allows.
-void Material::plan_compaction() {
-  const std::size_t most = memory_limit_ / MaterialLayer::tile_bytes;
-  compact_at_tiles_ = std::min(std::max(first_compaction_tiles, 2 * tiles_), std::max(most, tiles_ + 1));
 }
 
 void Material::check_memory(std::size_t needed) const {

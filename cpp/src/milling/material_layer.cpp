@@ -10,6 +10,8 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr std::int64_t edge = MaterialLayer::tile_nodes;
+constexpr float least_change = 1e-5F;  // mm; less is rounding
+constexpr std::size_t least_growth_tiles = 32;
 
 double distance_to_edge(const Vector2d& place, const Vector2d& a, const Vector2d& b) noexcept {
   const Vector2d along = b - a;
@@ -87,7 +89,7 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
     Vector2d a;
     Vector2d b;
   };
-  std::vector<std::vector<Edge>> near(index_.size());
+  std::vector<std::pair<std::int64_t, Edge>> near;                                     // to which tiles
   std::vector<std::vector<double>> crossings(static_cast<std::size_t>(rows_ * edge));  // of the boundary, per grid row
   const double tile_mm = spacing_ * edge;
   const double tile_reach = tile_mm * std::sqrt(0.5) + band_;
@@ -103,7 +105,7 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
         for (std::int64_t column = tile_of(low.x(), columns_); column <= tile_of(high.x(), columns_); ++column) {
           const Vector2d centre(x_of(column * edge) + 0.5 * tile_mm, y_of(row * edge) + 0.5 * tile_mm);
           if (distance_to_edge(centre, e.a, e.b) <= tile_reach) {
-            near[static_cast<std::size_t>(row * columns_ + column)].push_back(e);
+            near.emplace_back(row * columns_ + column, e);
           }
         }
       }
@@ -118,15 +120,18 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
     }
   }
   for (std::vector<double>& row : crossings) std::sort(row.begin(), row.end());
+  std::sort(near.begin(), near.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  auto next = near.cbegin();
   const auto inside = [&](std::int64_t i, std::int64_t j) {
     const std::vector<double>& row = crossings[static_cast<std::size_t>(j)];
     return (std::upper_bound(row.begin(), row.end(), x_of(i)) - row.begin()) % 2 == 1;
   };
   for (std::int64_t t = 0; t < columns_ * rows_; ++t) {
-    const std::vector<Edge>& edges = near[static_cast<std::size_t>(t)];
+    const auto first = next;
+    while (next != near.cend() && next->first == t) ++next;
     const std::int64_t i0 = t % columns_ * edge;
     const std::int64_t j0 = t / columns_ * edge;
-    if (edges.empty()) {
+    if (first == next) {
       index_[static_cast<std::size_t>(t)] = inside(i0, j0) ? full : empty;
       continue;
     }
@@ -137,7 +142,9 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
       const std::int64_t j = j0 + n / edge;
       const Vector2d place(x_of(i), y_of(j));
       double distance = band_;
-      for (const Edge& e : edges) distance = std::min(distance, distance_to_edge(place, e.a, e.b));
+      for (auto k = first; k != next; ++k) {
+        distance = std::min(distance, distance_to_edge(place, k->second.a, k->second.b));
+      }
       tile[static_cast<std::size_t>(n)] = static_cast<float>(inside(i, j) ? distance : -distance);
     }
   }
@@ -203,6 +210,7 @@ double MaterialLayer::distance_mm(double x_mm, double y_mm) const noexcept {
 }
 
 bool MaterialLayer::is_empty_around(double x_mm, double y_mm, double radius_mm) const noexcept {
+  if (!std::isfinite(x_mm + y_mm + radius_mm)) return true;
   const double tile_mm = spacing_ * edge;
   const auto clamped = [&](double from_origin, std::int64_t count) {
     return static_cast<std::int64_t>(std::clamp(std::floor(from_origin / tile_mm), -1.0, static_cast<double>(count)));
@@ -219,18 +227,21 @@ bool MaterialLayer::is_empty_around(double x_mm, double y_mm, double radius_mm) 
   return true;
 }
 
-std::size_t MaterialLayer::remove(const ToolStep& step, double tool_radius_mm, bool continues) {
+bool MaterialLayer::remove(const ToolStep& step, double tool_radius_mm, bool continues) {
   const Sweep sweep(step, tool_radius_mm, band_, spacing_, {x0_, y0_}, continues);
-  const std::size_t before = tiles();
   const auto rows = static_cast<double>(rows_ * edge);
   const std::int64_t end = first_at(sweep.middle.y() + sweep.reach, rows);
-  for (std::int64_t j = first_at(sweep.middle.y() - sweep.reach, rows); j < end; ++j) remove_in_row(sweep, j);
-  return tiles() - before;
+  bool changed = false;
+  for (std::int64_t j = first_at(sweep.middle.y() - sweep.reach, rows); j < end; ++j) {
+    changed |= remove_in_row(sweep, j);
+  }
+  if (tiles() > compact_at_tiles_) compact();
+  return changed;
 }
 
 /// Finds the nodes of a grid row whose distance may change: those near the step but not behind its start, nor deep in
 /// the disc that was swept there.
-void MaterialLayer::remove_in_row(const Sweep& sweep, std::int64_t j) {
+bool MaterialLayer::remove_in_row(const Sweep& sweep, std::int64_t j) {
   const auto y = static_cast<double>(j);
   const auto nodes = static_cast<double>(columns_ * edge);
   const double from_middle = y - sweep.middle.y();
@@ -238,8 +249,7 @@ void MaterialLayer::remove_in_row(const Sweep& sweep, std::int64_t j) {
   double low = sweep.middle.x() - half;
   double high = sweep.middle.x() + half;
   if (!sweep.continues) {
-    remove_nodes(sweep, j, first_at(low, nodes), first_at(high, nodes));
-    return;
+    return remove_nodes(sweep, j, first_at(low, nodes), first_at(high, nodes));
   }
   const double dy = y - sweep.from.y();
   const double rest = -sweep.behind - dy * sweep.ahead.y();  // ahead: (x - from.x) ahead.x > rest
@@ -248,18 +258,20 @@ void MaterialLayer::remove_in_row(const Sweep& sweep, std::int64_t j) {
   } else if (sweep.ahead.x() < 0.0) {
     high = std::min(high, sweep.from.x() + rest * sweep.per_ahead_x);
   } else if (rest > 0.0) {
-    return;
+    return false;
   }
   const double inner = std::sqrt(std::max(0.0, sweep.inner * sweep.inner - dy * dy));
   const double gap_low = std::clamp(sweep.from.x() - inner, low, std::max(low, high));
   const double gap_high = std::clamp(sweep.from.x() + inner, low, std::max(low, high));
-  if (low < gap_low) remove_nodes(sweep, j, first_at(low, nodes), first_at(gap_low, nodes));
-  if (gap_high < high) remove_nodes(sweep, j, first_at(gap_high, nodes), first_at(high, nodes));
+  bool changed = false;
+  if (low < gap_low) changed = remove_nodes(sweep, j, first_at(low, nodes), first_at(gap_low, nodes));
+  if (gap_high < high) changed |= remove_nodes(sweep, j, first_at(gap_high, nodes), first_at(high, nodes));
+  return changed;
 }
 
 /// Lowers the distances of the nodes first ... last - 1 of a row, tile by tile, in whole packets: a neighbour whose
 /// distance is taken as well only stays what it is.
-void MaterialLayer::remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_t first, std::int64_t last) {
+bool MaterialLayer::remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_t first, std::int64_t last) {
   constexpr std::int64_t packet = 4;
   const auto band = static_cast<float>(band_);
   const auto spacing = static_cast<float>(spacing_);
@@ -267,6 +279,7 @@ void MaterialLayer::remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_
   const auto y = static_cast<float>(y_of(j) - sweep.start_mm.y());
   const ToolStep::Shape<float> shape = sweep.shape;
   std::int32_t* const tiles_of_row = index_.data() + j / edge * columns_;
+  int changed = 0;
   while (first < last) {
     const std::int64_t column = first / edge;
     const std::int64_t left = column * edge;
@@ -283,16 +296,21 @@ void MaterialLayer::remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_
     if (shape.curvature == 0.0F) {
       for (int k = 0; k < packets * packet; ++k) {
         const float squared = shape.parts(x + spacing * static_cast<float>(k), y).squared(1.0F);
-        values[k] = std::min(values[k], std::max(std::sqrt(squared) - radius, -band));
+        const float value = std::min(values[k], std::max(std::sqrt(squared) - radius, -band));
+        changed |= static_cast<int>(values[k] - value > least_change);
+        values[k] = value;
       }
     } else {
       for (int k = 0; k < packets * packet; ++k) {
         const auto parts = shape.parts(x + spacing * static_cast<float>(k), y);
         const float squared = parts.squared(std::sqrt(parts.square));
-        values[k] = std::min(values[k], std::max(std::sqrt(squared) - radius, -band));
+        const float value = std::min(values[k], std::max(std::sqrt(squared) - radius, -band));
+        changed |= static_cast<int>(values[k] - value > least_change);
+        values[k] = value;
       }
     }
   }
+  return changed != 0;
 }
 
 bool MaterialLayer::has_material() const noexcept {
@@ -347,6 +365,9 @@ void MaterialLayer::compact() {
     free_.push_back(tile);
     tile = *high > -limit ? full : empty;
   }
+  // Next time when those with values have grown by a quarter: uniform ones are passed over quickly, and the search
+  // costs little beside what made them.
+  compact_at_tiles_ = tiles() + tiles() / 4 + least_growth_tiles;
 }
 
 std::size_t MaterialLayer::bytes() const noexcept {

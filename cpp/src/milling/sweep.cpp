@@ -204,10 +204,16 @@ class Sweeper {
 
   void sweep_oldest() {
     const Piece& piece = pending_.front();
-    const bool moves = piece.step.chord() != Vector2d::Zero();
+    const double half = 0.5 * piece.step.chord().norm();
+    const Vector2d middle = piece.step.from() + 0.5 * piece.step.chord();
     for (std::size_t layer = piece.lowest; layer < material_.size(); ++layer) {
+      const MaterialLayer& field = material_.layer(layer);
+      // Nor is there anything above: see `sample`.
+      if (field.is_empty_around(middle.x(), middle.y(), radius_ + half + field.band_mm())) break;
       const bool continues = piece.continues && layer >= piece.predecessor_lowest;
-      if (moves || !continues) material_.remove(layer, piece.step, radius_, continues);
+      if (half == 0.0 && continues) continue;
+      // Where nothing is left to take away, nothing is above; only the layers that the tool has just reached are new.
+      if (!material_.remove(layer, piece.step, radius_, continues) && continues) break;
     }
     pending_.pop_front();
   }

@@ -133,15 +133,15 @@ Travel follow(Player& player, const Path& path, const Vector3& end, std::span<co
 }  // namespace
 
 Travel travel_path(const std::shared_ptr<const Path>& path, const std::shared_ptr<const SpeedProfile>& profile,
-                   std::span<const double> stations_mm, const TravelOptions& options) {
+                   const Path& along, std::span<const double> stations_mm, const TravelOptions& options) {
   Interpolator interpolator(path, profile, options.period_s);
-  return follow(interpolator, *path, path->segments().back().end_mm, stations_mm, options);
+  return follow(interpolator, along, path->segments().back().end_mm, stations_mm, options);
 }
 
-Travel travel_blocks(std::span<const Segment> blocks, const Path& path, BlockEnd block_end,
+Travel travel_blocks(std::span<const Segment> blocks, const Path& along, BlockEnd block_end,
                      std::span<const double> stations_mm, const TravelOptions& options) {
   BlockPlayer player(blocks, options.period_s, block_end);
-  return follow(player, path, blocks.back().end_mm, stations_mm, options);
+  return follow(player, along, blocks.back().end_mm, stations_mm, options);
 }
 
 }  // namespace shapegcode

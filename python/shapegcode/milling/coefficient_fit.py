@@ -30,6 +30,7 @@ LEAST_FEED_RATIO = 1.3
 _ROUNDS = 6
 _HUBER = 2.5
 _OUTLIER = 4.0
+_LEAST_OUTLIER = 0.02
 _MEDIAN = 0.4549
 _LARGEST_SHARE_OUT = 0.25
 _STEP = 1e-5
@@ -61,6 +62,7 @@ class MeanForces:
         group: (n,) number of the pass or file, in the order in which it was cut.
         displaced: n engagements if the place of the tool were off by its standard error, the same way for all rows of
             a group; None: the engagements are exact.
+        torque_nm: (n,) mean torque of the spindle; None: not measured.
     """
 
     met: Engagement
@@ -70,6 +72,7 @@ class MeanForces:
     revolutions: Array
     group: npt.NDArray[np.intp]
     displaced: Engagement | None = None
+    torque_nm: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -132,6 +135,10 @@ class _Model:
     ) -> None:
         self.tool, self.depth, self.data, self.thickness = tool, axial_depth_mm, data, thickness
         self.reference = reference_mm
+        # A torque is laid over as the force at the tool's radius that makes it.
+        self.at_radius = 1e3 / tool.radius_mm
+        torque = [] if data.torque_nm is None else [self.at_radius * data.torque_nm]
+        self.measured = np.column_stack([data.force_n, *torque])
 
     def values(self, parameters: Array) -> dict[str, Any]:
         """The keys of ``[cutting]``."""
@@ -151,14 +158,16 @@ class _Model:
         return self.with_values(self.values(parameters))
 
     def with_values(self, values: Mapping[str, Any]) -> Array:
-        found = np.zeros((len(self.data.feed_mm_per_min), 2))
+        found = np.zeros(self.measured.shape)
         for speed, at, met in _by_speed(self.data):
             law = ForceLaw(self.tool, values, speed, self.depth)
-            found[at] = law.forces(met, self.data.feed_mm_per_min[at]).mean_n
+            forces = law.forces(met, self.data.feed_mm_per_min[at])
+            found[at, :2] = forces.mean_n
+            found[at, 2:] = self.at_radius * forces.mean_torque_nm[:, None]
         return found
 
     def slopes(self, parameters: Array, at: Array) -> Array:
-        """(2 n, p) change of the forces with each parameter; the edge forces act as they are."""
+        """(all measured values, p) change of the forces with each parameter; the edge forces act as they are."""
         columns = []
         for k in range(len(parameters)):
             moved = parameters.copy()
@@ -189,28 +198,29 @@ def fit_coefficients(
     middle = math.exp(float(np.mean(np.log(chip))))
     model = _Model(tool, axial_depth_mm, data, thickness, middle)
     parameters = _start(model, data, count)
-    noise = np.full((len(chip), 2), 1.0)
-    robust = np.ones((len(chip), 2))
+    noise, robust = np.ones(model.measured.shape), np.ones(model.measured.shape)
     for _ in range(_ROUNDS):
         before = parameters
-        parameters, left, slopes = _solved(model, data.force_n, parameters, robust / noise**2)
+        parameters, left, slopes = _solved(model, parameters, robust / noise**2)
         noise = _noise(left, model.forces(parameters), data, robust)
         scaled = np.abs(left) / noise
         robust = np.minimum(1.0, _HUBER / np.maximum(scaled, 1e-12))
         if np.all(np.abs(parameters - before) < _SETTLED * np.maximum(np.abs(parameters), 1.0)):
             break
-    outlier = np.any(np.abs(left) > _OUTLIER * noise, axis=1)
+    # Noise may be so small that the law itself is off by more than it: that alone makes no outlier.
+    size = np.linalg.norm(model.measured, axis=1)[:, None]
+    outlier = np.any((np.abs(left) > _OUTLIER * noise) & (np.abs(left) > _LEAST_OUTLIER * size), axis=1)
     if outlier.mean() > _LARGEST_SHARE_OUT:
         raise ArgumentError(
             f"{100 * outlier.mean():.0f} % of the forces do not follow one law: was the tool worn, did it chatter, or "
             "is the work piece not the one described?"
         )
     weights = np.where(outlier[:, None], 0.0, 1.0 / noise**2)
-    parameters, left, slopes = _solved(model, data.force_n, parameters, weights)
+    parameters, left, slopes = _solved(model, parameters, weights)
     correlation = _correlation(left / noise, data, outlier)
-    predicted = data.force_n - left
+    predicted = data.force_n - left[:, :2]
     covariance = _covariance(slopes, left, weights, correlation) + _of_place(model, parameters, slopes, weights)
-    kept = left[~outlier]
+    kept = left[~outlier, :2]
     size = np.linalg.norm(data.force_n[~outlier], axis=1)
     free = int((weights > 0.0).sum()) - count
     return CoefficientFit(
@@ -268,8 +278,8 @@ def _start(model: _Model, data: MeanForces, count: int) -> Array:
     along = model.with_values({**unit, "ratio": 0.0})
     across = model.with_values({**unit, "ratio": 1.0}) - along
     columns = np.column_stack([along.ravel(), across.ravel()])
-    weight = np.repeat(1.0 / np.maximum(np.linalg.norm(data.force_n, axis=1), 1e-9), 2)
-    (tangential, radial), *_ = np.linalg.lstsq(columns * weight[:, None], data.force_n.ravel() * weight, rcond=None)
+    weight = np.repeat(1.0 / np.maximum(np.linalg.norm(data.force_n, axis=1), 1e-9), model.measured.shape[1])
+    (tangential, radial), *_ = np.linalg.lstsq(columns * weight[:, None], model.measured.ravel() * weight, rcond=None)
     if tangential <= 0.0 or radial <= 0.0:
         raise ArgumentError(
             f"no cut gives such forces: they would need {tangential:.4g} N/mm² along and {radial:.4g} N/mm² across the "
@@ -281,12 +291,12 @@ def _start(model: _Model, data: MeanForces, count: int) -> Array:
     return start
 
 
-def _solved(model: _Model, force_n: Array, start: Array, weights: Array) -> tuple[Array, Array, Array]:
+def _solved(model: _Model, start: Array, weights: Array) -> tuple[Array, Array, Array]:
     """Levenberg-Marquardt steps to the weighted least squares: parameters, what they leave, slopes."""
     root = np.sqrt(weights).ravel()
     parameters = start
     predicted = model.forces(parameters)
-    left = force_n - predicted
+    left = model.measured - predicted
     error = float(np.sum((root * left.ravel()) ** 2))
     damping = 1e-3
     slopes = model.slopes(parameters, predicted)
@@ -300,7 +310,7 @@ def _solved(model: _Model, force_n: Array, start: Array, weights: Array) -> tupl
         moved[1], moved[3] = max(moved[1], -0.9), max(moved[3], -0.95 - moved[1])
         moved[4:] = np.maximum(moved[4:], 0.0)
         new = model.forces(moved)
-        new_error = float(np.sum((root * (force_n - new).ravel()) ** 2))
+        new_error = float(np.sum((root * (model.measured - new).ravel()) ** 2))
         if new_error > error * (1.0 + 1e-12):
             damping = max(damping, 1e-9) * 10.0
             if damping > 1e9:
@@ -309,7 +319,7 @@ def _solved(model: _Model, force_n: Array, start: Array, weights: Array) -> tupl
         gained = error - new_error
         change = float(np.max(np.abs(moved - parameters)))
         parameters, predicted, error, damping = moved, new, new_error, damping * 0.1
-        left = force_n - predicted
+        left = model.measured - predicted
         slopes = model.slopes(parameters, predicted)
         if gained <= _DONE * error or change < _DONE:
             break
@@ -324,7 +334,7 @@ def _noise(left: Array, predicted: Array, data: MeanForces, robust: Array) -> Ar
     """Standard deviation of each force: a constant and a share of the force, as the residuals show them."""
     found = np.empty_like(left)
     many = data.revolutions / float(np.mean(data.revolutions))
-    for k in range(2):
+    for k in range(left.shape[1]):
         square = predicted[:, k] ** 2
         columns = np.column_stack([np.ones(len(square)), square])
         weight = np.ones(len(square))

@@ -18,7 +18,7 @@ __all__ = ["Edge", "left_edge", "on_increments", "reduced", "tool_path", "unroll
 
 Array = npt.NDArray[np.float64]
 
-_GRID_MM = 0.01
+_GRID_MM = 0.004
 _CHORD_MM = 1e-4
 _MOVED = 9  # increments
 
@@ -105,7 +105,7 @@ def _envelope(line: Edge, radius: float, start: float, end: float, side: float) 
         return Edge(x, line.at(x) + side * radius * math.sqrt(1.0 + slope * slope))
     count = int(np.ceil((end - start) / _GRID_MM)) + 1
     reach = int(np.ceil(radius / _GRID_MM))
-    x = start + _GRID_MM * np.arange(-reach, count + reach)
+    x = start + _GRID_MM * np.arange(-reach, count + reach, dtype=np.float64)
     heights = side * line.at(x)
     best = np.full(count, -np.inf)
     for offset in range(-reach, reach + 1):

@@ -19,6 +19,7 @@ _PER_MINUTE = 60.0
 #: Samples per revolution from which on a file is a record and not a table of means.
 FEWEST_SAMPLES = 6.0
 _LEAST_AIR_REVS = 5
+_FEW_PER_TOOTH, _IN_STEP = 16.0, 0.01
 _TELL_SPEED, _TELL_FEED = 0.002, 0.005
 _GUARD_REVS = 2
 #: Of the noise in the air, and of the largest force: what is more is a cut.
@@ -29,7 +30,7 @@ _FEWEST_FOR_SPEED = 20.0
 _LARGEST_SHIFT_MM = 1.0
 _SHIFT_STEPS = 81
 #: The cut may last so much longer or shorter: at another feed override; where the place or the feeds are stated.
-_OTHER_FEED, _OTHER_LENGTH = 0.6, 0.15
+_OTHER_FEED, _OTHER_LENGTH = 0.6, 0.03
 _CHATTER, _CHATTER_LEAST = 8.0, 0.02  # times the median deviation; the least that counts as one, of the median
 _CHATTER_ROUNDS = 12
 
@@ -148,7 +149,7 @@ def spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: int
             bent = left - 2.0 * mid + right
             fine = 0.5 * (left - right) / bent if bent < 0.0 else 0.0
             best = height, (low + peak + fine) * step * _PER_MINUTE / order
-    return (commanded, False) if best is None else (best[1], True)
+    return (commanded, False) if best is None else (float(best[1]), True)
 
 
 def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, shape: Shape) -> PlacedRecord:
@@ -178,6 +179,12 @@ def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, shape: S
     if told and abs(speed / cut.spindle_rev_per_min - 1.0) > _TELL_SPEED:
         notes.append(f"the spindle turned at {speed:.1f} rev/min, {cut.spindle_rev_per_min:g} were commanded")
     samples = _PER_MINUTE / speed / period
+    per_tooth = samples / cut.tool.flutes
+    if per_tooth < _FEW_PER_TOOTH and abs(per_tooth - round(per_tooth)) < _IN_STEP:
+        notes.append(
+            f"{per_tooth:.1f} samples per tooth fall on the same angles over and over: means may be off by some "
+            "percent; record with more samples, or with a rate that is no multiple of the tooth passing frequency"
+        )
     force, offset, drift = _without_offset(record.force_n, begin, end, round(_GUARD_REVS * samples))
     torque = None
     if record.torque_nm is not None:

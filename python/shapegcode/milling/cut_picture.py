@@ -120,5 +120,6 @@ def plot_interval(file: str | Path, result: IntervalResult) -> None:
         panel.plot(each.time_s, each.lagging_n, "--", color=canvas.COLOURS[1], linewidth=1.1, label=label)
         panel.set_ylabel(f"{each.interval_mm:g} mm: N")
         canvas.legend_above(panel)
+    column[-1].set_xlabel("time in s")
     canvas.heading(figure, "Mean resultant at feeds that change every so often", "")
     canvas.save(figure, file)

@@ -23,7 +23,7 @@ _RAW_MM = 0.5  # by which the raw edge may stand out
 _CLEAR_Z_MM = 10.0
 _NEAR_Z_MM = 2.0
 _BLOCKS_OF_EDGE = 3.0  # times the block time that a block of the edge lasts at least
-_SAMPLES_PER_TOOTH = 12
+_SAMPLES_PER_TOOTH = 12.3  # no whole number: samples should not fall on the same angles over and over
 _TITLES = {"taper": "TAPER TEST CUT", "corner": "CORNER ON A STRAIGHT LINE", "interval": "FEED INTERVAL TEST"}
 _PURPOSES = {
     "taper": ("CUTTING COEFFICIENTS FROM A GROWING RADIAL DEPTH",),
@@ -74,7 +74,7 @@ class _Writer:
         cut, tool = self.cut, self.cut.tool
         left, right = min(each.start_mm for each in cut.passes), max(each.end_mm for each in cut.passes)
         edge = "REAR EDGE" if self.side < 0.0 else "FRONT EDGE"
-        rate = math.ceil(_SAMPLES_PER_TOOTH * tool.flutes * cut.spindle_rev_per_min / _PER_MINUTE / 100.0) * 100
+        rate = math.ceil(_SAMPLES_PER_TOOTH * tool.flutes * cut.spindle_rev_per_min / _PER_MINUTE / 10.0) * 10
         yield from _PURPOSES[cut.kind]
         yield f"SHAPEGCODE TESTCUT FOR {_plain(cut.machine)}"
         yield f"TOOL IN SPINDLE: D{tool.diameter_mm:g} MM, {tool.flutes} FLUTES,"

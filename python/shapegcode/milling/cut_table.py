@@ -67,11 +67,11 @@ def result_table(result: Result) -> Table:
     """The result in figures."""
     if isinstance(result, TaperResult):
         table = _table("coefficients of the cutting force", "key", "value", "95 % interval", "unit")
-        for each in result.fit.coefficients:
-            table.add_row(each.name, f"{each.value:.4g}", f"{each.low:.4g} ... {each.high:.4g}", each.unit)
-        for name, each in zip(("k1", "k2"), result.fit.at_chip, strict=True):
+        for found in result.fit.coefficients:
+            table.add_row(found.name, f"{found.value:.4g}", f"{found.low:.4g} ... {found.high:.4g}", found.unit)
+        for name, found in zip(("k1", "k2"), result.fit.at_chip, strict=True):
             chip = f"{name} at a chip of {1e3 * result.fit.middle_chip_mm:.2f} um"
-            table.add_row(chip, f"{each.value:.4g}", f"{each.low:.4g} ... {each.high:.4g}", each.unit)
+            table.add_row(chip, f"{found.value:.4g}", f"{found.low:.4g} ... {found.high:.4g}", found.unit)
         return table
     if isinstance(result, CornerResult):
         table = _table(
@@ -84,14 +84,14 @@ def result_table(result: Result) -> Table:
     table = _table(
         "how the feed is followed", "interval mm", "largest deviation", "at X mm", "noise", "lag ms", "follows"
     )
-    for row in result.passes:
+    for each in result.passes:
         table.add_row(
-            f"{row.interval_mm:g}",
-            f"{100 * row.deviation:.0f} %",
-            f"{row.at_mm:.2f}",
-            f"{100 * row.noise:.1f} %",
-            f"{1e3 * row.lag_s:.0f}",
-            "yes" if row.follows else "no",
+            f"{each.interval_mm:g}",
+            f"{100 * each.deviation:.0f} %",
+            f"{each.at_mm:.2f}",
+            f"{100 * each.noise:.1f} %",
+            f"{1e3 * each.lag_s:.0f}",
+            "yes" if each.follows else "no",
         )
     return table
 

@@ -238,7 +238,9 @@ def _stretches_that_keep(task: _Task, machine: Machine, motion: Motion) -> list[
             task.path.segment_ends_mm, task.kept, task.divisible, task.stations_mm, feeds, control.interval_mm,
             most_change, task.feed_unit,
         )  # fmt: skip
-        run = motion.travel(_core.with_feeds(task.path, stretches), task.stations_mm, task.window_s).feed_mm_per_min
+        run = motion.travel(
+            _core.with_feeds(task.path, stretches), task.path, task.stations_mm, task.window_s
+        ).feed_mm_per_min
         over = free & (run > task.load * (1.0 + _TOO_FAST))
         if not over.any():
             break

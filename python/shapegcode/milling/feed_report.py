@@ -15,7 +15,7 @@ from shapegcode.milling.feed_plan import KEPT, MINIMUM, FeedPlan, limits_of, mil
 from shapegcode.milling.survey import Survey, SurveyedRegion
 from shapegcode.milling.travel import Motion, Travelled, Vector
 
-__all__ = ["Load", "RegionLoad", "feed_report", "load_of", "region_load", "scaled_stations"]
+__all__ = ["Load", "RegionLoad", "feed_report", "load_of", "region_load"]
 
 _SLACK = 1e-3  # of a limit: what its own search and the rounding of a figure may be off by
 _AIR_N = 1e-9
@@ -77,18 +77,11 @@ def region_load(
         return None
     stations = np.asarray(part.track.s_mm)
     window_s = 60.0 / (part.tool.tool.flutes * part.spindle_rev_per_min)
-    was = load_of(part, before.travel(part.region.path, stations, window_s))
+    was = load_of(part, before.travel(part.region.path, part.region.path, stations, window_s))
     if plan is None and before is after:
         return RegionLoad(stations, was, was)
-    travelled = after.travel(written, scaled_stations(stations, written), window_s)
+    travelled = after.travel(written, part.region.path, stations, window_s)
     return RegionLoad(stations, was, load_of(part, travelled))
-
-
-def scaled_stations(stations_mm: Vector, path: _core.Path) -> Vector:
-    """The stations on the same path as read back, whose blocks end on the least increment."""
-    scaled: Vector = stations_mm * (path.length_mm / stations_mm[-1])
-    scaled[-1] = path.length_mm
-    return scaled
 
 
 def load_of(part: SurveyedRegion, travelled: Travelled) -> Load:

@@ -12,7 +12,7 @@ from shapegcode.budget import Budget
 from shapegcode.compensation import read_for_conversion, require_decision
 from shapegcode.converter import Conversion, convert, marked_out_of_tolerance
 from shapegcode.machine import Machine
-from shapegcode.milling.feed_report import RegionLoad, feed_report, load_of, scaled_stations
+from shapegcode.milling.feed_report import RegionLoad, feed_report, load_of
 from shapegcode.milling.schedule import MARGIN, FeedSchedule, schedule_survey
 from shapegcode.milling.stock_file import Stock
 from shapegcode.milling.survey import survey
@@ -114,13 +114,13 @@ def _measured(planned: FeedSchedule, conversion: Conversion, machine: Machine, m
             loads.append(load)
             continue
         window_s = 60.0 / (part.tool.tool.flutes * part.spindle_rev_per_min)
-        stations = scaled_stations(load.s_mm, region.path)
+        along = part.region.path
         place = placed.get(id(region))
         if place is None:
-            travelled = ordinary.travel(region.path, stations, window_s)
+            travelled = ordinary.travel(region.path, along, load.s_mm, window_s)
         else:
             blocks = conversion.emitted.core.cutting_path(place.first_line, place.last_line)
-            travelled = travel_emitted(blocks, region.path, machine, stations, window_s)
+            travelled = travel_emitted(blocks, along, machine, load.s_mm, window_s)
         loads.append(replace(load, after=load_of(part, travelled)))
     report = feed_report(planned.survey, planned.plans, loads, machine, margin)
     times = conversion.report["cycle_time_s"]

@@ -28,6 +28,7 @@ __all__ = ["Measured", "TaperResult", "fit_taper"]
 Array = npt.NDArray[np.float64]
 
 _BINS_PER_PASS = 60
+_FEWEST_TURNS = 4
 _ROUNDS = 2
 #: Standard error of the place of the tool, found from entry and exit, in feeds per revolution.
 _PLACE = 0.25
@@ -126,6 +127,7 @@ class _Rows:
     feed: float | Array
     speed: float
     force_n: Array
+    torque_nm: Array | None
     revolutions: float
 
 
@@ -200,41 +202,39 @@ def _of_means(cut: TestCut, measuring: MeasuringPass, record: ForceRecord) -> _R
                 f"{record.file}: a radial depth of {depth[wrong[0]]:g} mm: must be above 0 and below the diameter, "
                 f"{cut.tool.diameter_mm:g} mm"
             )
-        met, x, force = (
-            straight_engagement(cut.tool, depth, up=cut.milling == "up"),
-            np.full(len(depth), np.nan),
-            record.force_n,
-        )
-        displaced = met
+        row = np.ones(len(depth), dtype=bool)
+        met = straight_engagement(cut.tool, depth, up=cut.milling == "up")
+        x = np.full(len(depth), np.nan)
     else:
         if record.position_mm is None:
             raise ArgumentError(
                 f"{record.file}: means over time do not tell where they were taken: needed is position_mm or "
                 "radial_depth_mm"
             )
-        full = fully_engaged(cut, measuring, record.position_mm)
-        x, force = record.position_mm[full], record.force_n[full]
-        met = displaced = engagement(cut, measuring, x)
-    feed: float | Array = measuring.feed_mm_per_min
-    if record.feed_mm_per_min is not None:
-        feed = record.feed_mm_per_min if record.radial_depth_mm is not None else record.feed_mm_per_min[full]
-    return _Rows(met, displaced, x, feed, cut.spindle_rev_per_min, force, 1.0)
+        row = fully_engaged(cut, measuring, record.position_mm)
+        x = record.position_mm[row]
+        met = engagement(cut, measuring, x)
+    feed = measuring.feed_mm_per_min if record.feed_mm_per_min is None else record.feed_mm_per_min[row]
+    torque = None if record.torque_nm is None else np.abs(record.torque_nm[row])
+    return _Rows(met, met, x, feed, cut.spindle_rev_per_min, record.force_n[row], torque, 1.0)
 
 
 def _of_revolutions(cut: TestCut, measuring: MeasuringPass, found: Revolutions) -> _Rows:
     """Means over some revolutions each, chatter left out."""
     margin = 2.0 * found.feed_mm_per_min / found.spindle_rev_per_min
     kept = np.flatnonzero(fully_engaged(cut, measuring, found.x_mm, margin) & ~found.chatter)
-    if kept.size < 4:
+    if kept.size < _FEWEST_TURNS:
         raise ArgumentError(f"{found.source}: {kept.size} revolutions in full engagement: too few")
     many = max(1, kept.size // _BINS_PER_PASS)
-    count = kept.size // many
-    kept = kept[: count * many]
-    x = found.x_mm[kept].reshape(count, many).mean(axis=1)
-    force = found.mean_n[kept].reshape(count, many, 2).mean(axis=1)
+    # A bin holds neighbours only: none goes across what was left out.
+    runs = np.split(kept, np.flatnonzero(np.diff(kept) > 1) + 1)
+    bins = np.vstack([run[: len(run) // many * many].reshape(-1, many) for run in runs])
+    x = found.x_mm[bins].mean(axis=1)
     met = engagement(cut, measuring, x)
     displaced = engagement(cut, measuring, x + _PLACE * found.feed_mm_per_min / found.spindle_rev_per_min)
-    return _Rows(met, displaced, x, found.feed_mm_per_min, found.spindle_rev_per_min, force, float(many))
+    force = found.mean_n[bins].mean(axis=1)
+    torque = None if found.torque_nm is None else found.torque_nm[bins].mean(axis=1)
+    return _Rows(met, displaced, x, found.feed_mm_per_min, found.spindle_rev_per_min, force, torque, float(many))
 
 
 def _stretches(found: Revolutions) -> list[tuple[float, float]]:
@@ -251,6 +251,8 @@ def _joined(rows: Sequence[_Rows]) -> MeanForces:
         )
         for engaged in ([each.met for each in rows], [each.displaced for each in rows])
     )
+    # A torque that only some of the files have does not help the others.
+    torques = [each.torque_nm for each in rows if each.torque_nm is not None]
     return MeanForces(
         met,
         np.concatenate([np.broadcast_to(each.feed, size) for each, size in zip(rows, sizes, strict=True)]),
@@ -259,4 +261,5 @@ def _joined(rows: Sequence[_Rows]) -> MeanForces:
         np.repeat([each.revolutions for each in rows], sizes),
         np.repeat(np.arange(len(rows)), sizes),
         displaced,
+        np.concatenate(torques) if len(torques) == len(rows) else None,
     )

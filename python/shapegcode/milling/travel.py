@@ -45,8 +45,8 @@ class Motion(Protocol):
     def reach_s(self) -> float:
         """Time by which the travel lags behind a change of the commanded feed."""
 
-    def travel(self, path: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
-        """Travel along a path; stations ascend to its length, feeds are taken over the window."""
+    def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
+        """Travel of a path made of `along`, to whose length the stations ascend; feeds are over the window."""
 
 
 class OrdinaryMotion:
@@ -61,14 +61,16 @@ class OrdinaryMotion:
         """Half of what the filters behind the interpolation last."""
         return 0.5 * self._model.period_s * sum(filter_.duration_samples for filter_ in self._filters)
 
-    def travel(self, path: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
+    def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
         """See `Motion`."""
         model = self._model
         if model.motion == _core.MotionKind.look_ahead:
             profile = _core.plan_speed(path, model.limits)
-            return Travelled.of(_core.travel_path(path, profile, stations_mm, model.period_s, self._filters, window_s))
+            return Travelled.of(
+                _core.travel_path(path, profile, along, stations_mm, model.period_s, self._filters, window_s)
+            )
         return Travelled.of(
-            _core.travel_blocks(path, path, model.block_end, stations_mm, model.period_s, self._filters, window_s)
+            _core.travel_blocks(path, along, model.block_end, stations_mm, model.period_s, self._filters, window_s)
         )
 
 
@@ -93,10 +95,12 @@ class ShapedMotion:
         """Half of what shaper and filters last."""
         return 0.5 * self._period_s * sum(filter_.duration_samples for filter_ in self._filters)
 
-    def travel(self, path: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
+    def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
         """See `Motion`."""
         profile = _core.plan_speed(path, self._limits)
-        return Travelled.of(_core.travel_path(path, profile, stations_mm, self._period_s, self._filters, window_s))
+        return Travelled.of(
+            _core.travel_path(path, profile, along, stations_mm, self._period_s, self._filters, window_s)
+        )
 
 
 def travel_emitted(

@@ -54,9 +54,10 @@ class Material {
   /// Memory in use.
   [[nodiscard]] std::size_t bytes() const noexcept;
 
-  /// Takes away what a tool sweeps on a step in one layer; see MaterialLayer::remove. Throws Error(argument) where that
-  /// needs more memory than the limit.
-  void remove(std::size_t layer, const ToolStep& step, double tool_radius_mm, bool continues);
+  /// Takes away what a tool sweeps on a step in one layer; see MaterialLayer::remove. What is taken from a layer must
+  /// be taken from all above as well: `sweep` relies on it. Throws Error(argument) where that needs more memory than
+  /// the limit.
+  bool remove(std::size_t layer, const ToolStep& step, double tool_radius_mm, bool continues);
 
   /// Gives back the memory of what is uniform by now.
   void compact();
@@ -65,7 +66,6 @@ class Material {
 
  private:
   void check_memory(std::size_t needed) const;
-  void plan_compaction();
 
   std::vector<double> borders_;
   std::vector<double> middles_;
@@ -73,8 +73,7 @@ class Material {
   Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
   Eigen::Vector2d high_ = Eigen::Vector2d::Zero();
   std::size_t memory_limit_;
-  std::size_t tiles_ = 0;             // that carry values, of all layers
-  std::size_t compact_at_tiles_ = 0;  // look for uniform ones
+  std::size_t tiles_ = 0;  // that carry values, of all layers
 };
 
 /// Heights between layers for these paths in a stock from `bottom_mm` to `top_mm`: the heights at which the tool moves

@@ -33,8 +33,9 @@ class MaterialLayer {
   [[nodiscard]] bool is_empty_around(double x_mm, double y_mm, double radius_mm) const noexcept;
 
   /// Takes away what a tool of this radius sweeps on a step. `continues`: the disc at the step's start was swept
-  /// before, so that only what lies ahead of it is looked at. Returns how many tiles got values of their own.
-  std::size_t remove(const ToolStep& step, double tool_radius_mm, bool continues);
+  /// before, so that only what lies ahead of it is looked at. Returns whether any distance changed by more than
+  /// rounding.
+  bool remove(const ToolStep& step, double tool_radius_mm, bool continues);
 
   /// Whether any node is in material.
   [[nodiscard]] bool has_material() const noexcept;
@@ -66,8 +67,8 @@ class MaterialLayer {
 
   struct Sweep;
 
-  void remove_in_row(const Sweep& sweep, std::int64_t j);
-  void remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_t first, std::int64_t last);
+  bool remove_in_row(const Sweep& sweep, std::int64_t j);
+  bool remove_nodes(const Sweep& sweep, std::int64_t j, std::int64_t first, std::int64_t last);
   void fill(std::span<const Ring> rings);
   [[nodiscard]] double node(std::int64_t i, std::int64_t j) const noexcept;
   [[nodiscard]] double x_of(std::int64_t i) const noexcept { return x0_ + spacing_ * static_cast<double>(i); }
@@ -83,6 +84,7 @@ class MaterialLayer {
   std::vector<std::int32_t> index_;  // into pool_, or a flag
   std::deque<Tile> pool_;
   std::vector<std::int32_t> free_;
+  std::size_t compact_at_tiles_ = 0;
 };
 
 }  // namespace shapegcode

@@ -27,15 +27,15 @@ struct Travel {
   double duration_s = 0.0;               ///< until the set-points rest
 };
 
-/// A path under a speed profile (a controller with look-ahead), its set-points behind the filters followed along the
-/// path. `stations_mm` ascend from above 0 to the path's length. Throws Error(argument) on stations that do not, a
-/// period <= 0 or a window < 0.
+/// A path under a speed profile (a controller with look-ahead), its set-points behind the filters followed along
+/// `along`: the same path, or one of which it is made. `stations_mm` ascend from above 0 to the length of `along`.
+/// Throws Error(argument) on stations that do not, a period <= 0 or a window < 0.
 [[nodiscard]] Travel travel_path(const std::shared_ptr<const Path>& path,
-                                 const std::shared_ptr<const SpeedProfile>& profile,
+                                 const std::shared_ptr<const SpeedProfile>& profile, const Path& along,
                                  std::span<const double> stations_mm, const TravelOptions& options);
 
-/// Blocks at their feed (a controller without look-ahead), followed along `path`, of which they are made.
-[[nodiscard]] Travel travel_blocks(std::span<const Segment> blocks, const Path& path, BlockEnd block_end,
+/// Blocks at their feed (a controller without look-ahead), followed along `along`, of which they are made.
+[[nodiscard]] Travel travel_blocks(std::span<const Segment> blocks, const Path& along, BlockEnd block_end,
                                    std::span<const double> stations_mm, const TravelOptions& options);
 
 }  // namespace shapegcode
