@@ -134,7 +134,7 @@ def _peaks(part: SurveyedRegion, machine: Machine) -> Vector:
 def _run(path: _core.Path, stations: Vector, part: SurveyedRegion, machine: Machine) -> Vector:
     assert part.tool is not None
     window_s = 60.0 / (part.tool.tool.flutes * part.spindle_rev_per_min)
-    return OrdinaryMotion(machine).travel(path, stations, window_s).feed_mm_per_min
+    return OrdinaryMotion(machine).travel(path, path, stations, window_s).feed_mm_per_min
 
 
 def _brute_force(written: Program, machine: Machine, tool: Tool, stock: Stock, samples: int) -> dict[str, Any]:
