@@ -83,6 +83,7 @@ bench: package dev
 	$(BIN)/python tests/benchmarks/identification.py
 	$(BIN)/python tests/benchmarks/engagement.py
 	$(BIN)/python tests/benchmarks/simulate_program.py
+	$(BIN)/python tests/benchmarks/feed_schedule.py
 	$(BIN)/python tests/benchmarks/milling_force.py
 
 # New inputs go to build/, so that the kept corpus grows only by `fuzz-merge`, which adds what covers more.

@@ -11,9 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
-from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.milling.corner_study import (
     ALLOWANCE_MM,
@@ -101,7 +99,7 @@ def _figures(study: CornerStudy) -> dict[str, Any]:
         },
         "radial_depth_ratio": deepest.radial_depth_mm / _DIAMETER_MM,
         "angle_deg": math.degrees(deepest.turned_rad),
-        "allowance_for_paper_jump_mm": _allowance_for(case.rough_radius_mm, case.finish_radius_mm),
+        "full_circle_radial_depth_mm": _full_circle_mm(case.rough_radius_mm, case.finish_radius_mm),
         "blocks": {"number": len(blocks), "length_mm": {"min": float(blocks.min()), "max": float(blocks.max())}},
         "feed_mm_per_min": {"min": float(after.feed_mm_per_min.min()), "max": float(after.feed_mm_per_min.max())},
         "resultant_force_n": {"before": programmed.figures(length), "after": after.figures(length)},
@@ -132,16 +130,18 @@ def _figures(study: CornerStudy) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _allowance_for(rough_mm: float, finish_mm: float) -> float | None:
-    """Allowance with which the radial depth at the vertex would be the paper's 0.9 D; None: the corner has none."""
+def _full_circle_mm(rough_mm: float, finish_mm: float) -> float | None:
+    """Radial depth at the vertex if the rough corner were a whole circle, not an arc; None: no vertex."""
     if finish_mm > TOOL_RADIUS_MM:
         return None
-
-    def too_deep(allowance: float) -> float:
-        cut = _core.CornerCut(TOOL_RADIUS_MM, rough_mm, finish_mm, allowance)
-        return cut.at(cut.before_mm).radial_depth_mm - _PAPER_JUMP * _DIAMETER_MM
-
-    return float(brentq(too_deep, ALLOWANCE_MM, 0.5 * TOOL_RADIUS_MM, xtol=1e-6))
+    tool = np.array([-TOOL_RADIUS_MM, TOOL_RADIUS_MM])
+    rough = np.array([-1.0, 1.0]) * (rough_mm + ALLOWANCE_MM)
+    apart = float(np.hypot(*(rough - tool)))
+    towards = (rough - tool) / apart
+    along = (apart**2 + TOOL_RADIUS_MM**2 - rough_mm**2) / (2.0 * apart)
+    across = math.sqrt(TOOL_RADIUS_MM**2 - along**2)
+    # The upper of the two points where the circles meet; the wall is the X axis.
+    return float(tool[1] + along * towards[1] + across * abs(towards[0]))
 
 
 def _largest_wall_um(study: CornerStudy, along: AlongCorner) -> float:
@@ -197,11 +197,16 @@ def _first_rows(of: dict[str, Any]) -> list[dict[str, Any]]:
 def _jump_rows(of: dict[str, Any]) -> list[dict[str, Any]]:
     """Cases 2 and 3, whose path has a vertex."""
     number, depth, feed = of["case"], of["radial_depth_mm"], of["feed_mm_per_min"]
+    circle = of["full_circle_radial_depth_mm"] / _DIAMETER_MM
+    reason = (
+        f"{circle:.2f} D is where the tool meets the full circle of the rough corner, behind the end of its arc"
+        if circle > of["radial_depth_ratio"] + 1e-6
+        else "the paper gives one number for both cases"
+    )
     return [
         _row(
-            number, "jump of the radial depth", "0.9 D", f"{of['radial_depth_ratio']:.2f} D", False,
-            f"{_DIFFERS}: {depth['max']:.2f} mm before the vertex, {depth['behind']:.2f} mm behind it; 0.9 D would "
-            f"need an allowance of {of['allowance_for_paper_jump_mm']:.2f} mm",
+            number, "jump of the radial depth", f"{_PAPER_JUMP:g} D", f"{of['radial_depth_ratio']:.2f} D", False,
+            f"{_DIFFERS}: {depth['max']:.2f} mm before the vertex, {depth['behind']:.2f} mm behind it; {reason}",
         ),
         _row(
             number, "feeds by equation 7 with the mean resultant, mm/min", "(none)",

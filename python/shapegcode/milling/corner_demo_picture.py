@@ -12,7 +12,7 @@ import numpy.typing as npt
 from shapegcode import canvas
 from shapegcode.milling.corner_demo import CornerDemo
 from shapegcode.milling.corner_study import AXIAL_DEPTH_MM, STRAIGHT_MM, TOOL_RADIUS_MM, AlongCorner, CornerStudy
-from shapegcode.milling.feed_picture import plot_walls
+from shapegcode.milling.feed_picture import wall_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -191,8 +191,10 @@ def plot_surface(file: str | Path, study: CornerStudy) -> None:
     maps = {name: study.wall_error_um(along, _EVERY, height)[inside] for name, along in study.feeds}
     drawn = place[inside]
     edges = np.append(drawn, 2.0 * drawn[-1] - drawn[-2])
-    title = "Form error of the wall (figures 11 and 12); +: material is left standing"
-    plot_walls(file, edges, height, maps, title, _title(study))
+    figure, last = wall_figure(edges, height, maps, _COLOURS)
+    last.set_xlabel(_DISTANCE)
+    canvas.heading(figure, "Form error of the wall (figures 11 and 12); +: material is left standing", _title(study))
+    canvas.save(figure, file)
 
 
 def plot_scheduled(file: str | Path, studies: tuple[CornerStudy, ...]) -> None:

@@ -14,7 +14,6 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.milling.feed_plan import tool_beam
-from shapegcode.milling.feed_report import scaled_stations
 from shapegcode.milling.schedule import FeedSchedule, schedule_feed
 from shapegcode.milling.stock_file import Stock
 from shapegcode.milling.tool_file import Tool
@@ -258,16 +257,16 @@ def _scheduled(
     stations = np.asarray(track.s_mm)
     motion = OrdinaryMotion(machine)
 
-    def run(program: bytes | str) -> tuple[Vector, float]:
-        path = Program.from_text(program, machine, source=_source(case), emitted=True).regions[0].path
-        travelled = motion.travel(path, scaled_stations(stations, path), window_s)
+    def run(program: Program) -> tuple[Vector, float]:
+        path = program.regions[0].path
+        travelled = motion.travel(path, cut.path(1.0), stations, window_s)
         return travelled.feed_mm_per_min, float(travelled.time_s.sum())
 
-    feeds, time_s = run(result.text)
+    feeds, time_s = run(result.written)
     limits = _core.FeedLimits(peak_resultant_n=target_n)
     constant = float(np.min(_core.largest_feeds(force, track, limits, *_FEEDS_MM_PER_MIN)[0]))
     constant = math.floor(10.0 * constant) / 10.0  # as it can be written
-    _, constant_s = run(corner_program(case, cut, constant))
+    _, constant_s = run(Program.from_text(corner_program(case, cut, constant), machine, source=_source(case)))
     return Scheduled(result, text, _along(force, track, feeds), time_s, constant, constant_s)
 
 

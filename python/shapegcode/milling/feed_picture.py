@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +15,9 @@ from shapegcode.milling.schedule import FeedSchedule
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-__all__ = ["plot_along_path", "plot_path", "plot_surface", "plot_walls", "write_feed_pictures"]
+__all__ = ["plot_along_path", "plot_path", "plot_surface", "wall_figure", "write_feed_pictures"]
 
 Vector = npt.NDArray[np.float64]
 
@@ -25,7 +26,10 @@ _LIMIT = "#000000"
 _BANDS = 1500
 _PIECES = 20000
 _LOGARITHMIC = 8.0  # ratio of the largest feed to the least in material from which on the axis is logarithmic
+_MINOR = "235"  # first digits of the numbers that a logarithmic axis shows between powers of ten
 _AIR_MM2 = 1e-9
+_STACKED = 1.9  # width over height of the part from which on the two paths stand below each other
+_MARGIN = 0.03  # around the part, of its longer side
 _GROUND = 300  # cells of the ground along the longer side
 _LOADS = (
     ("peak_resultant_n", "resultant, peak\nin N", "N"),
@@ -130,6 +134,7 @@ def _feed_axis(panel: Axes, feeds: Vector) -> None:
         panel.set_yscale("log")
         panel.set_ylim(0.7 * least, 1.4 * largest)
         panel.yaxis.set_major_formatter("{x:g}")
+        panel.yaxis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:g}"[0] in _MINOR else "")
     else:
         panel.set_ylim(0.0, 1.08 * largest)
     panel.set_ylabel("feed\nin mm/min")
@@ -182,8 +187,10 @@ def plot_path(file: str | Path, traces: FeedTraces, material: _core.Material, pa
     lines, first = _pieces(traces)
     low, high = (each(traces.xy_mm, axis=0) for each in (np.min, np.max))
     low, high = np.minimum(low, material.low_mm), np.maximum(high, material.high_mm)
-    size = np.maximum(high - low, 1e-3)
-    wide = bool(size[0] > 1.3 * size[1])
+    margin = _MARGIN * max(float((high - low).max()), 1e-3)
+    low, high = low - margin, high + margin
+    size = high - low
+    wide = bool(size[0] > _STACKED * size[1])
     ratio = float(np.clip(size[1] / size[0], 0.25, 3.0))
     figure = canvas.figure(9.5, 2.0 + 2 * 8.0 * ratio) if wide else canvas.figure(12.0, 1.2 + 4.9 * ratio)
     grid: Any = figure.subplots(2 if wide else 1, 1 if wide else 2, sharex=True, sharey=True, squeeze=False)
@@ -198,12 +205,12 @@ def plot_path(file: str | Path, traces: FeedTraces, material: _core.Material, pa
         order, empty = order[force[order] >= 0.0], order[force[order] < 0.0]
         panel.add_collection(LineCollection(list(lines[empty]), colors=canvas.GREY, linewidths=0.7, rasterized=True))
         coloured = LineCollection(
-            lines[order], array=force[order], cmap="plasma_r", norm=norm, linewidths=2.2, rasterized=True,
+            list(lines[order]), array=force[order], cmap="plasma_r", norm=norm, linewidths=2.2, rasterized=True,
             capstyle="round",
         )  # fmt: skip
         panel.add_collection(coloured)
-        panel.set_xlim(low[0] - 0.03 * size.max(), high[0] + 0.03 * size.max())
-        panel.set_ylim(low[1] - 0.03 * size.max(), high[1] + 0.03 * size.max())
+        panel.set_xlim(low[0], high[0])
+        panel.set_ylim(low[1], high[1])
         panel.set_aspect("equal")
         panel.set_title(
             f"{when}: up to {max(float(values['peak_resultant_n'].max()), 0.0):.3g} N", loc="left", fontsize=10
@@ -261,20 +268,27 @@ def plot_surface(file: str | Path, walls: WallMaps, part: str) -> None:
         ValueError: a wrong ending.
         OSError: the file cannot be written.
     """
-    plot_walls(
-        file, walls.edges_mm, walls.height_mm, {"before": walls.before, "after": walls.after},
-        "Form error of the wall; +: material is left standing", part,
-    )  # fmt: skip
+    figure, last = wall_figure(
+        walls.edges_mm, walls.height_mm, {"before": walls.before, "after": walls.after}, (_BEFORE, _AFTER)
+    )
+    last.set_xlabel("distance along the cutting path in mm")
+    canvas.heading(figure, "Form error of the wall; +: material is left standing", part)
+    canvas.save(figure, file)
 
 
-def plot_walls(
-    file: str | Path, edges_mm: Vector, height_mm: Vector, maps: dict[str, Vector], title: str, part: str
-) -> None:
-    """Maps of the wall's error, µm, (columns, heights), below each other in one scale, and the largest per column.
+def wall_figure(
+    edges_mm: Vector, height_mm: Vector, maps: Mapping[str, Vector], colours: Sequence[str]
+) -> tuple[Figure, Axes]:
+    """Maps of the wall's error below each other in one scale, and in the last panel the largest of each column.
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Args:
+        edges_mm: of the columns, (m + 1,).
+        height_mm: above the tip, evenly spaced, (h,).
+        maps: error in µm by name, (m, h); NaN: no wall.
+        colours: of their curves in the last panel.
+
+    Returns:
+        The picture without its title, and its last panel.
     """
     everything = np.concatenate([each[np.isfinite(each)] for each in maps.values()])
     low, high = min(float(everything.min()), 0.0), max(float(everything.max()), 0.0)
@@ -295,18 +309,17 @@ def plot_walls(
         panel.set_title(f"{name}: up to {worst:.3g} µm", loc="left", fontsize=10)
     figure.colorbar(mesh, ax=grid[:-1], pad=0.01, label="error of the wall in µm")
     last = grid[-1]
-    for (name, values), colour in zip(maps.items(), (_BEFORE, _AFTER, canvas.COLOURS[2]), strict=False):
+    for (name, values), colour in zip(maps.items(), colours, strict=True):
         made = np.isfinite(values).any(axis=1)
         largest = np.full(len(values), np.nan)
         largest[made] = np.nanmax(np.abs(values[made]), axis=1)
         last.stairs(largest, edges_mm, baseline=None, color=colour, linewidth=1.1, label=name)
     last.set_ylim(bottom=0.0)
     last.grid(True, color="#e4e4e4", linewidth=0.6)
+    last.set_axisbelow(True)
     last.spines[["top", "right"]].set_visible(False)
     last.margins(x=0.0)
     last.set_ylabel("largest over\nthe height in µm")
-    last.set_xlabel("distance along the cutting path in mm")
     canvas.legend_above(last)
-    canvas.heading(figure, title, part)
     figure.align_ylabels(grid)
-    canvas.save(figure, file)
+    return figure, last

@@ -146,6 +146,8 @@ def envelope(values: Vector, starts: npt.NDArray[np.intp]) -> tuple[Vector, Vect
 class WallMaps:
     """Form error of the wall over distance and height, µm: + material is left standing.
 
+    Of the two walls of a slot it is that to the right of the feed.
+
     Attributes:
         edges_mm: of the columns, along the cutting path, (m + 1,).
         height_mm: above the tip, (h,).
@@ -185,7 +187,7 @@ def wall_maps(result: FeedSchedule, traces: FeedTraces) -> WallMaps | None:
                 continue
             for when, table in maps.items():
                 feed = float(traces.feed_mm_per_min[when][chosen[row]])
-                table[row, inside] = _larger(force, beam, arcs, feed, height[inside])
+                table[row, inside] = _wall(force, beam, arcs, feed, height[inside])
     if not np.isfinite(maps["before"]).any():
         return None
     edges = np.append(traces.distance_mm[starts] - traces.length_mm[starts], traces.distance_mm[-1])
@@ -199,12 +201,10 @@ def _reach(parts: list[tuple[SurveyedRegion, FeedPlan | None, RegionLoad]]) -> t
     return (float(cut[:, 0].min()), float(cut[:, 1].max())) if len(cut) else (0.0, 1.0)
 
 
-def _larger(force: _core.MillingForce, beam: _core.ToolBeam, arcs: Vector, feed: float, height: Vector) -> Vector:
-    """Error of the wall that is made; in a slot, of the two that which is off by more."""
-    right, left = (
-        np.asarray(_core.wall_error_um(force, beam, arcs, feed, side, height))
-        for side in (_core.WallSide.right, _core.WallSide.left)
-    )
-    use_left = np.isnan(right) | (np.abs(left) > np.abs(right))
-    larger: Vector = np.where(use_left & ~np.isnan(left), left, right)
-    return larger
+def _wall(force: _core.MillingForce, beam: _core.ToolBeam, arcs: Vector, feed: float, height: Vector) -> Vector:
+    """Error of the wall to the right of the feed, or of that to the left where only that is made."""
+    for side in (_core.WallSide.right, _core.WallSide.left):
+        error = np.asarray(_core.wall_error_um(force, beam, arcs, feed, side, height))
+        if np.isfinite(error).any():
+            break
+    return error

@@ -1,0 +1,305 @@
+"""What a feed schedule reaches, and what it costs: `python tests/benchmarks/feed_schedule.py [--json FILE] [--quick]`.
+
+Corner case 1 of paper 001 with 30 mm of straight before and behind it, and a pocket (tests/golden/feed): peak resultant
+against the limit, at another resolution and by brute force too (cut_by_points.py), share of the path near the limit,
+time against the constant feed that keeps the same limit. Then the speed of engagement and force over the number of
+blocks. Exit code 1 if a figure misses its target.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from cut_by_points import Block, Cutter, Vector, engaged, peak_resultant_n
+from table import markdown
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.milling.corner_study import CASES, study_corner
+from shapegcode.milling.feed_plan import limits_of, milling_force
+from shapegcode.milling.schedule import FeedSchedule, schedule_feed
+from shapegcode.milling.stock_file import Stock
+from shapegcode.milling.survey import SurveyedRegion, survey
+from shapegcode.milling.tool_file import Tool
+from shapegcode.milling.travel import OrdinaryMotion
+from shapegcode.program import Program
+from shapegcode.timing import cycle_time
+
+FEED = Path(__file__).resolve().parents[1] / "golden" / "feed"
+POINT_MM = 0.02
+SLICE_MM = 1.0
+SAMPLES = 150
+LEVEL_MM, ROW_MM, BLOCK_MM = 1.0, 3.2, 0.5
+LARGEST_S = 10.0
+
+
+def corner(machine: Machine) -> dict[str, Any]:
+    """The paper's corner."""
+    study = study_corner(CASES[0], machine)
+    scheduled, target = study.scheduled, float(study.programmed.peak_n[0])
+    return {
+        "limit_n": target,
+        "peak_n": float(scheduled.result.report["resultant_force_n"]["after"]["max"]),
+        "finer_peak_n": float(scheduled.along.peak_n.max()),
+        "share_within_5_percent": study.share_within(),
+        "time_s": scheduled.time_s,
+        "constant_feed_mm_per_min": scheduled.constant_feed_mm_per_min,
+        "constant_time_s": scheduled.constant_time_s,
+        "gain_percent": 100.0 * scheduled.gain,
+    }
+
+
+def pocket(machine: Machine, samples: int) -> dict[str, Any]:
+    """The pocket: two levels with sharp inner corners, slots and air moves, then the walls."""
+    tool, stock = Tool.load(FEED / "pocket_tool.toml"), Stock.load(FEED / "pocket_stock.toml")
+    program = Program.read(FEED / "POCKET.NC", machine)
+    result = schedule_feed(program, machine, tool, stock)
+    limit = float(tool.limits.resultant_n or np.inf)
+    written = result.written
+    constant = _constant_feed(result, tool, machine)
+    text = re.sub(r"F1500\.", f"F{constant:.1f}", (FEED / "POCKET.NC").read_text(encoding="ascii"))
+    times = [cycle_time(each, machine).total_s for each in (written, Program.from_text(text, machine))]
+    return {
+        "limit_n": limit,
+        "peak_n": float(result.report["resultant_force_n"]["after"]["max"]),
+        "programmed_peak_n": float(result.report["resultant_force_n"]["before"]["max"]),
+        **_finer(written, machine, tool, stock),
+        **_brute_force(written, machine, tool, stock, samples),
+        **_shares(result, limit),
+        "time_s": times[0],
+        "constant_feed_mm_per_min": constant,
+        "constant_time_s": times[1],
+        "programmed_time_s": result.report["cycle_time_s"]["before"],
+        "air_time_s": result.report["air_time_s"]["after"],
+        "gain_percent": 100.0 * (1.0 - times[0] / times[1]),
+        "warnings": result.report["warnings"],
+    }
+
+
+def _constant_feed(result: FeedSchedule, tool: Tool, machine: Machine) -> float:
+    """Highest constant feed that keeps the limits, without a margin, on everything that is not left as it was."""
+    highest = np.inf
+    for part, plan in zip(result.survey.regions, result.plans, strict=True):
+        assert plan is not None
+        assert part.track is not None
+        free = np.array([not reason for reason in plan.kept])[np.asarray(part.track.segment)]
+        feeds, _, _ = _core.largest_feeds(
+            milling_force(tool, part),
+            part.track,
+            limits_of(tool, machine, 0.0),
+            1.0,
+            machine.axes.x.max_feed_mm_per_min,
+        )
+        highest = min(highest, float(feeds[free].min()))
+    return float(np.floor(10.0 * highest) / 10.0)
+
+
+def _shares(result: FeedSchedule, limit: float) -> dict[str, float]:
+    """Of the path in material: near the limit, and held by the chip or left as it was instead."""
+    total = near = otherwise = 0.0
+    for part, plan, load in zip(result.survey.regions, result.plans, result.loads, strict=True):
+        assert plan is not None
+        assert load is not None
+        assert part.track is not None
+        length = np.diff(load.s_mm, prepend=0.0)
+        material = load.after.peak_resultant_n > 0.0
+        close = load.after.peak_resultant_n >= 0.95 * limit
+        total += float(length[material].sum())
+        near += float(length[material & close].sum())
+        otherwise += float(length[material & ~close & (plan.holds != "resultant")].sum())
+    return {"share_within_5_percent": near / total, "share_held_otherwise": otherwise / total}
+
+
+def _finer(written: Program, machine: Machine, tool: Tool, stock: Stock) -> dict[str, Any]:
+    """The written program swept anew through a grid of half the width; its stations are its own."""
+    swept = survey(written, machine, [tool], stock, resolution_mm=0.005 * tool.tool.diameter_mm)
+    peaks = [float(_peaks(part, machine).max()) for part in swept.regions]
+    return {"finer_peak_n": max(peaks)}
+
+
+def _peaks(part: SurveyedRegion, machine: Machine) -> Vector:
+    assert part.tool is not None
+    assert part.track is not None
+    feeds = _run(part.region.path, np.asarray(part.track.s_mm), part, machine)
+    return np.asarray(milling_force(part.tool, part).figures_of(part.track, feeds)["peak_resultant_n"])
+
+
+def _run(path: _core.Path, stations: Vector, part: SurveyedRegion, machine: Machine) -> Vector:
+    assert part.tool is not None
+    window_s = 60.0 / (part.tool.tool.flutes * part.spindle_rev_per_min)
+    return OrdinaryMotion(machine).travel(path, path, stations, window_s).feed_mm_per_min
+
+
+def _brute_force(written: Program, machine: Machine, tool: Tool, stock: Stock, samples: int) -> dict[str, Any]:
+    """Some stations of the written program: those with the largest peaks, and random ones."""
+    swept = survey(written, machine, [tool], stock)
+    block = stock.box
+    assert block is not None
+    low, high = zip(block.x_mm, block.y_mm, block.z_mm, strict=True)
+    law = tool.coefficients()
+    cutter = Cutter(
+        tool.radius_mm, tool.tool.flutes, np.radians(tool.tool.helix_deg),
+        (law.specific_n_per_mm2, law.specific_exponent), (law.ratio, law.ratio_exponent),
+    )  # fmt: skip
+    random = np.random.default_rng(1)
+    past = np.empty((0, 3))
+    ours: list[float] = []
+    theirs: list[float] = []
+    for part in swept.regions:
+        assert part.track is not None
+        path, stations = part.region.path, np.asarray(part.track.s_mm)
+        peaks = _peaks(part, machine)
+        feeds = _run(path, stations, part, machine)
+        points, ends = _points(path)
+        level = np.flatnonzero((np.asarray(part.track.horizontal) == 1.0) & (peaks > 0.0))
+        share = samples // len(swept.regions)
+        chosen = np.concatenate([level[np.argsort(peaks[level])[-share // 2 :]], random.choice(level, share // 2)])
+        for station in np.unique(chosen):
+            at = max(int(np.searchsorted(ends, stations[station] - 1e-9)), 1)
+            forward = points[at] - points[at - 1]
+            here = points[at] - forward * (ends[at] - stations[station]) / (ends[at] - ends[at - 1])
+            mask = engaged(
+                np.concatenate([past, points[:at]]), here, float(np.arctan2(forward[1], forward[0])), Block(low, high),
+                tool.radius_mm, SLICE_MM,
+            )  # fmt: skip
+            per_tooth = float(feeds[station]) / (cutter.flutes * part.spindle_rev_per_min)
+            theirs.append(peak_resultant_n(mask, cutter, SLICE_MM, per_tooth))
+            ours.append(float(peaks[station]))
+        past = np.concatenate([past, points])
+    difference = np.abs(np.array(ours) - np.array(theirs)) / float(tool.limits.resultant_n or 1.0)
+    return {
+        "brute_force_peak_n": max(theirs),
+        "brute_force_stations": len(theirs),
+        "brute_force_difference": {"median": float(np.median(difference)), "max": float(difference.max())},
+    }
+
+
+def _points(path: _core.Path) -> tuple[Vector, Vector]:
+    """The path as points not farther apart than `POINT_MM`, and how far along each is."""
+    pieces: list[Vector] = [np.array([path.start_mm])]
+    along: list[Vector] = [np.zeros(1)]
+    begin = 0.0
+    for number in range(len(path)):
+        segment = path[number]
+        count = max(int(np.ceil(segment.length_mm / POINT_MM)), 1)
+        steps = segment.length_mm * np.arange(1, count + 1) / count
+        pieces.append(np.array([segment.point_at(step) for step in steps]))
+        along.append(begin + steps)
+        begin += segment.length_mm
+    return np.concatenate(pieces), np.concatenate(along)
+
+
+def long_program(blocks: int) -> str:
+    """A pocket cut in rows, level by level, in blocks of 0.5 mm."""
+    return "\n".join(
+        ["%", "O1", "G21 G17 G90 G94", "M03 S6000", "G00 X10. Y10.", "G00 Z5.", *_rows(blocks), "M30", "%"]
+    )
+
+
+def _rows(blocks: int) -> Iterator[str]:
+    along = np.arange(10.0, 110.0 + 1e-9, BLOCK_MM)
+    across = np.arange(10.0, 60.0, ROW_MM)
+    written, level = 0, 0
+    while True:
+        level += 1
+        yield f"G01 Z{-level * LEVEL_MM:.3f} F300."
+        yield "G01 F1200."
+        for row, y in enumerate(across if level % 2 else across[::-1]):
+            ways = along if (row + level) % 2 else along[::-1]
+            for x in ways:
+                yield f"X{x:.3f} Y{y:.3f}"
+                written += 1
+                if written == blocks:
+                    return
+
+
+def speed(machine: Machine, blocks: int) -> dict[str, float]:
+    """Seconds for the engagement and force of a program of so many blocks; reading it is not in them."""
+    tool = Tool.load(FEED / "pocket_tool.toml")
+    text = long_program(blocks)
+    program = Program.from_text(text, machine, source="long program")
+    paths = [region.path for region in program.regions]
+    levels = [-LEVEL_MM * n for n in range(int(np.ceil(blocks / 3000)) + 1)]
+    stock = Stock.from_toml(
+        f"[box]\nx_mm = [0.0, 120.0]\ny_mm = [0.0, 70.0]\nz_mm = [{levels[-1] - 5.0}, 0.0]\n", "stock", Path()
+    )
+    begin, busy = time.perf_counter(), time.process_time()
+    swept = survey(program, machine, [tool], stock)
+    middle = time.perf_counter()
+    stations = 0
+    for part in swept.regions:
+        assert part.track is not None
+        stations += len(part.track)
+        milling_force(tool, part).figures_of(part.track, np.full(len(part.track), 1200.0))
+    end = time.perf_counter()
+    return {
+        "blocks": sum(len(path) for path in paths),
+        "stations": stations,
+        "engagement_s": middle - begin,
+        "force_s": end - middle,
+        "both_s": end - begin,
+        "processor_s": time.process_time() - busy,
+    }
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--json", type=Path, help="file for all figures")
+    parser.add_argument("--quick", action="store_true", help="fewer stations by brute force, a tenth of the blocks")
+    arguments = parser.parse_args()
+    scale = 10 if arguments.quick else 1
+    machine = Machine.load("vx500")
+    cuts = {"corner": corner(machine), "pocket": pocket(machine, SAMPLES // scale)}
+    speeds = [speed(machine, blocks // scale) for blocks in (25_000, 50_000, 100_000, 200_000)]
+    print(markdown(["what", *cuts], list(_rows_of(cuts))))
+    head = ["blocks", "stations", "engagement s", "force s", "both s", "processor time s", "µs of it per block"]
+    print()
+    print(markdown(head, [_speed_row(row) for row in speeds]))
+    if arguments.json is not None:
+        arguments.json.write_text(json.dumps({**cuts, "speed": speeds}, indent=1) + "\n", encoding="utf-8")
+    missed = [
+        f"{name}: {key}"
+        for name, cut in cuts.items()
+        for key in ("peak_n", "finer_peak_n", "brute_force_peak_n")
+        if cut.get(key, 0.0) > cut["limit_n"]
+    ]
+    missed += [f"{name}: gain" for name, cut in cuts.items() if cut["gain_percent"] < 15.0]
+    missed += ["speed" for row in speeds if row["blocks"] <= 100_100 and row["both_s"] > LARGEST_S]
+    if missed:
+        raise SystemExit("missed: " + ", ".join(missed))
+
+
+def _rows_of(cuts: dict[str, dict[str, Any]]) -> Iterator[list[str]]:
+    def row(what: str, key: str, unit: str, digits: int, scale: float = 1.0) -> list[str]:
+        return [what, *(f"{scale * cut[key]:.{digits}f} {unit}" if key in cut else "" for cut in cuts.values())]
+
+    yield row("limit of the peak resultant", "limit_n", "N", 2)
+    yield row("largest peak, as the schedule reports", "peak_n", "N", 2)
+    yield row("the same on other, finer stations", "finer_peak_n", "N", 2)
+    yield row("the same by brute force", "brute_force_peak_n", "N", 2)
+    yield row("path in material within 5 % of the limit", "share_within_5_percent", "%", 1, 100.0)
+    yield row("path held by something else", "share_held_otherwise", "%", 1, 100.0)
+    yield row("time", "time_s", "s", 2)
+    yield row("constant feed that keeps the limit", "constant_feed_mm_per_min", "mm/min", 1)
+    yield row("time with it", "constant_time_s", "s", 2)
+    yield row("gain", "gain_percent", "%", 1)
+
+
+def _speed_row(row: dict[str, float]) -> list[str]:
+    each = 1e6 * row["processor_s"] / row["blocks"]
+    return [
+        f"{row['blocks']:.0f}", f"{row['stations']:.0f}", f"{row['engagement_s']:.2f}", f"{row['force_s']:.2f}",
+        f"{row['both_s']:.2f}", f"{row['processor_s']:.2f}", f"{each:.1f}",
+    ]  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

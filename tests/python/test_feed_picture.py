@@ -1,0 +1,99 @@
+"""The pictures of a feed schedule: what they draw, and that nothing large is lost in a long program."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shapegcode import _core, canvas
+from shapegcode.machine import Machine
+from shapegcode.milling.feed_picture import write_feed_pictures
+from shapegcode.milling.feed_traces import LOADS, envelope, feed_traces, groups, wall_maps
+from shapegcode.milling.schedule import FeedSchedule, schedule_feed
+from shapegcode.milling.stock_file import Stock
+from shapegcode.milling.tool_file import Tool
+
+FEED = Path(__file__).parents[1] / "golden" / "feed"
+
+
+@pytest.fixture(scope="module")
+def pocket() -> FeedSchedule:
+    return schedule_feed(
+        FEED / "POCKET.NC", Machine.load("vx500"), Tool.load(FEED / "pocket_tool.toml"),
+        Stock.load(FEED / "pocket_stock.toml"), resolution_mm=0.16,
+    )  # fmt: skip
+
+
+def test_groups_hold_every_station_once_and_envelopes_lose_nothing() -> None:
+    random = np.random.default_rng(5)
+    distance = np.cumsum(random.exponential(1.0, 5000))
+    values = random.normal(size=5000)
+    starts = groups(distance, 300)
+    assert starts[0] == 0
+    assert 250 < len(starts) <= 300
+    assert (np.diff(starts) > 0).all()
+    low, high = envelope(values, starts)
+    ends = np.append(starts[1:], 5000)
+    assert [values[a:b].min() for a, b in zip(starts, ends, strict=True)] == low.tolist()
+    assert [values[a:b].max() for a, b in zip(starts, ends, strict=True)] == high.tolist()
+    spans = np.diff(distance[starts])
+    assert spans.max() < 3.0 * distance[-1] / 300 + 10.0
+    assert groups(distance[:200], 300).tolist() == list(range(200))
+
+
+def test_traces_are_those_of_the_regions_in_a_row(pocket: FeedSchedule) -> None:
+    traces = feed_traces(pocket)
+    regions = [part for part in pocket.survey.regions if part.track is not None]
+    assert traces.distance_mm[-1] == pytest.approx(sum(part.region.path.length_mm for part in regions), rel=1e-9)
+    assert traces.length_mm.sum() == pytest.approx(traces.distance_mm[-1], rel=1e-12)
+    assert len(traces.begins) == len(regions) == 3
+    assert traces.xy_mm[traces.begins[1]] == pytest.approx([22.3, 22.3], abs=0.5)
+    feeds = traces.feed_mm_per_min
+    assert set(np.round(feeds["programmed"], 6)) == {300.0, 1500.0, 2000.0}
+    # What is written stands in the text.
+    words = {float(word) for word in re.findall(rb"F([0-9.]+)", pocket.text)}
+    assert set(np.round(feeds["written"], 6)) <= words
+    assert (feeds["after"] <= feeds["written"].max() * (1.0 + 1e-9)).all()
+    assert set(traces.before) == set(traces.after) == set(LOADS)
+    assert (traces.limit["peak_resultant_n"] == 100.0).all()
+    assert np.isinf(traces.limit["mean_power_w"]).all()
+    assert traces.before["peak_resultant_n"].max() > 100.0 >= traces.after["peak_resultant_n"].max()
+
+
+def test_walls_are_those_of_the_core(pocket: FeedSchedule) -> None:
+    traces = feed_traces(pocket)
+    walls = wall_maps(pocket, traces)
+    assert walls is not None
+    assert walls.before.shape == walls.after.shape == (len(walls.edges_mm) - 1, len(walls.height_mm))
+    assert walls.height_mm[-1] == pytest.approx(8.0)
+    assert walls.edges_mm[[0, -1]] == pytest.approx([0.0, traces.distance_mm[-1]])
+    # The finishing pass at the end makes its wall over its whole depth, roughing only over a level's.
+    assert np.isfinite(walls.before[-20]).all()
+    assert np.isnan(walls.before[100]).any()
+    assert np.isfinite(walls.before[100]).any()
+    # Never more than the tip is deflected by at most.
+    assert np.nanmax(np.abs(walls.after)) <= traces.after["peak_deflection_um"].max() * (1.0 + 1e-9)
+
+
+def test_the_files(pocket: FeedSchedule, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(canvas, "FORMATS", (".svg",))
+    files = [Path(name) for name in write_feed_pictures(pocket, tmp_path / "plots")]
+    assert [file.name for file in files] == ["feed-along-path.svg", "feed-path.svg", "feed-surface.svg"]
+    along, path, surface = (file.read_text(encoding="utf-8") for file in files)
+    for words in ("POCKET.NC", "really run", "limit 100 N", "distance along the cutting path in mm"):
+        assert words in along
+    assert "before: up to 124 N" in path
+    assert "after: up to 98.4 N" in path
+    assert "Form error of the wall" in surface
+
+
+def test_without_known_forces_there_are_no_pictures(pocket: FeedSchedule, tmp_path: Path) -> None:
+    unknown = replace(pocket, loads=(None,) * len(pocket.loads))
+    assert write_feed_pictures(unknown, tmp_path / "plots") == []
+    assert not (tmp_path / "plots").exists()
+    with pytest.raises(_core.ArgumentError, match="nothing to draw"):
+        feed_traces(unknown)
