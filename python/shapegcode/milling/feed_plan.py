@@ -28,6 +28,7 @@ __all__ = [
 ]
 
 _ATTEMPTS = 12
+_LONGEST_REACH = 2.0  # of the lag, beyond which waiting longer changes nothing
 _LOWERING = 3  # attempts that only slow down earlier, before feeds are lowered too
 _SAME_DIRECTION = 0.95  # cosine of a turn after which the load is still that of before
 _LEAST_SHARE = 0.9  # of a feed that is lowered once
@@ -42,8 +43,8 @@ _LIMIT_NAMES = np.array(
     dtype="<U16",
 )
 
-PROGRAMMED, AIR, KEPT, MINIMUM = "programmed", "air", "kept", "minimum"
-"""What holds a feed where no limit does: the program, no material, a block that is left alone, the least chip."""
+PROGRAMMED, MAX_FEED, AIR, KEPT, MINIMUM = "programmed", "max_feed", "air", "kept", "minimum"
+"""What holds a feed where no limit does: the program, the largest feed, no material, a block left alone, the least."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +209,8 @@ def _limits_along(
     bound, limit, _ = _core.largest_feeds(
         force, track, limits_of(tool, machine, margin), 1e-3 * float(lowest.min()), highest
     )
-    holds = np.where(bound < ceiling, _LIMIT_NAMES[limit], PROGRAMMED)
+    top = np.where(ceiling > programmed, MAX_FEED, PROGRAMMED)
+    holds = np.where(bound < ceiling, _LIMIT_NAMES[limit], top)
     feeds = np.minimum(bound, ceiling)
     load = np.where(bound < highest, np.maximum(bound, lowest), np.inf)
     low = feeds < lowest
@@ -263,11 +265,13 @@ def _stretches_that_keep(task: _Task, machine: Machine, motion: Motion) -> list[
     most_change = math.inf if control.max_change_mm_per_min is None else control.max_change_mm_per_min
     floor = np.minimum(task.limit, task.lowest)
     planned = np.maximum(_stepped(task.limit, task.programmed[task.segment]), floor)
-    reach = np.full(len(planned), motion.reach_s + task.window_s)
+    before = np.full(len(planned), motion.reach_s + task.window_s)
+    behind = np.full(len(planned), motion.reach_s)
+    longest = _LONGEST_REACH * (motion.reach_s + task.window_s)
     free = task.kept[task.segment] == 0.0
     stretches: list[_core.FeedStretch] = []
     for attempt in range(_ATTEMPTS):
-        feeds = _core.look_ahead_on_load(task.stations_mm, planned, task.load, reach)
+        feeds = _core.look_ahead_on_load(task.stations_mm, planned, task.load, before, behind)
         stretches = _core.schedule_feed(
             task.path.segment_ends_mm, task.kept, task.divisible, task.stations_mm, feeds, control.interval_mm,
             most_change, task.feed_unit,
@@ -278,7 +282,8 @@ def _stretches_that_keep(task: _Task, machine: Machine, motion: Motion) -> list[
         over = free & (run > task.load * (1.0 + _TOO_FAST))
         if not over.any():
             break
-        reach[over] = 1.5 * reach[over] + motion.reach_s / 4.0 + task.window_s
+        for reach in (before, behind):
+            reach[over] = np.minimum(1.5 * reach[over] + task.window_s, longest)
         if attempt >= _LOWERING:
             planned[over] *= np.maximum(task.load[over] / run[over], _LEAST_SHARE)
             planned = np.maximum(planned, floor)
