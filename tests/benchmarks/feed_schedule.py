@@ -34,7 +34,7 @@ from shapegcode.timing import cycle_time
 
 FEED = Path(__file__).resolve().parents[1] / "golden" / "feed"
 POINT_MM = 0.02
-SLICE_MM = 1.0
+SLICE_MM = 0.2
 SAMPLES = 150
 LEVEL_MM, ROW_MM, BLOCK_MM = 1.0, 3.2, 0.5  # of the long program
 BLOCK_MM_LEAST = 0.6
