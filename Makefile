@@ -30,16 +30,13 @@ CPP_FILES := $(shell find cpp bindings tests/cpp tests/fuzz -name '*.[ch]pp')
 # Folders too: their time changes when a file comes or goes.
 PACKAGE_INPUTS := CMakeLists.txt cmake $(shell find cpp/include cpp/src bindings python \
                     -name __pycache__ -prune -o -print)
-# Groups of sources that clang-tidy reads as one: the folders; of gcode, which is large, reader, macros and the rest, and
-# alone what has names in common with others.
-TIDY_READER := $(filter cpp/src/gcode/reader% cpp/src/gcode/rewriter% cpp/src/gcode/move% cpp/src/gcode/interpreter% \
-                 cpp/src/gcode/block% cpp/src/gcode/coord% cpp/src/gcode/control% cpp/src/gcode/offsets%, $(CORE_SOURCES))
-TIDY_MACRO := $(filter cpp/src/gcode/macro%, $(CORE_SOURCES))
-TIDY_ALONE := $(filter cpp/src/gcode/comp% cpp/src/gcode/corner% cpp/src/gcode/cutter%, $(CORE_SOURCES))
-TIDY_REST := $(filter-out $(TIDY_READER) $(TIDY_MACRO) $(TIDY_ALONE), $(filter cpp/src/gcode/%, $(CORE_SOURCES)))
-TIDY_FOLDERS := $(filter-out gcode, $(notdir $(shell find cpp/src -mindepth 1 -maxdepth 1 -type d)))
-TIDY_STAMPS := $(TIDY_FOLDERS:%=build/tidy/%.ok) build/tidy/gcode_reader.ok build/tidy/gcode_macro.ok \
-               build/tidy/gcode_rest.ok build/tidy/mode.ok $(TIDY_ALONE:cpp/src/gcode/%.cpp=build/tidy/gcode_%.ok)
+# Groups of sources that clang-tidy reads as one, of about the same cost; a new folder falls into the last one.
+TIDY_gcode := $(filter cpp/src/gcode/%, $(CORE_SOURCES))
+TIDY_plant := $(filter cpp/src/plant/% cpp/src/identification/% cpp/src/linear_algebra.cpp, $(CORE_SOURCES))
+TIDY_motion := $(filter cpp/src/path/% cpp/src/filter/% cpp/src/motion/% cpp/src/emission/% cpp/src/simulation/%, \
+                 $(CORE_SOURCES))
+TIDY_rest := $(filter-out $(TIDY_gcode) $(TIDY_plant) $(TIDY_motion), $(CORE_SOURCES))
+TIDY_STAMPS := build/tidy/plant.ok build/tidy/rest.ok build/tidy/motion.ok build/tidy/gcode.ok
 
 .PHONY: help demo test lint bench fuzz stubs format clean \
         build-packages test-packages package dev tidy release sanitize stub-check fuzz-parameters fuzz-merge
@@ -171,13 +168,10 @@ build/release/compile_commands.json: CMakeLists.txt CMakePresets.json $(CORE_SOU
 	cmake --preset release
 	touch $@
 
-$(foreach folder, $(TIDY_FOLDERS), \
-  $(eval build/tidy/$(folder).ok: $(filter cpp/src/$(folder)/%, $(CORE_SOURCES))))
-$(foreach source, $(TIDY_ALONE), $(eval $(source:cpp/src/gcode/%.cpp=build/tidy/gcode_%.ok): $(source)))
-build/tidy/gcode_reader.ok: $(TIDY_READER)
-build/tidy/gcode_macro.ok: $(TIDY_MACRO)
-build/tidy/gcode_rest.ok: $(TIDY_REST)
-build/tidy/mode.ok: $(filter-out $(foreach folder, gcode $(TIDY_FOLDERS), cpp/src/$(folder)/%), $(CORE_SOURCES))
+build/tidy/gcode.ok: $(TIDY_gcode)
+build/tidy/plant.ok: $(TIDY_plant)
+build/tidy/motion.ok: $(TIDY_motion)
+build/tidy/rest.ok: $(TIDY_rest)
 $(TIDY_STAMPS): $(CPP_HEADERS) .clang-tidy tests/tools/tidy.sh build/release/compile_commands.json
 	tests/tools/tidy.sh $(@:.ok=.cpp) $(filter cpp/%.cpp, $^)
 	@touch $@

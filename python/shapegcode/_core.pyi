@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -5117,7 +5117,7 @@ class Travel:
     @property
     def highest_mm_per_s(self) -> numpy.ndarray:
         """
-        Largest distance covered within a window, over the window, (n,), mm/s.
+        Largest travel within a window, over the window, (n,), mm/s: what was travelled in the present direction and in XY, as a way along the path.
         """
     @property
     def time_s(self) -> numpy.ndarray:
@@ -5287,6 +5287,10 @@ def fastest_block_ends(blocks: Path) -> list[int]:
     """
     Per axis the block, but for the last, at whose end it is fastest; ascending, each once.
     """
+def feeds_per_minute(program: ProgramText, region: Region) -> bool:
+    """
+    Whether F is a feed per minute in every block of a region, in one unit of length.
+    """
 def fit_blocks(command: ShapedCommand, breaks: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: FitOptions) -> FittedBlocks:
     """
     Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. Raises ArgumentError on a position outside +-99999.999 mm.
@@ -5454,9 +5458,9 @@ def linear_model(parameters: FeedDriveParameters) -> tuple[typing.Annotated[nump
     Raises:
         ArgumentError: The drive is not linear.
     """
-def look_ahead_on_load(stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reach_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+def look_ahead_on_load(stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], load_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reach_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
     """
-    The feeds (n,), mm/min, lowered before each slower station over the way that a controller needs for the change: `reach_s` (n,) times the feed there.
+    The feeds (n,), mm/min, lowered before each station whose load allows less (`load_mm_per_min`, (n,)), over the way that a controller needs for the change: `reach_s` (n,) times the feed there.
     """
 def machine_frame(tool_frame: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], direction_rad: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
     """
@@ -5777,13 +5781,13 @@ def time_program(program: ProgramText, model: ControllerModel, per_block: bool =
     """
     Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in look-ahead. Raises ArgumentError on a model that no controller can have.
     """
-def travel_blocks(blocks: Path, path: Path, block_end: BlockEnd, stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, filters: collections.abc.Sequence[Fir] = [], window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Travel:
+def travel_blocks(blocks: Path, along: Path, block_end: BlockEnd, stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, filters: collections.abc.Sequence[Fir] = [], window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Travel:
     """
-    How blocks at their feed are travelled, followed along `path`; else as travel_path.
+    How blocks at their feed are travelled, followed along `along`; else as travel_path.
     """
-def travel_path(path: Path, profile: SpeedProfile, stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, filters: collections.abc.Sequence[Fir] = [], window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Travel:
+def travel_path(path: Path, profile: SpeedProfile, along: Path, stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], period_s: typing.SupportsFloat | typing.SupportsIndex, filters: collections.abc.Sequence[Fir] = [], window_s: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> Travel:
     """
-    How a path under a speed profile is travelled; `stations_mm` (n,) ascend to its length, `filters` stand behind the set-points, speeds are taken over `window_s`. Raises ArgumentError on stations that do not ascend.
+    How a path under a speed profile is travelled, followed along another one of which it is made, or along itself; `stations_mm` (n,) ascend to the length of that, `filters` stand behind the set-points, speeds are taken over `window_s`. Raises ArgumentError on stations that do not ascend.
     """
 def wall_error_um(force: MillingForce, beam: ToolBeam, arcs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feed_mm_per_min: typing.SupportsFloat | typing.SupportsIndex, side: WallSide, height_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], tolerance_rad: typing.SupportsFloat | typing.SupportsIndex = 0.02) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     """

@@ -136,7 +136,8 @@ TEST_CASE("the load is looked ahead on over the reach of a change") {
   FeedStations stations = even_stations(
       10.0, 0.1, +[](double s) { return s > 5.05 ? 60.0 : 600.0; });
   const std::vector<double> reach(stations.s_mm.size(), 0.05);  // 0.05 s at 10 mm/s: 0.5 mm
-  look_ahead_on_load(stations, stations.feed_mm_per_min, reach);
+  const std::vector<double> load = stations.feed_mm_per_min;
+  look_ahead_on_load(stations, load, reach);
   for (std::size_t i = 0; i < stations.s_mm.size(); ++i) {
     CHECK(stations.feed_mm_per_min[i] == (stations.s_mm[i] > 4.45 ? 60.0 : 600.0));
   }

@@ -73,7 +73,9 @@ bool is_plain(const Word& word) noexcept {
 }
 
 bool divisible(const SourceLine& line, const Block& block, const Segment& segment, const FeedWriterOptions& options) {
-  if (line.count != 1 || block.optional_skip || block.macro || !std::all_of(block.begin(), block.end(), is_plain)) {
+  // Each piece of a block with an exact stop would stop.
+  if (line.count != 1 || segment.stop_at_end || block.optional_skip || block.macro ||
+      !std::all_of(block.begin(), block.end(), is_plain)) {
     return false;
   }
   if (segment.kind == SegmentKind::arc &&
@@ -157,8 +159,17 @@ class Writer {
     ++line_count_;
   }
 
-  // A feed for moves that now say their own.
+  // A feed for moves that now say their own. A block with a position needs its feed even where nothing moves.
   void write_without_move(const SourceLine& line, const Block& block) {
+    const auto is_position = [](const Word& word) { return std::string_view("XYZIJK").find(word.letter) < 6; };
+    if (std::any_of(block.begin(), block.end(), is_position)) {
+      for (const Word& word : block) {
+        modal_feed_ = word.letter == 'F' ? word.value : modal_feed_;
+      }
+      result_.text += line.text;
+      end_line(line);
+      return;
+    }
     const std::size_t before = result_.text.size();
     bool removed = false;
     std::size_t at = 0;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -30,6 +31,7 @@ constexpr double widest_look_rad = 0.05;  // between two looks along the circumf
 constexpr double azimuth_tolerance_rad = 1e-7;
 constexpr double same_azimuth_rad = 1e-4;
 constexpr double least_horizontal = 1e-6;
+constexpr double touching_mm = 1e-6;  // a tip so little below a layer's top stands on it
 constexpr std::size_t samples_between_reports = 1024;
 
 /// A step of the tool with the lowest layer that it cuts.
@@ -153,8 +155,7 @@ class Sweeper {
         area += add_arcs(layer, place.z());
       }
     }
-    double plunged = 0.0;
-    if (tangent.z() < 0.0 && lowest > 0) plunged = area_below(lowest - 1, point);
+    const double plunged = tangent.z() < 0.0 ? plunged_area(place, lowest) : 0.0;
 
     track_.s_mm.push_back(begin_mm + to_mm);
     track_.x_mm.push_back(point.x());
@@ -178,6 +179,17 @@ class Sweeper {
     }
     while (!pending_.empty() && begin_mm + to_mm - pending_.front().end_mm >= kept_mm_) sweep_oldest();
     if (options_.progress && track_.size() % samples_between_reports == 0) options_.progress(begin_mm + to_mm);
+  }
+
+  /// Area below the end of a tool on its way down. A layer is taken away when the tip passes its middle: above that it
+  /// is looked at, below it counts what was there.
+  [[nodiscard]] double plunged_area(const Vector3& place, std::size_t lowest) {
+    if (lowest > 0 && place.z() < material_.borders_mm()[lowest] - touching_mm) {
+      plunged_layer_ = lowest - 1;
+      plunged_mm2_ = area_below(lowest - 1, place.head<2>());
+      return plunged_mm2_;
+    }
+    return plunged_layer_ == lowest ? plunged_mm2_ : 0.0;
   }
 
   /// Adds the way to a place to what is pending; on one segment to the latest piece, so that the grid has less to do.
@@ -360,6 +372,8 @@ class Sweeper {
   Vector2d last_direction_ = Vector2d::Zero();
   std::size_t last_lowest_ = 0;
   bool has_direction_ = false;
+  std::size_t plunged_layer_ = std::numeric_limits<std::size_t>::max();
+  double plunged_mm2_ = 0.0;
   std::uint32_t index_ = 0;
   EngagementTrack track_;
 };

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from shapegcode._core import ArgumentError
 from shapegcode.milling.cut_force import ForceLaw, mean_chip_mm
 from shapegcode.milling.cut_plan import CutTool, Engagement
+from shapegcode.milling.fit_noise import neighbour_correlation, noise_of
 
 __all__ = ["Coefficient", "CoefficientFit", "MeanForces", "fit_coefficients"]
 
@@ -31,13 +32,11 @@ _ROUNDS = 6
 _HUBER = 2.5
 _OUTLIER = 4.0
 _LEAST_OUTLIER = 0.02
-_MEDIAN = 0.4549
 _LARGEST_SHARE_OUT = 0.25
 _STEP = 1e-5
 _DONE = 1e-7
 _SETTLED = 1e-4
 _MOST_STEPS = 40
-_LARGEST_CORRELATION = 0.95
 
 _NAMES = (
     ("specific_n_per_mm2", "N/mm²"),
@@ -202,7 +201,7 @@ def fit_coefficients(
     for _ in range(_ROUNDS):
         before = parameters
         parameters, left, slopes = _solved(model, parameters, robust / noise**2)
-        noise = _noise(left, model.forces(parameters), data, robust)
+        noise = noise_of(left, model.forces(parameters), data.revolutions, robust)
         scaled = np.abs(left) / noise
         robust = np.minimum(1.0, _HUBER / np.maximum(scaled, 1e-12))
         if np.all(np.abs(parameters - before) < _SETTLED * np.maximum(np.abs(parameters), 1.0)):
@@ -217,7 +216,7 @@ def fit_coefficients(
         )
     weights = np.where(outlier[:, None], 0.0, 1.0 / noise**2)
     parameters, left, slopes = _solved(model, parameters, weights)
-    correlation = _correlation(left / noise, data, outlier)
+    correlation = neighbour_correlation(left / noise, data.group, outlier)
     predicted = data.force_n - left[:, :2]
     covariance = _covariance(slopes, left, weights, correlation) + _of_place(model, parameters, slopes, weights)
     kept = left[~outlier, :2]
@@ -328,50 +327,6 @@ def _solved(model: _Model, start: Array, weights: Array) -> tuple[Array, Array, 
 
 def _largest_step(count: int) -> Array:
     return np.array([1.0, 0.5, 1.0, 0.5, 1e3, 1e3])[:count]
-
-
-def _noise(left: Array, predicted: Array, data: MeanForces, robust: Array) -> Array:
-    """Standard deviation of each force: a constant and a share of the force, as the residuals show them."""
-    found = np.empty_like(left)
-    many = data.revolutions / float(np.mean(data.revolutions))
-    for k in range(left.shape[1]):
-        square = predicted[:, k] ** 2
-        columns = np.column_stack([np.ones(len(square)), square])
-        weight = np.ones(len(square))
-        level = np.full(len(square), float(np.mean((robust[:, k] * left[:, k]) ** 2)))
-        observed = robust[:, k] * left[:, k] ** 2 * many
-        for _ in range(4):
-            weight = 1.0 / np.maximum(level, 1e-300)
-            constant, share = _not_negative(columns * weight[:, None], observed * weight)
-            level = constant + share * square
-            level = np.maximum(level, 1e-4 * float(level.max()) + 1e-300)
-        # The median is not moved by outliers; of squares of a normal variable it is _MEDIAN of the mean.
-        level *= float(np.median(left[:, k] ** 2 * many / level)) / _MEDIAN
-        found[:, k] = np.sqrt(level / many)
-    return found
-
-
-def _not_negative(matrix: Array, right: Array) -> tuple[float, float]:
-    """Least squares with two unknowns, none below 0."""
-    both, *_ = np.linalg.lstsq(matrix, right, rcond=None)
-    if both.min() >= 0.0:
-        return float(both[0]), float(both[1])
-    alone = [max(float(column @ right) / float(column @ column), 0.0) for column in matrix.T]
-    errors = [float(np.sum((right - value * column) ** 2)) for value, column in zip(alone, matrix.T, strict=True)]
-    return (alone[0], 0.0) if errors[0] <= errors[1] else (0.0, alone[1])
-
-
-def _correlation(scaled: Array, data: MeanForces, outlier: npt.NDArray[np.bool_]) -> float:
-    """Correlation of neighbours within each pass, of what the fit leaves; not below 0."""
-    pairs = (data.group[1:] == data.group[:-1]) & ~outlier[1:] & ~outlier[:-1]
-    if pairs.sum() < 8:
-        return 0.0
-    product = float(np.mean(scaled[1:][pairs] * scaled[:-1][pairs]))
-    square = float(np.mean(scaled[~outlier] ** 2))
-    # By chance alone it is up to twice this.
-    chance = 2.0 / math.sqrt(2.0 * pairs.sum())
-    found = product / max(square, 1e-300)
-    return min(found, _LARGEST_CORRELATION) if found > chance else 0.0
 
 
 def _covariance(slopes: Array, left: Array, weights: Array, correlation: float) -> Array:

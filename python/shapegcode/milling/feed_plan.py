@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.milling.survey import SurveyedRegion
+from shapegcode.milling.survey import SurveyedMove, SurveyedRegion
 from shapegcode.milling.tool_file import Tool
 from shapegcode.milling.travel import Motion, Vector
 
@@ -23,6 +23,7 @@ _TOO_FAST = 1e-4  # relative: rounding of the travel, far below the margin
 _DEEPER_PLUNGE = 0.01  # of the tool's end in material: a ramp cuts with its end
 _AIR_MM2 = 1e-9
 _STEEPEST_AIR = 0.7  # share of the travel in XY from which on a move in air is no plunge
+_LEAST_PROGRAMMED = 0.1  # of the programmed feed, where the tool file says no least chip
 _STEP = 0.005  # feeds that differ by less are one: a border for less gains nothing
 _LIMIT_NAMES = np.array(
     [name for _, name in sorted((limit.value, name) for name, limit in _core.FeedLimit.__members__.items())],
@@ -56,8 +57,8 @@ class FeedPlan:
     window_s: float
 
 
-def milling_force(tool: Tool, surveyed: SurveyedRegion) -> _core.MillingForce:
-    """The force model of a region."""
+def milling_force(tool: Tool, surveyed: SurveyedRegion | SurveyedMove) -> _core.MillingForce:
+    """The force model of a region, or of a move outside of the regions."""
     return _core.MillingForce(tool.end_mill(), tool.coefficients(), surveyed.spindle_rev_per_min, surveyed.sense)
 
 
@@ -113,8 +114,11 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Motion, divi
     segment = np.asarray(track.segment)
     programmed = path.segment_feeds_mm_per_s * 60.0
     least = max((tool.limits.feed_per_tooth_min_mm or 0.0) * teeth_per_min, machine.controller.minimum_feed_mm_per_min)
-    lowest = feed_unit_mm_per_min * math.ceil(least / feed_unit_mm_per_min - 1e-9)  # what F can say
     kept = _kept_segments(surveyed, programmed, least, tool)
+    # Without a least chip nobody wants the tool to rub for hours to keep a limit that cannot be kept.
+    share = 0.0 if tool.limits.feed_per_tooth_min_mm else _LEAST_PROGRAMMED
+    slowest = np.maximum(least, share * programmed)
+    lowest = (feed_unit_mm_per_min * np.ceil(slowest / feed_unit_mm_per_min - 1e-9))[segment]  # what F can say
     limit, holds, load = _limits_along(surveyed, programmed[segment], lowest, machine, margin)
     at_minimum = holds == MINIMUM
     frozen = np.array([bool(reason) for reason in kept])
@@ -150,7 +154,7 @@ class _Task:
     kept: Vector  # per segment the feed that stays, 0: it may change
     programmed: Vector  # per segment
     divisible: list[bool]
-    lowest: float
+    lowest: Vector  # at each station
     feed_unit: float
     window_s: float
 
@@ -169,7 +173,7 @@ def _kept_segments(surveyed: SurveyedRegion, programmed: Vector, lowest: float, 
 
 
 def _limits_along(
-    surveyed: SurveyedRegion, programmed: Vector, lowest: float, machine: Machine, margin: float
+    surveyed: SurveyedRegion, programmed: Vector, lowest: Vector, machine: Machine, margin: float
 ) -> tuple[Vector, npt.NDArray[np.str_], Vector]:
     """Wanted feed on the stretch before each station, what holds it, and what the load allows there."""
     tool, track = surveyed.tool, surveyed.track
@@ -183,12 +187,14 @@ def _limits_along(
     force = milling_force(tool, surveyed)
     highest = max(fastest, float(ceiling.max()))
     # Searched to far below the least feed: what needs less than that is told apart from what just reaches it.
-    bound, limit, _ = _core.largest_feeds(force, track, limits_of(tool, machine, margin), 1e-3 * lowest, highest)
+    bound, limit, _ = _core.largest_feeds(
+        force, track, limits_of(tool, machine, margin), 1e-3 * float(lowest.min()), highest
+    )
     holds = np.where(bound < ceiling, _LIMIT_NAMES[limit], PROGRAMMED)
     feeds = np.minimum(bound, ceiling)
     load = np.where(bound < highest, np.maximum(bound, lowest), np.inf)
     low = feeds < lowest
-    feeds[low] = np.minimum(lowest, ceiling[low])
+    feeds[low] = np.minimum(lowest, ceiling)[low]
     holds[low] = MINIMUM
     air = np.asarray(track.section_mm2) <= _AIR_MM2
     feeds[air] = programmed[air]

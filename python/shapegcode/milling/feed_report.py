@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
@@ -11,14 +12,16 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.milling.feed_plan import KEPT, MINIMUM, FeedPlan, limits_of, milling_force, tool_beam
-from shapegcode.milling.survey import Survey, SurveyedRegion
+from shapegcode.milling.feed_plan import AIR, KEPT, MINIMUM, FeedPlan, limits_of, milling_force, tool_beam
+from shapegcode.milling.survey import Survey, SurveyedMove, SurveyedRegion
+from shapegcode.milling.tool_file import Tool
 from shapegcode.milling.travel import Motion, Travelled, Vector
 
 __all__ = ["Load", "RegionLoad", "feed_report", "load_of", "region_load"]
 
 _SLACK = 1e-3  # of a limit: what its own search and the rounding of a figure may be off by
 _AIR_N = 1e-9
+_SHOWN_ALIKE = 4
 _LIMITED = (  # column of Load, limit of the core, name and unit for people
     ("peak_resultant_n", "peak_resultant_n", "peak resultant", "N"),
     ("mean_resultant_n", "mean_resultant_n", "mean resultant", "N"),
@@ -84,7 +87,7 @@ def region_load(
     return RegionLoad(stations, was, load_of(part, travelled))
 
 
-def load_of(part: SurveyedRegion, travelled: Travelled) -> Load:
+def load_of(part: SurveyedRegion | SurveyedMove, travelled: Travelled) -> Load:
     """Load along a region that is travelled so."""
     assert part.tool is not None and part.track is not None
     figures = milling_force(part.tool, part).figures_of(part.track, travelled.feed_mm_per_min, tool_beam(part.tool))
@@ -116,6 +119,8 @@ def feed_report(
     excess = 0.0
     for part, plan, load in zip(surveyed.regions, plans, loads, strict=True):
         misses, beyond = _misses(part, plan, load, machine)
+        if load is None and part.track is not None and part.track.section_mm2.any():
+            misses = ["its force is not known"]
         excess = max(excess, beyond)
         place = f"{program.place(part.region.first_line)}: {program.lines(part.region)}"
         if part.kept:
@@ -139,6 +144,10 @@ def feed_report(
             }
         )
     known = [load for load in loads if load is not None]
+    elsewhere = [(move, _load_elsewhere(move)) for move in surveyed.moves]
+    known += [load for _, load in elsewhere if load is not None]
+    moves = [_move_entry(move, load, machine) for move, load in elsewhere]
+    warnings += [f"{entry['place']}: {miss}" for entry in moves for miss in entry["misses"]]
     limits = [entry for part, plan in zip(surveyed.regions, plans, strict=True) for entry in _limits(part, plan)]
     return {
         "program": program.source,
@@ -153,10 +162,41 @@ def feed_report(
         },
         "limits": limits,
         "regions": regions,
+        "moves": moves,
         "excess_ratio": excess,
-        "within_limits": not any(region["misses"] for region in regions),
-        "warnings": list(dict.fromkeys(warnings)),
+        "within_limits": not any(entry["misses"] for entry in (*regions, *moves)),
+        "warnings": _shortened(warnings, program.source),
     }
+
+
+def _load_elsewhere(move: SurveyedMove) -> RegionLoad | None:
+    """Load along a move outside of the regions at its programmed feed; None without a spindle speed."""
+    if not move.spindle_rev_per_min > 0.0:
+        return None
+    stations = np.asarray(move.track.s_mm)
+    times = np.diff(np.concatenate(([0.0], stations))) / move.feed_mm_per_min * 60.0
+    load = load_of(move, Travelled(np.full(len(stations), move.feed_mm_per_min), times))
+    return RegionLoad(stations, load, load)
+
+
+def _move_entry(move: SurveyedMove, load: RegionLoad | None, machine: Machine) -> dict[str, Any]:
+    """A move outside of the regions in the report."""
+    misses = ["its force is not known: no spindle speed"]
+    if load is not None:
+        misses = [
+            f"cut at its own feed: {words} {getattr(load.after, column).max():.4g} {unit}, limit {limit:.4g} {unit}"
+            for column, words, unit, limit in _exceeded(move.tool, load, machine)
+        ]
+    return {"place": move.place, "feed_mm_per_min": move.feed_mm_per_min, "misses": misses}
+
+
+def _exceeded(tool: Tool, load: RegionLoad, machine: Machine) -> Iterator[tuple[str, str, str, float]]:
+    """Column, name, unit and limit of what a load exceeds."""
+    limits = limits_of(tool, machine, 0.0)
+    for column, name, words, unit in _LIMITED:
+        limit = getattr(limits, name)
+        if np.isfinite(limit) and (getattr(load.after, column) > limit * (1.0 + _SLACK)).any():
+            yield column, words, unit, limit
 
 
 def _largest(part: SurveyedRegion, column: str) -> float | None:
@@ -223,20 +263,16 @@ def _misses(
     """
     if load is None or part.tool is None or part.track is None:
         return [], 0.0
-    limits = limits_of(part.tool, machine, 0.0)
     helped = np.zeros(len(load.s_mm), dtype=bool) if plan is None else ~np.isin(plan.holds, (KEPT, MINIMUM))
     misses, excess = [], 0.0
-    for column, name, words, unit in _LIMITED:
-        limit = getattr(limits, name)
+    for column, words, unit, limit in _exceeded(part.tool, load, machine):
         values = getattr(load.after, column)
-        if not np.isfinite(limit) or not (values > limit * (1.0 + _SLACK)).any():
-            continue
         misses.append(f"{words} {float(values.max()):.4g} {unit}, limit {limit:.4g} {unit}")
         excess = max(excess, float(values[helped].max(initial=0.0)) / limit - 1.0)
     return misses, excess
 
 
-def _kept_blocks(place: Any, part: SurveyedRegion, plan: FeedPlan) -> Iterator[str]:
+def _kept_blocks(place: Callable[[int], str], part: SurveyedRegion, plan: FeedPlan) -> Iterator[str]:
     """One sentence per run of blocks that are left alone for one reason."""
     lines = part.region.path.segment_lines
     for reason, run in groupby(range(len(lines)), key=lambda i: plan.kept[i]):
@@ -245,6 +281,21 @@ def _kept_blocks(place: Any, part: SurveyedRegion, plan: FeedPlan) -> Iterator[s
             first, last = int(lines[indices[0]]), int(lines[indices[-1]])
             where = "" if first == last else f" to line {last}"
             yield f"{place(first)}{where}: left as it was: {reason}"
+
+
+def _shortened(warnings: Sequence[str], source: str) -> list[str]:
+    """Each warning once; of many that say the same of different lines the first few, and how many more there are."""
+    shown: list[str] = []
+    seen: Counter[str] = Counter()
+    for warning in dict.fromkeys(warnings):
+        said = warning.rpartition(": ")[2]
+        seen[said] += 1
+        if seen[said] <= _SHOWN_ALIKE:
+            shown.append(warning)
+    shown += [
+        f"{source}: {number - _SHOWN_ALIKE} more: {said}" for said, number in seen.items() if number > _SHOWN_ALIKE
+    ]
+    return shown
 
 
 def _limits(part: SurveyedRegion, plan: FeedPlan | None) -> Iterator[dict[str, Any]]:
@@ -262,7 +313,9 @@ def _limits(part: SurveyedRegion, plan: FeedPlan | None) -> Iterator[dict[str, A
     holds: list[str] = []
     for i in range(len(path)):
         inside = slice(starts[i], ends[i])
-        tightest = int(np.argmin(plan.limit_mm_per_min[inside])) if ends[i] > starts[i] else 0
+        # A block that cuts is held by what holds it there, even if it begins in air.
+        feeds = np.where(plan.holds[inside] == AIR, np.inf, plan.limit_mm_per_min[inside])
+        tightest = int(np.argmin(feeds)) if ends[i] > starts[i] else 0
         holds.append(str(plan.holds[inside][tightest]) if ends[i] > starts[i] else KEPT)
     written = _feeds_of_segments(plan, path)
     lines = path.segment_lines

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.milling.stock_file import Stock
@@ -12,10 +14,11 @@ from shapegcode.milling.stock_material import build_material
 from shapegcode.milling.tool_file import Tool
 from shapegcode.program import Program
 
-__all__ = ["Survey", "SurveyedRegion", "survey"]
+__all__ = ["Survey", "SurveyedMove", "SurveyedRegion", "survey"]
 
 _RESOLUTION_RATIO = 0.01  # of the smallest tool's diameter
 _SHOWN_COLLISIONS = 5
+_SLACK_MM = 1e-6
 _TOOL_CHANGE, _CLOCKWISE, _COUNTER_CLOCKWISE = 6, 3, 4
 
 Progress = Callable[[int, int], None]
@@ -45,18 +48,41 @@ class SurveyedRegion:
 
 
 @dataclass(frozen=True)
+class SurveyedMove:
+    """A cutting move outside of the regions that meets material: its feed stays, but its force counts.
+
+    Attributes:
+        place: file and line.
+        tool: what cuts.
+        track: what it meets.
+        feed_mm_per_min: as programmed.
+        spindle_rev_per_min: speed of the spindle, 0 where it is not known.
+        sense: in which it turns.
+    """
+
+    place: str
+    tool: Tool
+    track: _core.EngagementTrack
+    feed_mm_per_min: float
+    spindle_rev_per_min: float
+    sense: _core.SpindleSense
+
+
+@dataclass(frozen=True)
 class Survey:
     """A program swept through its stock.
 
     Attributes:
         program: what was swept.
         regions: its regions in order.
+        moves: cutting moves outside of them that meet material.
         material: what is left.
         warnings: what was noticed on the way, each with its place.
     """
 
     program: Program
     regions: tuple[SurveyedRegion, ...]
+    moves: tuple[SurveyedMove, ...]
     material: _core.Material
     warnings: tuple[str, ...]
 
@@ -112,7 +138,7 @@ def survey(
         walk.warnings.append(
             f"{program.source}: the tool never touches the stock: see where it lies, in the program's own coordinates"
         )
-    return Survey(program, tuple(regions), material, tuple(walk.warnings))
+    return Survey(program, tuple(regions), tuple(walk.moves), material, tuple(walk.warnings))
 
 
 def _why_not_swept(region: _core.Region, program: Program) -> str:
@@ -130,6 +156,12 @@ def _why_not_swept(region: _core.Region, program: Program) -> str:
     return ""
 
 
+def _above_overhang(tool: Tool, track: _core.EngagementTrack) -> float:
+    """Height above the tip of what is cut above the clamping, mm; 0: nothing."""
+    top = float(track.arcs[:, 3].max(initial=0.0)) if len(track.arcs) else 0.0
+    return top if top > tool.tool.overhang_mm else 0.0
+
+
 class _Walk:
     """The state of the spindle and its tool along a program."""
 
@@ -141,6 +173,8 @@ class _Walk:
         self._sense: _core.SpindleSense | None = None
         self._ready = -1  # T before its M06
         self._number = -1
+        self.moves: list[SurveyedMove] = []
+        self._speed = -1.0
         self._collisions: list[str] = []
         # Where a program moves from places that are not known, neither are those of its rapids.
         self._adrift = any(region.incremental for region in program.regions)
@@ -165,7 +199,9 @@ class _Walk:
 
     def function(self, index: int) -> None:
         """A block with M, S or T words."""
-        m_codes, tool, _ = self._functions[index]
+        m_codes, tool, speed = self._functions[index]
+        if speed > 0.0:
+            self._speed = speed
         if tool > 0:
             self._ready = tool
         if _TOOL_CHANGE in m_codes and self._ready > 0:
@@ -192,7 +228,7 @@ class _Walk:
                 self.function(index)
             elif kind == _core.StepKind.region:
                 found.append(self._tool)
-        self._sense, self._ready, self._number = None, -1, -1
+        self._sense, self._ready, self._number, self._speed = None, -1, -1, -1.0
         return found
 
     def cuts_elsewhere(self) -> list[_core.Path]:
@@ -214,8 +250,15 @@ class _Walk:
         if segment.kind == _core.SegmentKind.rapid and self._adrift:
             return
         track = _core.sweep(material, _core.Path([segment]), tool.tool.diameter_mm)
-        if segment.kind == _core.SegmentKind.rapid and (track.section_mm2.any() or track.plunged_mm2.any()):
+        if not (track.section_mm2.any() or track.plunged_mm2.any()):
+            return
+        if segment.kind == _core.SegmentKind.rapid:
             self._collisions.append(self._program.place(line))
+        elif not _above_overhang(tool, track):
+            speed = self._speed if self._speed > 0.0 else tool.feed.spindle_rev_per_min or 0.0
+            feed = segment.feed_mm_per_s * 60.0
+            place = self._program.place(line)
+            self.moves.append(SurveyedMove(place, tool, track, feed, speed, tool.sense(self._sense)))
 
     def tell_collisions(self) -> None:
         """A warning for each place at which a rapid runs into material; of many the first ones."""
@@ -224,6 +267,21 @@ class _Walk:
             self.warnings.append(f"{place}: rapid into material: the stock file or the program is wrong")
         if len(places) > _SHOWN_COLLISIONS:
             self.warnings.append(f"{self._program.source}: {len(places) - _SHOWN_COLLISIONS} more rapids into material")
+
+    def _look_at_depth(self, region: _core.Region, tool: Tool, track: _core.EngagementTrack) -> None:
+        """Say where the tool cuts above its flutes."""
+        if not len(track.arcs):
+            return
+        tops = track.arcs[:, 3]
+        deepest = int(tops.argmax())
+        flutes_mm = tool.tool.flute_length_mm
+        if tops[deepest] > flutes_mm + _SLACK_MM:
+            sample = int(np.searchsorted(track.first_arc, deepest, side="right")) - 1
+            line = int(region.path.segment_lines[track.segment[sample]])
+            self.warnings.append(
+                f"{self._program.place(line)}: cuts {tops[deepest]:.4g} mm above the tip, tool.flute_length_mm is "
+                f"{flutes_mm:g}: the shank would rub"
+            )
 
     def sweep_region(self, material: _core.Material, index: int) -> SurveyedRegion:
         """A region."""
@@ -239,7 +297,11 @@ class _Walk:
         track = None
         if tool is not None and not kept:
             track = _core.sweep(material, region.path, tool.tool.diameter_mm)
-            if not speed > 0.0:
+            self._look_at_depth(region, tool, track)
+            if above := _above_overhang(tool, track):
+                kept = f"it cuts {above:.3g} mm above the tip, tool.overhang_mm is {tool.tool.overhang_mm:g}"
+                track = None
+            elif not speed > 0.0:
                 kept = "no spindle speed: neither S in the program nor feed.spindle_rev_per_min in the tool file"
             elif not _core.feeds_per_minute(self._program.core, region):
                 kept = "not all of its feeds are per minute (G94) in one unit"
