@@ -210,7 +210,7 @@ def _limits_along(
         force, track, limits_of(tool, machine, margin), 1e-3 * float(lowest.min()), highest
     )
     top = np.where(ceiling > programmed, MAX_FEED, PROGRAMMED)
-    holds = np.where(bound < ceiling, _LIMIT_NAMES[limit], top)
+    holds = np.where((bound < ceiling) & (limit != _core.FeedLimit.none.value), _LIMIT_NAMES[limit], top)
     feeds = np.minimum(bound, ceiling)
     load = np.where(bound < highest, np.maximum(bound, lowest), np.inf)
     low = feeds < lowest

@@ -208,7 +208,7 @@ def _largest(part: SurveyedRegion, column: str) -> float | None:
 
 
 def _removed_mm3(part: SurveyedRegion) -> float | None:
-    """Volume that the sides of the tool cut on the region."""
+    """Volume that is cut on the region."""
     if part.track is None or len(part.track) == 0:
         return None
     lengths = np.diff(np.concatenate(([0.0], part.track.s_mm)))

@@ -118,6 +118,8 @@ def survey(
     swept = [index for index, reason in enumerate(reasons) if not reason and cutters[index] is not None]
     if not swept:
         why = next((f": {reason}" for reason in reasons if reason), "")
+        if program.core.kept_compensated_moves:
+            why = ': they run under cutter compensation that is kept as it stands; set input.compensation = "expand"'
         raise _core.ArgumentError(f"{program.source}: no cutting moves whose engagement can be computed{why}")
     smallest = min(tools, key=lambda tool: tool.radius_mm)
     if resolution_mm is not None and not 0.0 < resolution_mm <= _COARSEST * smallest.radius_mm:
@@ -156,7 +158,9 @@ def _why_not_swept(region: _core.Region, zero: ZeroPoints) -> str:
     if region.incremental:
         return "its place is not known"
     if not region.path.arcs_in_xy:
-        return "it holds arcs that are not in the XY plane (G17)"
+        path = region.path
+        first = next(i for i in range(len(path)) if path[i].kind == _core.SegmentKind.arc and path[i].normal != 2)
+        return f"it holds arcs that are not in the XY plane (G17), the first in line {path[first].line_number}"
     return ""
 
 
