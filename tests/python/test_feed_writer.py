@@ -152,6 +152,21 @@ def test_a_full_circle_by_its_centre_and_an_arc_by_its_radius_are_divided() -> N
     ).replace("G03 X5. Y-4.I4. J0. F50.", "G03 I4. J0.X5.Y-4.F50.")
 
 
+def test_a_piece_of_a_wide_arc_is_written_by_its_centre() -> None:
+    text = "G90 G54 G17 G21\nG00 X0. Y0. Z0.\nG01 X1. F100.\nG02 X101. Y0. R50. F100.\nM30\n"
+    program = Program.from_text(text, MACHINE)
+    region = program.regions[0]
+    length = region.path.length_mm
+    stretches = [_core.FeedStretch(0.0, 1.64, 100.0), _core.FeedStretch(1.64, length, 50.0)]
+    written = _core.write_feeds(program.core, region, stretches, writer_options(region)).text.decode()
+    after = interpret(text.replace("G01 X1. F100.\nG02 X101. Y0. R50. F100.\n", written)).cuts
+    assert [move.kind for move in after] == ["line", "arc", "arc"]
+    for move in after[1:]:
+        assert move.centre is not None
+        assert np.linalg.norm(move.centre[:2] - [51.0, 0.0]) < 0.002 if move.sweep and abs(move.sweep) > 1.0 else True
+    assert sum(move.length for move in after) == pytest.approx(length, abs=0.003)
+
+
 def test_a_stretch_that_ends_in_an_indivisible_block_is_refused() -> None:
     program = Program.from_text("G90 G54 G17 G21\nG00 X0. Y0. Z0.\nG01 G09 X10. F100.\nM30\n", MACHINE)
     region = program.regions[0]

@@ -18,6 +18,7 @@ namespace {
 
 constexpr double same_place_mm = 1e-6;
 constexpr int most_feed_decimals = 4;
+constexpr double largest_sweep_by_radius = 0.5 * std::numbers::pi;
 constexpr std::size_t longest_line = 100000;  // the reader has held the program's own limit already
 
 using Increments = std::array<std::int64_t, axis_count>;
@@ -301,10 +302,14 @@ class Writer {
     }
   }
 
+  // Where an arc turns far, the increment by which its end is rounded moves the centre that R stands for.
   void append_radius(double radius, const Piece& piece) {
+    if (piece.sweep_rad > largest_sweep_by_radius) {
+      append_centre(piece);
+      return;
+    }
     result_.text += 'R';
-    const double magnitude = piece.sweep_rad > std::numbers::pi ? -radius : radius;
-    append_decimal(result_.text, std::llround(magnitude * std::pow(10.0, options_.position_decimals)),
+    append_decimal(result_.text, std::llround(radius * std::pow(10.0, options_.position_decimals)),
                    options_.position_decimals);
   }
 
@@ -334,19 +339,20 @@ class Writer {
 }  // namespace
 
 bool feeds_per_minute(const Program& program, const Region& region) {
-  bool same = region.entry.feed_mode == 94 || region.exit.feed_mode == 94;
-  double units = 0.0;
+  bool everywhere = true;
+  double mode = region.entry.feed_mode;
+  double units = region.entry.units;
   for_each_line(program, region, [&](const SourceLine& line, const Block& block) {
     for (const Word& word : block) {
-      same = same && !is_g(word, 93.0) && !is_g(word, 95.0);
-      if (is_g(word, 20.0) || is_g(word, 21.0)) {
-        // Before the first move it only says what holds.
-        same = same && (units == 0.0 || units == word.value) && (line.first == 0 || word.value == region.entry.units);
+      if (is_g(word, 93.0) || is_g(word, 94.0) || is_g(word, 95.0)) {
+        mode = word.value;
+      } else if (is_g(word, 20.0) || is_g(word, 21.0)) {
         units = word.value;
       }
     }
+    everywhere = everywhere && (line.count == 0 || (mode == 94.0 && units == region.exit.units));
   });
-  return same && region.exit.feed_mode == 94;
+  return everywhere && mode == 94.0 && units == region.exit.units;
 }
 
 std::vector<bool> divisible_segments(const Program& program, const Region& region, const FeedWriterOptions& options) {

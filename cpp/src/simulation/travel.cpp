@@ -84,6 +84,16 @@ class Follower {
     for (int i = 0; i < filters_.tail(); ++i) {
       add(end);
     }
+    // A stretch without length, as at a corner with a station on both sides, has the feed of the one before it; the
+    // first one that of the next.
+    if (stations_.size() > 1 && stations_[0] < same_place_mm) {
+      result_.highest_mm_per_s[0] = result_.highest_mm_per_s[1];
+    }
+    for (std::size_t i = 1; i < stations_.size(); ++i) {
+      if (stations_[i] - stations_[i - 1] < same_place_mm) {
+        result_.highest_mm_per_s[i] = std::max(result_.highest_mm_per_s[i], result_.highest_mm_per_s[i - 1]);
+      }
+    }
     result_.duration_s = moved_ > 0 ? static_cast<double>(moved_ - 1) * options_.period_s : 0.0;
     return std::move(result_);
   }

@@ -221,7 +221,10 @@ def _write(program: Program, plans: Sequence[FeedPlan | None], machine: Machine)
 
 def _read_back(text: bytes, program: Program, places: Sequence[int], machine: Machine) -> Program:
     """The written text as a program; its regions must be those of the original, by place, length and end."""
-    emitted = Program.from_text(text, machine, source=program.source, emitted=True)
+    try:
+        emitted = Program.from_text(text, machine, source="the written program", emitted=True)
+    except _core.ProgramError as error:
+        raise RoundTripError(f"the written program cannot be read: {error}") from error
     if len(emitted.regions) != len(program.regions):
         raise RoundTripError(f"{len(program.regions)} regions were read, {len(emitted.regions)} were written")
     for before, after, line in zip(program.regions, emitted.regions, places, strict=True):
@@ -233,4 +236,4 @@ def _read_back(text: bytes, program: Program, places: Sequence[int], machine: Ma
                 f"{program.lines(before)}: written from line {line}, read back from line {after.first_line}; ends "
                 f"{off:g} mm apart, lengths differ by {longer:g} mm"
             )
-    return emitted
+    return Program(emitted.core, program.source)

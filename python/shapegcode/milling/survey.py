@@ -21,7 +21,7 @@ _COARSEST = 0.1  # resolution, of the smallest tool's radius
 _RESOLUTION_RATIO = 0.01  # of the smallest tool's diameter
 _SHOWN_COLLISIONS = 5
 _SLACK_MM = 1e-6
-_TOOL_CHANGE, _CLOCKWISE, _COUNTER_CLOCKWISE = 6, 3, 4
+_TOOL_CHANGE, _CLOCKWISE, _COUNTER_CLOCKWISE, _STOP = 6, 3, 4, 5
 
 Progress = Callable[[int, int], None]
 
@@ -184,6 +184,7 @@ class _Walk:
         self._number = -1
         self.moves: list[SurveyedMove] = []
         self._speed = -1.0
+        self._stands = False  # M05
         self._collisions: list[str] = []
         # Where a program moves from places that are not known, neither are those of its rapids.
         self._adrift = any(region.incremental for region in program.regions)
@@ -217,6 +218,7 @@ class _Walk:
             self._ready = tool
         if _TOOL_CHANGE in m_codes and self._ready > 0:
             self._number = self._ready
+        self._stands = _STOP in m_codes or (self._stands and not {_CLOCKWISE, _COUNTER_CLOCKWISE} & set(m_codes))
         if _CLOCKWISE in m_codes:
             self._sense = _core.SpindleSense.clockwise
         if _COUNTER_CLOCKWISE in m_codes:
@@ -244,7 +246,7 @@ class _Walk:
                 self.function(index)
             elif kind == _core.StepKind.region:
                 found.append(self._tool)
-        self._sense, self._ready, self._number, self._speed = None, -1, -1, -1.0
+        self._sense, self._ready, self._number, self._speed, self._stands = None, -1, -1, -1.0, False
         return found
 
     def cuts_elsewhere(self) -> list[_core.Path]:
@@ -319,6 +321,8 @@ class _Walk:
                 track = None
             elif not speed > 0.0:
                 kept = "no spindle speed: neither S in the program nor feed.spindle_rev_per_min in the tool file"
+            elif self._stands:
+                kept = "the spindle stands (M05)"
             elif not _core.feeds_per_minute(self._program.core, region):
                 kept = "not all of its feeds are per minute (G94) in one unit"
         sense = _core.SpindleSense.clockwise if tool is None else tool.sense(self._sense)
