@@ -112,14 +112,17 @@ void register_feed_schedule(py::module_& module) {
       "stretches do not cover it.");
   module.def(
       "look_ahead_on_load",
-      [](const VectorArray& stations, const VectorArray& feeds, const VectorArray& load, const VectorArray& reach_s) {
+      [](const VectorArray& stations, const VectorArray& feeds, const VectorArray& load, const VectorArray& before_s,
+         const VectorArray& behind_s) {
         FeedStations at{numbers(stations), numbers(feeds)};
-        look_ahead_on_load(at, numbers(load), numbers(reach_s));
+        look_ahead_on_load(at, numbers(load), numbers(before_s), numbers(behind_s));
         return column(at.feed_mm_per_min);
       },
-      py::arg("stations_mm"), py::arg("feeds_mm_per_min"), py::arg("load_mm_per_min"), py::arg("reach_s"),
-      "The feeds (n,), mm/min, lowered before each station whose load allows less (`load_mm_per_min`, (n,)), over the "
-      "way that a controller needs for the change: `reach_s` (n,) times the feed there.");
+      py::arg("stations_mm"), py::arg("feeds_mm_per_min"), py::arg("load_mm_per_min"), py::arg("before_s"),
+      py::arg("behind_s"),
+      "The feeds (n,), mm/min, lowered around each station whose load allows less (`load_mm_per_min`, (n,)), because "
+      "the "
+      "travel lags behind a change: `before_s` and `behind_s` (n,) times the feed that the load allows.");
 
   py::class_<FeedWriterOptions>(module, "FeedWriterOptions", "How new feeds are written into a region's blocks.")
       .def(py::init([](double increment_mm, double unit_mm, int position_decimals, bool absolute_centres) {

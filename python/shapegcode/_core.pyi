@@ -5458,9 +5458,9 @@ def linear_model(parameters: FeedDriveParameters) -> tuple[typing.Annotated[nump
     Raises:
         ArgumentError: The drive is not linear.
     """
-def look_ahead_on_load(stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], load_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], reach_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
+def look_ahead_on_load(stations_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], feeds_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], load_mm_per_min: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], before_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], behind_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
     """
-    The feeds (n,), mm/min, lowered before each station whose load allows less (`load_mm_per_min`, (n,)), over the way that a controller needs for the change: `reach_s` (n,) times the feed there.
+    The feeds (n,), mm/min, lowered around each station whose load allows less (`load_mm_per_min`, (n,)), because the travel lags behind a change: `before_s` and `behind_s` (n,) times the feed that the load allows.
     """
 def machine_frame(tool_frame: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], direction_rad: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
     """

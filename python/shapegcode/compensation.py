@@ -59,7 +59,7 @@ def require_decision(program: Program, machine: Machine) -> None:
             line,
             1,
             "cutter compensation G41/G42: behind shaped moves the offset in the control would no longer act, and that "
-            "is how a shop hits size. --compensation expand shapes the path of the radius given in "
+            "is how a shop hits size. --compensation expand (input.compensation) shapes the path of the radius in "
             "input.tool_radius_mm or by G10 L12 (the header says so, and a guard stops the program if the control "
             "holds another one); --compensation keep leaves these moves as they are",
         )

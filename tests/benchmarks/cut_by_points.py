@@ -15,8 +15,8 @@ Vector = npt.NDArray[np.float64]
 
 _AZIMUTHS = np.radians(np.linspace(-90.0, 90.0, 721))
 _TURNS = 90
-_DISCS_PER_SLICE = 12
-_TOUCH_MM = 1e-3
+_DISCS_PER_SLICE = 3
+_TOUCH_MM = 2e-5
 
 
 @dataclass(frozen=True)

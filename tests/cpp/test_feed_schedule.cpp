@@ -132,24 +132,28 @@ TEST_CASE("a limited change of feed holds from stretch to stretch") {
   CHECK(stretches.front().end_mm > 20.0);  // the ramp is as short as it may be
 }
 
-TEST_CASE("the load is looked ahead on over the reach of a change") {
+TEST_CASE("feeds are low before a load and behind it as long as the travel lags") {
   FeedStations stations = even_stations(
-      10.0, 0.1, +[](double s) { return s > 5.05 ? 60.0 : 600.0; });
-  const std::vector<double> reach(stations.s_mm.size(), 0.05);  // 0.05 s at 10 mm/s: 0.5 mm
-  look_ahead_on_load(stations, stations.feed_mm_per_min, reach);
+      10.0, 0.1, +[](double s) { return s > 5.05 && s < 6.05 ? 60.0 : 600.0; });
+  const std::vector<double> load = stations.feed_mm_per_min;
+  const std::vector<double> before(stations.s_mm.size(), 0.45);  // at 1 mm/s: 0.45 mm
+  const std::vector<double> behind(stations.s_mm.size(), 0.25);
+  look_ahead_on_load(stations, load, before, behind);
   for (std::size_t i = 0; i < stations.s_mm.size(); ++i) {
-    CHECK(stations.feed_mm_per_min[i] == (stations.s_mm[i] > 4.45 ? 60.0 : 600.0));
+    // A station speaks for the 0.1 mm before it; whole ones are lowered.
+    const bool low = stations.s_mm[i] > 4.55 && stations.s_mm[i] < 6.35;
+    CHECK(stations.feed_mm_per_min[i] == (low ? 60.0 : 600.0));
   }
 }
 
 TEST_CASE("a feed that is low without need is not looked ahead on") {
   FeedStations stations = even_stations(
       10.0, 0.1, +[](double s) { return s > 5.05 ? 60.0 : 600.0; });
-  const std::vector<double> load(stations.s_mm.size(), 300.0);
-  look_ahead_on_load(stations, load, std::vector<double>(stations.s_mm.size(), 0.01));
-  CHECK(stations.feed_mm_per_min.front() == 300.0);
-  CHECK(stations.feed_mm_per_min[49] == 300.0);
-  CHECK(stations.feed_mm_per_min.back() == 60.0);
+  const std::vector<double> load(stations.s_mm.size(), infinity);
+  const std::vector<double> times(stations.s_mm.size(), 1.0);
+  const std::vector<double> wanted = stations.feed_mm_per_min;
+  look_ahead_on_load(stations, load, times, times);
+  CHECK(stations.feed_mm_per_min == wanted);
 }
 
 TEST_CASE("a path with other feeds has the same points") {

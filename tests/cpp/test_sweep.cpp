@@ -237,6 +237,15 @@ TEST_CASE("layers: heights, arcs shared by layers, and what a level leaves to th
   CHECK(most(sweep(material, Path({make_line({-9, 60, -6}, {49, 60, -6}, 10)}), diameter).section_mm2) == 0.0);
 }
 
+TEST_CASE("a tool that comes down to the material, but not into it, does not plunge") {
+  Material material = block({box(-20, -20, 20, 20)}, {-20.0, -8.0, -4.0, 0.0});
+  CHECK(most(sweep(material, Path({make_line({0, 0, 5}, {0, 0, 0}, 10)}), diameter).plunged_mm2) == 0.0);
+  (void)sweep(material, Path({make_line({0, 0, 0}, {0, 0, -8}, 10)}), diameter);
+  const EngagementTrack again = sweep(material, Path({make_line({0, 0, 2}, {0, 0, -8}, 10)}), diameter);
+  CHECK(most(again.plunged_mm2) == 0.0);
+  CHECK(most(again.section_mm2) == 0.0);
+}
+
 TEST_CASE("plunges and ramps: what is removed is what the track tells") {
   {
     Material material = block({box(-20, -20, 20, 20)}, {-8.0, -5.0, 0.0});

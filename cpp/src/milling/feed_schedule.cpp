@@ -253,20 +253,25 @@ Path with_feeds(const Path& path, std::span<const FeedStretch> stretches) {
 }
 
 void look_ahead_on_load(FeedStations& stations, std::span<const double> load_mm_per_min,
-                        std::span<const double> reach_s) {
+                        std::span<const double> before_s, std::span<const double> behind_s) {
   const std::size_t count = stations.s_mm.size();
-  if (reach_s.size() != count || load_mm_per_min.size() != count || stations.feed_mm_per_min.size() != count) {
-    refuse("a look-ahead on the load needs one load and one time per station");
+  if (before_s.size() != count || behind_s.size() != count || load_mm_per_min.size() != count ||
+      stations.feed_mm_per_min.size() != count) {
+    refuse("a look-ahead on the load needs one load and two times per station");
   }
-  // Each station by the feed that it has for its own sake, so that the reach of one does not add to that of the next.
-  const std::vector<double> own = stations.feed_mm_per_min;
-  for (std::size_t i = count; i-- > 1;) {
-    const double begin = stations.s_mm[i - 1];  // of the stretch for which station i speaks
-    for (std::size_t k = i; k-- > 0 && own[k] > load_mm_per_min[i];) {
-      if ((begin - stations.s_mm[k]) * seconds_per_minute > reach_s[i] * own[k]) {
-        break;
-      }
-      stations.feed_mm_per_min[k] = std::min(stations.feed_mm_per_min[k], load_mm_per_min[i]);
+  const std::vector<double>& s = stations.s_mm;
+  std::vector<double>& feed = stations.feed_mm_per_min;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double load = load_mm_per_min[i];
+    if (!std::isfinite(load)) {
+      continue;
+    }
+    const double begin = i > 0 ? s[i - 1] : 0.0;  // of the stretch for which station i speaks
+    for (std::size_t k = i; k-- > 0 && begin - s[k] < before_s[i] * load / seconds_per_minute;) {
+      feed[k] = std::min(feed[k], load);
+    }
+    for (std::size_t k = i + 1; k < count && s[k - 1] - s[i] < behind_s[i] * load / seconds_per_minute; ++k) {
+      feed[k] = std::min(feed[k], load);
     }
   }
 }

@@ -186,7 +186,10 @@ class Sweeper {
   [[nodiscard]] double plunged_area(const Vector3& place, std::size_t lowest) {
     if (lowest > 0 && place.z() < material_.borders_mm()[lowest] - touching_mm) {
       plunged_layer_ = lowest - 1;
-      plunged_mm2_ = area_below(lowest - 1, place.head<2>());
+      // Less than a rim as wide as the grid is what the grid does not know.
+      const double rim_mm2 = 2.0 * std::numbers::pi * radius_ * material_.resolution_mm();
+      const double area = area_below(lowest - 1, place.head<2>());
+      plunged_mm2_ = area > rim_mm2 ? area : 0.0;
       return plunged_mm2_;
     }
     return plunged_layer_ == lowest ? plunged_mm2_ : 0.0;

@@ -67,10 +67,11 @@ class Follower {
       }
     }
     const double speed = moves ? chip_travel(step) / (static_cast<double>(steps_.size()) * options_.period_s) : 0.0;
+    // The period covers the stretches from where it began to where it ended.
+    advance(behind_mm_ + same_place_mm);
     const std::size_t from = station_;
-    while (station_ + 1 < stations_.size() && stations_[station_] + same_place_mm < tracker_.s_mm()) {
-      ++station_;
-    }
+    behind_mm_ = tracker_.s_mm();
+    advance(behind_mm_ - same_place_mm);
     for (std::size_t i = from; i <= station_; ++i) {
       result_.highest_mm_per_s[i] = std::max(result_.highest_mm_per_s[i], speed);
     }
@@ -88,6 +89,13 @@ class Follower {
   }
 
  private:
+  // To the station before which a place lies.
+  void advance(double s_mm) noexcept {
+    while (station_ + 1 < stations_.size() && stations_[station_] < s_mm) {
+      ++station_;
+    }
+  }
+
   // Travel within the window in the direction of the present step, as a way along the path: a chip is cut by the way in
   // XY alone, and what was travelled before a corner does not make it thicker.
   [[nodiscard]] double chip_travel(const Vector3& step) const noexcept {
@@ -113,6 +121,7 @@ class Follower {
   Vector3 within_ = Vector3::Zero();  // their sum
   const Path& path_;
   std::size_t station_ = 0;
+  double behind_mm_ = 0.0;  // along the path, at the set-point before
   std::size_t count_ = 0;
   std::size_t moved_ = 0;
   bool started_ = false;

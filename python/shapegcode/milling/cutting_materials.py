@@ -17,7 +17,7 @@ __all__ = ["Material", "materials"]
 _LIBRARY = "materials.toml"
 
 Exponent = Annotated[Float, Field(gt=-1, lt=1)]
-Name = Annotated[str, Strict(), Field(min_length=1, max_length=60, pattern=r"^[\x21-\x7e]([\x20-\x7e]*[\x21-\x7e])?$")]
+Name = Annotated[str, Strict(), Field(min_length=1, max_length=60, pattern=r"^[!-$&-'*-~]([ !-$&-'*-~]*[!-$&-'*-~])?$")]
 
 
 class Material(Table):

@@ -23,6 +23,7 @@ Vector = npt.NDArray[np.float64]
 
 _BEFORE, _AFTER = canvas.COLOURS[0], canvas.COLOURS[1]
 _LIMIT = "#000000"
+_BEYOND = canvas.COLOURS[0]
 _BANDS = 1500
 _PIECES = 20000
 _LOGARITHMIC = 8.0  # ratio of the largest feed to the least in material from which on the axis is logarithmic
@@ -181,6 +182,7 @@ def plot_path(file: str | Path, traces: FeedTraces, material: _core.Material, pa
         ValueError: a wrong ending.
         OSError: the file cannot be written.
     """
+    from matplotlib import colormaps
     from matplotlib.collections import LineCollection
     from matplotlib.colors import Normalize
 
@@ -196,7 +198,10 @@ def plot_path(file: str | Path, traces: FeedTraces, material: _core.Material, pa
     grid: Any = figure.subplots(2 if wide else 1, 1 if wide else 2, sharex=True, sharey=True, squeeze=False)
     panels = list(grid.flat)
     largest = float(max(traces.before["peak_resultant_n"].max(), traces.after["peak_resultant_n"].max(), 1e-9))
-    norm = Normalize(0.0, largest)
+    limits = np.unique(traces.limit["peak_resultant_n"])
+    limited = len(limits) == 1 and float(limits[0]) < largest
+    norm = Normalize(0.0, float(limits[0]) if limited else largest)
+    shades = colormaps["YlGnBu"].with_extremes(over=_BEYOND)
     air = traces.section_mm2 <= _AIR_MM2
     for panel, (when, values) in zip(panels, (("before", traces.before), ("after", traces.after)), strict=True):
         _ground(panel, material, low, high)
@@ -205,7 +210,7 @@ def plot_path(file: str | Path, traces: FeedTraces, material: _core.Material, pa
         order, empty = order[force[order] >= 0.0], order[force[order] < 0.0]
         panel.add_collection(LineCollection(list(lines[empty]), colors=canvas.GREY, linewidths=0.7, rasterized=True))
         coloured = LineCollection(
-            list(lines[order]), array=force[order], cmap="plasma_r", norm=norm, linewidths=2.2, rasterized=True,
+            list(lines[order]), array=force[order], cmap=shades, norm=norm, linewidths=2.2, rasterized=True,
             capstyle="round",
         )  # fmt: skip
         panel.add_collection(coloured)
@@ -217,17 +222,8 @@ def plot_path(file: str | Path, traces: FeedTraces, material: _core.Material, pa
         )
         panel.set_xlabel("X in mm")
         panel.set_ylabel("Y in mm")
-    bar = figure.colorbar(coloured, ax=panels, shrink=0.85, pad=0.02)
-    bar.set_label("peak resultant in N")
-    limit = traces.limit["peak_resultant_n"]
-    known = np.unique(limit[np.isfinite(limit)])
-    if len(known) == 1 and known[0] < largest:
-        bar.ax.axhline(known[0], color="white", linewidth=3.0)
-        bar.ax.axhline(known[0], color=_LIMIT, linewidth=1.4)
-        bar.ax.annotate(
-            "limit", (0.0, known[0]), xycoords=("axes fraction", "data"), xytext=(-3, 0), textcoords="offset points",
-            ha="right", va="center", fontsize=8,
-        )  # fmt: skip
+    bar = figure.colorbar(coloured, ax=panels, shrink=0.85, pad=0.02, extend="max" if limited else "neither")
+    bar.set_label("peak resultant in N" + (f"; red: above the limit, {limits[0]:.4g} N" if limited else ""))
     canvas.heading(figure, "Peak resultant along the path; grey: without material", part)
     canvas.save(figure, file)
 

@@ -14,10 +14,23 @@ from shapegcode.milling.survey import SurveyedMove, SurveyedRegion
 from shapegcode.milling.tool_file import Tool
 from shapegcode.milling.travel import Motion, Vector
 
-__all__ = ["AIR", "KEPT", "MINIMUM", "PROGRAMMED", "FeedPlan", "limits_of", "milling_force", "plan_region", "tool_beam"]
+__all__ = [
+    "AIR",
+    "KEPT",
+    "MINIMUM",
+    "PROGRAMMED",
+    "FeedPlan",
+    "goes_on",
+    "limits_of",
+    "milling_force",
+    "plan_region",
+    "tool_beam",
+]
 
 _ATTEMPTS = 12
+_LONGEST_REACH = 2.0  # of the lag, beyond which waiting longer changes nothing
 _LOWERING = 3  # attempts that only slow down earlier, before feeds are lowered too
+_SAME_DIRECTION = 0.95  # cosine of a turn after which the load is still that of before
 _LEAST_SHARE = 0.9  # of a feed that is lowered once
 _TOO_FAST = 1e-4  # relative: rounding of the travel, far below the margin
 _DEEPER_PLUNGE = 0.01  # of the tool's end in material: a ramp cuts with its end
@@ -30,8 +43,8 @@ _LIMIT_NAMES = np.array(
     dtype="<U16",
 )
 
-PROGRAMMED, AIR, KEPT, MINIMUM = "programmed", "air", "kept", "minimum"
-"""What holds a feed where no limit does: the program, no material, a block that is left alone, the least chip."""
+PROGRAMMED, MAX_FEED, AIR, KEPT, MINIMUM = "programmed", "max_feed", "air", "kept", "minimum"
+"""What holds a feed where no limit does: the program, the largest feed, no material, a block left alone, the least."""
 
 
 @dataclass(frozen=True)
@@ -120,8 +133,8 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Motion, divi
     slowest = np.maximum(least, share * programmed)
     lowest = (feed_unit_mm_per_min * np.ceil(slowest / feed_unit_mm_per_min - 1e-9))[segment]  # what F can say
     limit, holds, load = _limits_along(surveyed, programmed[segment], lowest, machine, margin)
-    at_minimum = holds == MINIMUM
     frozen = np.array([bool(reason) for reason in kept])
+    at_minimum = (holds == MINIMUM) & ~frozen[segment]
     limit = np.where(frozen[segment], programmed[segment], limit)
     holds[frozen[segment]] = KEPT
     window_s = 60.0 / teeth_per_min
@@ -179,6 +192,12 @@ def _limits_along(
     tool, track = surveyed.tool, surveyed.track
     assert tool is not None and track is not None
     axes = machine.axes
+    least, most = machine.controller.minimum_feed_mm_per_min, tool.feed.max_feed_mm_per_min
+    if most is not None and most < least:
+        raise _core.ArgumentError(
+            f"feed.max_feed_mm_per_min = {most:g} of {tool.tool.name}: must not be below "
+            f"controller.minimum_feed_mm_per_min = {least:g}"
+        )
     fastest = min(axes.x.max_feed_mm_per_min, axes.y.max_feed_mm_per_min)
     fastest = min(fastest, tool.feed.max_feed_mm_per_min or fastest)
     # Without a largest chip nobody said that more than the programmed feed is wanted in material.
@@ -190,27 +209,38 @@ def _limits_along(
     bound, limit, _ = _core.largest_feeds(
         force, track, limits_of(tool, machine, margin), 1e-3 * float(lowest.min()), highest
     )
-    holds = np.where(bound < ceiling, _LIMIT_NAMES[limit], PROGRAMMED)
+    top = np.where(ceiling > programmed, MAX_FEED, PROGRAMMED)
+    holds = np.where((bound < ceiling) & (limit != _core.FeedLimit.none.value), _LIMIT_NAMES[limit], top)
     feeds = np.minimum(bound, ceiling)
     load = np.where(bound < highest, np.maximum(bound, lowest), np.inf)
     low = feeds < lowest
     feeds[low] = np.minimum(lowest, ceiling)[low]
     holds[low] = MINIMUM
     air = np.asarray(track.section_mm2) <= _AIR_MM2
-    feeds[air] = programmed[air]
+    feeds[air] = np.minimum(programmed, fastest)[air]
     load[air] = np.inf
     holds[air] = AIR
     # A station speaks for the stretch before it, on which the load changes from what the last one met.
-    segment = np.asarray(track.segment)
-    same = (segment[1:] == segment[:-1]) & ~air[1:] & ~air[:-1]
-    before = np.where(same & (feeds[:-1] < feeds[1:]), np.arange(len(feeds) - 1), np.arange(1, len(feeds)))
+    passed = goes_on(track) & ~air[:-1]
+    before = np.where(passed & (feeds[:-1] < feeds[1:]), np.arange(len(feeds) - 1), np.arange(1, len(feeds)))
     feeds[1:], holds[1:] = feeds[before], holds[before]
-    load[1:] = np.where(same, np.minimum(load[1:], load[:-1]), load[1:])
+    load[1:] = np.where(passed, np.minimum(load[1:], load[:-1]), load[1:])
     if tool.feed.air_feed_mm_per_min is not None:
         level = np.asarray(track.horizontal) > _STEEPEST_AIR  # nobody wants a tool to come down faster than he said
-        clear = air & level & ~_near_material(np.asarray(track.s_mm), air, tool.feed.approach_mm)
+        clear = air & (holds == AIR) & level & ~_near_material(np.asarray(track.s_mm), air, tool.feed.approach_mm)
         feeds[clear] = np.maximum(programmed[clear], min(tool.feed.air_feed_mm_per_min, fastest))
     return feeds, holds, load
+
+
+def goes_on(track: _core.EngagementTrack) -> npt.NDArray[np.bool_]:
+    """Per station but the last whether the tool goes on from it in much the same direction, (n - 1,).
+
+    At a corner the load of the block before ends with the block.
+    """
+    turn = np.diff(np.asarray(track.direction_rad))
+    level = np.asarray(track.horizontal)
+    on: npt.NDArray[np.bool_] = (np.cos(turn) > _SAME_DIRECTION) & (level[1:] > 0.0) & (level[:-1] > 0.0)
+    return on
 
 
 def _stepped(limit: Vector, programmed: Vector) -> Vector:
@@ -235,11 +265,13 @@ def _stretches_that_keep(task: _Task, machine: Machine, motion: Motion) -> list[
     most_change = math.inf if control.max_change_mm_per_min is None else control.max_change_mm_per_min
     floor = np.minimum(task.limit, task.lowest)
     planned = np.maximum(_stepped(task.limit, task.programmed[task.segment]), floor)
-    reach = np.full(len(planned), motion.reach_s + task.window_s)
+    before = np.full(len(planned), motion.reach_s + task.window_s)
+    behind = np.full(len(planned), motion.reach_s)
+    longest = _LONGEST_REACH * (motion.reach_s + task.window_s)
     free = task.kept[task.segment] == 0.0
     stretches: list[_core.FeedStretch] = []
     for attempt in range(_ATTEMPTS):
-        feeds = _core.look_ahead_on_load(task.stations_mm, planned, task.load, reach)
+        feeds = _core.look_ahead_on_load(task.stations_mm, planned, task.load, before, behind)
         stretches = _core.schedule_feed(
             task.path.segment_ends_mm, task.kept, task.divisible, task.stations_mm, feeds, control.interval_mm,
             most_change, task.feed_unit,
@@ -250,7 +282,8 @@ def _stretches_that_keep(task: _Task, machine: Machine, motion: Motion) -> list[
         over = free & (run > task.load * (1.0 + _TOO_FAST))
         if not over.any():
             break
-        reach[over] = 1.5 * reach[over] + motion.reach_s / 4.0 + task.window_s
+        for reach in (before, behind):
+            reach[over] = np.minimum(1.5 * reach[over] + task.window_s, longest)
         if attempt >= _LOWERING:
             planned[over] *= np.maximum(task.load[over] / run[over], _LEAST_SHARE)
             planned = np.maximum(planned, floor)

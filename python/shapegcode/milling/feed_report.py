@@ -12,7 +12,7 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.milling.feed_plan import AIR, KEPT, MINIMUM, FeedPlan, limits_of, milling_force, tool_beam
+from shapegcode.milling.feed_plan import AIR, KEPT, MINIMUM, FeedPlan, goes_on, limits_of, milling_force, tool_beam
 from shapegcode.milling.survey import Survey, SurveyedMove, SurveyedRegion
 from shapegcode.milling.tool_file import Tool
 from shapegcode.milling.travel import Motion, Travelled, Vector
@@ -90,7 +90,10 @@ def region_load(
 def load_of(part: SurveyedRegion | SurveyedMove, travelled: Travelled) -> Load:
     """Load along a region that is travelled so."""
     assert part.tool is not None and part.track is not None
-    figures = milling_force(part.tool, part).figures_of(part.track, travelled.feed_mm_per_min, tool_beam(part.tool))
+    # What a station meets is met with the feed of the stretch before it and of the one behind it.
+    feeds = travelled.feed_mm_per_min.copy()
+    feeds[:-1] = np.where(goes_on(part.track), np.maximum(feeds[:-1], feeds[1:]), feeds[:-1])
+    figures = milling_force(part.tool, part).figures_of(part.track, feeds, tool_beam(part.tool))
     return Load(
         travelled.feed_mm_per_min,
         travelled.time_s,
@@ -110,7 +113,8 @@ def feed_report(
     warnings = [*program.warnings, *surveyed.warnings]
     for tool in {id(part.tool): part.tool for part in surveyed.regions if part.tool is not None}.values():
         own = limits_of(tool, machine, 0.0)
-        if not any(np.isfinite(getattr(own, name)) for _, name, *_ in _LIMITED):
+        names = [name for _, name, *_ in _LIMITED] + ["feed_per_tooth_mm"]
+        if not any(np.isfinite(getattr(own, name)) for name in names):
             warnings.append(
                 f"tool {tool.tool.name}: no limit of force, deflection, torque or power is set, so nothing slows "
                 "its feed: set one of [limits] in its file; the column before shows what it takes now"
@@ -204,7 +208,7 @@ def _largest(part: SurveyedRegion, column: str) -> float | None:
 
 
 def _removed_mm3(part: SurveyedRegion) -> float | None:
-    """Volume that the sides of the tool cut on the region."""
+    """Volume that is cut on the region."""
     if part.track is None or len(part.track) == 0:
         return None
     lengths = np.diff(np.concatenate(([0.0], part.track.s_mm)))

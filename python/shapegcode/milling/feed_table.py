@@ -22,6 +22,7 @@ _LIMIT_WORDS = {
     "resultant": "resultant force",
     "chip_load": "feed per tooth",
     "programmed": "feed as programmed",
+    "max_feed": "largest feed of tool or axes",
     "air": "nothing to cut",
     "minimum": "least feed",
     "kept": "left as it was",

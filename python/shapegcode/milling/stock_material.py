@@ -18,6 +18,7 @@ __all__ = ["build_material"]
 
 # Height of the layers on ramps and helices.
 _RAMP_STEP_RATIO = 0.1  # of the tool's diameter
+_MOST_LAYERS = 200  # sweeping one costs time in every layer above the tip
 
 
 def build_material(
@@ -53,14 +54,28 @@ def build_material(
     rings = [ring for piece in pieces for ring in piece.rings]
     step = _RAMP_STEP_RATIO * tool.tool.diameter_mm
     if stock.program is None:
-        return _core.Material(rings, _core.layer_borders([*paths, *others], bottom, top, step), resolution_mm)
+        return _core.Material(rings, _fewer(_core.layer_borders([*paths, *others], bottom, top, step)), resolution_mm)
     rough = Tool.load(stock.beside(stock.program.tool))
     moves = _moves(stock, stock.program, machine)
-    borders = _core.layer_borders([*moves, *paths, *others], bottom, top, step)
+    borders = _fewer(_core.layer_borders([*moves, *paths, *others], bottom, top, step))
     material = _core.Material(rings, borders, resolution_mm)
     for path in moves:
         _core.sweep(material, path, rough.tool.diameter_mm)
     return material
+
+
+def _fewer(borders_mm: Sequence[float]) -> list[float]:
+    """At most so many heights: those that lie closest together become one, as in a surface that is milled in 3-D."""
+    borders = list(borders_mm)
+    least_mm = (borders[-1] - borders[0]) / (4.0 * _MOST_LAYERS)
+    while len(borders) > _MOST_LAYERS + 1:
+        kept = borders[:1]
+        for border in borders[1:-1]:
+            if border - kept[-1] >= least_mm:
+                kept.append(border)
+        borders = [*kept, borders[-1]]
+        least_mm *= 1.5
+    return borders
 
 
 def _moves(stock: Stock, rough: Rough, machine: Machine) -> list[_core.Path]:

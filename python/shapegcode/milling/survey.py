@@ -12,10 +12,12 @@ from shapegcode.machine import Machine
 from shapegcode.milling.stock_file import Stock
 from shapegcode.milling.stock_material import build_material
 from shapegcode.milling.tool_file import Tool
+from shapegcode.milling.zero_points import ZeroPoints
 from shapegcode.program import Program
 
 __all__ = ["Survey", "SurveyedMove", "SurveyedRegion", "survey"]
 
+_COARSEST = 0.1  # resolution, of the smallest tool's radius
 _RESOLUTION_RATIO = 0.01  # of the smallest tool's diameter
 _SHOWN_COLLISIONS = 5
 _SLACK_MM = 1e-6
@@ -112,12 +114,19 @@ def survey(
     """
     walk = _Walk(program, tools)
     cutters = walk.tools_of_regions()
-    reasons = [_why_not_swept(region, program) for region in program.regions]
+    reasons = [_why_not_swept(region, walk.zero) for region in program.regions]
     swept = [index for index, reason in enumerate(reasons) if not reason and cutters[index] is not None]
     if not swept:
         why = next((f": {reason}" for reason in reasons if reason), "")
+        if program.core.kept_compensated_moves:
+            why = ': they run under cutter compensation that is kept as it stands; set input.compensation = "expand"'
         raise _core.ArgumentError(f"{program.source}: no cutting moves whose engagement can be computed{why}")
     smallest = min(tools, key=lambda tool: tool.radius_mm)
+    if resolution_mm is not None and not 0.0 < resolution_mm <= _COARSEST * smallest.radius_mm:
+        raise _core.ArgumentError(
+            f"resolution is {resolution_mm:g} mm, must be above 0 and at most {_COARSEST * smallest.radius_mm:g} mm "
+            f"(a tenth of the radius of {smallest.tool.name})"
+        )
     resolution = resolution_mm or _RESOLUTION_RATIO * smallest.tool.diameter_mm
     # The walls of an allowance are those that the finishing tool leaves.
     walls = [program.regions[index].path for index in swept if cutters[index] is smallest]
@@ -134,25 +143,24 @@ def survey(
             regions.append(walk.sweep_region(material, index))
         on_progress(done + 1, total)
     walk.tell_collisions()
-    if not any(region.track is not None and len(region.track) and region.track.section_mm2.any() for region in regions):
+    known = [region.track for region in regions if region.track is not None]
+    if known and not any(track.section_mm2.any() for track in known):
         walk.warnings.append(
             f"{program.source}: the tool never touches the stock: see where it lies, in the program's own coordinates"
         )
     return Survey(program, tuple(regions), tuple(walk.moves), material, tuple(walk.warnings))
 
 
-def _why_not_swept(region: _core.Region, program: Program) -> str:
+def _why_not_swept(region: _core.Region, zero: ZeroPoints) -> str:
     """Why what the tool meets on a region cannot be told; empty if it can."""
-    first = program.regions[0].exit
-    if (region.exit.coordinate_system, region.exit.coordinate_number) != (
-        first.coordinate_system,
-        first.coordinate_number,
-    ):
-        return "it is cut in other work coordinates than the first cutting move, in whose the stock lies"
+    if elsewhere := zero.why_elsewhere(region.first_line):
+        return elsewhere
     if region.incremental:
         return "its place is not known"
     if not region.path.arcs_in_xy:
-        return "it holds arcs that are not in the XY plane (G17)"
+        path = region.path
+        first = next(i for i in range(len(path)) if path[i].kind == _core.SegmentKind.arc and path[i].normal != 2)
+        return f"it holds arcs that are not in the XY plane (G17), the first in line {path[first].line_number}"
     return ""
 
 
@@ -167,6 +175,7 @@ class _Walk:
 
     def __init__(self, program: Program, tools: Sequence[Tool]) -> None:
         self.warnings: list[str] = []
+        self.zero = ZeroPoints(program)
         self._program = program
         self._functions = program.core.functions
         self._moves = program.core.other_moves
@@ -190,6 +199,8 @@ class _Walk:
                 raise _core.ArgumentError(f"two tools have the number T{number}")
             else:
                 self._tools[number] = tool
+        # Where the program changes tools, T alone only gets the next one ready.
+        self._changes = any(_TOOL_CHANGE in m_codes for m_codes, _, _ in self._functions)
         used = {tool for _, tool, _ in self._functions if tool > 0}
         if self._any is not None and len(used) > 1:
             self.warnings.append(
@@ -215,10 +226,15 @@ class _Walk:
     def _tool(self) -> Tool | None:
         if self._any is not None:
             return self._any
-        number = self._number if self._number > 0 else self._ready
-        if number <= 0 and len(self._tools) == 1:  # a program for one tool need not name it
+        number = self._in_spindle
+        if number <= 0 and len(self._tools) == 1 and not self._changes:  # a program for one tool need not name it
             return next(iter(self._tools.values()))
         return self._tools.get(number)
+
+    @property
+    def _in_spindle(self) -> int:
+        """T number of the tool that cuts; not positive: not known."""
+        return self._number if self._changes else self._ready
 
     def tools_of_regions(self) -> list[Tool | None]:
         """What cuts each region; the walk stands at the program's start again afterwards."""
@@ -247,7 +263,7 @@ class _Walk:
             return
         if segment.kind == _core.SegmentKind.arc and segment.normal != 2:
             return
-        if segment.kind == _core.SegmentKind.rapid and self._adrift:
+        if (segment.kind == _core.SegmentKind.rapid and self._adrift) or self.zero.why_elsewhere(line):
             return
         track = _core.sweep(material, _core.Path([segment]), tool.tool.diameter_mm)
         if not (track.section_mm2.any() or track.plunged_mm2.any()):
@@ -287,9 +303,9 @@ class _Walk:
         """A region."""
         region = self._program.regions[index]
         tool = self._tool
-        kept = _why_not_swept(region, self._program)
+        kept = _why_not_swept(region, self.zero)
         if tool is None:
-            number = self._number if self._number > 0 else self._ready
+            number = self._in_spindle
             kept = f"no tool file describes T{number}" if number > 0 else "the program names no tool before it"
         speed = region.entry.spindle_rev_per_min
         if tool is not None and not speed > 0.0:

@@ -50,11 +50,14 @@ struct FeedStretch {
 /// stretches do not cover the path.
 [[nodiscard]] Path with_feeds(const Path& path, std::span<const FeedStretch> stretches);
 
-/// Lowers the feeds before each station that the load holds, over the way on which a controller that needs `reach_s`
-/// for a change of feed would still be too fast there: reach_s times the feed on the way. `load_mm_per_min`: the
-/// largest feed that the load at a station allows, which may be above what is wanted there. One entry of both per
-/// station.
+/// Lowers the feeds around each station that the load holds, because the travel lags behind a change of feed: a change
+/// down must be commanded so early that the travel has followed, `before_s` times the feed that the load allows, and a
+/// change up not before the travel has left, `behind_s` times it. `load_mm_per_min`: the largest feed that the load at
+/// a station allows, which may be above what is wanted there. One entry of each per station.
+///
+/// Behind a filter of mean delay m and length d a change commanded at a place begins m times the slower feed before it
+/// and has ended d - m times the slower feed behind it.
 void look_ahead_on_load(FeedStations& stations, std::span<const double> load_mm_per_min,
-                        std::span<const double> reach_s);
+                        std::span<const double> before_s, std::span<const double> behind_s);
 
 }  // namespace shapegcode
