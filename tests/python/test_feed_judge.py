@@ -107,8 +107,9 @@ def assert_good(of: Judged, *, near: float) -> None:
     for when in ("before", "after"):
         reported, own = of.result.report["resultant_force_n"][when], getattr(of.verdict, when)
         assert reported["mean"] == pytest.approx(own["mean"], rel=0.02)
-        # A bound from above where the feed changes within a step of the engagement.
-        assert -0.01 <= reported["max"] / own["max"] - 1.0 <= 0.12
+        # A bound from above where the feed changes within a step of the engagement; of a look-ahead the judge takes the
+        # F word at once, without acceleration.
+        assert -0.03 <= reported["max"] / own["max"] - 1.0 <= 0.12
     blocks = of.result.report["blocks"]
     assert blocks["before"] == sum(1 for move in interpret(of.case.program).moves if move.is_cut and move.length > 0.0)
     assert blocks["after"] == sum(
