@@ -19,7 +19,7 @@ from shapegcode import _core
 from shapegcode.machine_errors import FileError
 from shapegcode.milling.file_documentation import STOCK_EXAMPLES
 from shapegcode.milling.stock_file import Stock, StockError
-from shapegcode.milling.stock_shape import StockPiece
+from shapegcode.milling.stock_shape import StockPiece, stock_polygons
 
 DATA = resources.files("shapegcode") / "data" / "milling"
 RADIUS = 4.0  # of the tool
@@ -78,7 +78,7 @@ def complaint(text: str) -> str:
 
 def unsuited(stock: Stock, path: _core.Path, radius: float = RADIUS) -> str:
     with pytest.raises(StockError) as caught:
-        stock.polygons([path], radius)
+        stock_polygons(stock, [path], radius)
     return str(caught.value)
 
 
@@ -86,7 +86,7 @@ def unsuited(stock: Stock, path: _core.Path, radius: float = RADIUS) -> str:
 
 
 def test_a_box() -> None:
-    (piece,) = Stock.from_toml("[box]\nx_mm = [1, 5]\ny_mm = [-2, 3]\nz_mm = [-4, 0]\n").polygons([], RADIUS)
+    (piece,) = stock_polygons(Stock.from_toml("[box]\nx_mm = [1, 5]\ny_mm = [-2, 3]\nz_mm = [-4, 0]\n"), [], RADIUS)
     assert area([piece]).equals(shapely.box(1, -2, 5, 3))
     assert (piece.bottom_mm, piece.top_mm) == (-4, 0)
     assert shapely.LinearRing(piece.rings[0]).is_ccw
@@ -99,7 +99,7 @@ points_mm = [[0, 0], [0, 10], [20, 10], [20, 0]]
 holes_mm = [[[5, 3], [9, 3], [9, 7], [5, 7]]]
 z_mm = [-4, 1]
 """
-    (piece,) = Stock.from_toml(text).polygons([], RADIUS)
+    (piece,) = stock_polygons(Stock.from_toml(text), [], RADIUS)
     outline, hole = piece.rings
     assert (len(outline), len(hole)) == (4, 4)
     assert shapely.LinearRing(outline).is_ccw
@@ -114,7 +114,7 @@ points_mm = [[0, 0], [20, 0], [20, 10], [0, 10]]
 holes_mm = [[[8, -1], [12, -1], [12, 11], [8, 11]]]
 z_mm = [-4, 1]
 """
-    pieces = Stock.from_toml(text).polygons([], RADIUS)
+    pieces = stock_polygons(Stock.from_toml(text), [], RADIUS)
     assert sorted(area([piece]).area for piece in pieces) == pytest.approx([80, 80])
 
 
@@ -123,7 +123,7 @@ def test_of_a_roughing_program_the_stock_before_it() -> None:
     assert stock.kind == "program"
     assert stock.program is not None
     assert stock.beside(stock.program.file) == Path("/jobs/rough.nc")
-    assert area(stock.polygons([], RADIUS)).equals(shapely.box(0, 0, 120, 80))
+    assert area(stock_polygons(stock, [], RADIUS)).equals(shapely.box(0, 0, 120, 80))
 
 
 @pytest.mark.parametrize("title", STOCK_EXAMPLES)
@@ -136,7 +136,7 @@ def test_examples_load(title: str) -> None:
 
 def test_the_corner_of_paper_001() -> None:
     stock = Stock.from_toml((DATA / "paper001_stock.toml").read_text(encoding="utf-8"))
-    (piece,) = stock.polygons([corner()], RADIUS)
+    (piece,) = stock_polygons(stock, [corner()], RADIUS)
     assert (piece.bottom_mm, piece.top_mm) == (-15, 0)
     rough = shapely.LinearRing(piece.rings[0])
     # Rough walls 0.8 mm in front of the finished ones, joined by a radius of 8 about (-0.8, 4.8).
@@ -158,7 +158,7 @@ def test_the_corner_of_paper_001() -> None:
 
 def test_radial_depth_in_the_corner_is_that_of_paper_001() -> None:
     """Largest radial depth 2.103 mm at 14 degrees, from the polygon alone (spec, paper 001 case 1)."""
-    (piece,) = allowance().polygons([corner()], RADIUS)
+    (piece,) = stock_polygons(allowance(), [corner()], RADIUS)
     rough = shapely.Polygon(piece.rings[0])
     depths = []
     for degrees in range(31):
@@ -177,7 +177,7 @@ def test_radial_depth_in_the_corner_is_that_of_paper_001() -> None:
 def test_wide_corners_keep_their_radius_less_the_allowance() -> None:
     """A corner of 20 mm in the part is one of 19.2 mm before, if roughing could do 8."""
     path = _core.Path([line((-30, 0), (0, 0)), arc((0, 0), (16, 16), (0, 16), 90), line((16, 16), (16, 46))])
-    (piece,) = allowance().polygons([path], RADIUS)
+    (piece,) = stock_polygons(allowance(), [path], RADIUS)
     rough = shapely.LinearRing(piece.rings[0])
     for degrees in np.linspace(270, 360, 19):
         direction = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
@@ -188,7 +188,7 @@ def test_outside_corners_get_the_allowance_all_round() -> None:
     """Round a corner of the part, wall on the right, the layer is 0.8 mm everywhere: an arc of 0.8 about the edge."""
     edge = np.array([0.0, 0.0])
     path = _core.Path([line((-30, 4), (0, 4)), arc((0, 4), (4, 0), (0, 0), -90), line((4, 0), (4, -30))])
-    (piece,) = allowance().polygons([path], RADIUS)
+    (piece,) = stock_polygons(allowance(), [path], RADIUS)
     rough = shapely.LinearRing(piece.rings[0])
     for degrees in np.linspace(0, 90, 10):
         direction = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
@@ -197,7 +197,7 @@ def test_outside_corners_get_the_allowance_all_round() -> None:
 
 def test_a_straight_wall_is_a_plain_layer_that_goes_on_beyond_its_ends() -> None:
     stock = allowance(width_mm=6.0)
-    result = area(stock.polygons([_core.Path([line((0, 0), (50, 0))])], RADIUS))
+    result = area(stock_polygons(stock, [_core.Path([line((0, 0), (50, 0))])], RADIUS))
     inside = result.intersection(shapely.box(-2 * RADIUS, -30, 50 + 2 * RADIUS, 30))
     assert inside.area == pytest.approx((50 + 4 * RADIUS) * (6.0 + 2 * 0.8), rel=1e-5)  # it grows to the back as well
     assert inside.bounds == pytest.approx((-8, -4 - 6.8, 58, -3.2), abs=NEAR_MM)
@@ -205,15 +205,15 @@ def test_a_straight_wall_is_a_plain_layer_that_goes_on_beyond_its_ends() -> None
 
 def test_the_wall_may_be_on_the_left() -> None:
     path = _core.Path([line((0, 0), (50, 0))])
-    right = area(allowance().polygons([path], RADIUS))
-    left = area(allowance(wall='"left"').polygons([path], RADIUS))
+    right = area(stock_polygons(allowance(), [path], RADIUS))
+    left = area(stock_polygons(allowance(wall='"left"'), [path], RADIUS))
     mirrored = shapely.transform(right, lambda points: points * [1, -1])
     assert left.symmetric_difference(mirrored).area < NEAR_MM2
 
 
 def test_a_pocket() -> None:
     """Path 40 x 20 with a tool of 8: a pocket 48 x 28; with corners of 4, where roughing left 8."""
-    (piece,) = allowance(wall='"right"').polygons([_core.Path(rectangle(40, 20))], RADIUS)
+    (piece,) = stock_polygons(allowance(wall='"right"'), [_core.Path(rectangle(40, 20))], RADIUS)
     assert len(piece.rings) == 2
     hole = shapely.Polygon(piece.rings[1])
     within_reach(hole, shapely.box(-24 + 0.8 + 8, -14 + 0.8 + 8, 24 - 0.8 - 8, 14 - 0.8 - 8), 8)
@@ -222,7 +222,7 @@ def test_a_pocket() -> None:
 
 def test_a_boss() -> None:
     """The same path, the other way round: the part is 32 x 12 and has an even layer, rounded at its corners."""
-    (piece,) = allowance(wall='"left"', width_mm=30).polygons([_core.Path(rectangle(40, 20))], RADIUS)
+    (piece,) = stock_polygons(allowance(wall='"left"', width_mm=30), [_core.Path(rectangle(40, 20))], RADIUS)
     assert len(piece.rings) == 1
     within_reach(shapely.Polygon(piece.rings[0]), shapely.box(-16, -6, 16, 6), 0.8)
 
@@ -230,30 +230,30 @@ def test_a_boss() -> None:
 def test_a_pocket_ran_clockwise_has_its_wall_on_the_left() -> None:
     corners = [(0, -10), (-20, -10), (-20, 10), (20, 10), (20, -10), (0, -10)]
     path = _core.Path([line(a, b) for a, b in pairwise(corners)])
-    clockwise = area(allowance(wall='"left"').polygons([path], RADIUS))
-    counter = area(allowance().polygons([_core.Path(rectangle(40, 20))], RADIUS))
+    clockwise = area(stock_polygons(allowance(wall='"left"'), [path], RADIUS))
+    counter = area(stock_polygons(allowance(), [_core.Path(rectangle(40, 20))], RADIUS))
     assert clockwise.symmetric_difference(counter).area < NEAR_MM2
 
 
 def test_what_leads_to_a_closed_contour_is_no_wall() -> None:
-    plain = area(allowance().polygons([_core.Path(rectangle(40, 20))], RADIUS))
+    plain = area(stock_polygons(allowance(), [_core.Path(rectangle(40, 20))], RADIUS))
     led = [
         line((-3, -7), (-3, -7.0001)),
         line((-3, -7.0001), (0, -10)),
         *rectangle(40, 20),
         line((0, -10), (3, -7)),
     ]
-    assert area(allowance().polygons([_core.Path(led)], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
+    assert area(stock_polygons(allowance(), [_core.Path(led)], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
 
 
 def test_a_contour_may_run_on_over_its_beginning() -> None:
-    plain = area(allowance().polygons([_core.Path(rectangle(40, 20))], RADIUS))
+    plain = area(stock_polygons(allowance(), [_core.Path(rectangle(40, 20))], RADIUS))
     overlapping = [*rectangle(40, 20), line((0, -10), (2, -10)), line((2, -10), (2, -8))]
     lead_in = line((0, -8), (0, -10))
     # Once with a point where the contour began, once straight through it.
     through = [lead_in, *rectangle(40, 20)[:-1], line((-20, -10), (2, -10)), line((2, -10), (2, -8))]
     for segments in ([lead_in, *overlapping], through):
-        result = area(allowance().polygons([_core.Path(segments)], RADIUS))
+        result = area(stock_polygons(allowance(), [_core.Path(segments)], RADIUS))
         assert result.symmetric_difference(plain).area < NEAR_MM2
 
 
@@ -262,7 +262,7 @@ def test_a_wall_of_thousands_of_short_moves_is_one_piece() -> None:
     along = np.linspace(0, 120, 2001)
     points = np.column_stack([along, 3 * np.sin(along / 15)])
     path = _core.Path([line(a, b) for a, b in pairwise(points)])
-    (piece,) = allowance(allowance_mm=0.5, corner_radius_mm=6.0).polygons([path], RADIUS)
+    (piece,) = stock_polygons(allowance(allowance_mm=0.5, corner_radius_mm=6.0), [path], RADIUS)
     assert len(piece.rings) == 1
     outline = shapely.LineString(piece.rings[0])
     inner = outline.intersection(shapely.box(10, -20, 110, 20))
@@ -274,26 +274,26 @@ def test_a_wall_of_thousands_of_short_moves_is_one_piece() -> None:
 
 def test_several_levels_of_one_contour_are_one_wall() -> None:
     once = rectangle(40, 20)
-    plain = area(allowance().polygons([_core.Path(once)], RADIUS))
+    plain = area(stock_polygons(allowance(), [_core.Path(once)], RADIUS))
     down = _core.Segment.line([0, -10, Z], [0, -10, 2 * Z], 10.0)
     twice = [*once, down]
     corners = [(0, -10), (20, -10), (20, 10), (-20, 10), (-20, -10), (0, -10)]
     twice += [line(a, b, 2 * Z) for a, b in pairwise(corners)]
-    assert area(allowance().polygons([_core.Path(twice)], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
-    assert area(allowance().polygons([_core.Path(once)] * 2, RADIUS)).symmetric_difference(plain).area < NEAR_MM2
+    assert area(stock_polygons(allowance(), [_core.Path(twice)], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
+    assert area(stock_polygons(allowance(), [_core.Path(once)] * 2, RADIUS)).symmetric_difference(plain).area < NEAR_MM2
 
 
 def test_moves_above_the_stock_do_not_count() -> None:
     above = _core.Path([line((-60, 5), (60, 5), 1.0)])
-    plain = area(allowance().polygons([corner()], RADIUS))
-    assert area(allowance().polygons([above, corner()], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
+    plain = area(stock_polygons(allowance(), [corner()], RADIUS))
+    assert area(stock_polygons(allowance(), [above, corner()], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
     assert unsuited(allowance(), above) == (
         "s.toml:5: allowance.z_mm = [-15.0, 0.0]: no cutting move of the program goes below the top"
     )
 
 
 def test_lead_in_and_lead_out_of_an_open_wall_are_left_out() -> None:
-    plain = area(allowance().polygons([corner()], RADIUS))
+    plain = area(stock_polygons(allowance(), [corner()], RADIUS))
     length = 5 * math.pi / 2
     led = _core.Path(
         [
@@ -305,7 +305,7 @@ def test_lead_in_and_lead_out_of_an_open_wall_are_left_out() -> None:
         ]
     )
     stock = allowance(lead_in_mm=length, lead_out_mm=math.hypot(7, 6))
-    assert area(stock.polygons([led], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
+    assert area(stock_polygons(stock, [led], RADIUS)).symmetric_difference(plain).area < NEAR_MM2
     assert "no wall is left" in unsuited(allowance(lead_in_mm=60, lead_out_mm=60), led)
 
 
@@ -313,7 +313,7 @@ def test_a_thin_wall_between_two_pockets_is_no_stock_inside_either() -> None:
     shift = 52.0  # pockets 48 wide: 4 mm between them
     aside = np.array([shift, 0, 0])
     second = [_core.Segment.line(one.start_mm + aside, one.end_mm + aside, 10.0) for one in rectangle(40, 20)]
-    result = area(allowance().polygons([_core.Path(rectangle(40, 20)), _core.Path(second)], RADIUS))
+    result = area(stock_polygons(allowance(), [_core.Path(rectangle(40, 20)), _core.Path(second)], RADIUS))
     between = result.intersection(shapely.LineString([(0, 0), (shift, 0)]))
     assert between.length == pytest.approx(4 + 2 * 0.8, abs=NEAR_MM)
 
@@ -409,7 +409,7 @@ def test_a_bad_point_is_the_only_problem_of_its_list() -> None:
 def test_a_polygon_that_is_none(points: str, holes: str, expected: str) -> None:
     stock = Stock.from_toml(f"[polygon]\npoints_mm = {points}\nholes_mm = {holes}\nz_mm = [0, 1]\n", "s.toml")
     with pytest.raises(StockError) as caught:
-        stock.polygons([], RADIUS)
+        stock_polygons(stock, [], RADIUS)
     assert expected in str(caught.value)
 
 

@@ -7,19 +7,14 @@ makes polygons of it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, PrivateAttr, model_validator
 
 from shapegcode.machine_errors import FileError, KeyProblem, Problem, line_of
 from shapegcode.machine_file import parsed, read_text, validated
 from shapegcode.machine_keys import Float, NonNegative, Positive, Table, Text, key
-
-if TYPE_CHECKING:
-    from shapegcode import _core
-    from shapegcode.milling.stock_shape import StockPiece
 
 __all__ = ["Allowance", "Box", "Polygon", "Rough", "Solid", "Stock", "StockError"]
 
@@ -181,20 +176,6 @@ class Stock(Table):
     def error(self, key: str, value: str, limit: str) -> StockError:
         """A key of this file that does not suit the program: its dotted name, its value as TOML, what is wrong."""
         return StockError(self._source, (Problem(key, value, limit, line_of(key, self._text)),))
-
-    def polygons(self, paths: Sequence[_core.Path], tool_radius_mm: float) -> list[StockPiece]:
-        """The stock as prisms over polygons.
-
-        Args:
-            paths: cutting moves of the program, for an allowance.
-            tool_radius_mm: of the tool that the program runs with, for an allowance.
-
-        Raises:
-            StockError: the stock does not suit the program.
-        """
-        from shapegcode.milling.stock_shape import stock_polygons
-
-        return stock_polygons(self, paths, tool_radius_mm)
 
 
 def _exactly_one(table: Table, *names: str) -> None:

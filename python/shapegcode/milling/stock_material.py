@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from shapegcode import _core
 from shapegcode.machine_keys import toml
 from shapegcode.milling.stock_file import Rough, Stock, StockError
+from shapegcode.milling.stock_shape import stock_polygons
 from shapegcode.milling.tool_file import Tool
 from shapegcode.program import Program
 
@@ -49,7 +50,7 @@ def build_material(
         ArgumentError: a grid that does not fit into memory.
         OSError: a file that the stock file names cannot be read.
     """
-    pieces = stock.polygons(paths, tool.radius_mm)
+    pieces = stock_polygons(stock, paths, tool.radius_mm)
     bottom, top = pieces[0].bottom_mm, pieces[0].top_mm
     rings = [ring for piece in pieces for ring in piece.rings]
     step = _RAMP_STEP_RATIO * tool.tool.diameter_mm
