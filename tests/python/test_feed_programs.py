@@ -1,0 +1,123 @@
+"""What real programs hold beside plain moves, and what a feed schedule makes of it."""
+
+from __future__ import annotations
+
+import pytest
+
+import shapegcode as sg
+from judge.interpreter import interpret
+
+HEAD = "%\nG90 G54 G17 G21 G94\nS5000 M03\nG00 X-10. Y2. Z-5.\n"
+TAIL = "G00 Z50.\nM30\n%\n"
+BOX = "[box]\nx_mm = [0.0, 100.0]\ny_mm = [0.0, 60.0]\nz_mm = [-20.0, 0.0]\n"
+TOOL = """
+[tool]
+name = "E8"
+{number}
+diameter_mm = 8.0
+flutes = 4
+helix_deg = 30.0
+flute_length_mm = {flutes}
+overhang_mm = {overhang}
+[cutting]
+material = "al6061-t6-carbide"
+[limits]
+resultant_n = 200.0
+[feed]
+{feed}
+"""
+
+
+def scheduled(body: str, *, head: str = HEAD, flutes: float = 20.0, overhang: float = 32.0, number: int | None = None,
+              feed: str = "") -> sg.FeedSchedule:  # fmt: skip
+    machine = sg.Machine.load("vx500")
+    line = "" if number is None else f"number = {number}"
+    tool = sg.Tool.from_toml(TOOL.format(number=line, flutes=flutes, overhang=overhang, feed=feed))
+    program = sg.Program.from_text(head + body + TAIL, machine, source="part.nc")
+    return sg.schedule_feed(program, machine, tool, sg.Stock.from_toml(BOX))
+
+
+def said(result: sg.FeedSchedule, words: str) -> bool:
+    return any(words in warning for warning in result.report["warnings"])
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "G95 G01 X50. F.2\nG94 X110. F1600.\n",
+        "G01 X50. F1600.\nG95 X80. F.2\nG94 X110. F1600.\n",
+        "G01 X50. F1600.\nG93 X80. F12.\nG94 X110. F1600.\n",
+    ],
+)
+def test_regions_with_other_kinds_of_feed_keep_their_text(body: str) -> None:
+    result = scheduled(body)
+    assert result.text.decode() == HEAD + body + TAIL
+    assert said(result, "not all of its feeds are per minute")
+
+
+def test_blocks_that_stop_exactly_are_not_divided() -> None:
+    body = "G01 X50. F5000.\nG61\nX70.\nX90. Y10.\nX110.\nG64\n"
+    result = scheduled(body)
+    cuts = interpret(result.text.decode()).cuts
+    assert [tuple(move.end[:2]) for move in cuts[-3:]] == [(70.0, 2.0), (90.0, 10.0), (110.0, 10.0)]
+    assert result.within_limits
+
+
+def test_a_first_move_without_length_keeps_its_feed() -> None:
+    result = scheduled("G01 X-10. F5000.\nX110.\n")
+    assert interpret(result.text.decode()).cuts
+    assert result.within_limits
+
+
+def test_cuts_that_share_their_block_count_though_their_feed_stays() -> None:
+    result = scheduled("G01 X50. F5000.\nX110. M08\n")
+    assert not result.within_limits
+    (move,) = result.report["moves"]
+    assert move["place"] == "part.nc:6"
+    assert "limit 200 N" in move["misses"][0]
+
+
+@pytest.mark.parametrize(
+    ("shift", "back"),
+    [("G52 Y10.", "G52 Y0."), ("G92 Y-8.", None), ("G10 L2 P1 Y10.", None), ("G55", "G54")],
+)
+def test_cuts_in_moved_coordinates_are_left(shift: str, back: str | None) -> None:
+    moved = f"G01 X110. F5000.\nG00 Z50.\n{shift}\nG00 X-10. Y2.\nZ-5.\nG01 X110. F5000.\n"
+    result = scheduled(moved, feed="air_feed_mm_per_min = 6000")
+    assert said(result, "coordinates" if back == "G54" else "zero point has been moved")
+    assert result.text.decode().endswith(moved.split(shift)[1] + TAIL)
+    if back is not None:
+        again = scheduled(f"{moved}G00 Z50.\n{back}\nG00 X-10. Y50.\nZ-5.\nG01 X110. F5000.\n")
+        plan = again.plans[-1]
+        assert plan is not None
+        assert len(plan.stretches) > 1
+
+
+def test_depth_above_the_flutes_and_above_the_overhang_is_said() -> None:
+    assert said(scheduled("G01 X110. F1000.\n", flutes=4.0), "cuts 5 mm above the tip, tool.flute_length_mm is 4")
+    result = scheduled("G01 X110. F1000.\n", flutes=4.0, overhang=4.5)
+    assert said(result, "it cuts 5 mm above the tip, tool.overhang_mm is 4.5")
+    assert not result.plans[0]
+
+
+def test_a_tool_that_is_only_got_ready_does_not_cut() -> None:
+    head = HEAD.replace("S5000", "T2\nS5000")
+    result = scheduled("G01 X110. F5000.\nG00 Z50.\nM06\nG00 X-10. Y50.\nZ-5.\nG01 X110. F5000.\n", head=head, number=2)
+    assert [plan is not None for plan in result.plans] == [False, True]
+    assert said(result, "the program names no tool before it")
+
+
+def test_no_limit_changes_nothing_where_no_limit_acts() -> None:
+    body = "G01 X20. F1000.\nX40. F120.\nG02 X60. Y22. R20. F300.\nG01 X70. F900.\n"
+    result = scheduled(body.replace("Y2.", "Y2."), head=HEAD.replace("Z-5.", "Z20."))
+    assert result.text.decode() == HEAD.replace("Z-5.", "Z20.") + body + TAIL
+
+
+def test_a_schedule_of_its_own_output_changes_little() -> None:
+    body = "G01 X50. F5000.\nG03 X60. Y12. R10.\nG01 Y50.\nX20.\n"
+    first = scheduled(body)
+    text = first.text.decode()
+    again = scheduled(text[len(HEAD) : -len(TAIL)])
+    times = [result.report["cycle_time_s"]["after"] for result in (first, again)]
+    assert times[1] == pytest.approx(times[0], rel=0.01)
+    assert again.within_limits
