@@ -125,16 +125,22 @@ void register_feed_schedule(py::module_& module) {
       "travel lags behind a change: `before_s` and `behind_s` (n,) times the feed that the load allows.");
 
   py::class_<FeedWriterOptions>(module, "FeedWriterOptions", "How new feeds are written into a region's blocks.")
-      .def(py::init([](double increment_mm, double unit_mm, int position_decimals, bool absolute_centres) {
-             return FeedWriterOptions{increment_mm, unit_mm, position_decimals, absolute_centres};
+      .def(py::init([](double increment_mm, double unit_mm, int position_decimals, bool absolute_centres,
+                       double modal_feed, bool restore_feed) {
+             return FeedWriterOptions{increment_mm,     unit_mm,    position_decimals,
+                                      absolute_centres, modal_feed, restore_feed};
            }),
            py::arg("increment_mm"), py::arg("unit_mm"), py::arg("position_decimals"), py::arg("absolute_centres"),
+           py::arg("modal_feed") = 0.0, py::arg("restore_feed") = true,
            "Least increment, mm; unit of position words and of the length in F, mm; decimals of a position; whether "
-           "I J K are positions.");
+           "I J K are positions; F that holds before the region (0: as in the original), and whether that of the "
+           "original "
+           "is left behind.");
   py::class_<RefedRegion>(module, "RefedRegion", "A region's text with other feeds.")
       .def_property_readonly(
           "text", [](const RefedRegion& self) { return py::bytes(self.text); }, "Whole lines.")
       .def_readonly("blocks", &RefedRegion::blocks, "Blocks with a cutting move.")
+      .def_readonly("modal_feed", &RefedRegion::modal_feed, "F that holds behind it.")
       .def_readonly("lines", &RefedRegion::lines, "Per block its line, counted from the text's first one = 0.");
   module.def(
       "divisible_segments",

@@ -5082,9 +5082,9 @@ class FeedWriterOptions:
     """
     How new feeds are written into a region's blocks.
     """
-    def __init__(self, increment_mm: typing.SupportsFloat | typing.SupportsIndex, unit_mm: typing.SupportsFloat | typing.SupportsIndex, position_decimals: typing.SupportsInt | typing.SupportsIndex, absolute_centres: bool) -> None:
+    def __init__(self, increment_mm: typing.SupportsFloat | typing.SupportsIndex, unit_mm: typing.SupportsFloat | typing.SupportsIndex, position_decimals: typing.SupportsInt | typing.SupportsIndex, absolute_centres: bool, modal_feed: typing.SupportsFloat | typing.SupportsIndex = 0.0, restore_feed: bool = True) -> None:
         """
-        Least increment, mm; unit of position words and of the length in F, mm; decimals of a position; whether I J K are positions.
+        Least increment, mm; unit of position words and of the length in F, mm; decimals of a position; whether I J K are positions; F that holds before the region (0: as in the original), and whether that of the original is left behind.
         """
 class RefedRegion:
     """
@@ -5099,6 +5099,11 @@ class RefedRegion:
     def lines(self) -> list[int]:
         """
         Per block its line, counted from the text's first one = 0.
+        """
+    @property
+    def modal_feed(self) -> float:
+        """
+        F that holds behind it.
         """
     @property
     def text(self) -> bytes:

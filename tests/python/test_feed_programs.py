@@ -63,6 +63,15 @@ def test_blocks_that_stop_exactly_are_not_divided() -> None:
     assert result.within_limits
 
 
+def test_the_feed_is_given_back_only_where_something_needs_it() -> None:
+    twice = "G01 X90. F5000.\nG00 Z50.\nX-10. Y50.\nZ-5.\nG01 X110.\n"
+    assert "\nF5000.\nG00 Z50.\nX-10." not in scheduled(twice).text.decode()
+    drilled = twice.replace("X-10. Y50.", "G81 X-5. Y70. R2. Z-1.\nG80\nG00 X-10. Y50.")
+    assert "\nF5000.\nG00 Z50.\nG81" in scheduled(drilled).text.decode()
+    feeds = [move.feed for move in interpret(scheduled(drilled).text.decode()).moves if move.cycle and move.feed > 0.0]
+    assert set(feeds) == {5000.0}
+
+
 def test_a_first_move_without_length_keeps_its_feed() -> None:
     result = scheduled("G01 X-10. F5000.\nX110.\n")
     assert interpret(result.text.decode()).cuts

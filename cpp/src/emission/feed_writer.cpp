@@ -102,7 +102,7 @@ class Writer {
   Writer(const Program& program, const Region& region, std::span<const FeedStretch> stretches,
          const FeedWriterOptions& options)
       : path_(*region.path), region_(region), stretches_(stretches), options_(options), line_end_(program.line_end) {
-    modal_feed_ = region.entry.feed;
+    modal_feed_ = options.modal_feed > 0.0 ? options.modal_feed : region.entry.feed;
   }
 
   void write(const SourceLine& line, const Block& block) {
@@ -131,13 +131,15 @@ class Writer {
   }
 
   RefedRegion finish() {
-    if (!same_feed(modal_feed_, region_.exit.feed)) {
+    if (options_.restore_feed && !same_feed(modal_feed_, region_.exit.feed)) {
       if (!result_.text.empty() && result_.text.back() != '\n') {
         result_.text += line_end_;
       }
       append_feed_word(region_.exit.feed);
       result_.text += line_end_;
+      modal_feed_ = region_.exit.feed;
     }
+    result_.modal_feed = modal_feed_;
     return std::move(result_);
   }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -30,6 +31,8 @@ MARGIN = 0.015
 _SWEEPING = 0.5  # share of the progress bar; of the rest for planning
 _PLANNING = 0.7
 _SAME_PLACE_INCREMENTS = 1.0
+_COMMENT = re.compile(rb"\([^)]*\)")
+_NEEDS_FEED = re.compile(rb"F|G0*[123](?!\d)|G\s*[78]\d|G\s*6[56]|M\s*\d*9[789]|[#<]")  # cuts, cycles, calls
 
 Progress = Callable[[float], None]
 
@@ -177,7 +180,9 @@ def _plan_all(
     return plans
 
 
-def _writer_options(region: _core.Region, machine: Machine) -> _core.FeedWriterOptions:
+def _writer_options(
+    region: _core.Region, machine: Machine, *, modal_feed: float = 0.0, restore_feed: bool = True
+) -> _core.FeedWriterOptions:
     unit = MM_PER_INCH if region.exit.units == 20 else 1.0
     increment = least_increment_mm(machine, region.exit.units)
     return _core.FeedWriterOptions(
@@ -185,6 +190,8 @@ def _writer_options(region: _core.Region, machine: Machine) -> _core.FeedWriterO
         unit_mm=unit,
         position_decimals=-round(math.log10(increment / unit)),
         absolute_centres=machine.input.arc_centre == "absolute",
+        modal_feed=modal_feed,
+        restore_feed=restore_feed,
     )
 
 
@@ -201,22 +208,36 @@ def _write(program: Program, plans: Sequence[FeedPlan | None], machine: Machine)
     parts: list[bytes] = []
     places: list[int] = []
     line, position, blocks = 1, 0, 0
-    for region, plan in zip(program.regions, plans, strict=True):
+    modal_feed = 0.0  # where it is not that of the original
+    for index, (region, plan) in enumerate(zip(program.regions, plans, strict=True)):
         between = core.slice(position, region.text_begin)
         line += between.count(b"\n")
         places.append(line)
         text = core.slice(region.text_begin, region.text_end)
         if plan is None:
             blocks += region.blocks
+            modal_feed = 0.0
         else:
-            refed = _core.write_feeds(core, region, list(plan.stretches), _writer_options(region, machine))
+            restore = not _says_its_own_feed(program, plans, index)
+            options = _writer_options(region, machine, modal_feed=modal_feed, restore_feed=restore)
+            refed = _core.write_feeds(core, region, list(plan.stretches), options)
             text = refed.text
             blocks += refed.blocks
+            modal_feed = 0.0 if restore else refed.modal_feed
         parts += [between, text]
         line += text.count(b"\n")
         position = region.text_end
     parts.append(core.slice(position, core.size))
     return b"".join(parts), places, blocks
+
+
+def _says_its_own_feed(program: Program, plans: Sequence[FeedPlan | None], index: int) -> bool:
+    """Whether the region behind one is written too, and nothing in between could need the modal feed."""
+    if index + 1 == len(plans) or plans[index + 1] is None:
+        return False
+    here, following = program.regions[index], program.regions[index + 1]
+    between = _COMMENT.sub(b"", program.core.slice(here.text_end, following.text_begin))
+    return here.exit.units == following.entry.units and not _NEEDS_FEED.search(between.upper())
 
 
 def _read_back(text: bytes, program: Program, places: Sequence[int], machine: Machine) -> Program:
