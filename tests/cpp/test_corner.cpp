@@ -51,10 +51,8 @@ double brute_entry(const CornerCut& cut, const Vector2d& centre, double directio
     return distance > cut.rough_radius_mm;
   };
   double entry = -0.5 * pi;
-  for (int k = 1; k < 200000; ++k) {
-    const double azimuth = -0.5 * pi + pi * k / 200000;
-    if (!is_material(side * azimuth)) break;
-    entry = azimuth;
+  for (const double step : {pi / 2000, pi / 200000}) {
+    while (entry + step < 0.5 * pi && is_material(side * (entry + step))) entry += step;
   }
   return side * entry;
 }

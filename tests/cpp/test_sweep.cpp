@@ -35,7 +35,7 @@ const std::vector<double> one_layer = {-5.0, 0.0};
 Ring box(double x0, double y0, double x1, double y1) { return {{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}}; }
 
 Ring circle(double r) {
-  constexpr int points = 4000;  // off by less than 0.01 um at 10 mm
+  constexpr int points = 1500;  // off by less than 0.03 um at 10 mm
   Ring ring;
   for (int k = 0; k < points; ++k)
     ring.emplace_back(r * std::cos(2.0 * pi * k / points), r * std::sin(2.0 * pi * k / points));
@@ -83,7 +83,7 @@ double removed_by(const EngagementTrack& track) {
 
 TEST_CASE("slot: exactly the front half, in every direction") {
   for (double heading = 0.0; heading < 6.3; heading += 0.37) {
-    Material material = block({circle(25.0)});
+    Material material = block({box(-25, -25, 25, 25)});
     const Vector3 along(std::cos(heading), std::sin(heading), 0.0);
     const Vector3 start = Vector3(0.3, 0.1, -5.0) - 18.0 * along;
     const EngagementTrack track = sweep(material, Path({make_line(start, start + 30.0 * along, 10.0)}), diameter);
@@ -124,7 +124,7 @@ TEST_CASE("circle inside circle: a tool orbits in a bore") {
   for (const double bore : {9.0, 6.0}) {
     for (const double path_radius : {bore - radius + 0.5, bore - radius + 2.0}) {
       for (const double resolution : {0.08, 0.02}) {
-        const Ring around = box(-20, -20, 20, 20);
+        const Ring around = box(-12, -12, 12, 12);
         Material material = block({around, circle(bore)}, one_layer, resolution);
         const Path path = orbit(path_radius);
         const EngagementTrack track = sweep(material, path, diameter);
