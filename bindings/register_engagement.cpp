@@ -141,6 +141,10 @@ void register_material(py::module_& module) {
            "bottom to top, mm (see layer_borders); distance of the grid's nodes, mm (a hundredth of the tool's "
            "diameter is a good choice). Raises ArgumentError on an outline or heights that enclose nothing, or a grid "
            "that needs more memory than the limit.")
+      .def("take_whole_layers", &Material::take_whole_layers,
+           "From now on only whole layers are taken away: those whose bottom the tip reaches. What is left is never "
+           "less "
+           "than what is really there, also under a ramp.")
       .def("compact", &Material::compact, "Gives back the memory of what is uniform by now.")
       .def(
           "copy", [](const Material& self) { return std::make_shared<Material>(self); },

@@ -87,7 +87,9 @@ if TYPE_CHECKING:
     from shapegcode.milling.shaped_schedule import ScheduledConversion as ScheduledConversion
     from shapegcode.milling.shaped_schedule import convert_scheduled as convert_scheduled
     from shapegcode.milling.stock_file import Stock as Stock
+    from shapegcode.milling.stock_file import StockError as StockError
     from shapegcode.milling.tool_file import Tool as Tool
+    from shapegcode.milling.tool_file import ToolError as ToolError
     from shapegcode.played import stream as stream
     from shapegcode.program import Program as Program
     from shapegcode.shaping import (
@@ -109,6 +111,7 @@ if TYPE_CHECKING:
     from shapegcode.simulator import simulate as simulate
     from shapegcode.timing import CycleTime as CycleTime
     from shapegcode.timing import cycle_time as cycle_time
+    from shapegcode.verify import RoundTripError as RoundTripError
 
 _HOME = {
     **dict.fromkeys(
@@ -132,8 +135,9 @@ _HOME = {
     "identify": "identification.tap_test",
     **dict.fromkeys(("FeedSchedule", "schedule_feed"), "milling.schedule"),
     **dict.fromkeys(("ScheduledConversion", "convert_scheduled"), "milling.shaped_schedule"),
-    "Stock": "milling.stock_file",
-    "Tool": "milling.tool_file",
+    **dict.fromkeys(("Stock", "StockError"), "milling.stock_file"),
+    **dict.fromkeys(("Tool", "ToolError"), "milling.tool_file"),
+    "RoundTripError": "verify",
     "plant_response": "linear_response",
     **dict.fromkeys(
         ("ModeBand", "Recommendation", "choose_block_period", "choose_shaper", "shortest_non_negative"), "shaping"

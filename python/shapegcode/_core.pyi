@@ -4398,6 +4398,10 @@ class Material:
         """
         Whether there is material at a place.
         """
+    def take_whole_layers(self) -> None:
+        """
+        From now on only whole layers are taken away: those whose bottom the tip reaches. What is left is never less than what is really there, also under a ramp.
+        """
     def volume_in_cylinder_mm3(self, x_mm: typing.SupportsFloat | typing.SupportsIndex, y_mm: typing.SupportsFloat | typing.SupportsIndex, radius_mm: typing.SupportsFloat | typing.SupportsIndex, bottom_mm: typing.SupportsFloat | typing.SupportsIndex, top_mm: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
         Material in an upright cylinder, mm3: what a tool would stand in.

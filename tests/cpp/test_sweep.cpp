@@ -246,6 +246,26 @@ TEST_CASE("a tool that comes down to the material, but not into it, does not plu
   CHECK(most(again.section_mm2) == 0.0);
 }
 
+TEST_CASE("a material from which whole layers are taken keeps what a ramp may have left") {
+  const Path ramp({make_line({-12, 0, 0}, {12, 0, -4}, 10)});
+  const Path level({make_line({12, 0, -4}, {-12, 0, -4}, 10)});
+  const std::vector<const Path*> paths = {&ramp, &level};
+  Material material = block({box(-20, -20, 20, 20)}, layer_borders(paths, -6.0, 0.0, 1.0));
+  Material cautious = material;
+  cautious.take_whole_layers();
+  (void)sweep(material, ramp, diameter);
+  (void)sweep(cautious, ramp, diameter);
+  CHECK(cautious.volume_mm3() > material.volume_mm3());
+  for (double x = -12.0; x <= 12.0; x += 0.5) {
+    // The tool's end is nowhere lower than the ramp under its rear: there is material below it.
+    const double end_mm = -4.0 * (std::min(x + radius, 12.0) + 12.0) / 24.0;
+    CHECK(cautious.is_material(x, 0.0, end_mm - 0.01));
+  }
+  (void)sweep(material, level, diameter);
+  (void)sweep(cautious, level, diameter);
+  CHECK(cautious.volume_mm3() == doctest::Approx(material.volume_mm3()).epsilon(1e-9));
+}
+
 TEST_CASE("plunges and ramps: what is removed is what the track tells") {
   {
     Material material = block({box(-20, -20, 20, 20)}, {-8.0, -5.0, 0.0});

@@ -116,6 +116,15 @@ def test_a_tool_that_is_only_got_ready_does_not_cut() -> None:
     assert said(result, "the program names no tool before it")
 
 
+def test_what_a_ramp_may_have_left_is_no_air() -> None:
+    body = "G00 X20. Y30. Z5.\nG01 Z.5 F600.\nX80. Z-8. F500.\nX20. F1000.\nX80.\n"
+    result = scheduled(body, head="%\nG90 G54 G17 G21 G94\nS5000 M03\n", feed="air_feed_mm_per_min = 6000")
+    level = [move for move in interpret(result.text.decode()).cuts if move.start[2] == move.end[2] == -8.0]
+    assert level[-1].end[0] == 80.0
+    assert level[-1].feed == 6000.0  # the second pass at depth is air for certain
+    assert max(move.feed for move in level[:-1]) <= 1000.0
+
+
 def test_no_limit_changes_nothing_where_no_limit_acts() -> None:
     body = "G01 X20. F1000.\nX40. F120.\nG02 X60. Y22. R20. F300.\nG01 X70. F900.\n"
     result = scheduled(body.replace("Y2.", "Y2."), head=HEAD.replace("Z-5.", "Z20."))

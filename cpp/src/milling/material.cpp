@@ -94,6 +94,10 @@ Material::Material(std::span<const Ring> rings, std::span<const double> borders_
 }
 
 std::size_t Material::lowest_cut(double tip_mm) const noexcept {
+  if (whole_layers_) {
+    const auto reached = std::lower_bound(borders_.begin(), borders_.end() - 1, tip_mm - same_height_mm);
+    return static_cast<std::size_t>(reached - borders_.begin());
+  }
   return static_cast<std::size_t>(std::upper_bound(middles_.begin(), middles_.end(), tip_mm) - middles_.begin());
 }
 

@@ -28,8 +28,8 @@ from shapegcode.cli.options import (
 if TYPE_CHECKING:
     from shapegcode.budget import Budget
     from shapegcode.cli.console import ProgressBar
-    from shapegcode.converter import Conversion
     from shapegcode.machine import Machine
+    from shapegcode.milling.shaped_schedule import ScheduledConversion
     from shapegcode.program import Program
 
 __all__ = ["add_arguments", "run"]
@@ -181,7 +181,8 @@ def run(args: argparse.Namespace) -> int:
     with progress(f"converting {args.input}", args.json) as bar:
         program = read_for_conversion(args.input, machine, program_number=args.program)
         if args.feed_schedule:
-            conversion, within = _convert_scheduled(args, program, machine, budget, bar)
+            scheduled = _convert_scheduled(args, program, machine, budget, bar)
+            conversion, within = scheduled.conversion, scheduled.within_tolerance
         else:
             stages = {"shaping": 0.0, "shaping again, slower": 0.0, "round trip": 0.5}
             conversion = convert(
@@ -199,6 +200,10 @@ def run(args: argparse.Namespace) -> int:
             from shapegcode.pictures import write_pictures
 
             report["plots"] = write_pictures(conversion, machine, args.plots)
+            if args.feed_schedule:
+                from shapegcode.milling.feed_picture import write_feed_pictures
+
+                report["plots"] += write_feed_pictures(scheduled.schedule, args.plots)
         if args.json not in (None, "-"):
             write_json(report, args.json)
         # Last of all, so that no program stands there when something else could not be written.
@@ -207,10 +212,12 @@ def run(args: argparse.Namespace) -> int:
         write_json(report, args.json)
     console = output_console(args.json)
     if args.feed_schedule:
-        from shapegcode.milling.feed_table import feed_tables
+        from shapegcode.milling.feed_table import feed_tables, verdict
 
         for table in feed_tables(report["feed_schedule"]):
             console.print(table)
+        console.print(verdict(report["feed_schedule"]), markup=False, soft_wrap=True)
+        console.print("original, below: the program with these feeds, not yet shaped", markup=False)
     print_before_after(report, args.json)
     console.print(f"wrote {target}", markup=False, soft_wrap=True)
     if target == failed and output.exists():
@@ -220,14 +227,14 @@ def run(args: argparse.Namespace) -> int:
 
 def _convert_scheduled(
     args: argparse.Namespace, program: Program, machine: Machine, budget: Budget | None, bar: ProgressBar
-) -> tuple[Conversion, bool]:
-    """Feeds and shaping in one go, and whether tolerances and limits are kept."""
+) -> ScheduledConversion:
+    """Feeds and shaping in one go."""
     from shapegcode.milling.schedule import MARGIN
     from shapegcode.milling.shaped_schedule import convert_scheduled
     from shapegcode.milling.stock_file import Stock
     from shapegcode.milling.tool_file import Tool
 
-    scheduled = convert_scheduled(
+    return convert_scheduled(
         program,
         machine,
         [Tool.load(name) for name in args.tool],
@@ -239,4 +246,3 @@ def _convert_scheduled(
         budget=budget,
         on_progress=bar.update,
     )
-    return scheduled.conversion, scheduled.within_tolerance

@@ -135,8 +135,9 @@ def _corner(json_target: str | None, folder: str) -> int:
         table.add_column(column, overflow="fold")
     verdicts = {True: "yes", False: "NO", None: ""}
     for row in result["rows"]:
+        said = "differs" if row["note"].startswith("differs") else verdicts[row["agrees"]]
         table.add_row(
-            str(row["case"]), row["what"], row["paper"], row["here"], verdicts[row["agrees"]], row["note"]
+            str(row["case"]), row["what"], row["paper"], row["here"], said, row["note"]
         )  # fmt: skip
     console.print(table)
     console.print(result["remark"], markup=False)

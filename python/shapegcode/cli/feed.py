@@ -12,8 +12,8 @@ from shapegcode.cli.options import (
     load_machine,
     micrometres,
     output_file,
-    ratio,
     refuse_same_file,
+    share,
 )
 
 __all__ = ["add_arguments", "add_cutting_arguments", "run"]
@@ -38,7 +38,7 @@ def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) ->
     parser.add_argument(
         "--margin",
         metavar="RATIO",
-        type=ratio,
+        type=share,
         default=None,
         help="share of each limit that is left free, for example 3%% (default: 1.5%%)",
     )
@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_bytes, write_json
     from shapegcode.compensation import read_for_conversion
-    from shapegcode.milling.feed_table import feed_tables, next_step
+    from shapegcode.milling.feed_table import feed_tables, next_step, verdict
     from shapegcode.milling.schedule import MARGIN, schedule_feed
     from shapegcode.milling.stock_file import Stock
     from shapegcode.milling.tool_file import Tool
@@ -123,5 +123,6 @@ def run(args: argparse.Namespace) -> int:
     if report["warnings"]:
         console.print(warning_table(report["warnings"]))
     console.print(f"wrote {output}", markup=False, soft_wrap=True)
+    console.print(verdict(report), markup=False, soft_wrap=True)
     console.print(f"next: {next_step(report)}", markup=False)
     return ExitCode.OK if result.within_limits else ExitCode.OUT_OF_TOLERANCE

@@ -212,6 +212,14 @@ def ratio(text: str) -> float:
     return value
 
 
+def share(text: str) -> float:
+    """A share such as ``3%`` or ``0.03``, at least 0 and below 1."""
+    value = _number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    if not 0.0 <= value < 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be at least 0 and below 100%")
+    return value
+
+
 def override(text: str) -> float:
     """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control takes)."""
     value = _number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)

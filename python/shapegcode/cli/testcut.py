@@ -272,6 +272,8 @@ def _fit(args: argparse.Namespace) -> int:
             f"{args.cut} describes a {cut.kind}: -o, --edge-forces and --chip-thickness go with a taper"
         )
     measured = _measured(args, cut)
+    if args.output is not None:
+        _refuse_whole_tool_file(Path(args.output))
     targets = [Path(name) for name in (args.output, args.json) if name not in (None, "-")]
     refuse_same_file(targets, [Path(args.cut), *(Path(each.record.file) for each in measured)])
     refuse_same_file(targets[:1], targets[1:])
@@ -329,3 +331,24 @@ def _pair(text: str) -> tuple[float, float]:
     if not pair[0] < pair[1]:
         raise argparse.ArgumentTypeError(f"{text!r}: must be two lengths in mm, ascending, for example 0.4:2.8")
     return pair
+
+
+def _refuse_whole_tool_file(path: Path) -> None:
+    """Refuse to write the table [cutting] over a file that holds more than that.
+
+    Raises:
+        ArgumentError: it does.
+    """
+    import tomllib
+
+    from shapegcode._core import ArgumentError
+
+    try:
+        tables = set(tomllib.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError):  # not there, or nothing of ours
+        return
+    if tables - {"cutting"}:
+        raise ArgumentError(
+            f"-o {path}: holds more than [cutting] ({', '.join(sorted(tables - {'cutting'}))}), which would be lost: "
+            "name another file and put its table into this one"
+        )

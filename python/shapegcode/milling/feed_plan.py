@@ -227,7 +227,10 @@ def _limits_along(
     load[1:] = np.where(passed, np.minimum(load[1:], load[:-1]), load[1:])
     if tool.feed.air_feed_mm_per_min is not None:
         level = np.asarray(track.horizontal) > _STEEPEST_AIR  # nobody wants a tool to come down faster than he said
-        clear = air & (holds == AIR) & level & ~_near_material(np.asarray(track.s_mm), air, tool.feed.approach_mm)
+        certain = air if surveyed.clear is None else surveyed.clear
+        certain = air & certain
+        near = _near_material(np.asarray(track.s_mm), certain, tool.feed.approach_mm)
+        clear = certain & (holds == AIR) & level & ~near
         feeds[clear] = np.maximum(programmed[clear], min(tool.feed.air_feed_mm_per_min, fastest))
     return feeds, holds, load
 

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from shapegcode.milling.feed_plan import AIR, KEPT, MINIMUM, FeedPlan, goes_on, 
 from shapegcode.milling.survey import Survey, SurveyedMove, SurveyedRegion
 from shapegcode.milling.tool_file import Tool
 from shapegcode.milling.travel import Motion, Travelled, Vector
+from shapegcode.program import Program
 
 __all__ = ["Load", "RegionLoad", "feed_report", "load_of", "region_load"]
 
@@ -124,7 +125,7 @@ def feed_report(
     for part, plan, load in zip(surveyed.regions, plans, loads, strict=True):
         misses, beyond = _misses(part, plan, load, machine)
         if load is None and part.track is not None and part.track.section_mm2.any():
-            misses = ["its force is not known"]
+            misses = [f"its force is not known: {part.kept or 'nothing is said of it'}"]
         excess = max(excess, beyond)
         place = f"{program.place(part.region.first_line)}: {program.lines(part.region)}"
         if part.kept:
@@ -148,8 +149,12 @@ def feed_report(
             }
         )
     known = [load for load in loads if load is not None]
+    placed: list[tuple[Sequence[str], RegionLoad]] = [
+        (_Places(program, part), load) for part, load in zip(surveyed.regions, loads, strict=True) if load is not None
+    ]
     elsewhere = [(move, _load_elsewhere(move)) for move in surveyed.moves]
     known += [load for _, load in elsewhere if load is not None]
+    placed += [([move.place] * len(load.s_mm), load) for move, load in elsewhere if load is not None]
     moves = [_move_entry(move, load, machine) for move, load in elsewhere]
     warnings += [f"{entry['place']}: {miss}" for entry in moves for miss in entry["misses"]]
     limits = [entry for part, plan in zip(surveyed.regions, plans, strict=True) for entry in _limits(part, plan)]
@@ -160,7 +165,7 @@ def feed_report(
         "margin": margin,
         "feed_mm_per_min": _feeds(surveyed, plans),
         "resultant_force_n": _before_after_all(known),
-        "peak": _peaks(known),
+        "peak": _peaks(placed),
         "air_time_s": {
             when: float(sum(_air_time(getattr(load, when)) for load in known)) for when in ("before", "after")
         },
@@ -232,15 +237,38 @@ def _resultant(loads: Sequence[Load]) -> dict[str, float]:
     }
 
 
-def _peaks(loads: Sequence[RegionLoad]) -> dict[str, dict[str, float]]:
-    """The largest value of each column, before and after."""
-    return {
-        column: {
-            when: max((float(getattr(getattr(load, when), column).max(initial=0.0)) for load in loads), default=0.0)
-            for when in ("before", "after")
-        }
-        for column, *_ in _LIMITED
-    }
+def _peaks(loads: Sequence[tuple[Sequence[str], RegionLoad]]) -> dict[str, dict[str, Any]]:
+    """The largest value of each column, before and after, and the place of the latter; loads with their places."""
+    peaks: dict[str, dict[str, Any]] = {}
+    for column, *_ in _LIMITED:
+        entry: dict[str, Any] = {"before": 0.0, "after": 0.0, "place": ""}
+        for places, load in loads:
+            was, now = getattr(load.before, column), getattr(load.after, column)
+            entry["before"] = max(entry["before"], float(was.max(initial=0.0)))
+            if len(now) and float(now.max()) > entry["after"]:
+                entry["after"], entry["place"] = float(now.max()), places[int(np.argmax(now))]
+        peaks[column] = entry
+    return peaks
+
+
+class _Places(Sequence[str]):
+    """File and line of each station of a region, looked up when asked for."""
+
+    def __init__(self, program: Program, part: SurveyedRegion) -> None:
+        assert part.track is not None
+        self._program, self._lines, self._segment = program, part.region.path.segment_lines, part.track.segment
+
+    def __len__(self) -> int:
+        return len(self._segment)
+
+    @overload
+    def __getitem__(self, station: int) -> str: ...
+    @overload
+    def __getitem__(self, station: slice) -> Sequence[str]: ...
+    def __getitem__(self, station: int | slice) -> str | Sequence[str]:
+        if isinstance(station, slice):
+            return [self[i] for i in range(*station.indices(len(self)))]
+        return self._program.place(int(self._lines[self._segment[station]]))
 
 
 def _air_time(load: Load) -> float:
@@ -271,7 +299,14 @@ def _misses(
     misses, excess = [], 0.0
     for column, words, unit, limit in _exceeded(part.tool, load, machine):
         values = getattr(load.after, column)
-        misses.append(f"{words} {float(values.max()):.4g} {unit}, limit {limit:.4g} {unit}")
+        worst = int(np.argmax(values))
+        line = int(part.region.path.segment_lines[part.track.segment[worst]])
+        cause = ""
+        if plan is None or plan.holds[worst] == KEPT:
+            cause = ", where the feed stays as it was: lower it yourself"
+        elif plan.holds[worst] == MINIMUM:
+            cause = ", at the least feed"
+        misses.append(f"{words} {float(values[worst]):.4g} {unit} in line {line}, limit {limit:.4g} {unit}{cause}")
         excess = max(excess, float(values[helped].max(initial=0.0)) / limit - 1.0)
     return misses, excess
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.table import Table
 
-__all__ = ["feed_tables", "next_step"]
+__all__ = ["feed_tables", "next_step", "verdict"]
 
 _PEAKS = (
     ("peak_resultant_n", "resultant, peak", "N", 1),
@@ -17,7 +17,8 @@ _PEAKS = (
     ("peak_torque_nm", "torque, peak", "N m", 3),
     ("mean_power_w", "power, mean of a revolution", "W", 1),
 )
-_SHOWN_RANGES = 12
+_SHOWN_RANGES = 24
+_SHOWN_MISSES = 3
 _LIMIT_WORDS = {
     "resultant": "resultant force",
     "chip_load": "feed per tooth",
@@ -38,9 +39,11 @@ def feed_tables(report: Mapping[str, Any]) -> Iterator[Table]:
     for column in ("before", "after"):
         table.add_column(column, justify="right")
     table.add_column("unit")
+    table.add_column("line", justify="right")
     for key, name, unit, digits in _PEAKS:
         pair = report["peak"][key]
-        table.add_row(name, *(f"{pair[when]:.{digits}f}" for when in ("before", "after")), unit)
+        values = [f"{pair[when]:.{digits}f}" for when in ("before", "after")]
+        table.add_row(name, *values, unit, pair["place"].rpartition(":")[2])
     resultant = report["resultant_force_n"]
     table.add_row(
         "resultant, mean of the time in material", *(f"{resultant[when]['mean']:.1f}" for when in ("before", "after")),
@@ -81,9 +84,19 @@ def _limit_table(report: Mapping[str, Any]) -> Table:
     return table
 
 
+def verdict(report: Mapping[str, Any]) -> str:
+    """Whether every limit is kept, and where not."""
+    misses = [miss for entry in (*report["regions"], *report["moves"]) for miss in entry["misses"]]
+    if not misses:
+        return "every limit is kept"
+    more = f"; and {len(misses) - _SHOWN_MISSES} more" if len(misses) > _SHOWN_MISSES else ""
+    return f"NOT within limits: {'; '.join(misses[:_SHOWN_MISSES])}{more}"
+
+
 def next_step(report: Mapping[str, Any]) -> str:
     """The one thing to do now."""
-    misses = [miss for region in report["regions"] for miss in region["misses"]]
-    if misses:
-        return f"a limit is not kept ({misses[0]}): see the warnings; less depth of cut or another limit"
-    return "shapegcode convert shapes this program too; or both in one go: convert --feed-schedule"
+    if report["within_limits"]:
+        return "shapegcode convert shapes this program too; or both in one go: convert --feed-schedule"
+    if any("not known" in miss for entry in (*report["regions"], *report["moves"]) for miss in entry["misses"]):
+        return "say what is not known: S in the program or feed.spindle_rev_per_min in the tool file"
+    return "take less material at once there, lower the feed of what stays as it was, or choose another limit"

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
@@ -38,6 +39,8 @@ class SurveyedRegion:
         spindle_rev_per_min: speed of the spindle, 0 where it is not known.
         sense: in which it turns.
         kept: why the feeds of the region stay as they are; empty if they may change.
+        clear: per sample whether nothing is met for certain, (n,): behind a ramp the layers of the material are cut in
+            part, which the track takes for whole or gone. None: wherever the track says so.
     """
 
     region: _core.Region
@@ -47,6 +50,7 @@ class SurveyedRegion:
     spindle_rev_per_min: float
     sense: _core.SpindleSense
     kept: str
+    clear: npt.NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)
@@ -117,7 +121,7 @@ def survey(
     reasons = [_why_not_swept(region, walk.zero) for region in program.regions]
     swept = [index for index, reason in enumerate(reasons) if not reason and cutters[index] is not None]
     if not swept:
-        why = next((f": {reason}" for reason in reasons if reason), "")
+        why = next((f": {reason}" for reason in reasons if reason), walk.why_no_tool(cutters))
         if program.core.kept_compensated_moves:
             why = ': they run under cutter compensation that is kept as it stands; set input.compensation = "expand"'
         raise _core.ArgumentError(f"{program.source}: no cutting moves whose engagement can be computed{why}")
@@ -132,6 +136,9 @@ def survey(
     walls = [program.regions[index].path for index in swept if cutters[index] is smallest]
     others = [program.regions[index].path for index in swept if cutters[index] is not smallest]
     material = build_material(stock, walls, smallest, resolution, machine, others=[*others, *walk.cuts_elsewhere()])
+    if any(tool.feed.air_feed_mm_per_min is not None for tool in tools):
+        walk.cautious = material.copy()
+        walk.cautious.take_whole_layers()
     regions: list[SurveyedRegion] = []
     total = len(program.core.steps)
     for done, (kind, index, line) in enumerate(program.core.steps):
@@ -142,7 +149,7 @@ def survey(
         else:
             regions.append(walk.sweep_region(material, index))
         on_progress(done + 1, total)
-    walk.tell_collisions()
+    walk.tell_collisions()  # first of all, as nothing else is right if they are
     known = [region.track for region in regions if region.track is not None]
     if known and not any(track.section_mm2.any() for track in known):
         walk.warnings.append(
@@ -183,6 +190,8 @@ class _Walk:
         self._ready = -1  # T before its M06
         self._number = -1
         self.moves: list[SurveyedMove] = []
+        # A second work piece on which ramps leave what they may have left: what is air there is air for certain.
+        self.cautious: _core.Material | None = None
         self._speed = -1.0
         self._stands = False  # M05
         self._collisions: list[str] = []
@@ -249,6 +258,14 @@ class _Walk:
         self._sense, self._ready, self._number, self._speed, self._stands = None, -1, -1, -1.0, False
         return found
 
+    def why_no_tool(self, cutters: Sequence[Tool | None]) -> str:
+        """Which tools are missing where no region has one; empty if that is not the reason."""
+        if not cutters or any(cutter is not None for cutter in cutters):
+            return ""
+        used = sorted({tool for _, tool, _ in self._functions if tool > 0})
+        said = f"the program uses {', '.join(f'T{n}' for n in used)}" if used else "the program names no tool"
+        return f": {said}, the tool files describe {', '.join(f'T{n}' for n in sorted(self._tools))}"
+
     def cuts_elsewhere(self) -> list[_core.Path]:
         """Cutting moves outside of the regions, each as a path."""
         return [
@@ -267,7 +284,10 @@ class _Walk:
             return
         if (segment.kind == _core.SegmentKind.rapid and self._adrift) or self.zero.why_elsewhere(line):
             return
-        track = _core.sweep(material, _core.Path([segment]), tool.tool.diameter_mm)
+        path = _core.Path([segment])
+        track = _core.sweep(material, path, tool.tool.diameter_mm)
+        if self.cautious is not None:
+            _core.sweep(self.cautious, path, tool.tool.diameter_mm)
         if not (track.section_mm2.any() or track.plunged_mm2.any()):
             return
         if segment.kind == _core.SegmentKind.rapid:
@@ -281,10 +301,13 @@ class _Walk:
     def tell_collisions(self) -> None:
         """A warning for each place at which a rapid runs into material; of many the first ones."""
         places = list(dict.fromkeys(self._collisions))
-        for place in places[:_SHOWN_COLLISIONS]:
-            self.warnings.append(f"{place}: rapid into material: the stock file or the program is wrong")
+        told = [
+            f"{place}: rapid into material: is Z 0 of the stock file that of the program?"
+            for place in places[:_SHOWN_COLLISIONS]
+        ]
         if len(places) > _SHOWN_COLLISIONS:
-            self.warnings.append(f"{self._program.source}: {len(places) - _SHOWN_COLLISIONS} more rapids into material")
+            told.append(f"{self._program.source}: {len(places) - _SHOWN_COLLISIONS} more rapids into material")
+        self.warnings[:0] = told
 
     def _look_at_depth(self, region: _core.Region, tool: Tool, track: _core.EngagementTrack) -> None:
         """Say where the tool cuts above its flutes."""
@@ -312,9 +335,11 @@ class _Walk:
         speed = region.entry.spindle_rev_per_min
         if tool is not None and not speed > 0.0:
             speed = tool.feed.spindle_rev_per_min or 0.0
-        track = None
+        track, clear = None, None
         if tool is not None and not kept:
             track = _core.sweep(material, region.path, tool.tool.diameter_mm)
+            if self.cautious is not None:
+                clear = ~(_core.sweep(self.cautious, region.path, tool.tool.diameter_mm).section_mm2 > 0.0)
             self._look_at_depth(region, tool, track)
             if above := _above_overhang(tool, track):
                 kept = f"it cuts {above:.3g} mm above the tip, tool.overhang_mm is {tool.tool.overhang_mm:g}"
@@ -326,4 +351,4 @@ class _Walk:
             elif not _core.feeds_per_minute(self._program.core, region):
                 kept = "not all of its feeds are per minute (G94) in one unit"
         sense = _core.SpindleSense.clockwise if tool is None else tool.sense(self._sense)
-        return SurveyedRegion(region, index, tool, track, speed, sense, kept)
+        return SurveyedRegion(region, index, tool, track, speed, sense, kept, clear)

@@ -197,7 +197,9 @@ class Limits(Table):
     torque_nm: Positive | None = key("peak torque about the axis of the tool", unit="N m", default=None)
     power_w: Positive | None = key("mean power of the cut", unit="W", default=None)
     feed_per_tooth_min_mm: Positive | None = key(
-        "least feed per tooth: below it the edge rubs", unit="mm", default=None
+        "least feed per tooth: below it the edge rubs. Left out: no feed goes below a tenth of the programmed one",
+        unit="mm",
+        default=None,
     )
     feed_per_tooth_max_mm: Positive | None = key("largest feed per tooth", unit="mm", default=None)
 

@@ -33,7 +33,8 @@ class Material {
   [[nodiscard]] const Eigen::Vector2d& low_mm() const noexcept { return low_; }
   [[nodiscard]] const Eigen::Vector2d& high_mm() const noexcept { return high_; }
 
-  /// Index of the lowest layer that a tool with its tip at this height takes away; size() if it is above all of them.
+  /// Index of the lowest layer that a tool with its tip at this height takes away: those whose middle lies above the
+  /// tip; size() if it is above all of them.
   [[nodiscard]] std::size_t lowest_cut(double tip_mm) const noexcept;
 
   /// Whether there is material at a place; false outside of the stock.
@@ -59,6 +60,10 @@ class Material {
   /// the limit.
   bool remove(std::size_t layer, const ToolStep& step, double tool_radius_mm, bool continues);
 
+  /// From now on only whole layers are taken away: those whose bottom the tip reaches. What is then left is never less
+  /// than what is really there, also under a ramp; what is met on the ramp itself is less.
+  void take_whole_layers() noexcept { whole_layers_ = true; }
+
   /// Gives back the memory of what is uniform by now.
   void compact();
 
@@ -69,6 +74,7 @@ class Material {
 
   std::vector<double> borders_;
   std::vector<double> middles_;
+  bool whole_layers_ = false;
   std::vector<MaterialLayer> layers_;
   Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
   Eigen::Vector2d high_ = Eigen::Vector2d::Zero();
