@@ -374,7 +374,7 @@ def test_changed_bytes_never_crash() -> None:
 
 @pytest.mark.slow
 def test_many_changed_bytes_never_crash() -> None:
-    fuzz(seed=2, count=200)
+    fuzz(seed=2, count=100)
 
 
 @settings(max_examples=200, suppress_health_check=list(HealthCheck))

@@ -92,16 +92,17 @@ def share_of_intervals_with_the_truth(draws: int, seed: int) -> Array:
 
 
 def test_intervals_hold_the_truth_in_most_draws() -> None:
-    inside = share_of_intervals_with_the_truth(50, 2)
-    # Three standard deviations of 50 draws at 95 %.
-    assert np.all(inside >= 0.85), inside
+    inside = share_of_intervals_with_the_truth(30, 2)
+    # Three standard deviations of 30 draws at 95 %.
+    assert np.all(inside >= 0.83), inside
 
 
 @pytest.mark.slow
 def test_intervals_hold_the_truth_in_95_of_100_draws() -> None:
-    inside = share_of_intervals_with_the_truth(250, 3)
-    assert np.all(inside > 0.91), inside
-    assert np.all(inside < 0.985), inside
+    inside = share_of_intervals_with_the_truth(120, 3)
+    # Two and a half standard deviations of 120 draws at 95 %, on either side.
+    assert np.all(inside > 0.90), inside
+    assert np.all(inside < 0.9999), inside
 
 
 def test_edge_forces_are_told_apart_by_the_feed() -> None:
