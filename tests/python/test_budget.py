@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import json
 import math
@@ -174,6 +175,12 @@ def test_arcs_with_absolute_centres_cannot_be_given_up() -> None:
         budgeted(text, keys, max_blocks_per_second=1)
 
 
+@functools.cache
+def at_period(ms: int) -> Any:
+    """The part on another block period: what several limits are held against."""
+    return convert(PART, MACHINE, block_period_s=ms * 1e-3)
+
+
 # ---- line and control --------------------------------------------------------------------------------------
 
 
@@ -215,7 +222,7 @@ def test_the_shortest_shaper_whose_blocks_are_slow_enough(limits: dict[str, Any]
             continue
         shorter = grid.shaper.duration_s - duration
         if shorter < -1e-9 or (shorter < 1e-9 and ms < chosen):
-            other = convert(PART, MACHINE, block_period_s=ms * 1e-3)
+            other = at_period(ms)
             assert rates(other)[which] > limit, f"{ms} ms would do"
 
 

@@ -14,6 +14,7 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.milling.stock_file import Stock, StockError
 from shapegcode.milling.stock_material import build_material
+from shapegcode.milling.stock_shape import stock_polygons
 from shapegcode.milling.tool_file import Tool
 
 TOOL = """\
@@ -98,7 +99,7 @@ def test_an_allowance_is_the_stock_of_the_analytic_corner() -> None:
         stock = Stock.from_toml(
             f'[allowance]\nallowance_mm = 0.8\ncorner_radius_mm = {rough}\nwall = "right"\nz_mm = [-15, 0]\n'
         )
-        pieces = stock.polygons([cut.path(3.6, -15.0)], 4.0)
+        pieces = stock_polygons(stock, [cut.path(3.6, -15.0)], 4.0)
         mine = shapely.union_all([shapely.Polygon(piece.rings[0], piece.rings[1:]) for piece in pieces])
         theirs = shapely.Polygon(cut.stock(10.0))
         # Where the tool comes to: both go on beyond the ends, each as far as it likes, and behind the finished wall.
