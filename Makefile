@@ -31,12 +31,13 @@ CPP_FILES := $(shell find cpp bindings tests/cpp tests/fuzz -name '*.[ch]pp')
 PACKAGE_INPUTS := CMakeLists.txt cmake $(shell find cpp/include cpp/src bindings python \
                     -name __pycache__ -prune -o -print)
 # Groups of sources that clang-tidy reads as one, of about the same cost; a new folder falls into the last one.
-TIDY_gcode := $(filter cpp/src/gcode/%, $(CORE_SOURCES))
-TIDY_plant := $(filter cpp/src/plant/% cpp/src/identification/% cpp/src/linear_algebra.cpp, $(CORE_SOURCES))
-TIDY_motion := $(filter cpp/src/path/% cpp/src/filter/% cpp/src/motion/% cpp/src/emission/% cpp/src/simulation/%, \
+TIDY_program := $(filter cpp/src/program/%, $(CORE_SOURCES))
+TIDY_plant := $(filter cpp/src/plant/% cpp/src/identify/% cpp/src/base/%, $(CORE_SOURCES))
+TIDY_motion := $(filter cpp/src/path/% cpp/src/filter/% cpp/src/motion/% cpp/src/command/% cpp/src/write/% \
+                 cpp/src/play/%, \
                  $(CORE_SOURCES))
-TIDY_rest := $(filter-out $(TIDY_gcode) $(TIDY_plant) $(TIDY_motion), $(CORE_SOURCES))
-TIDY_STAMPS := build/tidy/plant.ok build/tidy/rest.ok build/tidy/motion.ok build/tidy/gcode.ok
+TIDY_rest := $(filter-out $(TIDY_program) $(TIDY_plant) $(TIDY_motion), $(CORE_SOURCES))
+TIDY_STAMPS := build/tidy/plant.ok build/tidy/rest.ok build/tidy/motion.ok build/tidy/program.ok
 
 .PHONY: help demo test lint bench fuzz stubs format clean \
         build-packages test-packages package dev tidy release sanitize stub-check fuzz-parameters fuzz-merge
@@ -168,7 +169,7 @@ build/release/compile_commands.json: CMakeLists.txt CMakePresets.json $(CORE_SOU
 	cmake --preset release
 	touch $@
 
-build/tidy/gcode.ok: $(TIDY_gcode)
+build/tidy/program.ok: $(TIDY_program)
 build/tidy/plant.ok: $(TIDY_plant)
 build/tidy/motion.ok: $(TIDY_motion)
 build/tidy/rest.ok: $(TIDY_rest)

@@ -2,13 +2,14 @@
 
 #include <pybind11/pybind11.h>
 
-// These two keep the global namespace of their own files.
-void register_shaping(pybind11::module_& module);
-void register_shaping_families(pybind11::module_& module);
-
 namespace shapegcode::bindings {
 
+/// For what takes long and touches no Python object.
+using release_gil = pybind11::call_guard<pybind11::gil_scoped_release>;
+
 void register_errors(pybind11::module_& module);
+void register_shaping(pybind11::module_& module);
+void register_shaping_families(pybind11::module_& module);
 void register_minimal(pybind11::module_& module);
 void register_filter(pybind11::module_& module);
 void register_path(pybind11::module_& module);

@@ -17,11 +17,10 @@
 #include <utility>
 #include <vector>
 
-#include "shapegcode/filter/fir.hpp"
-#include "shapegcode/gcode/interpreter.hpp"
-#include "shapegcode/motion/block_player.hpp"
-#include "shapegcode/motion/interpolator.hpp"
-#include "shapegcode/motion/look_ahead.hpp"
+#include "shapegcode/filter.hpp"
+#include "shapegcode/program.hpp"
+#include "shapegcode/control.hpp"
+#include "shapegcode/motion.hpp"
 #include "shapegcode/plant/modal.hpp"
 
 namespace {

@@ -8,14 +8,11 @@
 #include <numbers>
 #include <vector>
 
-#include "shapegcode/filter/fir.hpp"
-#include "shapegcode/filter/varying_fir.hpp"
-#include "shapegcode/metrology/contour.hpp"
-#include "shapegcode/motion/block_player.hpp"
-#include "shapegcode/motion/interpolator.hpp"
-#include "shapegcode/motion/look_ahead.hpp"
-#include "shapegcode/motion/rapid.hpp"
-#include "shapegcode/plant/feed_drive_real_time.hpp"
+#include "shapegcode/control.hpp"
+#include "shapegcode/filter.hpp"
+#include "shapegcode/measure/contour.hpp"
+#include "shapegcode/motion.hpp"
+#include "shapegcode/plant/feed_drive.hpp"
 #include "shapegcode/plant/linear_plant.hpp"
 #include "shapegcode/plant/modal.hpp"
 #include "shapegcode/plant/servo_lag.hpp"

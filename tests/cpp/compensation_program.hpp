@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "shapegcode/gcode/cutter_compensation.hpp"
+#include "program/rewrite/cutter_compensation.hpp"
 
 // Programs for the tests of cutter compensation, and their results as text.
 namespace shapegcode::tests {

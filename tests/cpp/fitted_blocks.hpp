@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "shapegcode/emission/block_fit.hpp"
+#include "shapegcode/write.hpp"
 
 // Commands to be fitted, and fitted blocks as a controller sees them: shared by the tests of fitting and rounding.
 namespace shapegcode::tests {

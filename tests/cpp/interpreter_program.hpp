@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/gcode/interpreter.hpp"
+#include "shapegcode/program.hpp"
 
 // Programs for the tests of the interpreter, and what they come to.
 namespace shapegcode::tests {

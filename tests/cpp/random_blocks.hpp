@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "shapegcode/path/segment.hpp"
+#include "shapegcode/path.hpp"
 
 // Blocks in G17 that leave a point in a given direction, and random numbers for their sizes.
 namespace shapegcode::tests {

@@ -8,7 +8,7 @@
 #include <limits>
 #include <numbers>
 
-#include "shapegcode/motion/look_ahead.hpp"
+#include "shapegcode/motion.hpp"
 
 // What the tests of the look-ahead share.
 namespace shapegcode::tests {

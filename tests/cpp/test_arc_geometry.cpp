@@ -5,8 +5,8 @@
 #include <optional>
 #include <random>
 
+#include "program/interpret/arc_geometry.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/gcode/arc_geometry.hpp"
 
 using shapegcode::ArcWords;
 using shapegcode::Error;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/identification/arma.hpp"
+#include "shapegcode/identify/arma.hpp"
 
 using shapegcode::Arma;
 using shapegcode::Error;

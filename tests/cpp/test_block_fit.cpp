@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "fitted_blocks.hpp"
-#include "shapegcode/emission/block_fit.hpp"
 #include "shapegcode/error.hpp"
+#include "shapegcode/write.hpp"
 
 using namespace shapegcode::tests;
 using shapegcode::Error;

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/motion/block_player.hpp"
 
 using shapegcode::BlockEnd;
 using shapegcode::BlockPlayer;

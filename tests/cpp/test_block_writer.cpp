@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "shapegcode/emission/block_writer.hpp"
-#include "shapegcode/gcode/interpreter.hpp"
+#include "shapegcode/program.hpp"
+#include "shapegcode/write.hpp"
 
 using shapegcode::BlockMark;
 using shapegcode::FittedBlock;

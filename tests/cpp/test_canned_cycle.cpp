@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "shapegcode/gcode/canned_cycle.hpp"
+#include "program/interpret/canned_cycle.hpp"
 
 using shapegcode::CannedCycle;
 using shapegcode::expand_cycle;

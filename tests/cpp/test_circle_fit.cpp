@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/metrology/circle_fit.hpp"
+#include "shapegcode/measure/sections.hpp"
 
 using Eigen::Vector2d;
 using shapegcode::CircleFit;

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "compensation_program.hpp"
-#include "shapegcode/gcode/cutter_compensation.hpp"
+#include "program/rewrite/cutter_compensation.hpp"
 
 // What changes from block to block in cutter compensation: value, side, direction, motion.
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/metrology/contour.hpp"
+#include "shapegcode/measure/contour.hpp"
 
 using shapegcode::ContourTracker;
 using shapegcode::DeviationStats;

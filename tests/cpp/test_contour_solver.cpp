@@ -10,11 +10,10 @@
 #include <span>
 #include <vector>
 
+#include "shapegcode/command.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/plant/modal.hpp"
-#include "shapegcode/shaping/contour_kernel.hpp"
-#include "shapegcode/shaping/contour_solver.hpp"
-#include "shapegcode/shaping/grid.hpp"
+#include "shapegcode/shaper.hpp"
 
 using shapegcode::contour_kernel;
 using shapegcode::ContourSolver;

@@ -3,8 +3,8 @@
 #include <array>
 #include <vector>
 
+#include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/motion/controller.hpp"
 
 using namespace shapegcode;
 

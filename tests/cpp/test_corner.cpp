@@ -9,7 +9,7 @@
 
 #include "shapegcode/error.hpp"
 #include "shapegcode/milling/corner.hpp"
-#include "shapegcode/milling/sweep.hpp"
+#include "shapegcode/milling/material.hpp"
 
 using Eigen::Vector2d;
 using shapegcode::corner_engagement;

@@ -1,4 +1,4 @@
-#include "shapegcode/gcode/corner_words.hpp"
+#include "program/rewrite/corner_words.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,4 +1,4 @@
-#include "shapegcode/gcode/cutter_compensation.hpp"
+#include "program/rewrite/cutter_compensation.hpp"
 
 #include <doctest/doctest.h>
 

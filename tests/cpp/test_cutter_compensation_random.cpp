@@ -6,10 +6,10 @@
 #include <numbers>
 #include <vector>
 
+#include "program/interpret/arc_geometry.hpp"
+#include "program/rewrite/cutter_compensation.hpp"
 #include "random_blocks.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/gcode/arc_geometry.hpp"
-#include "shapegcode/gcode/cutter_compensation.hpp"
 
 // Properties of compensated paths on random programs, by brute force: the distance of dense samples of the tool centre
 // to the programmed blocks, with a distance function of its own.

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/milling/cutting_force.hpp"
+#include "shapegcode/milling/force.hpp"
 
 using shapegcode::ChipThickness;
 using shapegcode::CuttingCoefficients;

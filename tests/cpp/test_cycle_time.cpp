@@ -5,9 +5,8 @@
 #include <string>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/gcode/interpreter.hpp"
-#include "shapegcode/simulation/circle.hpp"
-#include "shapegcode/simulation/cycle_time.hpp"
+#include "shapegcode/program.hpp"
+#include "shapegcode/timing.hpp"
 
 using namespace shapegcode;
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/identification/decay_fit.hpp"
+#include "shapegcode/identify/modal_fit.hpp"
 
 using shapegcode::DecayFit;
 

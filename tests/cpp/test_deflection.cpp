@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/milling/cutting_force.hpp"
-#include "shapegcode/milling/deflection.hpp"
+#include "shapegcode/milling/force.hpp"
 
 using shapegcode::compliance_um_per_n;
 using shapegcode::CuttingCoefficients;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/identification/equivalent_mass.hpp"
+#include "shapegcode/identify/equivalent_mass.hpp"
 
 using shapegcode::EquivalentMass;
 using shapegcode::EquivalentOscillator;

@@ -1,4 +1,4 @@
-#include "shapegcode/shaping/extra_insensitive.hpp"
+#include "shapegcode/shaper.hpp"
 
 #include <doctest/doctest.h>
 

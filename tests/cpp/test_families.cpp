@@ -1,4 +1,4 @@
-#include "shapegcode/shaping/families.hpp"
+#include "shapegcode/shaper.hpp"
 
 #include <doctest/doctest.h>
 

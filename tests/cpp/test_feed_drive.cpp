@@ -13,7 +13,6 @@
 #include "feed_drives.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/plant/feed_drive.hpp"
-#include "shapegcode/plant/feed_drive_real_time.hpp"
 #include "shapegcode/plant/modal.hpp"
 
 using Eigen::Index;

@@ -9,8 +9,8 @@
 #include <Eigen/Core>
 
 #include "feed_drives.hpp"
-#include "plant/feed_drive_equations.hpp"
-#include "shapegcode/plant/friction.hpp"
+#include "plant/feed_drive/feed_drive_equations.hpp"
+#include "shapegcode/plant/feed_drive.hpp"
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;

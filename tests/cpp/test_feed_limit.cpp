@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/milling/feed_limit.hpp"
+#include "shapegcode/milling/feed.hpp"
 
 using shapegcode::ChipThickness;
 using shapegcode::CuttingCoefficients;

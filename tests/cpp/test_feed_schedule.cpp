@@ -1,4 +1,4 @@
-#include "shapegcode/milling/feed_schedule.hpp"
+#include "shapegcode/milling/feed.hpp"
 
 #include <doctest/doctest.h>
 

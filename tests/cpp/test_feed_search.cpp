@@ -7,11 +7,10 @@
 #include <numbers>
 #include <vector>
 
-#include "shapegcode/emission/feed_search.hpp"
-#include "shapegcode/emission/shaped_command.hpp"
+#include "shapegcode/command.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/motion/look_ahead.hpp"
-#include "shapegcode/shaping/grid.hpp"
+#include "shapegcode/motion.hpp"
+#include "shapegcode/shaper.hpp"
 
 using shapegcode::ContourTarget;
 using shapegcode::Error;

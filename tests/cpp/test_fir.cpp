@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/filter/fir.hpp"
+#include "shapegcode/filter.hpp"
 
 using shapegcode::Error;
 using shapegcode::Fir;

@@ -1,4 +1,4 @@
-#include "shapegcode/shaping/grid.hpp"
+#include "shapegcode/shaper.hpp"
 
 #include <doctest/doctest.h>
 

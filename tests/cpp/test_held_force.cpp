@@ -1,4 +1,4 @@
-#include "identification/held_force.hpp"
+#include "identify/held_force.hpp"
 
 #include <cmath>
 #include <numbers>

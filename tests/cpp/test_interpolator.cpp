@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/motion/interpolator.hpp"
+#include "shapegcode/motion.hpp"
 
 using shapegcode::Error;
 using shapegcode::interpolate;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "interpreter_program.hpp"
-#include "shapegcode/gcode/interpreter.hpp"
+#include "shapegcode/program.hpp"
 
 using shapegcode::Program;
 using shapegcode::read_program;

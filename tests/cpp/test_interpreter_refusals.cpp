@@ -5,7 +5,7 @@
 #include <string>
 
 #include "interpreter_program.hpp"
-#include "shapegcode/gcode/interpreter.hpp"
+#include "shapegcode/program.hpp"
 
 using shapegcode::read_program;
 using shapegcode::ReaderOptions;

@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
+#include "program/text/lexer.hpp"
+#include "program/text/number_format.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/gcode/lexer.hpp"
-#include "shapegcode/gcode/number_format.hpp"
 
 using shapegcode::Block;
 using shapegcode::Error;

@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
+#include "plant/feed_drive/ode.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/plant/linear_plant.hpp"
 #include "shapegcode/plant/modal.hpp"
-#include "shapegcode/plant/ode.hpp"
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;

@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/motion/interpolator.hpp"
-#include "shapegcode/motion/look_ahead.hpp"
+#include "shapegcode/motion.hpp"
 #include "speed_plans.hpp"
 
 using shapegcode::AccelerationLaw;

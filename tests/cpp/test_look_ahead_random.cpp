@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "shapegcode/motion/look_ahead.hpp"
+#include "shapegcode/motion.hpp"
 #include "speed_plans.hpp"
 
 using shapegcode::AccelerationLaw;

@@ -12,8 +12,8 @@
 #include <string>
 #include <string_view>
 
+#include "program/macro/macro_expression.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/gcode/macro_expression.hpp"
 
 using shapegcode::Error;
 using shapegcode::ErrorKind;

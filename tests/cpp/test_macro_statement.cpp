@@ -5,9 +5,9 @@
 #include <string>
 #include <string_view>
 
+#include "program/macro/macro_statement.hpp"
+#include "program/macro/macro_variables.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/gcode/macro_statement.hpp"
-#include "shapegcode/gcode/macro_variables.hpp"
 
 using shapegcode::Error;
 using shapegcode::ErrorKind;

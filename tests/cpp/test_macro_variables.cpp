@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "program/macro/macro_variables.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/gcode/macro_variables.hpp"
 
 using shapegcode::Error;
 using shapegcode::ErrorKind;

@@ -7,10 +7,10 @@
 #include <string>
 #include <string_view>
 
+#include "program/macro/macro_statement.hpp"
+#include "program/macro/macro_variables.hpp"
+#include "program/text/lexer.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/gcode/lexer.hpp"
-#include "shapegcode/gcode/macro_statement.hpp"
-#include "shapegcode/gcode/macro_variables.hpp"
 
 using shapegcode::Error;
 using shapegcode::ErrorKind;

@@ -1,4 +1,4 @@
-#include "shapegcode/shaping/minimal.hpp"
+#include "shapegcode/minimal_shapers.hpp"
 
 #include <doctest/doctest.h>
 
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/shaping/families.hpp"
+#include "shapegcode/shaper.hpp"
 
 using shapegcode::minimal_two_mode;
 using shapegcode::Mode;

@@ -9,11 +9,10 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/shaping/families.hpp"
-#include "shapegcode/shaping/minimal.hpp"
-#include "shapegcode/shaping/minimal_branches.hpp"
-#include "shaping/minimal_boxes.hpp"
-#include "shaping/minimal_system.hpp"
+#include "shapegcode/minimal_shapers.hpp"
+#include "shapegcode/shaper.hpp"
+#include "shaper/minimal/minimal_boxes.hpp"
+#include "shaper/minimal/minimal_system.hpp"
 
 using shapegcode::minimal_shapers;
 using shapegcode::minimal_two_mode;

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "identification/one_pole.hpp"
+#include "identify/one_pole.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/identification/modal_fit.hpp"
+#include "shapegcode/identify/modal_fit.hpp"
 
 using shapegcode::Error;
 using shapegcode::ModalFit;

@@ -11,7 +11,6 @@
 
 #include "shapegcode/error.hpp"
 #include "shapegcode/plant/modal.hpp"
-#include "shapegcode/plant/modal_response.hpp"
 
 using Eigen::Index;
 using Eigen::MatrixXd;

@@ -5,8 +5,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/identification/modal_fit.hpp"
-#include "shapegcode/identification/mode_ranking.hpp"
+#include "shapegcode/identify/modal_fit.hpp"
 
 using shapegcode::ModeRanking;
 using shapegcode::NaturalModes;

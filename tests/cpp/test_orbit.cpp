@@ -6,8 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "shapegcode/metrology/contour.hpp"
-#include "shapegcode/metrology/orbit.hpp"
+#include "shapegcode/measure/contour.hpp"
 
 using shapegcode::ContourTracker;
 using shapegcode::make_arc;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/path/path.hpp"
+#include "shapegcode/path.hpp"
 
 using shapegcode::Error;
 using shapegcode::make_arc;

@@ -10,9 +10,8 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/motion/interpolator.hpp"
-#include "shapegcode/motion/look_ahead.hpp"
-#include "shapegcode/simulation/playback.hpp"
+#include "shapegcode/motion.hpp"
+#include "shapegcode/play.hpp"
 
 using shapegcode::BlockEnd;
 using shapegcode::count_slowed_blocks;

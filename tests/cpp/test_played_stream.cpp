@@ -8,11 +8,10 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/gcode/interpreter.hpp"
-#include "shapegcode/motion/look_ahead.hpp"
-#include "shapegcode/simulation/csv_rows.hpp"
-#include "shapegcode/simulation/cycle_time.hpp"
-#include "shapegcode/simulation/played_stream.hpp"
+#include "shapegcode/motion.hpp"
+#include "shapegcode/play_stream.hpp"
+#include "shapegcode/program.hpp"
+#include "shapegcode/timing.hpp"
 
 using namespace shapegcode;
 

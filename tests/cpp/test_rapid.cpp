@@ -3,10 +3,9 @@
 #include <cmath>
 #include <random>
 
+#include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/motion/interpolator.hpp"
-#include "shapegcode/motion/look_ahead.hpp"
-#include "shapegcode/motion/rapid.hpp"
+#include "shapegcode/motion.hpp"
 
 using namespace shapegcode;
 

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "interpreter_program.hpp"
-#include "shapegcode/gcode/interpreter.hpp"
+#include "shapegcode/program.hpp"
 
 using shapegcode::Program;
 using shapegcode::ReaderOptions;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/metrology/roughness.hpp"
+#include "shapegcode/measure/sections.hpp"
 
 using shapegcode::gaussian_low_pass;
 using shapegcode::measure_roughness;

@@ -1,4 +1,4 @@
-#include "shapegcode/emission/rounding.hpp"
+#include "write/rounding.hpp"
 
 #include <doctest/doctest.h>
 

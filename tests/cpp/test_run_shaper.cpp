@@ -8,10 +8,9 @@
 #include <numbers>
 #include <vector>
 
-#include "shapegcode/emission/run_shaper.hpp"
-#include "shapegcode/emission/shaped_command.hpp"
-#include "shapegcode/motion/look_ahead.hpp"
-#include "shapegcode/shaping/grid.hpp"
+#include "shapegcode/command.hpp"
+#include "shapegcode/motion.hpp"
+#include "shapegcode/shaper.hpp"
 
 using shapegcode::AxisModes;
 using shapegcode::ContourTarget;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/metrology/section_metrology.hpp"
+#include "shapegcode/measure/sections.hpp"
 
 using shapegcode::ContourTracker;
 using shapegcode::make_arc;

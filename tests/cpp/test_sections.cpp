@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/metrology/sections.hpp"
+#include "shapegcode/measure/sections.hpp"
 
 using shapegcode::LineRange;
 using shapegcode::make_arc;

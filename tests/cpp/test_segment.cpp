@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/path/segment.hpp"
+#include "shapegcode/path.hpp"
 
 using shapegcode::curvature;
 using shapegcode::Error;

@@ -1,4 +1,4 @@
-#include "shapegcode/shaping/sensitivity.hpp"
+#include "shapegcode/shaper.hpp"
 
 #include <doctest/doctest.h>
 
@@ -9,8 +9,6 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/shaping/extra_insensitive.hpp"
-#include "shapegcode/shaping/families.hpp"
 
 using shapegcode::insensitivity;
 using shapegcode::Mode;

@@ -8,9 +8,9 @@
 #include <numbers>
 #include <vector>
 
-#include "shapegcode/emission/shaped_command.hpp"
+#include "shapegcode/command.hpp"
 #include "shapegcode/error.hpp"
-#include "shapegcode/shaping/grid.hpp"
+#include "shapegcode/shaper.hpp"
 
 using shapegcode::Error;
 using shapegcode::Fir;

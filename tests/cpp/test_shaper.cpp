@@ -1,4 +1,4 @@
-#include "shapegcode/shaping/shaper.hpp"
+#include "shapegcode/shaper.hpp"
 
 #include <doctest/doctest.h>
 
@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/shaping/families.hpp"
 
 using shapegcode::Error;
 using shapegcode::ErrorKind;

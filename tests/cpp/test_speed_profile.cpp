@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "shapegcode/motion/speed_profile.hpp"
+#include "shapegcode/motion.hpp"
 
 using shapegcode::SpeedPhase;
 using shapegcode::SpeedProfile;

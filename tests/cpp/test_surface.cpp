@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/milling/surface.hpp"
+#include "shapegcode/milling/force.hpp"
 
 using shapegcode::compliance_um_per_n;
 using shapegcode::CuttingCoefficients;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/milling/sweep.hpp"
+#include "shapegcode/milling/material.hpp"
 
 using Eigen::Vector2d;
 using shapegcode::EngagementTrack;

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/metrology/contour.hpp"
-#include "shapegcode/metrology/swept_walls.hpp"
+#include "shapegcode/measure/contour.hpp"
+#include "shapegcode/measure/sections.hpp"
 
 using Eigen::Vector2d;
 using shapegcode::ContourTracker;

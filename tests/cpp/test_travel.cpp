@@ -1,4 +1,4 @@
-#include "shapegcode/simulation/travel.hpp"
+#include "shapegcode/play.hpp"
 
 #include <doctest/doctest.h>
 
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/motion/look_ahead.hpp"
+#include "shapegcode/motion.hpp"
 
 using namespace shapegcode;
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/filter/varying_fir.hpp"
+#include "shapegcode/filter.hpp"
 
 using Eigen::Index;
 using shapegcode::Error;

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/metrology/vibration.hpp"
+#include "shapegcode/measure/sections.hpp"
 
 using shapegcode::RestVibration;
 using shapegcode::Vector3;

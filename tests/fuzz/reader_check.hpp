@@ -12,7 +12,7 @@
 #include <string_view>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/gcode/interpreter.hpp"
+#include "shapegcode/program.hpp"
 
 /// What must hold for every text that the reader is given. Shared by the fuzzer and by the test that replays its
 /// corpus.

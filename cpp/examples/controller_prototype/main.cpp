@@ -11,13 +11,11 @@
 #include <numbers>
 #include <vector>
 
-#include "shapegcode/filter/fir.hpp"
-#include "shapegcode/motion/interpolator.hpp"
-#include "shapegcode/motion/look_ahead.hpp"
-#include "shapegcode/plant/feed_drive_real_time.hpp"
+#include "shapegcode/filter.hpp"
+#include "shapegcode/motion.hpp"
+#include "shapegcode/plant/feed_drive.hpp"
 #include "shapegcode/plant/modal.hpp"
-#include "shapegcode/shaping/grid.hpp"
-#include "shapegcode/shaping/shaper.hpp"
+#include "shapegcode/shaper.hpp"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "shapegcode/filter/fir.hpp"
+#include "shapegcode/filter.hpp"
 
 #include <algorithm>
 #include <array>

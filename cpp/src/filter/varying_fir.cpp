@@ -1,4 +1,4 @@
-#include "shapegcode/filter/varying_fir.hpp"
+#include "shapegcode/filter.hpp"
 
 #include <algorithm>
 #include <bit>

@@ -6,11 +6,13 @@
 #include <numbers>
 #include <utility>
 
+#include "milling/azimuth.hpp"
+
 namespace shapegcode {
 
 namespace {
 
-constexpr double half_pi = 0.5 * std::numbers::pi;
+using detail::half_pi;
 
 // Grid coordinate: 0 at pi/2, 1 at azimuth 0; a power of the distance from pi/2 becomes twice as smooth.
 double azimuth_at(double y) { return half_pi * (1.0 - y * y); }

@@ -9,11 +9,13 @@
 #include <utility>
 #include <vector>
 
-#include "shapegcode/error.hpp"
-#include "shapegcode/milling/tool_step.hpp"
+#include "milling/refuse.hpp"
+#include "shapegcode/milling/force.hpp"
 
 namespace shapegcode {
 namespace {
+
+using detail::refuse;
 
 using Eigen::Vector2d;
 
@@ -135,8 +137,6 @@ double distance_from_way(const CornerCut& cut, const Geometry& g, const Place& t
 Vector2d turned_over(const CornerCut& cut, const Vector2d& v) { return cut.mirrored ? Vector2d(v.x(), -v.y()) : v; }
 
 Vector3 at_height(const Vector2d& v, double z) { return {v.x(), v.y(), z}; }
-
-void refuse(const std::string& message) { throw Error(ErrorKind::argument, message); }
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-#include "shapegcode/milling/cutting_force.hpp"
+#include "shapegcode/milling/force.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,19 +7,20 @@
 #include <string>
 #include <utility>
 
+#include "milling/azimuth.hpp"
+#include "milling/refuse.hpp"
 #include "milling/revolution.hpp"
-#include "shapegcode/error.hpp"
 
 namespace shapegcode {
 
 namespace {
 
-constexpr double half_pi = 0.5 * std::numbers::pi;
+using detail::half_pi;
+using detail::refuse;
+
 constexpr double arc_slack_rad = 1e-9;
 constexpr double same_end_rad = 1e-9;
 constexpr double pieces_per_overhang = 10.0;  // of a load on the beam
-
-[[noreturn]] void refuse(const std::string& message) { throw Error(ErrorKind::argument, message); }
 
 bool same(std::span<const EngagedArc> a, const std::vector<EngagedArc>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const EngagedArc& p, const EngagedArc& q) {

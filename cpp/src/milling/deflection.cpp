@@ -1,4 +1,4 @@
-#include "shapegcode/milling/deflection.hpp"
+#include "shapegcode/milling/force.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,21 +1,22 @@
-#include "shapegcode/milling/end_mill.hpp"
+#include "shapegcode/milling/force.hpp"
 
 #include <cmath>
 #include <numbers>
 #include <string>
 
-#include "shapegcode/error.hpp"
+#include "milling/refuse.hpp"
 
 namespace shapegcode {
 
 namespace {
+
+using detail::refuse;
 
 constexpr double steepest_helix_rad = 80.0 / 180.0 * std::numbers::pi;
 
 }  // namespace
 
 void check(const EndMill& tool) {
-  const auto refuse = [](const std::string& message) { throw Error(ErrorKind::argument, message); };
   if (!(tool.diameter_mm > 0.0) || !std::isfinite(tool.diameter_mm)) {
     refuse("tool diameter is " + std::to_string(tool.diameter_mm) + " mm, must be above 0");
   }

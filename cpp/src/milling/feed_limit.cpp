@@ -1,4 +1,4 @@
-#include "shapegcode/milling/feed_limit.hpp"
+#include "shapegcode/milling/feed.hpp"
 
 #include <algorithm>
 #include <cmath>

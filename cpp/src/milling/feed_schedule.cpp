@@ -1,4 +1,4 @@
-#include "shapegcode/milling/feed_schedule.hpp"
+#include "shapegcode/milling/feed.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,10 +6,12 @@
 #include <string>
 #include <utility>
 
-#include "shapegcode/error.hpp"
+#include "milling/refuse.hpp"
 
 namespace shapegcode {
 namespace {
+
+using detail::refuse;
 
 constexpr double rounding_mm = 1e-9;
 constexpr double same_place_mm = 1e-6;
@@ -17,8 +19,6 @@ constexpr double border_charge = 0.01;    // of the time of the shortest stretch
 constexpr double candidates = 4.0;        // places for a border per least length within a block
 constexpr double longest_stretch = 16.0;  // least lengths; longer ones come from equal neighbours
 constexpr double seconds_per_minute = 60.0;
-
-[[noreturn]] void refuse(const std::string& message) { throw Error(ErrorKind::argument, message); }
 
 void check(std::span<const FeedBlock> blocks, const FeedStations& stations, const FeedScheduleOptions& options) {
   if (blocks.empty() || stations.s_mm.empty() || stations.s_mm.size() != stations.feed_mm_per_min.size()) {

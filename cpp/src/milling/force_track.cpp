@@ -2,7 +2,7 @@
 #include <string>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/milling/cutting_force.hpp"
+#include "shapegcode/milling/force.hpp"
 
 namespace shapegcode {
 

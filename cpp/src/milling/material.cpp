@@ -6,10 +6,12 @@
 #include <string>
 #include <utility>
 
-#include "shapegcode/error.hpp"
+#include "milling/refuse.hpp"
 
 namespace shapegcode {
 namespace {
+
+using detail::refuse;
 
 using Eigen::Vector2d;
 
@@ -17,8 +19,6 @@ constexpr double level_mm = 1e-6;  // a move that climbs by less stays on its le
 constexpr double same_height_mm = 1e-3;
 constexpr double least_slope = 1e-3;  // horizontal share below which a move is a plunge
 constexpr double megabyte = 1e6;
-
-[[noreturn]] void refuse(const std::string& message) { throw Error(ErrorKind::argument, message); }
 
 double cross(const Vector2d& a, const Vector2d& b) noexcept { return a.x() * b.y() - a.y() * b.x(); }
 

@@ -1,4 +1,4 @@
-#include "shapegcode/milling/material_layer.hpp"
+#include "shapegcode/milling/material.hpp"
 
 #include <algorithm>
 #include <cmath>

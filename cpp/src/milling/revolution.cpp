@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "milling/azimuth.hpp"
+
 namespace shapegcode {
 
 namespace {
@@ -11,8 +13,6 @@ namespace {
 constexpr double panel_rad = 8.0 / 180.0 * std::numbers::pi;  // of Simpson's rule, two steps each
 constexpr double brief_rad = 1.0 / 180.0 * std::numbers::pi;  // between kinks: a straight line will do
 constexpr double same_kink_rad = 1e-6;
-// A force without helix jumps where an arc begins: both sides are looked at from a little inside.
-constexpr double inside_rad = 1e-9;
 // A weighted load along less azimuth than this stands at its middle.
 constexpr double short_rad = 1e-2;
 
@@ -108,7 +108,7 @@ void Revolution::place_angles(const FluteSet& set, std::span<const EngagedPiece>
     const double step = length / static_cast<double>(steps);
     for (std::size_t k = 0; k <= steps; ++k) {
       const bool end = k == 0 || k == steps;
-      const double inwards = k == 0 ? inside_rad : (k == steps ? -inside_rad : 0.0);
+      const double inwards = k == 0 ? detail::inside_rad : (k == steps ? -detail::inside_rad : 0.0);
       angle_.push_back(first + step * static_cast<double>(k) + inwards);
       weight_.push_back(step / (brief ? 2.0 : 3.0) * (end ? 1.0 : (k % 2 == 1 ? 4.0 : 2.0)) / set.pitch_rad);
     }

@@ -1,4 +1,4 @@
-#include "shapegcode/milling/surface.hpp"
+#include "shapegcode/milling/force.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,14 +6,15 @@
 #include <numbers>
 #include <string>
 
+#include "milling/azimuth.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
 
 namespace {
 
-constexpr double half_pi = 0.5 * std::numbers::pi;
-constexpr double inside_rad = 1e-9;  // the flute that makes the wall still counts as cutting
+using detail::half_pi;
+using detail::inside_rad;
 
 bool reaches(std::span<const EngagedArc> arcs, WallSide side, double height_mm, double tolerance_rad) {
   return std::any_of(arcs.begin(), arcs.end(), [&](const EngagedArc& arc) {

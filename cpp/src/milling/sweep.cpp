@@ -1,4 +1,4 @@
-#include "shapegcode/milling/sweep.hpp"
+#include "shapegcode/milling/material.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,14 +11,16 @@
 #include <utility>
 #include <vector>
 
+#include "milling/azimuth.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
 
+using detail::half_pi;
+
 using Eigen::Vector2d;
 
-constexpr double half_pi = 0.5 * std::numbers::pi;
 constexpr double steps_per_diameter = 40.0;
 constexpr double largest_turn_rad = 0.35;  // of one step on an arc
 // Behind a vertex the load changes at once: the first step there is cut up at these shares.

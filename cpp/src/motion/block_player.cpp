@@ -1,4 +1,4 @@
-#include "shapegcode/motion/block_player.hpp"
+#include "shapegcode/control.hpp"
 
 #include <algorithm>
 #include <cmath>

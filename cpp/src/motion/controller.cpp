@@ -1,11 +1,11 @@
-#include "shapegcode/motion/controller.hpp"
+#include "shapegcode/control.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/motion/look_ahead.hpp"
+#include "shapegcode/motion.hpp"
 
 namespace shapegcode {
 namespace {

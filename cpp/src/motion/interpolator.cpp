@@ -1,4 +1,4 @@
-#include "shapegcode/motion/interpolator.hpp"
+#include "shapegcode/motion.hpp"
 
 #include <algorithm>
 #include <cmath>

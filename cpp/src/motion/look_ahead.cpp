@@ -1,4 +1,4 @@
-#include "shapegcode/motion/look_ahead.hpp"
+#include "shapegcode/motion.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "shapegcode/motion/rapid.hpp"
+#include "shapegcode/control.hpp"
 
 #include <algorithm>
 #include <cmath>

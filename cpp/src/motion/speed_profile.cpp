@@ -1,4 +1,4 @@
-#include "shapegcode/motion/speed_profile.hpp"
+#include "shapegcode/motion.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "shapegcode/path/path.hpp"
+#include "shapegcode/path.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "shapegcode/path/segment.hpp"
+#include "shapegcode/path.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
-#include "shapegcode/plant/friction.hpp"
+#include "shapegcode/plant/feed_drive.hpp"
 
 #include <cmath>
 #include <string>
 
-#include "plant/drive_checks.hpp"
+#include "plant/feed_drive/drive_checks.hpp"
 
 namespace shapegcode {
 

@@ -9,7 +9,7 @@
 
 #include <Eigen/LU>
 
-#include "linear_algebra.hpp"
+#include "base/linear_algebra.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {

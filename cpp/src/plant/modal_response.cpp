@@ -1,4 +1,4 @@
-#include "shapegcode/plant/modal_response.hpp"
+#include "shapegcode/plant/modal.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,6 @@
 #include <string>
 
 #include "shapegcode/error.hpp"
-#include "shapegcode/plant/mode_transition.hpp"
 
 namespace shapegcode {
 namespace {

@@ -1,4 +1,4 @@
-#include "shapegcode/plant/mode_table.hpp"
+#include "shapegcode/plant/modal.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "shapegcode/plant/mode_transition.hpp"
+#include "shapegcode/plant/modal.hpp"
 
 #include <cmath>
 #include <complex>

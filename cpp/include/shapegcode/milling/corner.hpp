@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-#include "shapegcode/milling/engagement.hpp"
-#include "shapegcode/milling/material_layer.hpp"
-#include "shapegcode/path/path.hpp"
+#include "shapegcode/milling/force.hpp"
+#include "shapegcode/milling/material.hpp"
+#include "shapegcode/path.hpp"
 
 namespace shapegcode {
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -7,9 +8,47 @@
 #include <Eigen/Core>
 
 #include "shapegcode/mode.hpp"
-#include "shapegcode/plant/friction.hpp"
 
 namespace shapegcode {
+
+/// How a sliding pair resists.
+enum class FrictionModel : std::uint8_t {
+  viscous,   ///< in proportion to the speed alone
+  stribeck,  ///< Coulomb, static and Stribeck as a function of the speed, made smooth through zero
+  lugre,     ///< the same with bristles between the surfaces: presliding, stick, frictional lag; one state
+};
+
+/// Friction of one sliding pair, SI. Curve of the steady speed v:
+/// F(v) = sign(v) * (coulomb + (static - coulomb) * exp(-(v/stribeck_velocity)^2)) + viscous * v.
+struct FrictionParameters {
+  FrictionModel model = FrictionModel::viscous;
+  double viscous_n_s_per_m = 0.0;           ///< >= 0
+  double coulomb_n = 0.0;                   ///< sliding friction; > 0 unless viscous
+  double static_n = 0.0;                    ///< friction to be overcome from rest; >= coulomb_n
+  double stribeck_velocity_m_per_s = 0.0;   ///< speed at which static has given way to sliding friction; > 0
+  double smoothing_velocity_m_per_s = 0.0;  ///< Stribeck: sign(v) is tanh(v / this); > 0
+  double bristle_stiffness_n_per_m = 0.0;   ///< LuGre, sigma0: force over displacement before sliding; > 0
+  double bristle_damping_n_s_per_m = 0.0;   ///< LuGre, sigma1; >= 0
+
+  /// Throws Error(argument) with the value and its limit; `place` begins the message ("friction of the table").
+  void check(const char* place) const;
+  [[nodiscard]] bool has_bristles() const noexcept { return model == FrictionModel::lugre; }
+};
+
+/// Force against the motion and its derivatives.
+struct FrictionForce {
+  double force_n = 0.0;
+  double by_velocity = 0.0;           ///< N/(m/s)
+  double by_bristle = 0.0;            ///< N/m
+  double bristle_rate_m_per_s = 0.0;  ///< of the bristles' deflection
+  double rate_by_velocity = 0.0;
+  double rate_by_bristle = 0.0;  ///< 1/s
+};
+
+/// Force at a speed (m/s) and, with LuGre, a deflection of the bristles (m). LuGre after Canudas de Wit, Olsson, Astrom
+/// and Lischinsky (1995): z' = v - sigma0 |v| z / g(v), F = sigma0 z + sigma1 z' + viscous v, g the curve above.
+[[nodiscard]] FrictionForce friction_force(const FrictionParameters& friction, double velocity_m_per_s,
+                                           double bristle_m) noexcept;
 
 /// What the position loop compares with the set-point.
 enum class PositionFeedback : std::uint8_t {
@@ -94,6 +133,43 @@ class FeedDrive {
   /// Internal steps and evaluations of the equations by this object: for tests and reports.
   [[nodiscard]] long steps() const noexcept;
   [[nodiscard]] long rhs_evaluations() const noexcept;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// The equations of FeedDrive with fixed steps, for a controller prototype that needs its plant in bounded time: a
+/// Rosenbrock method (L-stable, third order: Rodas3 of Sandu et al. 1997) whose linear systems are solved in place.
+/// After construction no allocation, no lock, no exception. Each step() costs the same, except where a set-point asks
+/// for what no machine follows (metres per second at once): steps that fail there are divided, at most to 21 times the
+/// work. docs/feed_drive.md states the error beside FeedDrive for the usual drives; twice the substeps show it for
+/// another.
+class FeedDriveRealTime {
+ public:
+  static constexpr int default_substeps = 4;
+
+  /// At rest at zero. `substeps` per period, 1 ... 1000. Throws Error(argument) on parameters outside their range, a
+  /// period <= 0 or other substeps.
+  FeedDriveRealTime(FeedDriveParameters parameters, double period_s, int substeps = default_substeps);
+  ~FeedDriveRealTime();
+  FeedDriveRealTime(const FeedDriveRealTime& other);
+  FeedDriveRealTime& operator=(const FeedDriveRealTime& other);
+  FeedDriveRealTime(FeedDriveRealTime&& other) noexcept;
+  FeedDriveRealTime& operator=(FeedDriveRealTime&& other) noexcept;
+
+  /// At rest at `position_mm`, without force in spring and bristles.
+  void reset(double position_mm) noexcept;
+  /// Next set-point; returns the response (table and modes, mm) at that instant. A set-point that is not finite gives
+  /// a response that is not finite from then on, until reset().
+  double step(double setpoint_mm) noexcept;
+
+  // As of the last set-point.
+  [[nodiscard]] double response_mm() const noexcept;  ///< table and modes
+  [[nodiscard]] double table_mm() const noexcept;
+  [[nodiscard]] double motor_mm() const noexcept;          ///< angle of the motor as travel
+  [[nodiscard]] double friction_force_n() const noexcept;  ///< on the table, against its motion
+  [[nodiscard]] double motor_force_n() const noexcept;     ///< torque of the motor as force, within its limit
 
  private:
   struct Impl;

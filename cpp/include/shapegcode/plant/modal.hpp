@@ -5,12 +5,41 @@
 #include <memory>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "shapegcode/mode.hpp"
-#include "shapegcode/plant/mode_table.hpp"
-#include "shapegcode/plant/mode_transition.hpp"
 #include "shapegcode/samples.hpp"
 
 namespace shapegcode {
+
+/// (d, d')(t+h) = matrix * (d, d')(t): deflection and its velocity of a free mode over a time h.
+struct ModeTransition {
+  double dd = 1.0, dv = 0.0, vd = 0.0, vv = 1.0;
+};
+
+/// The matrix exponential of d'' + 2*zeta*omega*d' + omega^2*d = 0 over `time_s`, in closed form. Throws as pole().
+[[nodiscard]] ModeTransition mode_transition(const Mode& mode, double time_s);
+
+/// How a mode depends on where an axis stands: linear in frequency and damping ratio between the rows, constant beyond
+/// the ends. An empty table leaves the mode as it is.
+struct ModeTable {
+  int axis = 0;                       ///< whose position counts: 0, 1, 2 for X, Y, Z
+  std::vector<double> position_mm;    ///< strictly ascending
+  std::vector<double> frequency_hz;   ///< undamped natural frequency, one per position
+  std::vector<double> damping_ratio;  ///< one per position, or none: that of the mode
+
+  [[nodiscard]] bool empty() const noexcept { return position_mm.empty(); }
+};
+
+/// One table per mode of every axis; an axis may have fewer tables than modes, the others do not vary.
+using AxisModeTables = std::array<std::vector<ModeTable>, axis_count>;
+
+/// Throws Error(argument) unless the table is empty, or names an axis and has strictly ascending, finite positions, as
+/// many frequencies above 0, and none or as many damping ratios 0 <= zeta < 1.
+void check_table(const ModeTable& table);
+
+/// The mode at a position (mm) of the table's axis; the participation stays. The table must pass check_table.
+[[nodiscard]] Mode mode_at(const Mode& mode, const ModeTable& table, double position_mm) noexcept;
 
 /// Base-excited modes per axis: d'' + 2*zeta*omega*d' + omega^2*d = -x'' and response u = x + sum(participation*d).
 using AxisModes = std::array<std::vector<Mode>, axis_count>;
@@ -121,5 +150,38 @@ class ModalPlant {
   Vector3 deflection_ = Vector3::Zero();
   Vector3 peak_ = Vector3::Zero();
 };
+
+/// ModalPlant with constant modes for whole records: the same motion to the last bit (but for deflections below 1e-290,
+/// which count as none), without peaks between samples, any number of axes, and about as fast as memory can be read.
+/// Records may be handed over in pieces.
+class ModalResponse {
+ public:
+  /// (n_samples, n_axes) in any memory order, mm.
+  using Record = Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>>;
+  using Result = Eigen::Ref<Eigen::MatrixXd, 0, Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>>;
+
+  /// `modes`: by axis; an axis without modes follows its command. Throws Error(argument) on period_s <= 0, an invalid
+  /// mode or no axis.
+  ModalResponse(const std::vector<std::vector<Mode>>& modes, double period_s);
+  ~ModalResponse();
+  ModalResponse(ModalResponse&&) noexcept;
+  ModalResponse& operator=(ModalResponse&&) noexcept;
+  ModalResponse(const ModalResponse&) = delete;
+  ModalResponse& operator=(const ModalResponse&) = delete;
+
+  /// Response at each row of the next piece of a record, in the units of the command. At the first row of the first
+  /// piece the plant is at rest. `response` has the shape of `command`, and may be the command itself. Throws
+  /// Error(argument) on another shape or a value that is not finite (not to be continued then).
+  void apply(const Record& command, Result response);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// The response of base-excited modes to a record of set-points that is linear between them (ModalResponse), at rest
+/// at the first row. Throws as ModalResponse and its apply().
+[[nodiscard]] Eigen::MatrixXd plant_response(const ModalResponse::Record& command,
+                                             const std::vector<std::vector<Mode>>& modes, double period_s);
 
 }  // namespace shapegcode

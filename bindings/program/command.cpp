@@ -1,0 +1,154 @@
+#include <pybind11/eigen.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "arrays.hpp"
+#include "register.hpp"
+#include "shapegcode/command.hpp"
+
+namespace py = pybind11;
+
+namespace shapegcode::bindings {
+namespace {
+
+using Column = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+}  // namespace
+
+void register_shaped_command(py::module_& module) {
+  py::enum_<ContourTarget>(module, "ContourTarget", "What shall follow the programmed path.")
+      .value("none", ContourTarget::none, "Nothing: the path is shaped as it is.")
+      .value("command", ContourTarget::command, "The shaped command.")
+      .value("response", ContourTarget::response, "The plant's response to it: the part.");
+
+  py::class_<ShapingOptions>(module, "ShapingOptions",
+                             "How a region is turned into a shaped command on the block grid.")
+      .def(py::init<>())
+      .def_readwrite("limits", &ShapingOptions::limits, "Limits of the look-ahead.")
+      .def_readwrite("block_period_s", &ShapingOptions::block_period_s, "s.")
+      .def_readwrite("interpolation_period_s", &ShapingOptions::interpolation_period_s, "s.")
+      .def_readwrite("plunge_axis_angle_rad", &ShapingOptions::plunge_axis_angle_rad,
+                     "How far a side of a corner may lean from Z and still count as plunge, rad.")
+      .def_readwrite("plunge_corner_angle_rad", &ShapingOptions::plunge_corner_angle_rad,
+                     "Least change of direction of such a corner, rad.")
+      .def_readwrite("rest_at_stop_s", &ShapingOptions::rest_at_stop_s, "Pause at a forced stop, s.")
+      .def_readwrite("target", &ShapingOptions::target,
+                     "What is brought back to the path; with a target, the contour tolerance of `limits` is its own.")
+      .def_readwrite("modes", &ShapingOptions::modes, "Modes of X, Y and Z, for the response as target.")
+      .def_readwrite("following", &ShapingOptions::following,
+                     "Shapers along an axis in place of the one shaper, taps in whole block periods; None: none.")
+      .def_readwrite("mode_tables", &ShapingOptions::mode_tables,
+                     "How the modes vary with the position of the axis that is followed, for the response as target.")
+      .def_readwrite("axis_shapers", &ShapingOptions::axis_shapers,
+                     "A shaper for each of X, Y and Z, of one mean delay, in place of the common one; empty: none.")
+      .def_readwrite("least_feed_mm_per_s", &ShapingOptions::least_feed_mm_per_s,
+                     "What the controller can run: no run is slowed below it, mm/s.")
+      .def_readwrite("contour_smoothness", &ShapingOptions::contour_smoothness,
+                     "Weight of the correction's second differences.");
+
+  py::class_<ShapedCommand, std::shared_ptr<ShapedCommand>>(module, "ShapedCommand",
+                                                            "A shaped command on the block grid.")
+      .def_readonly("first_period", &ShapedCommand::first_period, "Periods of the region before this piece.")
+      .def_property_readonly(
+          "grid_mm", [](const std::shared_ptr<ShapedCommand>& self) { return view(self->grid_mm, py::cast(self)); },
+          "(n+1, 3) positions at k*T_B, mm, read-only view.")
+      .def_property_readonly(
+          "middle_mm", [](const std::shared_ptr<ShapedCommand>& self) { return view(self->middle_mm, py::cast(self)); },
+          "(n, 3) positions half a period later, mm, read-only view.")
+      .def_property_readonly(
+          "arc_normal", [](const ShapedCommand& self) { return self.arc_normal; },
+          "Per period the axis across an arc's plane, or -1.")
+      .def_readonly("run_ends", &ShapedCommand::run_ends, "Periods of this piece at which the command is at rest.")
+      .def_readonly("segment_periods", &ShapedCommand::segment_periods,
+                    "Per marked segment the period of the region in which its begin is reached.");
+
+  module.def(
+      "shape_path",
+      [](const std::shared_ptr<Path>& path, const Fir& shaper, const std::vector<std::uint32_t>& marked,
+         const ShapingOptions& options) {
+        const py::gil_scoped_release release;
+        return std::make_shared<ShapedCommand>(shape_path(path, shaper, marked, options));
+      },
+      py::arg("path"), py::arg("shaper"), py::arg("marked_segments"), py::arg("options"),
+      "Split at forced stops, plan, sample on half the block grid and shape. `shaper` has its taps in whole block "
+      "periods. Raises ArgumentError if the block period is no multiple of the interpolation period.");
+
+  py::class_<RegionShaper>(module, "RegionShaper",
+                           R"(A region's shaped command in pieces, so that memory does not grow with the region.
+
+Args:
+    path: The programmed path.
+    shaper: Taps in whole block periods, common to all axes.
+    marked_segments: Ascending indices whose begin in time is wanted.
+    options: How the region is shaped.
+
+Raises:
+    ArgumentError: The block period is no multiple of the interpolation period, or a limit is not above 0.)")
+      .def(py::init(
+               [](std::shared_ptr<Path> path, const Fir& shaper, const std::vector<std::uint32_t>& marked,
+                  const ShapingOptions& options) { return RegionShaper(std::move(path), shaper, marked, options); }),
+           py::arg("path"), py::arg("shaper"), py::arg("marked_segments"), py::arg("options"), "See the class.")
+      .def(
+          "next",
+          [](RegionShaper& self, std::uint32_t periods) -> std::optional<std::shared_ptr<ShapedCommand>> {
+            const py::gil_scoped_release release;
+            auto piece = std::make_shared<ShapedCommand>();
+            if (!self.next(*piece, periods)) {
+              return std::nullopt;
+            }
+            return piece;
+          },
+          py::arg("periods"), "Next piece of at most so many periods, or None behind the last.")
+      .def_property_readonly("largest_deviation_mm", &RegionShaper::largest_deviation_mm,
+                             "Largest deviation of what shall follow the path, as far as given out, mm.")
+      .def_property_readonly("stops", &RegionShaper::stops,
+                             "Stops at corners that no speed passes within the tolerance.");
+
+  py::class_<ContourSolver>(module, "ContourSolver",
+                            R"(Correction of a command before shaping that brings the shaped command back to the path.
+
+Minimises |e + f*c|^2 + w |second differences of c|^2 for one axis.
+
+Args:
+    kernel: f, taps at delays 0, 1, ... samples.
+    smoothness: w, above 0.
+
+Raises:
+    ArgumentError: An empty or not finite kernel, or a smoothness that is not above 0.
+
+Source: spec 5.)")
+      .def(py::init<std::vector<double>, double>(), py::arg("kernel"), py::arg("smoothness"), "See the class.")
+      .def(
+          "solve",
+          [](ContourSolver& self, const Column& error, const Column& carried, const Column& stiffness) {
+            const auto values = [](const Column& column) {
+              return std::span<const double>(column.data(), static_cast<std::size_t>(column.size()));
+            };
+            const std::size_t past = values(carried).size();
+            const std::size_t m = values(error).size() - std::min(values(error).size(), self.reach());
+            std::vector<double> correction(past + m);
+            std::ranges::copy(values(carried), correction.begin());
+            {
+              const py::gil_scoped_release release;
+              self.solve(values(error), correction, values(stiffness));
+            }
+            return py::array_t<double>(static_cast<py::ssize_t>(m), correction.data() + past);
+          },
+          py::arg("error"), py::arg("carried"), py::arg("stiffness") = Column(0),
+          "Corrections (m,) for errors (m + len(kernel) - 1,); `carried`: the len(kernel) + 1 corrections before.");
+  module.def(
+      "contour_kernel",
+      [](const Fir& shaper, const std::vector<Mode>& modes, double period_s, ContourTarget target) {
+        return contour_kernel(shaper, modes, period_s, target);
+      },
+      py::arg("shaper"), py::arg("modes"), py::arg("period_s"), py::arg("target"),
+      "Kernel from a command before shaping to what shall follow the path; `shaper`: taps in samples of `period_s`.");
+}
+
+}  // namespace shapegcode::bindings

@@ -1,0 +1,167 @@
+#include <pybind11/stl.h>
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "arrays.hpp"
+#include "register.hpp"
+#include "shapegcode/error.hpp"
+#include "shapegcode/milling/feed.hpp"
+#include "shapegcode/play.hpp"
+#include "shapegcode/write.hpp"
+
+namespace py = pybind11;
+
+namespace shapegcode::bindings {
+namespace {
+
+std::vector<double> numbers(const VectorArray& values) {
+  if (values.ndim() != 1) {
+    throw Error(ErrorKind::argument, "an array of shape (n,) is needed");
+  }
+  return {values.data(), values.data() + values.size()};
+}
+
+py::array column(const std::vector<double>& values) {
+  return py::array_t<double>(static_cast<py::ssize_t>(values.size()), values.data());
+}
+
+void register_travel(py::module_& module) {
+  py::class_<Travel>(module, "Travel", "How a path is really travelled, per stretch between two stations.")
+      .def_property_readonly(
+          "highest_mm_per_s", [](const Travel& self) { return column(self.highest_mm_per_s); },
+          "Largest travel within a window, over the window, (n,), mm/s: what was travelled in the present direction "
+          "and "
+          "in XY, as a way along the path.")
+      .def_property_readonly(
+          "time_s", [](const Travel& self) { return column(self.time_s); }, "Time on each stretch, (n,), s.")
+      .def_readonly("duration_s", &Travel::duration_s, "Until the set-points rest, s.");
+
+  module.def(
+      "travel_path",
+      [](const std::shared_ptr<Path>& path, const std::shared_ptr<SpeedProfile>& profile,
+         const std::shared_ptr<Path>& along, const VectorArray& stations, double period_s,
+         const std::vector<Fir>& filters, double window_s) {
+        const std::vector<double> s = numbers(stations);
+        const py::gil_scoped_release release;
+        return travel_path(path, profile, *along, s, {period_s, filters, window_s});
+      },
+      py::arg("path"), py::arg("profile"), py::arg("along"), py::arg("stations_mm"), py::arg("period_s"),
+      py::arg("filters") = std::vector<Fir>{}, py::arg("window_s") = 0.0,
+      "How a path under a speed profile is travelled, followed along another one of which it is made, or along itself; "
+      "`stations_mm` (n,) ascend to the length of that, `filters` stand behind "
+      "the set-points, speeds are taken over `window_s`. Raises ArgumentError on stations that do not ascend.");
+  module.def(
+      "travel_blocks",
+      [](const std::shared_ptr<Path>& blocks, const std::shared_ptr<Path>& along, BlockEnd block_end,
+         const VectorArray& stations, double period_s, const std::vector<Fir>& filters, double window_s) {
+        const std::vector<double> s = numbers(stations);
+        const py::gil_scoped_release release;
+        return travel_blocks(blocks->segments(), *along, block_end, s, {period_s, filters, window_s});
+      },
+      py::arg("blocks"), py::arg("along"), py::arg("block_end"), py::arg("stations_mm"), py::arg("period_s"),
+      py::arg("filters") = std::vector<Fir>{}, py::arg("window_s") = 0.0,
+      "How blocks at their feed are travelled, followed along `along`; else as travel_path.");
+}
+
+}  // namespace
+
+void register_feed_schedule(py::module_& module) {
+  py::class_<FeedStretch>(module, "FeedStretch", "A stretch of one feed.")
+      .def(py::init<double, double, double>(), py::arg("begin_mm"), py::arg("end_mm"), py::arg("feed_mm_per_min"))
+      .def_readonly("begin_mm", &FeedStretch::begin_mm, "Along the path, mm.")
+      .def_readonly("end_mm", &FeedStretch::end_mm, "Along the path, mm.")
+      .def_readonly("feed_mm_per_min", &FeedStretch::feed_mm_per_min, "mm/min.");
+
+  module.def(
+      "schedule_feed",
+      [](const VectorArray& ends, const VectorArray& kept, const std::vector<bool>& divisible,
+         const VectorArray& stations, const VectorArray& feeds, double least_length_mm, double most_change_mm_per_min,
+         double resolution_mm_per_min) {
+        const std::vector<double> end = numbers(ends);
+        const std::vector<double> keep = numbers(kept);
+        if (keep.size() != end.size() || divisible.size() != end.size()) {
+          throw Error(ErrorKind::argument, "ends, kept feeds and divisibility must be of one length");
+        }
+        std::vector<FeedBlock> blocks(end.size());
+        for (std::size_t i = 0; i < end.size(); ++i) {
+          blocks[i] = {end[i], keep[i], divisible[i]};
+        }
+        const FeedStations at{numbers(stations), numbers(feeds)};
+        const py::gil_scoped_release release;
+        return schedule_feed(blocks, at, {least_length_mm, most_change_mm_per_min, resolution_mm_per_min});
+      },
+      py::arg("block_ends_mm"), py::arg("kept_mm_per_min"), py::arg("divisible"), py::arg("stations_mm"),
+      py::arg("feeds_mm_per_min"), py::arg("least_length_mm") = FeedScheduleOptions{}.least_length_mm,
+      py::arg("most_change_mm_per_min") = FeedScheduleOptions{}.most_change_mm_per_min,
+      py::arg("resolution_mm_per_min") = FeedScheduleOptions{}.resolution_mm_per_min,
+      "Feeds of a path in the shortest time that the stations allow: stretches not shorter than the least length, each "
+      "at the lowest feed of its stations. Per block its end (n,), the feed that it keeps (0: it may change) and "
+      "whether "
+      "it may be divided; feeds (m,) hold up to their station. Raises ArgumentError on values that do not ascend or "
+      "are "
+      "not above 0.");
+  module.def(
+      "with_feeds",
+      [](const std::shared_ptr<Path>& path, const std::vector<FeedStretch>& stretches) {
+        return std::make_shared<Path>(with_feeds(*path, stretches));
+      },
+      py::arg("path"), py::arg("stretches"),
+      "The path with other feeds: segments are divided where a stretch ends within one. Raises ArgumentError if the "
+      "stretches do not cover it.");
+  module.def(
+      "look_ahead_on_load",
+      [](const VectorArray& stations, const VectorArray& feeds, const VectorArray& load, const VectorArray& before_s,
+         const VectorArray& behind_s) {
+        FeedStations at{numbers(stations), numbers(feeds)};
+        look_ahead_on_load(at, numbers(load), numbers(before_s), numbers(behind_s));
+        return column(at.feed_mm_per_min);
+      },
+      py::arg("stations_mm"), py::arg("feeds_mm_per_min"), py::arg("load_mm_per_min"), py::arg("before_s"),
+      py::arg("behind_s"),
+      "The feeds (n,), mm/min, lowered around each station whose load allows less (`load_mm_per_min`, (n,)), because "
+      "the "
+      "travel lags behind a change: `before_s` and `behind_s` (n,) times the feed that the load allows.");
+
+  py::class_<FeedWriterOptions>(module, "FeedWriterOptions", "How new feeds are written into a region's blocks.")
+      .def(py::init([](double increment_mm, double unit_mm, int position_decimals, bool absolute_centres,
+                       double modal_feed, bool restore_feed) {
+             return FeedWriterOptions{increment_mm,     unit_mm,    position_decimals,
+                                      absolute_centres, modal_feed, restore_feed};
+           }),
+           py::arg("increment_mm"), py::arg("unit_mm"), py::arg("position_decimals"), py::arg("absolute_centres"),
+           py::arg("modal_feed") = 0.0, py::arg("restore_feed") = true,
+           "Least increment, mm; unit of position words and of the length in F, mm; decimals of a position; whether "
+           "I J K are positions; F that holds before the region (0: as in the original), and whether that of the "
+           "original "
+           "is left behind.");
+  py::class_<RefedRegion>(module, "RefedRegion", "A region's text with other feeds.")
+      .def_property_readonly(
+          "text", [](const RefedRegion& self) { return py::bytes(self.text); }, "Whole lines.")
+      .def_readonly("blocks", &RefedRegion::blocks, "Blocks with a cutting move.")
+      .def_readonly("modal_feed", &RefedRegion::modal_feed, "F that holds behind it.")
+      .def_readonly("lines", &RefedRegion::lines, "Per block its line, counted from the text's first one = 0.");
+  module.def(
+      "divisible_segments",
+      [](const Program& program, const Region& region, const FeedWriterOptions& options) {
+        return divisible_segments(program, region, options);
+      },
+      py::arg("program"), py::arg("region"), py::arg("options"),
+      "Which segments of a region's path may be divided into several blocks.");
+  module.def(
+      "feeds_per_minute",
+      [](const Program& program, const Region& region) { return feeds_per_minute(program, region); },
+      py::arg("program"), py::arg("region"),
+      "Whether F is a feed per minute in every block of a region, in one unit of length.");
+  module.def(
+      "write_feeds",
+      [](const Program& program, const Region& region, const std::vector<FeedStretch>& stretches,
+         const FeedWriterOptions& options) { return write_feeds(program, region, stretches, options); },
+      py::arg("program"), py::arg("region"), py::arg("stretches"), py::arg("options"),
+      "The region's lines with the feeds of stretches that cover its path; what else stands in them stays. Raises "
+      "ArgumentError if they do not cover it, or end within a block that cannot be divided.");
+  register_travel(module);
+}
+
+}  // namespace shapegcode::bindings

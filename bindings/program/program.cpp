@@ -1,0 +1,305 @@
+#include <pybind11/stl.h>
+
+#include <pybind11/functional.h>
+
+#include <algorithm>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "arrays.hpp"
+#include "register.hpp"
+#include "shapegcode/error.hpp"
+#include "shapegcode/program.hpp"
+
+namespace py = pybind11;
+
+namespace shapegcode::bindings {
+namespace {
+
+py::bytes slice(const Program& program, std::size_t begin, std::size_t end) {
+  end = std::min(end, program.text.size());
+  begin = std::min(begin, end);
+  return py::bytes(program.text.data() + begin, end - begin);
+}
+
+// The cutting moves of a range of lines as one path (the regions there, put together).
+std::shared_ptr<const Path> cutting_path(const Program& program, std::uint32_t first_line, std::uint32_t last_line) {
+  std::vector<std::shared_ptr<Region>> inside;
+  for (const auto& region : program.regions) {
+    if (region->first_line >= first_line && region->last_line <= last_line) {
+      inside.push_back(region);
+    }
+  }
+  if (inside.size() == 1) {
+    return inside.front()->path;
+  }
+  std::vector<Segment> segments;
+  for (const auto& region : inside) {
+    segments.insert(segments.end(), region->path->segments().begin(), region->path->segments().end());
+  }
+  return std::make_shared<const Path>(std::move(segments));
+}
+
+std::shared_ptr<Region> one_line_region(const std::shared_ptr<Path>& path, const ModalState& entry,
+                                        const ModalState& exit, std::uint32_t line, std::size_t text_begin,
+                                        std::size_t text_end) {
+  auto region = std::make_shared<Region>();
+  region->first_line = region->last_line = line;
+  region->text_begin = text_begin;
+  region->text_end = text_end;
+  region->path = path;
+  region->entry = entry;
+  region->exit = exit;
+  region->exact_stop_at_end = true;
+  region->blocks = 1;
+  return region;
+}
+
+char one_letter(const std::string& text, const char* allowed) {
+  if (text.size() != 1 || std::string(allowed).find(text) == std::string::npos) {
+    throw Error(ErrorKind::argument, "'" + text + "' must be one of the letters " + allowed);
+  }
+  return text.front();
+}
+
+// Calls back into Python from a reading that has let go of the interpreter lock.
+std::function<std::optional<SourceText>(std::int64_t)> program_loader(py::object loader) {
+  if (loader.is_none()) {
+    return {};
+  }
+  // The last copy may go while the lock is not held.
+  const std::shared_ptr<py::object> callable(new py::object(std::move(loader)), [](py::object* held) {
+    const py::gil_scoped_acquire acquire;
+    delete held;
+  });
+  return [callable](std::int64_t number) -> std::optional<SourceText> {
+    const py::gil_scoped_acquire acquire;
+    const py::object result = (*callable)(number);
+    if (result.is_none()) {
+      return std::nullopt;
+    }
+    const auto pair = result.cast<std::pair<std::string, py::bytes>>();
+    return SourceText{pair.first, static_cast<std::string>(pair.second)};
+  };
+}
+
+py::list findings(const std::vector<Finding>& all) {
+  py::list list;
+  for (const Finding& finding : all) {
+    list.append(py::make_tuple(finding.line, finding.column, finding.alarm, finding.message, finding.file));
+  }
+  return list;
+}
+
+py::list steps(const Program& program) {
+  py::list list;
+  for (const ProgramStep& step : program.steps) {
+    list.append(py::make_tuple(step.kind, step.index, step.line));
+  }
+  return list;
+}
+
+py::list functions(const Program& program) {
+  py::list list;
+  for (const MachineFunction& function : program.functions) {
+    const std::vector<int> m_codes(function.m_codes.begin(), function.m_codes.begin() + function.m_count);
+    list.append(py::make_tuple(m_codes, function.tool, function.spindle_rev_per_min));
+  }
+  return list;
+}
+
+py::list other_moves(const Program& program) {
+  py::list moves;
+  for (const OtherMove& move : program.other_moves) {
+    moves.append(py::make_tuple(move.segment, move.dwell_s));
+  }
+  return moves;
+}
+
+}  // namespace
+
+void register_gcode(py::module_& module) {
+  py::class_<ModalState>(module, "ModalState", "Modal state of the controller, as G numbers.")
+      .def(py::init<>())
+      .def_readwrite("motion", &ModalState::motion, "Group 01: 0, 1, 2, 3.")
+      .def_readwrite("plane", &ModalState::plane, "Group 02: 17, 18, 19.")
+      .def_readwrite("distance", &ModalState::distance, "Group 03: 90, 91.")
+      .def_readwrite("feed_mode", &ModalState::feed_mode, "Group 05: 93, 94, 95.")
+      .def_readwrite("units", &ModalState::units, "Group 06: 20, 21.")
+      .def_readwrite("compensation", &ModalState::compensation, "Group 07: 40, 41, 42.")
+      .def_readwrite("length_offset", &ModalState::length_offset, "Group 08: 43, 44, 49.")
+      .def_readwrite("length_number", &ModalState::length_number, "H.")
+      .def_readwrite("cycle", &ModalState::cycle, "Group 09: 73 ... 89, 80 = none.")
+      .def_readwrite("cycle_return", &ModalState::cycle_return, "Group 10: 98, 99.")
+      .def_readwrite("coordinate_system", &ModalState::coordinate_system, "Group 14: 54 ... 59; 541 for G54.1.")
+      .def_readwrite("coordinate_number", &ModalState::coordinate_number, "P of G54.1.")
+      .def_readwrite("exact_stop", &ModalState::exact_stop, "Group 15: 61 ... 64.")
+      .def_readwrite("feed", &ModalState::feed, "F as programmed; 0 before the first.")
+      .def_readwrite("spindle_rev_per_min", &ModalState::spindle_rev_per_min, "S; 0 before the first.")
+      .def_readonly("position_mm", &ModalState::position_mm, "Position in the active work coordinates, shape (3,), mm.")
+      .def_readonly("known", &ModalState::known, "Whether each axis' position is known.")
+      .def_property_readonly(
+          "uncertain", [](const ModalState& self) { return self.uncertain_groups != 0; },
+          "Whether a modal code depends on the block-skip switch.");
+
+  py::enum_<StepKind>(module, "StepKind", "What a step of a program is.")
+      .value("region", StepKind::region)
+      .value("move", StepKind::move)
+      .value("function", StepKind::function);
+
+  py::class_<ToolOffset>(module, "ToolOffset", "Offsets of one tool, mm; None: not known.")
+      .def(py::init<>())
+      .def_readwrite("length_mm", &ToolOffset::length_mm, "Geometry of H.")
+      .def_readwrite("length_wear_mm", &ToolOffset::length_wear_mm, "Wear of H.")
+      .def_readwrite("radius_mm", &ToolOffset::radius_mm, "Geometry of D.")
+      .def_readwrite("radius_wear_mm", &ToolOffset::radius_wear_mm, "Wear of D.");
+
+  py::class_<CodeBindings>(module, "CodeBindings", "Codes that the machine builder bound to programs.")
+      .def(py::init<>())
+      .def_readwrite("g_macros", &CodeBindings::g_macros, "G code in tenths to program, called like G65.")
+      .def_readwrite("m_macros", &CodeBindings::m_macros, "M code to program, called like G65.")
+      .def_readwrite("m_subprograms", &CodeBindings::m_subprograms, "M code to program, called like M98.")
+      .def_readwrite("tool_program", &CodeBindings::tool_program, "T calls it with T in #149; -1: none.");
+
+  py::class_<ReaderOptions>(module, "ReaderOptions", "The controller's settings that change how a text is read.")
+      .def(py::init<>())
+      .def_readwrite("calculator_decimal_point", &ReaderOptions::calculator_decimal_point,
+                     "True: X10 is 10 mm; False: 10 least increments (parameter 3401#0).")
+      .def_readwrite("absolute_arc_centres", &ReaderOptions::absolute_arc_centres, "I J K are positions (not FANUC).")
+      .def_readwrite("least_increment_mm", &ReaderOptions::least_increment_mm, "Metric least increment, mm.")
+      .def_readwrite("least_increment_inch", &ReaderOptions::least_increment_inch, "Inch least increment, inch.")
+      .def_readwrite("arc_tolerance_mm", &ReaderOptions::arc_tolerance_mm,
+                     "Largest difference of an arc's radii, mm (parameter 3410).")
+      .def_readwrite("max_line_length", &ReaderOptions::max_line_length, "Characters.")
+      .def_readwrite("unknown_after_tool_change", &ReaderOptions::unknown_after_tool_change,
+                     "Axes whose position is not known after M06.")
+      .def_readwrite("work_offsets_mm", &ReaderOptions::work_offsets_mm, "G54 ... G59, mm; empty: not known.")
+      .def_readwrite("extra_work_offsets_mm", &ReaderOptions::extra_work_offsets_mm, "G54.1 P number to offsets, mm.")
+      .def_readwrite("tool_offsets", &ReaderOptions::tool_offsets, "Number to ToolOffset.")
+      .def_property(
+          "offset_memory", [](const ReaderOptions& self) { return std::string(1, self.offset_memory); },
+          [](ReaderOptions& self, const std::string& memory) { self.offset_memory = one_letter(memory, "ABC"); },
+          "Offset memory A, B or C.")
+      .def_readwrite("retained_variables", &ReaderOptions::retained_variables, "#500 ... #999.")
+      .def_readwrite("bindings", &ReaderOptions::bindings, "Codes bound to programs.")
+      .def_readwrite("program", &ReaderOptions::program, "O number to play of a file with several; -1: the first.")
+      .def_property(
+          "load_program", [](const ReaderOptions& self) { return static_cast<bool>(self.load_program); },
+          [](ReaderOptions& self, py::object loader) { self.load_program = program_loader(std::move(loader)); },
+          "Called with an O number that the file does not hold; gives (name, bytes) or None.")
+      .def_readwrite("opaque_programs", &ReaderOptions::opaque_programs,
+                     "First and last program number whose calls are kept if the program is not found.")
+      .def_readwrite("subprogram_nesting", &ReaderOptions::subprogram_nesting, "Deepest nesting of M98.")
+      .def_readwrite("max_steps", &ReaderOptions::max_steps, "Blocks executed behind the first call or jump.")
+      .def_readwrite("block_skip", &ReaderOptions::block_skip, "Switch of / ... /9: on, off, or None: not known.")
+      .def_readwrite("expand_compensation", &ReaderOptions::expand_compensation,
+                     "G41/G42 become plain moves; False: kept as they stand.")
+      .def_property(
+          "compensation_start_up", [](const ReaderOptions& self) { return std::string(1, self.compensation_start_up); },
+          [](ReaderOptions& self, const std::string& type) { self.compensation_start_up = one_letter(type, "AB"); },
+          "Start-up of cutter compensation, A or B (parameter 5003).")
+      .def_readwrite("scale_unit", &ReaderOptions::scale_unit, "Of the factors of G51 without a point.")
+      .def_readwrite("peck_clearance_mm", &ReaderOptions::peck_clearance_mm,
+                     "To which a peck of G73 and G83 returns, mm (parameters 5114, 5115).")
+      .def_readwrite("collect_alarms", &ReaderOptions::collect_alarms,
+                     "Go on behind an alarm and keep all in ProgramText.alarms.")
+      .def_readwrite("power_on", &ReaderOptions::power_on, "Modal state before the first block.")
+      .def_readwrite("probe_lines", &ReaderOptions::probe_lines, "Ascending lines behind which the state is kept.");
+
+  py::class_<RegionNote>(module, "RegionNote", "An N word or a comment inside a region.")
+      .def_readonly("segment", &RegionNote::segment, "Index of the segment before which it stood.")
+      .def_readonly("n_number", &RegionNote::n_number, "-1: none.")
+      .def_readonly("comment_offset", &RegionNote::comment_offset, "Byte offset of its comment in the text.")
+      .def_readonly("comment_length", &RegionNote::comment_length, "Bytes; 0: no comment.");
+
+  py::class_<Region, std::shared_ptr<Region>>(module, "Region", "A run of cutting moves between two stops.")
+      .def(py::init(&one_line_region), py::kw_only(), py::arg("path"), py::arg("entry"), py::arg("exit"),
+           py::arg("line"), py::arg("text_begin"), py::arg("text_end"),
+           "One line of a text as a region that ends with an exact stop: what takes the place of a rapid. `path`: its "
+           "move; `entry`, `exit`: modal state before and behind it; `text_begin`, `text_end`: its bytes.")
+      .def_readonly("first_line", &Region::first_line, "From 1.")
+      .def_readonly("last_line", &Region::last_line, "From 1, inclusive.")
+      .def_readonly("text_begin", &Region::text_begin, "Byte offset of its first line.")
+      .def_readonly("text_end", &Region::text_end, "Byte offset behind its last line.")
+      .def_property_readonly(
+          "path", [](const Region& self) { return std::const_pointer_cast<Path>(self.path); }, "Its moves.")
+      .def_property_readonly(
+          "notes", [](const Region& self) { return self.notes; }, "N words and comments in order.")
+      .def_readonly("entry", &Region::entry, "Modal state before it.")
+      .def_readonly("exit", &Region::exit, "Modal state after it.")
+      .def_readonly("incremental", &Region::incremental, "Moves an axis of unknown position: its origin is arbitrary.")
+      .def_readonly("exact_stop_at_end", &Region::exact_stop_at_end, "Ends with G09 or in G61.")
+      .def_readonly("look_ahead_mode", &Region::look_ahead_mode,
+                    "The program switched a look-ahead mode on before it (G05.1 Q1, G08 P1, G05 P10000).")
+      .def_readonly("blocks", &Region::blocks, "Source blocks with a cutting move.");
+
+  py::class_<Program, std::shared_ptr<Program>>(module, "ProgramText",
+                                                "A program read: its text to the letter and its regions.")
+      .def_property_readonly(
+          "text", [](const Program& self) { return py::bytes(self.text); }, "The whole text.")
+      .def("slice", &slice, py::arg("begin"), py::arg("end"), "Bytes of the text between two offsets.")
+      .def_property_readonly(
+          "size", [](const Program& self) { return self.text.size(); }, "Bytes.")
+      .def_readonly("line_end", &Program::line_end, "Line end of the text.")
+      .def_readonly("line_count", &Program::line_count, "Lines.")
+      .def_readonly("block_count", &Program::block_count, "Lines with at least one word.")
+      .def_readonly("header_offset", &Program::header_offset, "Byte offset at which a header comment may stand.")
+      .def_readonly("program_number", &Program::program_number, "O number; -1: none.")
+      .def_property_readonly(
+          "regions", [](const Program& self) { return self.regions; }, "Runs of cutting moves in order.")
+      .def_property_readonly("other_moves", &other_moves,
+                             "Rapids, cycles and kept moves as (Segment, dwell_s) pairs, for the clock.")
+      .def_property_readonly("steps", &steps,
+                             "(StepKind, index into regions, other_moves or functions, line) in program order.")
+      .def_property_readonly("functions", &functions, "(M codes, T or -1, S or -1) of blocks with M, S or T words.")
+      .def_property_readonly(
+          "warnings", [](const Program& self) { return findings(self.warnings); },
+          "(line, column, alarm, message, file) each; alarm 0: none; file empty: the program's own.")
+      .def_property_readonly(
+          "alarms", [](const Program& self) { return findings(self.alarms); },
+          "What a control would refuse, as `warnings`; only with ReaderOptions.collect_alarms.")
+      .def_readonly("expanded", &Program::expanded,
+                    "Whether `text` is the plain program that calls, macros and coordinate modes come to.")
+      .def(
+          "origin",
+          [](const Program& self, std::uint32_t line) -> py::tuple {
+            if (self.origins.empty() || line == 0 || line > self.origins.size()) {
+              return py::make_tuple(line, std::string());
+            }
+            const LineOrigin& origin = self.origins[line - 1];
+            return py::make_tuple(origin.line, self.files[origin.file]);
+          },
+          py::arg("line"), "(line, file) of the source from which a line of `text` comes.")
+      .def_readonly("program_numbers", &Program::program_numbers, "All O numbers in the file.")
+      .def_readonly("expanded_radii_mm", &Program::expanded_radii_mm,
+                    "D number to radius, mm, where cutter compensation was expanded.")
+      .def_readonly("compensated_moves", &Program::compensated_moves, "Cutting moves under G41 or G42, expanded.")
+      .def_readonly("kept_compensated_moves", &Program::kept_compensated_moves,
+                    "Cutting moves under G41 or G42, kept as they stand.")
+      .def_readonly("final_state", &Program::final_state, "Modal state at the end.")
+      .def_property_readonly(
+          "probed", [](const Program& self) { return self.probed; },
+          "Modal state behind each of ReaderOptions.probe_lines.")
+      .def(
+          "cutting_path",
+          [](const Program& self, std::uint32_t first, std::uint32_t last) {
+            return std::const_pointer_cast<Path>(cutting_path(self, first, last));
+          },
+          py::arg("first_line"), py::arg("last_line"),
+          "The cutting moves of the regions within a range of lines, as one path.");
+
+  module.def(
+      "read_program",
+      [](const py::bytes& bytes, const ReaderOptions& options) {
+        auto text = static_cast<std::string>(bytes);
+        const py::gil_scoped_release release;
+        return std::make_shared<Program>(read_program(std::move(text), options));
+      },
+      py::arg("text"), py::arg("options") = ReaderOptions(),
+      "Read a program text (bytes). Raises ProgramError with line and column.");
+}
+
+}  // namespace shapegcode::bindings

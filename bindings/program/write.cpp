@@ -1,0 +1,131 @@
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "arrays.hpp"
+#include "register.hpp"
+#include "shapegcode/command.hpp"
+#include "shapegcode/write.hpp"
+
+namespace py = pybind11;
+
+namespace shapegcode::bindings {
+namespace {
+
+struct FittedBlocks {
+  std::vector<FittedBlock> blocks;
+  std::uint32_t left_periods = 0;
+};
+
+}  // namespace
+
+void register_emission(py::module_& module) {
+  py::class_<FitOptions>(module, "FitOptions", "Grid on which blocks are fitted.")
+      .def(py::init<>())
+      .def_readwrite("increment_mm", &FitOptions::increment_mm, "Least increment of the words, mm.")
+      .def_readwrite("block_period_s", &FitOptions::block_period_s, "s.")
+      .def_readwrite("interpolation_period_s", &FitOptions::interpolation_period_s, "s.")
+      .def_readwrite("feed_unit_mm_per_s", &FitOptions::feed_unit_mm_per_s, "One step of the last F digit, mm/s.")
+      .def_readwrite("minimum_feed", &FitOptions::minimum_feed, "In feed units.")
+      .def_readwrite("merge_tolerance_increments", &FitOptions::merge_tolerance_increments,
+                     "Deviation of merged blocks per axis, least increments.")
+      .def_readwrite("lent_periods", &FitOptions::lent_periods, "Periods that the blocks before did not last.")
+      .def_readwrite("modes", &FitOptions::modes,
+                     "Modes of X, Y, Z, which the rounding of block ends leaves at rest; none: ends are rounded to the "
+                     "nearest increment.")
+      .def(
+          "end_with_arc",
+          [](FitOptions& self, bool clockwise, int normal, double radius_mm) {
+            self.last_kind = clockwise ? FittedKind::clockwise : FittedKind::counter_clockwise;
+            self.last_normal = static_cast<std::uint8_t>(normal);
+            self.last_radius_mm = radius_mm;
+          },
+          py::arg("clockwise"), py::arg("normal"), py::arg("radius_mm"),
+          "The last block must be an arc, so that the modal motion code behind it is G02 or G03.")
+      .def_readwrite("arc_min_chord_mm", &FitOptions::arc_min_chord_mm, "Shorter pieces are lines, mm.");
+
+  py::class_<FittedBlocks, std::shared_ptr<FittedBlocks>>(module, "FittedBlocks", "Blocks ready to be written.")
+      .def("__len__", [](const FittedBlocks& self) { return self.blocks.size(); })
+      .def_readonly("left_periods", &FittedBlocks::left_periods,
+                    "Time that the blocks do not last: `FitOptions.lent_periods` of the next piece.")
+      .def_property_readonly(
+          "periods",
+          [](const FittedBlocks& self) {
+            py::array_t<std::uint32_t> out(static_cast<py::ssize_t>(self.blocks.size()));
+            auto* to = out.mutable_data();
+            for (const FittedBlock& block : self.blocks) {
+              *to++ = block.periods;
+            }
+            return out;
+          },
+          "Whole block periods that each lasts, (n,).")
+      .def_property_readonly(
+          "first_periods",
+          [](const FittedBlocks& self) {
+            py::array_t<std::uint32_t> out(static_cast<py::ssize_t>(self.blocks.size()));
+            auto* to = out.mutable_data();
+            for (const FittedBlock& block : self.blocks) {
+              *to++ = block.first_period;
+            }
+            return out;
+          },
+          "Block period of the command in which each begins, (n,).")
+      .def_property_readonly(
+          "ends",
+          [](const FittedBlocks& self) {
+            py::array_t<std::int64_t> out({static_cast<py::ssize_t>(self.blocks.size()), py::ssize_t{axis_count}});
+            auto* to = out.mutable_data();
+            for (const FittedBlock& block : self.blocks) {
+              to = std::copy(block.end.begin(), block.end.end(), to);
+            }
+            return out;
+          },
+          "Absolute end positions in least increments, (n, 3).");
+
+  module.def(
+      "fit_blocks",
+      [](const ShapedCommand& command, const std::vector<std::uint32_t>& breaks, const FitOptions& options) {
+        const py::gil_scoped_release release;
+        auto fitted = std::make_shared<FittedBlocks>();
+        fitted->blocks = fit_blocks(command.grid_mm, command.middle_mm, command.arc_normal, breaks, options,
+                                    command.run_ends, &fitted->left_periods);
+        return fitted;
+      },
+      py::arg("command"), py::arg("breaks"), py::arg("options"),
+      "Blocks that each last a whole number of block periods; `breaks`: ascending periods at which a block must end. "
+      "Raises ArgumentError on a position outside +-99999.999 mm.");
+
+  py::class_<BlockMark>(module, "BlockMark", "An N word or comment to be written before the block that begins there.")
+      .def(py::init([](std::uint32_t period, std::int32_t n_number, const py::bytes& comment) {
+             return BlockMark{period, n_number, static_cast<std::string>(comment)};
+           }),
+           py::arg("period"), py::arg("n_number") = -1, py::arg("comment") = py::bytes());
+
+  py::class_<WriterOptions>(module, "WriterOptions", "How fitted blocks are written.")
+      .def(py::init<>())
+      .def_readwrite("position_decimals", &WriterOptions::position_decimals, "Digits behind the point.")
+      .def_readwrite("feed_decimals", &WriterOptions::feed_decimals, "Digits behind the point.")
+      .def_readwrite("incremental", &WriterOptions::incremental, "G91 words.")
+      .def_readwrite("motion", &WriterOptions::motion, "Motion code active before the first block.")
+      .def_readwrite("plane", &WriterOptions::plane, "Plane active before the first block.")
+      .def_readwrite("exact_stop_at_end", &WriterOptions::exact_stop_at_end, "G09 on the last block.")
+      .def_readwrite("line_end", &WriterOptions::line_end, "Line end.");
+
+  module.def(
+      "write_blocks",
+      [](const FittedBlocks& fitted, const std::array<std::int64_t, axis_count>& start,
+         const std::vector<BlockMark>& marks, const WriterOptions& options) {
+        WrittenBlocks written;
+        {
+          const py::gil_scoped_release release;
+          written = write_blocks(fitted.blocks, start, marks, options);
+        }
+        return std::make_tuple(py::bytes(written.text), written.motion, written.plane);
+      },
+      py::arg("blocks"), py::arg("start"), py::arg("marks"), py::arg("options"),
+      "(text as bytes, motion code, plane) of fitted blocks; `start` in increments.");
+}
+
+}  // namespace shapegcode::bindings

@@ -1,0 +1,237 @@
+#include <pybind11/complex.h>
+#include <pybind11/numpy.h>
+#include <pybind11/operators.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <cmath>
+#include <cstddef>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "register.hpp"
+#include "shapegcode/error.hpp"
+#include "shapegcode/minimal_shapers.hpp"
+#include "shapegcode/mode.hpp"
+#include "shapegcode/shaper.hpp"
+
+namespace py = pybind11;
+
+namespace shapegcode::bindings {
+namespace {
+
+using shapegcode::Mode;
+using shapegcode::Shaper;
+
+Mode checked_mode(double frequency_hz, double damping_ratio, double participation) {
+  const Mode mode{frequency_hz, damping_ratio, participation};
+  static_cast<void>(shapegcode::pole(mode));  // checks frequency and damping
+  if (!std::isfinite(participation)) {
+    std::ostringstream message;
+    message << "mode at " << frequency_hz << " Hz has participation " << participation << ", must be finite";
+    throw shapegcode::Error(shapegcode::ErrorKind::argument, message.str());
+  }
+  return mode;
+}
+
+std::string repr(double value) { return py::repr(py::float_(value)).cast<std::string>(); }
+
+std::string repr(const std::vector<double>& values) { return py::repr(py::cast(values)).cast<std::string>(); }
+
+/// Read-only view on memory that `owner` keeps alive.
+py::array_t<double> read_only_view(const std::vector<double>& values, const py::object& owner) {
+  py::array_t<double> view({static_cast<py::ssize_t>(values.size())}, values.data(), owner);
+  view.attr("flags").attr("writeable") = false;
+  return view;
+}
+
+void register_mode(py::module_& m) {
+  py::class_<Mode>(m, "Mode", R"(One vibration mode of one axis, base-excited by the axis command. Immutable.
+
+Args:
+    frequency_hz: Undamped natural frequency in Hz, above 0.
+    damping_ratio: Damping ratio (no unit), 0 <= zeta < 1.
+    participation: Share of this mode's relative deflection in the response (no unit), finite.
+
+Raises:
+    ArgumentError: A value is outside its range.)")
+      .def(py::init(&checked_mode), py::arg("frequency_hz"), py::arg("damping_ratio"), py::arg("participation") = 1.0,
+           "Make a mode; ArgumentError if a value is outside the range that the class states.")
+      .def_readonly("frequency_hz", &Mode::frequency_hz, "Undamped natural frequency in Hz.")
+      .def_readonly("damping_ratio", &Mode::damping_ratio, "Damping ratio, no unit.")
+      .def_readonly("participation", &Mode::participation,
+                    "Share of this mode's relative deflection in the response, no unit.")
+      .def_property_readonly("pole", &shapegcode::pole,
+                             "Pole -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s (spec 2; paper 002, eq. 7).")
+      .def("__repr__",
+           [](const Mode& self) {
+             return "Mode(frequency_hz=" + repr(self.frequency_hz) + ", damping_ratio=" + repr(self.damping_ratio) +
+                    ", participation=" + repr(self.participation) + ")";
+           })
+      .def(
+          "__eq__",
+          [](const Mode& self, const Mode& other) {
+            return self.frequency_hz == other.frequency_hz && self.damping_ratio == other.damping_ratio &&
+                   self.participation == other.participation;
+          },
+          py::is_operator())
+      .def("__hash__",
+           [](const Mode& self) {
+             return py::hash(py::make_tuple(self.frequency_hz, self.damping_ratio, self.participation));
+           })
+      .def(py::pickle(
+          [](const Mode& self) { return py::make_tuple(self.frequency_hz, self.damping_ratio, self.participation); },
+          [](const py::tuple& state) {
+            return checked_mode(state[0].cast<double>(), state[1].cast<double>(), state[2].cast<double>());
+          }));
+}
+
+void register_shaper(py::module_& m) {
+  py::class_<Shaper>(m, "Shaper", R"(Input shaper: amplitudes at ascending times that add up to one. Immutable.
+
+Args:
+    times_s: Times of the taps in s, shape (n_taps,), n_taps >= 1, strictly ascending from exactly 0.
+    amplitudes: Amplitudes of the taps (no unit), shape (n_taps,), sum 1 within 1e-9; may be negative.
+
+Raises:
+    ArgumentError: Unequal lengths, no tap, a value that is not finite, times that do not ascend from 0, or a sum
+        other than 1.
+
+Source: paper 002, eq. 4 and 9.)")
+      .def(py::init(&shapegcode::make_shaper), py::arg("times_s"), py::arg("amplitudes"),
+           "Make a shaper; ArgumentError if the taps are not what the class asks for.")
+      .def_property_readonly(
+          "times_s", [](const py::object& self) { return read_only_view(self.cast<const Shaper&>().times_s, self); },
+          "Times of the taps in s, shape (n_taps,), read-only view.")
+      .def_property_readonly(
+          "amplitudes",
+          [](const py::object& self) { return read_only_view(self.cast<const Shaper&>().amplitudes, self); },
+          "Amplitudes of the taps (no unit), shape (n_taps,), read-only view.")
+      .def_property_readonly("duration_s", &shapegcode::duration_s,
+                             "Time of the last tap in s: how much longer the shaped command moves.")
+      .def_property_readonly("mean_s", &shapegcode::mean_s, "First moment in s: the mean delay of the shaped command.")
+      .def_property_readonly("variance_s2", &shapegcode::variance_s2,
+                             "Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2 (spec 0).")
+      .def_property_readonly("has_negative", &shapegcode::has_negative, "True if any amplitude is below zero.")
+      .def_property_readonly("abs_sum", &shapegcode::abs_sum,
+                             "Sum of the amplitudes' magnitudes (no unit): 1 for a non-negative shaper.")
+      .def("residual_ratio", &shapegcode::residual_ratio, py::arg("mode"),
+           R"(Residual vibration of a mode after the last tap, relative to the unshaped one.
+
+V = exp(-zeta*omega*t_N) * |sum A_k exp(zeta*omega*t_k) exp(j*omega_d*t_k)|; the participation plays no part. Its
+rounding floor is about 1e-16*(1 + omega*t_N)*abs_sum.
+
+Args:
+    mode: The mode whose vibration is judged; need not be one that the shaper was designed for.
+
+Returns:
+    The ratio V (no unit), 0 where the shaper cancels the mode.
+
+Source: spec 2; paper 002, eq. 8.)")
+      .def("__repr__",
+           [](const Shaper& self) {
+             return "Shaper(times_s=" + repr(self.times_s) + ", amplitudes=" + repr(self.amplitudes) + ")";
+           })
+      .def(
+          "__eq__", [](const Shaper& self, const Shaper& other) { return self == other; }, py::is_operator())
+      .def(py::pickle([](const Shaper& self) { return py::make_tuple(self.times_s, self.amplitudes); },
+                      [](const py::tuple& state) {
+                        return shapegcode::make_shaper(state[0].cast<std::vector<double>>(),
+                                                       state[1].cast<std::vector<double>>());
+                      }));
+}
+
+void register_designs(py::module_& m) {
+  m.def("zv", &shapegcode::zv, py::arg("mode"), release_gil(),
+        R"(Zero-vibration shaper of one mode: taps at 0 and half the damped period.
+
+Args:
+    mode: The mode to cancel.
+
+Returns:
+    A shaper with 2 non-negative taps.
+
+Source: paper 002, eq. 1-2 (Smith 1958).)");
+  m.def("convolve", &shapegcode::convolve, py::arg("first"), py::arg("second"), release_gil(),
+        R"(The two shapers in series: cancels what either cancels, lasts as long as both together.
+
+Args:
+    first: A shaper.
+    second: Another one; the order does not matter.
+
+Returns:
+    The series shaper; taps whose times agree within 1e-12 of its duration are merged.
+
+Source: paper 002, eq. 3.)");
+  m.def(
+      "convolved_zv", [](const std::vector<Mode>& modes) { return shapegcode::convolved_zv(modes); }, py::arg("modes"),
+      release_gil(),
+      R"(Convolved ZV, the conventional multi-mode shaper: 2^n non-negative taps.
+
+Args:
+    modes: The n >= 1 modes to cancel.
+
+Returns:
+    The shaper; its duration is the sum of the half damped periods.
+
+Raises:
+    ArgumentError: No mode.
+
+Source: paper 002, section 2.)");
+  m.def("minimal_two_mode", &shapegcode::minimal_two_mode, py::arg("first"), py::arg("second"),
+        py::arg("max_duration_s"), py::arg("max_abs_sum") = 10.0, release_gil(),
+        R"(All minimal (three-impulse) shapers of two modes, ascending in duration, then in the second time.
+
+Complete: boxes of the plane of the two free times are discarded only where a bound on derivatives proves that they
+hold no solution, and Newton starts from all that are left. Where one ZV serves both modes (undamped, odd ratio) it is
+listed with its two taps; where amplitudes at given times are not unique, those with the smallest sum of squares are.
+
+Args:
+    first: One mode, damped or not.
+    second: The other one, either may be the faster.
+    max_duration_s: Largest duration in s, above 0, at most 100 periods of the faster mode.
+    max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1; 1 is not enough for rounding, use
+        has_negative to pick the non-negative ones.
+
+Returns:
+    The shapers, residual_ratio of both modes below 1e-13; empty if there is none in the range.
+
+Raises:
+    ArgumentError: The modes' poles agree within 1e-6, or a value is outside its range.
+
+Source: paper 002, eq. 12-17; the search is this project's.)");
+  m.def(
+      "grid_polynomial",
+      [](const std::vector<Mode>& modes, double period_s) { return shapegcode::grid_polynomial(modes, period_s); },
+      py::arg("modes"), py::arg("period_s"), release_gil(),
+      R"(Shortest shaper with taps at multiples of a period that cancels every mode exactly there.
+
+The polynomial with the roots z = exp(s*period) and their conjugates: two periods per mode, one for a mode whose z is
+real, none for one that aliases onto an earlier one. Amplitudes may be negative and large: look at abs_sum before use.
+
+Args:
+    modes: The modes to cancel, at least one; one above the grid's Nyquist frequency is fine.
+    period_s: Period of the grid in s, above 0.
+
+Returns:
+    The shaper; residual_ratio of every mode is at most 1e-10, some 1e-16*abs_sum as a rule.
+
+Raises:
+    ArgumentError: No mode, or a period that is not positive.
+    DesignError: A z closer to +1 than 0.01, or so large an abs_sum that rounding leaves more than 1e-10.
+
+Source: this project (spec 2, grid-exact shapers).)");
+}
+
+}  // namespace
+
+/// Mode, Shaper and the designs of the core. The exceptions of bindings/errors.cpp must be registered as well.
+void register_shaping(py::module_& m) {
+  register_mode(m);
+  register_shaper(m);
+  register_designs(m);
+}
+
+}  // namespace shapegcode::bindings

@@ -1,0 +1,201 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "shapegcode/filter.hpp"
+#include "shapegcode/motion.hpp"
+#include "shapegcode/path.hpp"
+#include "shapegcode/samples.hpp"
+
+namespace shapegcode {
+
+/// When a block's successor starts.
+enum class BlockEnd : std::uint8_t {
+  ceil,   ///< on the next interpolation tick (paper 004)
+  carry,  ///< at once: the remainder of a period is carried over
+};
+
+/// Time after which a block's successor starts, in periods: l / (F T_I), a whole number under `ceil` (spec section 0).
+/// 0 for a block without length.
+[[nodiscard]] double block_periods(double length_mm, double feed_mm_per_s, double period_s,
+                                   BlockEnd block_end) noexcept;
+
+/// Whole periods that hold so many: rounded up, but for what is rounding error.
+[[nodiscard]] double whole_periods(double periods) noexcept;
+
+/// A controller without look-ahead: every block runs at its feed for its whole length, the next one follows at once.
+/// The acceleration filter comes after it (a moving average: block overlap). Real-time form.
+class BlockPlayer {
+ public:
+  /// `override_ratio` scales every feed. Throws Error(argument) on period or ratio <= 0, or a segment without feed.
+  BlockPlayer(std::span<const Segment> blocks, double period_s, BlockEnd block_end, double override_ratio = 1.0);
+
+  /// Stop for so long behind a block, as where the block buffer runs empty: the set-points stay at its end, then the
+  /// next block follows. One pause per player, a later call takes the place of an earlier one. Under `ceil` whole
+  /// periods, rounded up. Throws Error(argument) on a time that is negative or not finite, or a block that is
+  /// over already or does not exist.
+  void pause_after(std::size_t block, double seconds);
+  /// Next set-point, the start first; false once the end was given.
+  bool step(Vector3& position) noexcept;
+  /// Block on which the set-point last given lies.
+  [[nodiscard]] std::size_t block() const noexcept { return block_; }
+  /// Whether the set-point last given is one of a pause.
+  [[nodiscard]] bool pausing() const noexcept;
+  /// Duration of one block: a whole number of periods under `ceil`.
+  [[nodiscard]] double block_duration_s(const Segment& segment) const noexcept;
+
+ private:
+  void open_block() noexcept;
+
+  std::span<const Segment> blocks_;
+  double period_s_;
+  double ratio_;
+  BlockEnd block_end_;
+  std::size_t block_ = 0;
+  double elapsed_s_ = 0.0;   // since the open block began
+  double duration_s_ = 0.0;  // of the open block and a pause behind it
+  std::size_t paused_block_ = 0;
+  double pause_s_ = 0.0;
+  bool started_ = false;
+  bool finished_ = false;
+};
+
+/// Sum of block durations in s.
+[[nodiscard]] double play_duration_s(std::span<const Segment> blocks, double period_s, BlockEnd block_end,
+                                     double override_ratio = 1.0);
+
+/// Where the controller accelerates a cutting move.
+enum class MotionKind : std::uint8_t {
+  look_ahead,           ///< before interpolation: the speed is planned along the path
+  after_interpolation,  ///< behind it: each axis is filtered, and cutting blocks overlap (paper 004)
+};
+
+/// Shape of the acceleration after interpolation.
+enum class FilterShape : std::uint8_t {
+  linear,       ///< moving average of the time constant; with a bell time a second one behind it
+  exponential,  ///< geometric weights of the time constant
+};
+
+/// Way of a rapid (1401#1).
+enum class RapidPath : std::uint8_t {
+  linear,      ///< straight: the axis that needs longest sets the tangential rate
+  non_linear,  ///< every axis at its own rate
+};
+
+/// Where the wait for in-position comes from.
+enum class InPosition : std::uint8_t {
+  measured,   ///< a constant per axis; the slowest axis that moved counts (paper 004, section 2.3)
+  servo_lag,  ///< until the position error of a first-order servo loop is within the width (1825, 1826)
+};
+
+/// Everything that decides how long a program takes on a controller, and what its acceleration does to the path.
+/// Plain values; the numbers in the comments are FANUC parameters.
+struct ControllerModel {
+  double period_s = 0.001;  ///< interpolation period T_I
+  BlockEnd block_end = BlockEnd::ceil;
+
+  MotionKind motion = MotionKind::look_ahead;
+  FilterShape filter_shape = FilterShape::linear;  ///< after_interpolation only (1610)
+  double time_constant_s = 0.05;                   ///< after_interpolation: A (1622); rounded to whole periods
+  double bell_time_s = 0.0;                        ///< after_interpolation, linear: second moving average; 0: none
+  /// Exponential: the weights end where less than this share of them is left (the controller stops when less than an
+  /// increment is left); the filter then lasts time_constant_s * ln(1 / share).
+  double exponential_rest = 1e-4;
+  /// Look-ahead before interpolation (1783, 1735, 1737, 1660, 1772). `max_feed_mm_per_s` holds in both kinds of motion.
+  MotionLimits limits;
+  double look_ahead_filter_time_constant_s = 0.0;  ///< moving average behind look-ahead (1769); 0: none
+
+  Vector3 rapid_rate_mm_per_s = Vector3::Constant(400.0);   ///< 1420
+  Vector3 rapid_time_constant_s = Vector3::Constant(0.15);  ///< 1620: from rest to the rate at override 1
+  double rapid_bell_time_s = 0.0;                           ///< 1621; 0: none
+  RapidPath rapid_path = RapidPath::linear;
+  InPosition in_position = InPosition::measured;
+  Vector3 in_position_s = Vector3::Zero();                 ///< measured
+  Vector3 position_gain_per_s = Vector3::Constant(30.0);   ///< servo_lag (1825)
+  Vector3 feed_forward_ratio = Vector3::Zero();            ///< servo_lag, 0 ... 1 (2092)
+  Vector3 in_position_width_mm = Vector3::Constant(0.02);  ///< servo_lag (1826)
+
+  double feed_override = 1.0;   ///< scales every programmed feed
+  double rapid_override = 1.0;  ///< scales the rapid rates; the acceleration of a rapid stays what it is
+  double tool_change_s = 0.0;   ///< M06
+  double m_function_s = 0.0;    ///< every other M code
+};
+
+/// Throws Error(argument) on a value that no controller can have; the message names it.
+void check(const ControllerModel& model);
+
+/// Filters behind interpolation in order: none, one or two (acceleration after interpolation, or 1769 in look-ahead).
+[[nodiscard]] std::vector<Fir> acceleration_filters(const ControllerModel& model);
+
+/// Periods that filters add to a run of set-points: as many as their cascade has taps (spec section 0: A for one moving
+/// average); 0 without filters.
+[[nodiscard]] int filter_periods(const std::vector<Fir>& filters) noexcept;
+
+/// Feed of a cutting block in mm/s: programmed feed times override, no axis above its largest feed.
+[[nodiscard]] double controlled_feed_mm_per_s(const Segment& segment, const ControllerModel& model) noexcept;
+
+/// Time of a run of overlapping cutting blocks (spec section 0, paper 004): sum of ceil(l / (F T_I)) T_I (or of l / F
+/// under `carry`) plus the length of the acceleration filters. Blocks without length take no time. Lengths in mm, feeds
+/// in mm/s, taken as they are (no override). Throws Error(argument) on unequal sizes or a feed <= 0.
+[[nodiscard]] double block_overlap_time_s(std::span<const double> lengths_mm, std::span<const double> feeds_mm_per_s,
+                                          const ControllerModel& model);
+
+/// Shape of one rapid in whole interpolation periods, per axis: the way is run off evenly in `travel` periods and
+/// smoothed by a moving average over `ramp` and one over `bell` periods, so it takes the sum of the three. A short
+/// rapid has travel = ramp.
+struct RapidShape {
+  std::array<int, axis_count> travel = {};
+  std::array<int, axis_count> ramp = {};
+  int bell = 0;
+  double even_s = 0.0;         ///< what the way would take at its rate all along; non-linear: of the slowest axis
+  double rate_mm_per_s = 0.0;  ///< reached; linear: tangential; non-linear: of the axis that takes longest
+};
+
+/// Paper 004, eq. 6 to 16, with rates and accelerations per axis: linear v = min_i(1420_i L/d_i) and
+/// a = min_i(1420_i/1620_i L/d_i); non-linear each axis for itself. Axes without travel have 0 periods. Throws
+/// Error(argument) on a rapid of more than 1e8 periods.
+[[nodiscard]] RapidShape rapid_shape(const Vector3& travel_mm, const ControllerModel& model);
+
+/// Time of a rapid from rest to rest without the wait for in-position; 0 without travel.
+[[nodiscard]] double rapid_time_s(const Vector3& travel_mm, const ControllerModel& model);
+
+/// Wait for in-position behind a rapid. `measured`: the largest constant of an axis that moves. `servo_lag`: closed
+/// form of the position error e' = (1 - a) x' - K e (gain K, feed-forward a) at the end of the command, which decays to
+/// the width w in ln(e / w) / K; whole periods.
+[[nodiscard]] double in_position_wait_s(const Vector3& travel_mm, const ControllerModel& model);
+
+/// The same behind any command: `error_mm` is what the servo loop lags at its end, `moved` the axes that moved.
+[[nodiscard]] double in_position_wait_s(const Vector3& error_mm, const std::array<bool, axis_count>& moved,
+                                        const ControllerModel& model);
+
+/// Set-points of a rapid, one per period, the start first. Its periods are found by trial, not by the closed form.
+class RapidPlayer {
+ public:
+  /// Throws Error(argument) on a model that `check` refuses.
+  RapidPlayer(const Vector3& start_mm, const Vector3& end_mm, const ControllerModel& model);
+  /// Next set-point; false once the end was given.
+  bool step(Vector3& position) noexcept;
+  /// Periods from rest to rest.
+  [[nodiscard]] int period_count() const noexcept { return count_; }
+
+ private:
+  struct Axis {
+    int travel = 0;
+    std::vector<FirStream> filters;
+  };
+  Vector3 start_mm_;
+  Vector3 travel_mm_;
+  Vector3 end_mm_;
+  std::array<Axis, axis_count> axes_;
+  int index_ = 0;
+  int count_ = 0;
+};
+
+/// All set-points of a rapid, (n, 3).
+[[nodiscard]] Samples rapid_samples(const Vector3& start_mm, const Vector3& end_mm, const ControllerModel& model);
+
+}  // namespace shapegcode

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <complex>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace shapegcode {
+
+/// What a sensor measured: the order of the derivative of the displacement.
+enum class Quantity : std::uint8_t { displacement = 0, velocity = 1, acceleration = 2 };
+
+/// One tap: force (N) and response (m, m/s or m/s²) at the same instants, as long as the caller keeps them.
+struct TapSignals {
+  std::span<const double> force_n;
+  std::span<const double> response;
+};
+
+/// Free decays: the responses of one or several records, as long as the caller keeps them.
+using Responses = std::span<const std::span<const double>>;
+
+/// Natural frequencies (rad/s, undamped) and damping ratios (no unit) of modes, of equal length.
+struct NaturalModes {
+  std::vector<double> omega_rad_s;
+  std::vector<double> damping_ratio;
+};
+
+/// Throws Error(argument), naming record and sample, if there is no record, one of fewer than `least_samples`, or a
+/// value that is not finite.
+void check_responses(Responses responses, std::size_t least_samples);
+
+/// As check_responses, and if force and response differ in length or a record's force is zero throughout.
+void check_taps(std::span<const TapSignals> taps, std::size_t least_samples);
+
+/// Throws Error(argument) unless the time between samples, in s, is finite and above 0.
+void check_period(double period_s);
+
+/// ARMA(2n, 2n-1) model of n modes: response = B(z)/A(z) force, A = 1 - phi_1/z - ... - phi_2n/z^2n.
+struct Arma {
+  /// phi_1 ... phi_2n in the sign convention of paper 003, eq. 1: lambda^2n - phi_1 lambda^(2n-1) - ... - phi_2n = 0.
+  Eigen::VectorXd phi;
+  /// b_0, b_1, ...: one row for all taps with 2n+1 terms, or one row per free decay with 2n.
+  Eigen::MatrixXd numerator;
+  /// theta_k = -b_k/b_0 of each row (not a number where b_0 is 0).
+  Eigen::MatrixXd theta;
+  std::vector<std::complex<double>> poles;  ///< roots lambda
+  std::vector<double> residual_rms;         ///< per record: response minus B/A force, in the response's unit
+  int iterations = 0;
+  bool converged = false;  ///< phi settled; if not, the best of all iterations is given
+};
+
+/// Joint model of several taps of the same point, from rest at the first sample: iterated least squares, in which force
+/// and response are filtered with 1/A of the last round (Steiglitz, McBride 1965), so that noise on the response does
+/// not bend the poles as it bends those of the plain least squares. Unstable poles are reflected into the unit circle.
+///
+/// `plain`: one round of unfiltered least squares instead (the equation's error, not the response's, is made small).
+/// Without noise and with the right number of modes both are exact.
+///
+/// The numerator has 2n+1 terms: with a force linear between samples the acceleration follows it at once.
+/// Throws Error(argument) on signals that check_taps refuses, n_modes outside 1 ... 50, or fewer samples than terms.
+[[nodiscard]] Arma arma_driven(std::span<const TapSignals> taps, int n_modes, bool plain = false);
+
+/// Joint model of several free decays: the same with a unit impulse at the first sample for the force; poles are
+/// common, numerators (initial states) each record's own. Errors as in arma_driven.
+[[nodiscard]] Arma arma_decay(Responses responses, int n_modes, bool plain = false);
+
+/// Modes of discrete poles, ascending in frequency: omega = |ln lambda|/period, zeta = -Re(ln lambda)/|ln lambda| (spec
+/// 8; the same as paper 003, eq. 5-6). Kept are complex pairs that are stable: real poles (among them those at the
+/// Nyquist frequency) and poles on or outside the unit circle are no modes. Throws Error(argument) on the period.
+[[nodiscard]] NaturalModes poles_to_modes(std::span<const std::complex<double>> poles, double period_s);
+
+/// Poles of models with n = 1 ... n_max modes for a stabilisation chart; entry n-1 holds 2n poles of the samples'
+/// period.
+///
+/// A subspace method (ESPRIT; Roy, Kailath 1989): all orders are read off the eigenvectors of one covariance matrix of
+/// the free decay. Of taps the decay is the correlation of response with force, at lags beyond the force's own length:
+/// all taps enter by their weight, and noise that has nothing to do with the force falls out. The covariance spans
+/// delays of one or more samples each, such that the highest frequency with content is sampled at least twice; where
+/// that is more than one, a mode of which the spectrum shows nothing (60 dB below the strongest) may appear aliased.
+///
+/// Throws Error(argument) on signals that check_taps or check_responses refuses, n_max outside 1 ... 50, or records too
+/// short for n_max (8 n_max + 8 samples needed).
+[[nodiscard]] std::vector<std::vector<std::complex<double>>> stabilisation_poles(std::span<const TapSignals> taps,
+                                                                                 int n_max);
+[[nodiscard]] std::vector<std::vector<std::complex<double>>> stabilisation_poles(Responses responses, int n_max);
+
+}  // namespace shapegcode

@@ -1,0 +1,178 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "shapegcode/path.hpp"
+
+namespace shapegcode {
+
+/// Statistics of a signed deviation in mm.
+struct DeviationStats {
+  double max_abs_mm = 0.0;
+  double most_positive_mm = 0.0;
+  double most_negative_mm = 0.0;
+  double sum_of_squares_mm2 = 0.0;
+  std::size_t count = 0;
+  void add(double deviation_mm) noexcept;
+  /// A distance by which the track missed a corner of the path (CornerReach): counts in the largest magnitude alone.
+  void include_missed(double distance_mm) noexcept;
+  /// The extremes of others, of samples that do not count in the root mean square.
+  void include_extremes(const DeviationStats& others) noexcept;
+  /// Root mean square; 0 without samples.
+  [[nodiscard]] double rms_mm() const noexcept;
+};
+
+/// Where a point lies beside the path, seen along the direction of travel.
+enum class PathSide : std::uint8_t {
+  none,  ///< on the path, or beside a travel along Z only
+  left,
+  right,
+  above,  ///< the deviation is more along Z than across it
+  below,
+};
+
+/// True distance of a moving point to the programmed path (not the tracking error in time), following the path
+/// forward. Positive on the left of the direction of travel seen along the tool axis (+Z looking down), negative on
+/// the right; a deviation along Z only, or from a travel along Z only, is positive above. Amortised O(1) per sample, no
+/// allocation after construction. Copies what it needs of the path.
+///
+/// The foot point is searched within an arc length that the last step and the last deviation allow, so that another
+/// pass of the path nearby is not mistaken for the present one. On a path that turns back on itself the outward and the
+/// return leg are equally near: the leg on which the point moves forward is taken. If the deviation keeps growing
+/// while the foot point stays (the track was lost), the search widens until it is found again.
+class ContourTracker {
+ public:
+  /// The point is expected at the path's start. Throws Error(argument) on a path without segments.
+  explicit ContourTracker(const Path& path);
+  /// Signed deviation in mm of the next sample; NaN, and no change of state, if `p` is not finite.
+  double step(const Vector3& p) noexcept;
+  /// Segment index of the last foot point.
+  [[nodiscard]] std::size_t segment() const noexcept { return cursor_; }
+  /// Side on which the last sample lies.
+  [[nodiscard]] PathSide side() const noexcept;
+  /// Distance of the last foot point from the path's start in mm.
+  [[nodiscard]] double s_mm() const noexcept { return s_; }
+
+ private:
+  /// What a search needs of one segment: exactly one cache line.
+  struct Piece {
+    Vector3 start;
+    Vector3 direction;  // unit; of the neighbour if the piece has no length
+    double length;
+    double s;  // of the start, from the path's start
+  };
+  struct Arc {
+    Segment segment;
+    int a, b, n;                 // plane axes and normal
+    double cosine, sine, sense;  // start direction from the centre; +1 turns a towards b
+    double turn;                 // |sweep|
+    double radius_rate, pitch;   // mm/rad
+    Vector3 start_tangent, end_tangent;
+  };
+  struct Foot {
+    double distance2 = 0.0;
+    double along = 0.0;                 // distance from the piece's start
+    Vector3 offset = Vector3::Zero();   // foot to point
+    Vector3 tangent = Vector3::Zero();  // arcs only
+  };
+  struct Window {
+    double begin, end;  // mm from the path's start
+  };
+  struct Found {
+    Foot foot;
+    std::size_t piece;
+    double s;  // of the foot, from the path's start
+  };
+
+  [[nodiscard]] Foot foot_on(std::size_t piece, const Vector3& p, const Window& window) const noexcept;
+  [[nodiscard]] Foot foot_on_arc(std::size_t piece, const Vector3& p, const Window& window) const noexcept;
+  [[nodiscard]] static Foot arc_point_foot(const Arc& arc, double u, const Vector3& p) noexcept;
+  [[nodiscard]] Found search(const Vector3& p, double move, const Window& window) const noexcept;
+  [[nodiscard]] double lateral_side(const Found& found, double distance) const noexcept;
+  [[nodiscard]] Vector3 start_tangent(std::size_t piece) const noexcept;
+  [[nodiscard]] Vector3 end_tangent(std::size_t piece) const noexcept;
+
+  /// The path as a search wants it; constant, so that copies of a tracker share it.
+  struct Geometry {
+    std::vector<Piece> pieces;
+    std::vector<std::int32_t> arc_of;  // -1 for a line
+    std::vector<Arc> arcs;
+  };
+  [[nodiscard]] static std::shared_ptr<const Geometry> geometry_of(const Path& path);
+
+  std::shared_ptr<const Geometry> geometry_;
+  Vector3 last_ = Vector3::Zero();
+  std::size_t cursor_ = 0;
+  double s_ = 0.0;
+  double furthest_ = 0.0;      // largest s_ of late: a point that moves back from there may be on the return leg
+  double deviation_ = 0.0;     // unsigned, of the last sample
+  double lateral_ = 0.0;       // of the last sample: 1 left, -1 right, 0 neither
+  double height_ = 0.0;        // of the last sample above its foot
+  std::uint32_t growing_ = 0;  // samples since the deviation began to grow
+};
+
+/// Orbit error of every arc of a path: area between the moving point's track and the programmed arc, divided by the
+/// area of the programmed sector (spec section 3; for a quarter arc the sector is the quarter disc). The area is
+/// the integral of |R^2 - r^2|/2 over the arc's own angular range, in the arc's plane, with r^2 linear in the angle
+/// between samples; the angle is unwrapped, so that arcs of several turns and helices count every turn. A move back
+/// takes off what the move forward added.
+class OrbitError {
+ public:
+  explicit OrbitError(const Path& path);
+  /// Next sample, and the segment index on which its foot point lies (ContourTracker::segment()). Samples that are not
+  /// finite or lie on no segment are ignored. No allocation.
+  void step(const Vector3& p, std::size_t segment) noexcept;
+  /// Percent, one entry per arc of the path in order.
+  [[nodiscard]] std::vector<double> percent() const;
+
+ private:
+  struct Arc {
+    int a, b;  // plane axes
+    double centre_a, centre_b;
+    double cosine, sine, sense;  // start direction from the centre; +1 turns a towards b
+    double turn;                 // |sweep|
+    double start_radius, radius_rate;
+    double sector_area;  // mm^2
+    double area = 0.0;   // mm^2, so far
+    double u = 0.0;      // unwrapped angle of the last sample on this arc, from the arc's start
+  };
+  void add_move(Arc& arc, std::size_t index, const Vector3& to, std::size_t to_segment) noexcept;
+
+  std::vector<std::int32_t> arc_of_;  // -1 for a line
+  std::vector<Arc> arcs_;
+  bool has_last_ = false;
+  Vector3 last_ = Vector3::Zero();
+  std::size_t last_segment_ = 0;
+};
+
+/// How far a moving point stays away from the corners of a path. The distance from point to path does not see a corner
+/// that is cut short along the path itself (a reversal, a narrow V); the distance from corner to track does.
+class CornerReach {
+ public:
+  /// Corners are junctions at which the direction changes by `least_angle_rad` or more, and the path's end.
+  explicit CornerReach(const Path& path, double least_angle_rad = 0.1745);
+  /// Next sample, and the distance of its foot point along the path (ContourTracker::s_mm()). No allocation.
+  void step(const Vector3& p, double foot_mm) noexcept;
+  /// Largest distance of a corner from the track so far, mm.
+  [[nodiscard]] double largest_mm() const noexcept;
+  /// The same of the corners that lie well behind the point: for a track that ends before the path does.
+  [[nodiscard]] double largest_passed_mm() const noexcept;
+
+ private:
+  struct Corner {
+    Vector3 point;
+    double s = 0.0;      // from the path's start
+    double best2 = 0.0;  // squared distance to the track
+  };
+  std::vector<Corner> corners_;
+  std::size_t first_ = 0;  // corners [first_, next_) are near enough to be looked at
+  std::size_t next_ = 0;
+  double largest2_ = 0.0;
+  Vector3 last_ = Vector3::Zero();
+  bool started_ = false;
+};
+
+}  // namespace shapegcode

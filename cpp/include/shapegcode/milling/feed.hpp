@@ -1,0 +1,110 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "shapegcode/milling/force.hpp"
+#include "shapegcode/path.hpp"
+
+namespace shapegcode {
+
+/// What bounds a feed over one revolution of the spindle; infinite: no limit.
+struct FeedLimits {
+  static constexpr double none = std::numeric_limits<double>::infinity();
+
+  double mean_resultant_n = none;    ///< mean of the magnitude of the XY force
+  double peak_resultant_n = none;    ///< largest magnitude
+  double peak_deflection_um = none;  ///< of the tip; needs `beam`
+  double peak_torque_nm = none;
+  double mean_power_w = none;
+  double feed_per_tooth_mm = none;  ///< chip load as tool makers state it
+  double peak_chip_mm = none;       ///< thickest chip, which a light radial cut makes thinner than the feed per tooth
+  std::optional<ToolBeam> beam = {};
+};
+
+/// Throws Error(argument) on a limit that is not positive, a beam that `check` refuses, or a limit of deflection
+/// without a beam.
+void check(const FeedLimits& limits);
+
+enum class FeedLimit : std::uint8_t {
+  none,  ///< the highest feed asked for is within all limits
+  resultant,
+  deflection,
+  torque,
+  power,
+  chip_load,
+};
+
+struct LimitedFeed {
+  double feed_mm_per_min = 0.0;
+  FeedLimit limit = FeedLimit::none;  ///< the one that is reached first
+  bool within = true;                 ///< false: even the lowest feed is beyond the limit, and it is returned
+};
+
+/// The highest feed between `lowest` and `highest` (mm/min) that stays within all limits. Never above a limit, and
+/// where a limit binds within 0.02 % of it. Throws Error(argument) on limits or an engagement that `check` or `figures`
+/// refuse, or unless 0 < lowest <= highest.
+[[nodiscard]] LimitedFeed largest_feed(MillingForce& force, std::span<const EngagedArc> arcs, const FeedLimits& limits,
+                                       double lowest, double highest);
+
+/// The same for every sample of a track, feeds along the path (its horizontal part makes the chip); where nothing is
+/// met or the tool only plunges: the highest. Throws as largest_feed.
+[[nodiscard]] std::vector<LimitedFeed> largest_feeds(MillingForce& force, const EngagementTrack& track,
+                                                     const FeedLimits& limits, double lowest, double highest);
+
+/// How fast a path may be run: `feed_mm_per_min[i]` holds on the stretch that ends at `s_mm[i]` and begins at the
+/// station before it (0 before the first). Ascending; the last one is the path's end.
+struct FeedStations {
+  std::vector<double> s_mm;
+  std::vector<double> feed_mm_per_min;
+};
+
+/// What a block is to the scheduler.
+struct FeedBlock {
+  double end_mm = 0.0;           ///< of the block, along the path
+  double kept_mm_per_min = 0.0;  ///< it keeps this feed; 0: it may get another one
+  bool divisible = false;        ///< may be divided into several blocks
+};
+
+struct FeedScheduleOptions {
+  double least_length_mm = 0.6;  ///< over which a feed stays, and of a piece of a divided block
+  /// From one feed to the next, as far as feeds that are kept allow.
+  double most_change_mm_per_min = std::numeric_limits<double>::infinity();
+  double resolution_mm_per_min = 0.1;  ///< feeds are whole multiples, rounded down
+};
+
+/// A stretch of one feed.
+struct FeedStretch {
+  double begin_mm = 0.0;
+  double end_mm = 0.0;
+  double feed_mm_per_min = 0.0;
+};
+
+/// Feeds of a path in the shortest time that the stations allow: stretches that begin and end where a block does or
+/// within a divisible one, none shorter than the least length (but where kept blocks leave no more room), each at the
+/// lowest feed of its stations. The borders are chosen together (dynamic programming), with a charge for each of one
+/// percent of the shortest stretch's time, so that none is made for nothing. O(stations + length).
+///
+/// Throws Error(argument) on stations or blocks that do not ascend to one end, a feed that is not above 0, or options
+/// outside their range.
+[[nodiscard]] std::vector<FeedStretch> schedule_feed(std::span<const FeedBlock> blocks, const FeedStations& stations,
+                                                     const FeedScheduleOptions& options);
+
+/// The path with other feeds: segments are divided where a stretch ends within one. Throws Error(argument) if the
+/// stretches do not cover the path.
+[[nodiscard]] Path with_feeds(const Path& path, std::span<const FeedStretch> stretches);
+
+/// Lowers the feeds around each station that the load holds, because the travel lags behind a change of feed: a change
+/// down must be commanded so early that the travel has followed, `before_s` times the feed that the load allows, and a
+/// change up not before the travel has left, `behind_s` times it. `load_mm_per_min`: the largest feed that the load at
+/// a station allows, which may be above what is wanted there. One entry of each per station.
+///
+/// Behind a filter of mean delay m and length d a change commanded at a place begins m times the slower feed before it
+/// and has ended d - m times the slower feed behind it.
+void look_ahead_on_load(FeedStations& stations, std::span<const double> load_mm_per_min,
+                        std::span<const double> before_s, std::span<const double> behind_s);
+
+}  // namespace shapegcode

@@ -1,0 +1,333 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace shapegcode {
+
+/// Sense in which the spindle turns, seen from the spindle towards the work piece.
+enum class SpindleSense : std::uint8_t {
+  clockwise,          ///< M03
+  counter_clockwise,  ///< M04
+};
+
+/// A cylindrical end mill with a flat end. Its axis is Z; heights count from the tip.
+struct EndMill {
+  double diameter_mm = 0.0;
+  int flutes = 0;
+  double helix_rad = 0.0;  ///< of a right-hand helix on a right-hand cutter: the tip enters first
+  /// How far each flute stands out beyond the mean radius, in the order in which they cut; empty: no runout.
+  std::vector<double> runout_mm = {};
+
+  [[nodiscard]] double radius_mm() const noexcept { return 0.5 * diameter_mm; }
+};
+
+/// Throws Error(argument) on a diameter or number of flutes that is not positive, a helix outside 0 ... 80 degrees, or
+/// a runout that is not one finite number per flute or reaches the radius.
+void check(const EndMill& tool);
+
+/// A stretch of the tool's circumference that is in material, over a stretch of its length. Azimuths in rad from the
+/// direction of feed, positive to its left (counter-clockwise seen from +Z); only the front half cuts, so
+/// -pi/2 <= from < to <= pi/2. With a clockwise spindle a tooth passes from +pi/2 (left, up milling) to -pi/2 (right,
+/// down milling), and its chip is feed per tooth times cos(azimuth) thick.
+struct EngagedArc {
+  double from_rad = 0.0;
+  double to_rad = 0.0;
+  double bottom_mm = 0.0;  ///< above the tool's tip
+  double top_mm = 0.0;
+};
+
+/// What the tool meets along a path, in the order of travel; columns of one length but for `arcs`.
+struct EngagementTrack {
+  std::vector<double> s_mm;  ///< distance along the path at which the sample stands
+  std::vector<double> x_mm;  ///< of the tool's axis
+  std::vector<double> y_mm;
+  std::vector<double> direction_rad;     ///< of feed in the XY plane, from +X; 0 where the tool only plunges
+  std::vector<double> horizontal;        ///< share of the travel that lies in the XY plane: 1 level, 0 a plunge
+  std::vector<std::uint32_t> segment;    ///< of the path
+  std::vector<double> radial_depth_mm;   ///< width of what is met, across the direction of feed: R (sin to - sin from)
+  std::vector<double> section_mm2;       ///< area across the direction of feed; times the feed: material removal rate
+  std::vector<double> plunged_mm2;       ///< area of material below the end of a tool that goes down (0: goes level)
+  std::vector<std::uint32_t> first_arc;  ///< size() + 1 entries, into `arcs`
+  std::vector<EngagedArc> arcs;
+
+  [[nodiscard]] std::size_t size() const noexcept { return s_mm.size(); }
+  [[nodiscard]] std::span<const EngagedArc> arcs_of(std::size_t i) const noexcept {
+    return {arcs.data() + first_arc[i], arcs.data() + first_arc[i + 1]};
+  }
+};
+
+/// A short way of the tool's axis in the XY plane, a line or an arc of less than half a turn, and the distance from it.
+/// A line is an arc without curvature; coordinates count from the start, so that large arcs lose no digits.
+class ToolStep {
+ public:
+  /// `curvature_per_mm` > 0 turns left, < 0 right, 0 is a line. Start and end may be the same point.
+  ToolStep(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double curvature_per_mm = 0.0)
+      : from_(from), chord_(to - from), curvature_(curvature_per_mm) {
+    const double length = chord_.norm();
+    if (length > 0.0) {
+      const Eigen::Vector2d along = chord_ / length;
+      const double sine = std::clamp(0.5 * length * curvature_, -1.0, 1.0);
+      const double cosine = std::sqrt(1.0 - sine * sine);
+      const Eigen::Vector2d left(-along.y(), along.x());
+      start_tangent_ = cosine * along - sine * left;
+      end_tangent_ = cosine * along + sine * left;
+    } else {
+      curvature_ = 0.0;  // a line across the X axis without length: beside it only where this is the distance, too
+      start_tangent_ = end_tangent_ = Eigen::Vector2d::UnitX();
+    }
+  }
+
+  [[nodiscard]] const Eigen::Vector2d& from() const noexcept { return from_; }
+  [[nodiscard]] const Eigen::Vector2d& chord() const noexcept { return chord_; }
+  [[nodiscard]] double curvature() const noexcept { return curvature_; }
+  [[nodiscard]] const Eigen::Vector2d& start_tangent() const noexcept { return start_tangent_; }
+
+  /// What the distance is made of at a place (x, y) from the start. Beside the arc (weight 1) it is
+  /// |offset / (1 + sqrt(square))|, where `square` is the squared ratio of the place's distance from the arc's centre
+  /// to its radius; elsewhere (weight 0) it is the root of `end`, the squared distance of the nearer end. In between,
+  /// for 1 nm, both are the same. A weight instead of a choice keeps rows of a grid free of branches.
+  template <typename Scalar>
+  struct Parts {
+    Scalar offset;
+    Scalar square;
+    Scalar end;
+    Scalar beside;
+
+    /// The squared distance; `root` is that of `square`, 1 on a line.
+    [[nodiscard]] Scalar squared(Scalar root) const noexcept {
+      const Scalar aside = offset / (Scalar(1) + root);
+      return end + beside * (aside * aside - end);
+    }
+  };
+
+  /// The constants of a step as the kernels want them: double for single places, float for rows of a grid.
+  template <typename Scalar>
+  struct Shape {
+    explicit Shape(const ToolStep& step)
+        : curvature(static_cast<Scalar>(step.curvature_)),
+          t0x(static_cast<Scalar>(step.start_tangent_.x())),
+          t0y(static_cast<Scalar>(step.start_tangent_.y())),
+          t1x(static_cast<Scalar>(step.end_tangent_.x())),
+          t1y(static_cast<Scalar>(step.end_tangent_.y())),
+          cx(static_cast<Scalar>(step.chord_.x())),
+          cy(static_cast<Scalar>(step.chord_.y())) {}
+
+    [[nodiscard]] Parts<Scalar> parts(Scalar x, Scalar y) const noexcept {
+      const Scalar squared = x * x + y * y;
+      const Scalar ex = x - cx;
+      const Scalar ey = y - cy;
+      const Scalar offset = curvature * squared - Scalar(2) * (y * t0x - x * t0y);
+      const Scalar square = std::abs(Scalar(1) + curvature * offset);  // below 0 by rounding only
+      const Scalar end = std::min(squared, ex * ex + ey * ey);
+      const Scalar within = std::min(x * t0x + y * t0y, -(ex * t1x + ey * t1y));  // mm from the nearer end's normal
+      const Scalar beside = std::min(std::max(within * Scalar(1e6), Scalar(0)), Scalar(1));
+      return {offset, square, end, beside};
+    }
+
+    Scalar curvature, t0x, t0y, t1x, t1y, cx, cy;
+  };
+
+  /// Distance of a place from the step, mm.
+  [[nodiscard]] double distance_mm(const Eigen::Vector2d& place) const noexcept {
+    const Eigen::Vector2d v = place - from_;
+    const Parts<double> p = Shape<double>(*this).parts(v.x(), v.y());
+    return std::sqrt(p.squared(std::sqrt(p.square)));
+  }
+
+ private:
+  Eigen::Vector2d from_;
+  Eigen::Vector2d chord_;
+  double curvature_;
+  Eigen::Vector2d start_tangent_;
+  Eigen::Vector2d end_tangent_;
+};
+
+/// An end mill as a beam that is clamped at its overhang: a shank, and below it the fluted part, which is as stiff as a
+/// round bar of an effective diameter. Heights count from the tip.
+struct ToolBeam {
+  double overhang_mm = 0.0;            ///< from the tip to where it is clamped (effective length of paper 001)
+  double fluted_length_mm = 0.0;       ///< from the tip; at or above the overhang: no shank is free
+  double effective_diameter_mm = 0.0;  ///< of the fluted part: about 0.8 of the cutter's diameter
+  double shank_diameter_mm = 0.0;
+  double young_modulus_gpa = 0.0;
+  /// Springs across the axis between the clamped end and the frame, one behind the other.
+  double holder_n_per_um = std::numeric_limits<double>::infinity();
+  double spindle_n_per_um = std::numeric_limits<double>::infinity();
+};
+
+/// Throws Error(argument) on a length, diameter, modulus or stiffness that is not positive, or a value that is not
+/// finite (a stiffness may be infinite: rigid).
+void check(const ToolBeam& beam);
+
+/// Deflection at one height under a load of 1 N across the axis at another, um/N: Euler-Bernoulli beam of two sections
+/// in closed form, springs added. The same when both heights change places. Heights beyond the overhang count as
+/// clamped. The beam is taken as checked.
+[[nodiscard]] double compliance_um_per_n(const ToolBeam& beam, double at_mm, double load_mm) noexcept;
+
+/// Deflection of the tip under a load of 1 N at a height, um/N.
+[[nodiscard]] inline double tip_compliance_um_per_n(const ToolBeam& beam, double load_mm) noexcept {
+  return compliance_um_per_n(beam, 0.0, load_mm);
+}
+
+/// Which chip thickness the specific cutting force belongs to.
+enum class ChipThickness : std::uint8_t {
+  mean,   ///< of the whole engagement: how paper 001 fits its coefficients
+  local,  ///< of each element of a flute
+};
+
+/// Power laws of the cutting force (paper 001 eq. 2, 3, 8, 9), with edge forces. t is the chip thickness in mm:
+/// dF_t = k1(t) t dz + K_te dz, dF_r = k2(t) k1(t) t dz + K_re dz, k1 = specific * t^specific_exponent,
+/// k2 = ratio * t^ratio_exponent.
+struct CuttingCoefficients {
+  double specific_n_per_mm2 = 0.0;
+  double specific_exponent = 0.0;
+  double ratio = 0.0;
+  double ratio_exponent = 0.0;
+  double tangential_edge_n_per_mm = 0.0;
+  double radial_edge_n_per_mm = 0.0;
+  ChipThickness thickness = ChipThickness::mean;
+};
+
+/// Throws Error(argument) on a value that is not finite, a specific force or edge force below 0, or an exponent at
+/// which the force would not grow with the chip (specific_exponent or its sum with ratio_exponent <= -1).
+void check(const CuttingCoefficients& coefficients);
+
+/// Figures over one revolution. Forces on the tool, in N; frame of the tool: x along the feed, y to its left.
+struct ForceFigures {
+  Eigen::Vector2d mean_n = Eigen::Vector2d::Zero();  ///< mean of the vector
+  double mean_resultant_n = 0.0;                     ///< mean of the magnitude
+  double peak_resultant_n = 0.0;                     ///< largest magnitude
+  double peak_flute_n = 0.0;                         ///< largest magnitude on a single flute
+  double mean_torque_nm = 0.0;
+  double peak_torque_nm = 0.0;
+  double mean_power_w = 0.0;  ///< of the spindle: mean torque times angular speed
+  double peak_chip_mm = 0.0;  ///< thickest chip
+};
+
+/// Forces on the tool over one revolution, sample by sample; frame of the tool.
+struct ForceCurve {
+  Eigen::VectorXd turned_rad;  ///< by the spindle, in its own sense; at 0 the first flute's tip looks along the feed
+  Eigen::MatrixX2d force_n;    ///< (n_angles, 2)
+  Eigen::VectorXd torque_nm;   ///< (n_angles,); positive: against the spindle
+  std::vector<Eigen::MatrixX2d> flute_n;  ///< of each flute, (n_angles, 2)
+};
+
+/// A force in the frame of the tool (x along the feed, y to its left) in the frame of the machine (paper 001 eq. 4, 5,
+/// whose angle counts the other way); `direction_rad`: of the feed, from +X towards +Y.
+[[nodiscard]] Eigen::Vector2d machine_frame(const Eigen::Vector2d& tool_frame, double direction_rad) noexcept;
+
+/// Forces of an end mill at one engagement. The chip of a tooth at azimuth p is feed per tooth * cos p thick (paper 001
+/// eq. 1); with runout that of flute i is the least of m * feed per tooth * cos p + r_i - r_(i-m), m >= 1, and not
+/// below 0. A flute with a helix takes its force from the integral of the chip's powers over azimuth, so nothing is cut
+/// into discs. With a counter-clockwise spindle all is mirrored, helix and order of the flutes included. The mean chip
+/// thickness, where the coefficients ask for it, is that of the whole engagement without runout.
+///
+/// Holds the tables that many engagements share, and the last engagement, so make one and keep it. Not for several
+/// threads at a time. All members throw Error(argument) on an arc that does not lie within -pi/2 ... pi/2 and above the
+/// tip, or on a feed that is negative or not finite; a feed of 0 and an empty engagement give zeros.
+class MillingForce {
+ public:
+  /// Throws Error(argument) on a tool or coefficients that `check` refuses, or a speed that is not positive.
+  MillingForce(EndMill tool, CuttingCoefficients coefficients, double spindle_rev_per_min,
+               SpindleSense sense = SpindleSense::clockwise);
+  ~MillingForce();
+  MillingForce(MillingForce&&) noexcept;
+  MillingForce& operator=(MillingForce&&) noexcept;
+  MillingForce(const MillingForce&) = delete;
+  MillingForce& operator=(const MillingForce&) = delete;
+
+  [[nodiscard]] const EndMill& tool() const noexcept;
+  [[nodiscard]] const CuttingCoefficients& coefficients() const noexcept;
+  [[nodiscard]] double spindle_rev_per_min() const noexcept;
+  [[nodiscard]] SpindleSense sense() const noexcept;
+  [[nodiscard]] double feed_per_tooth_mm(double feed_mm_per_min) const noexcept;
+
+  /// Figures over one revolution at a feed along the path. Means of force and torque are exact; the mean of the
+  /// magnitude and the peaks are good to 0.1 % (angles at most 4 degrees apart, ends of arcs included, parabolas
+  /// between).
+  [[nodiscard]] ForceFigures figures(std::span<const EngagedArc> arcs, double feed_mm_per_min);
+
+  /// The same without the largest force on a single flute, which stays 0: what a search for a feed needs.
+  [[nodiscard]] ForceFigures quick_figures(std::span<const EngagedArc> arcs, double feed_mm_per_min);
+
+  /// Forces at `angles` equal steps of the spindle. Throws Error(argument) on angles < 1.
+  [[nodiscard]] ForceCurve curve(std::span<const EngagedArc> arcs, double feed_mm_per_min, int angles);
+
+  /// Largest deflection of the tip over one revolution, um: quasi-static, the beam under the load along its flutes.
+  /// Throws Error(argument) also on an engagement above the overhang.
+  [[nodiscard]] double peak_deflection_um(std::span<const EngagedArc> arcs, double feed_mm_per_min,
+                                          const ToolBeam& beam);
+
+  /// Deflection at a height above the tip, at an angle of the spindle as in ForceCurve, um, frame of the tool. Throws
+  /// as peak_deflection_um.
+  [[nodiscard]] Eigen::Vector2d deflection_um(std::span<const EngagedArc> arcs, double feed_mm_per_min,
+                                              double turned_rad, double height_mm, const ToolBeam& beam);
+
+  /// Centre of the force along x and along y (paper 001 eq. 6), as distance from the clamped end, mm; NaN where that
+  /// force is 0. `overhang_mm`: the effective length of the tool.
+  [[nodiscard]] Eigen::Vector2d force_centre_mm(std::span<const EngagedArc> arcs, double feed_mm_per_min,
+                                                double turned_rad, double overhang_mm);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Figures of a whole track, a row per sample: mean_x_n, mean_y_n, mean_resultant_n, peak_resultant_n, peak_torque_nm,
+/// mean_torque_nm, mean_power_w, peak_chip_mm, peak_deflection_um; forces in the frame of the tool.
+enum class ForceColumn : std::uint8_t {
+  mean_x_n,
+  mean_y_n,
+  mean_resultant_n,
+  peak_resultant_n,
+  peak_torque_nm,
+  mean_torque_nm,
+  mean_power_w,
+  peak_chip_mm,
+  peak_deflection_um,
+};
+inline constexpr int force_columns = 9;
+
+/// `feed_mm_per_min`: along the path, one per sample; the chip comes from its horizontal part. Throws as
+/// MillingForce::figures, and on another number of feeds. The deflection of the tip is 0 without a beam.
+[[nodiscard]] Eigen::MatrixXd figures_of(MillingForce& force, const EngagementTrack& track,
+                                         std::span<const double> feed_mm_per_min, const ToolBeam* beam = nullptr);
+
+/// The wall that a tool finishes beside its way, seen along the feed. With a clockwise spindle the right one is made by
+/// down milling, the left one by up milling.
+enum class WallSide : std::uint8_t {
+  right,
+  left,
+};
+
+/// An arc that ends this close to +-pi/2 counts as reaching the wall; a bit more than what a material model of 20 um
+/// leaves open.
+inline constexpr double wall_tolerance_rad = 0.02;
+
+/// Form error of the wall across itself, um, at heights above the tip: + material is left standing, - the wall is cut
+/// too deep. Each height is finished as a flute passes +-pi/2 there; the error is what the beam is deflected at that
+/// height under all forces of that moment, and of several flutes with runout the one that reaches deepest counts (from
+/// the mean radius). Paper 001, section 2.3; the load is taken as spread along the flutes instead of at its centre. NaN
+/// where the engagement does not reach the wall. Throws Error(argument) as MillingForce::deflection_um, or on a height
+/// below the tip or not finite.
+[[nodiscard]] Eigen::VectorXd wall_error_um(MillingForce& force, const ToolBeam& beam, std::span<const EngagedArc> arcs,
+                                            double feed_mm_per_min, WallSide side, std::span<const double> height_mm,
+                                            double tolerance_rad = wall_tolerance_rad);
+
+/// The same along a track, (n_samples, n_heights); feeds along the path, one per sample (its horizontal part makes the
+/// chip). Throws also on another number of feeds.
+[[nodiscard]] Eigen::MatrixXd wall_errors_um(MillingForce& force, const ToolBeam& beam, const EngagementTrack& track,
+                                             std::span<const double> feed_mm_per_min, WallSide side,
+                                             std::span<const double> height_mm,
+                                             double tolerance_rad = wall_tolerance_rad);
+
+}  // namespace shapegcode

@@ -1,0 +1,155 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "shapegcode/filter.hpp"
+#include "shapegcode/path.hpp"
+#include "shapegcode/samples.hpp"
+
+namespace shapegcode {
+
+/// Law of a change of speed.
+enum class AccelerationLaw : std::uint8_t {
+  constant_time,  ///< a ramp lasts the time constant whatever the speed step, where the path leaves room for it
+  jerk_limited,   ///< the acceleration of the axes, smoothed by the jerk time
+};
+
+/// What look-ahead keeps. Infinity switches a limit off.
+struct MotionLimits {
+  static constexpr double none = std::numeric_limits<double>::infinity();
+
+  AccelerationLaw law = AccelerationLaw::constant_time;
+  double time_constant_s = 0.05;  ///< constant_time: length of a ramp from rest to the programmed feed
+  double jerk_time_s = 0.0;       ///< length of the smoothing of the acceleration; 0 = none
+  Vector3 max_feed_mm_per_s = Vector3::Constant(none);
+  Vector3 max_acceleration_mm_per_s2 = Vector3::Constant(none);
+  Vector3 max_jerk_mm_per_s3 = Vector3::Constant(none);
+  Vector3 corner_speed_difference_mm_per_s = Vector3::Constant(none);  ///< per axis at a corner
+  double centripetal_acceleration_mm_per_s2 = none;                    ///< on arcs and along polylines (1735)
+  Vector3 contour_acceleration_mm_per_s2 = Vector3::Constant(none);    ///< per axis, of a change of direction (1737)
+  double feed_override = 1.0;                                          ///< scales the programmed feeds
+  double arc_feed_ratio = 1.0;                                         ///< feed on arcs relative to the programmed feed
+  /// Deviation that a filter with the spread below may cause at corners and on arcs.
+  double contour_tolerance_mm = none;
+  double corner_share = 1.0;        ///< of it for one corner: several may fall into one filter, and then they add up
+  double filter_variance_s2 = 0.0;  ///< second central moment of the filter that follows
+  double filter_mean_deviation_s = 0.0;  ///< its mean absolute deviation from the mean delay
+};
+
+/// One stretch of constant tangential acceleration.
+struct SpeedPhase {
+  double start_s = 0.0;  ///< time at which it begins
+  double duration_s = 0.0;
+  double distance_mm = 0.0;  ///< along the path at its begin
+  double speed_mm_per_s = 0.0;
+  double acceleration_mm_per_s2 = 0.0;
+};
+
+/// Distance along a path as a function of time. Constant after construction.
+class SpeedProfile {
+ public:
+  SpeedProfile() = default;
+  /// `length_mm` is the distance reached at the end, to the last bit.
+  SpeedProfile(std::vector<SpeedPhase> phases, double length_mm, double jerk_time_s);
+
+  [[nodiscard]] const std::vector<SpeedPhase>& phases() const noexcept { return phases_; }
+  /// Time of the ramps alone, without the smoothing by the jerk time.
+  [[nodiscard]] double ramp_duration_s() const noexcept { return duration_s_; }
+  [[nodiscard]] double jerk_time_s() const noexcept { return jerk_time_s_; }
+  /// Whole time: ramps plus smoothing.
+  [[nodiscard]] double duration_s() const noexcept { return duration_s_ + jerk_time_s_; }
+  [[nodiscard]] double length_mm() const noexcept { return length_mm_; }
+  /// Distance at a time, before smoothing; `cursor` as in Path::point.
+  [[nodiscard]] double distance_mm(double time_s, std::size_t& cursor) const noexcept;
+  /// Tangential speed at a time, before smoothing.
+  [[nodiscard]] double speed_mm_per_s(double time_s, std::size_t& cursor) const noexcept;
+  /// Time at which a distance is reached, before smoothing.
+  [[nodiscard]] double time_s(double distance_mm, std::size_t& cursor) const noexcept;
+
+ private:
+  void seek(double time_s, std::size_t& cursor) const noexcept;
+
+  std::vector<SpeedPhase> phases_;
+  double duration_s_ = 0.0;
+  double length_mm_ = 0.0;
+  double jerk_time_s_ = 0.0;
+};
+
+/// Speeds that a path may have beside its limits, mm/s; infinity where there is none.
+struct SpeedCaps {
+  std::vector<float> on_segment;   ///< of each segment
+  std::vector<float> at_junction;  ///< [i]: where segment i is entered
+};
+
+/// Tangential speed profile over a whole path from rest to rest: every segment at most at its feed, every limit kept,
+/// deceleration ended where a slower segment begins. O(n). Throws Error(argument) on a limit that is not positive
+/// or a segment without feed, or caps that are not one per segment.
+///
+/// Forward and backward passes over the segments' boundary speeds (the planner of grbl and of LinuxCNC, in v^2); then,
+/// under the constant-time law, ramps are stretched to the time constant where a neighbouring steady stretch leaves
+/// room. A jerk time smooths distance over time by a moving average of that length; the slow stretches around corners
+/// are lengthened by half of it on both sides, so that smoothing does not raise the speed at the corner.
+///
+/// Behind a jerk time the acceleration of an axis may exceed its limit where segments of different direction meet at
+/// speed (there the corner limits bound what happens), and jerk on arcs is not bounded.
+[[nodiscard]] SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const SpeedCaps* caps = nullptr);
+
+/// Highest speed at which no axis of a segment is above its largest feed.
+[[nodiscard]] double axis_feed_limit(const Segment& segment, const MotionLimits& limits) noexcept;
+
+/// Highest speed at which segment `i` may be run under the limits.
+[[nodiscard]] double segment_speed_limit(const Segment& segment, const MotionLimits& limits) noexcept;
+
+/// Highest speed at the junction of two segments.
+[[nodiscard]] double corner_speed_limit(const Segment& before, const Segment& after,
+                                        const MotionLimits& limits) noexcept;
+
+/// Indices of segments before which the tool must come to rest: sharp corners between the tool axis and the plane
+/// across it (a plunge or retract), which a shaper must not mix; corners that the filter behind cannot pass within the
+/// contour tolerance at any speed; and exact stops. `axis_angle_rad`: how far a side may lean from the tool axis Z and
+/// still count as plunge; `corner_angle_rad`: least change of direction of such a corner.
+[[nodiscard]] std::vector<std::size_t> forced_stops(const std::vector<Segment>& segments, double axis_angle_rad,
+                                                    double corner_angle_rad, const MotionLimits& limits);
+
+/// Set-points of a path under a speed profile, one per interpolation period, from the start (first step) to the end.
+/// `step` is the real-time form: no allocation, no exception, no lock, work bounded by the segments and phases that one
+/// period passes over. `interpolate` is the batch form and made of the same steps.
+class Interpolator {
+ public:
+  /// `delay_s` >= 0: rest at the start before the motion begins; need not be a multiple of the period. Throws
+  /// Error(argument) on a period <= 0.
+  Interpolator(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile, double period_s,
+               double delay_s = 0.0);
+
+  /// Next set-point. False once the last set-point was given; `position` then stays at the end.
+  bool step(Vector3& position) noexcept;
+  /// Distance along the path at the set-point last given.
+  [[nodiscard]] double distance_mm() const noexcept { return distance_mm_; }
+  /// Segment of the set-point last given.
+  [[nodiscard]] std::size_t segment() const noexcept { return path_cursor_; }
+  /// Number of set-points from start to end.
+  [[nodiscard]] std::size_t sample_count() const noexcept { return sample_count_; }
+  [[nodiscard]] double period_s() const noexcept { return period_s_; }
+
+ private:
+  std::shared_ptr<const Path> path_;
+  std::shared_ptr<const SpeedProfile> profile_;
+  FirStream smoothing_;
+  double period_s_ = 0.0;
+  double delay_s_ = 0.0;
+  std::size_t sample_count_ = 0;
+  std::size_t index_ = 0;
+  std::size_t path_cursor_ = 0;
+  std::size_t phase_cursor_ = 0;
+  double distance_mm_ = 0.0;
+};
+
+/// All set-points of a path: (n_samples, 3).
+[[nodiscard]] Samples interpolate(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
+                                  double period_s);
+
+}  // namespace shapegcode

@@ -1,0 +1,185 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "shapegcode/path.hpp"
+#include "shapegcode/samples.hpp"
+
+namespace shapegcode {
+
+/// The modal state of the controller that a program carries from block to block, as G numbers.
+struct ModalState {
+  int motion = 0;                    ///< group 01: 0, 1, 2, 3
+  int plane = 17;                    ///< group 02: 17, 18, 19
+  int distance = 90;                 ///< group 03: 90, 91
+  int feed_mode = 94;                ///< group 05: 93, 94, 95
+  int units = 21;                    ///< group 06: 20, 21
+  int compensation = 40;             ///< group 07: 40, 41, 42
+  int length_offset = 49;            ///< group 08: 43, 44, 49
+  int length_number = 0;             ///< H
+  int cycle = 80;                    ///< group 09: 73 ... 89, 80
+  int cycle_return = 98;             ///< group 10: 98, 99
+  int coordinate_system = 54;        ///< group 14; 541 for G54.1
+  int coordinate_number = 0;         ///< P of G54.1
+  int exact_stop = 64;               ///< group 15: 61, 62, 63, 64
+  double feed = 0.0;                 ///< F as programmed (mm or inch per minute, per revolution; 1/min); 0: none yet
+  double spindle_rev_per_min = 0.0;  ///< S, 0 before the first
+  Vector3 position_mm = Vector3::Zero();  ///< in the active work coordinates
+  std::array<bool, axis_count> known = {false, false, false};
+  /// Modal groups whose value depends on the block-skip switch (bit n = group n; bit 0 = F).
+  std::uint32_t uncertain_groups = 0;
+};
+
+/// A program file that a call refers to, found by whoever knows about files.
+struct SourceText {
+  std::string name;  ///< for messages
+  std::string text;
+};
+
+/// Offsets of one tool, mm; what is not given is not known.
+struct ToolOffset {
+  std::optional<double> length_mm;
+  std::optional<double> length_wear_mm;
+  std::optional<double> radius_mm;
+  std::optional<double> radius_wear_mm;
+};
+
+/// Codes that the machine builder bound to programs (parameters 6050 ... 6089).
+struct CodeBindings {
+  std::map<int, std::int64_t> g_macros;       ///< G code in tenths -> program, called like G65
+  std::map<int, std::int64_t> m_macros;       ///< M code -> program, called like G65
+  std::map<int, std::int64_t> m_subprograms;  ///< M code -> program, called like M98
+  std::int64_t tool_program = -1;             ///< T calls it with T in #149; -1: none
+};
+
+/// How a program text is to be read: the controller's settings that change its meaning.
+struct ReaderOptions {
+  bool calculator_decimal_point = true;  ///< parameter 3401#0: X10 is 10 mm (true) or 10 least increments (false)
+  bool absolute_arc_centres = false;     ///< I J K are positions, not distances from the start (not FANUC)
+  double least_increment_mm = 0.001;     ///< of metric input
+  double least_increment_inch = 0.0001;  ///< of inch input
+  double arc_tolerance_mm = 0.01;        ///< largest difference of start and end radius
+  std::size_t max_line_length = 250;     ///< characters
+  std::array<bool, axis_count> unknown_after_tool_change = {true, true, true};
+  std::vector<std::array<double, axis_count>> work_offsets_mm;          ///< G54 ... G59, empty if not known
+  std::map<int, std::array<double, axis_count>> extra_work_offsets_mm;  ///< G54.1 P1 ...
+  std::map<int, ToolOffset> tool_offsets;                               ///< by H and D number
+  char offset_memory = 'C';                                             ///< A, B or C: see SystemVariables
+  std::map<int, double> retained_variables;                             ///< #500 ... #999
+  CodeBindings bindings;
+  std::int64_t program = -1;  ///< O number to play of a file that holds several; -1: the first
+  std::function<std::optional<SourceText>(std::int64_t)> load_program;  ///< programs that the file does not hold
+  std::array<std::int64_t, 2> opaque_programs = {9000, 9999};           ///< if not found: called, but not looked into
+  int subprogram_nesting = 10;
+  std::uint64_t max_steps = 10'000'000;           ///< blocks executed behind the first call or jump
+  std::array<std::optional<bool>, 9> block_skip;  ///< switch on, off, or not known, of / ... /9
+  bool expand_compensation = true;                ///< G41/G42 become plain moves; false: kept as they stand
+  char compensation_start_up = 'A';               ///< type A or B (parameter 5003)
+  double scale_unit = 0.001;                      ///< of P, I, J, K of G51 without a point (parameter 5400#7)
+  double peck_clearance_mm = 0.5;                 ///< of G73 and G83 (parameters 5114, 5115)
+  bool collect_alarms = false;                    ///< go on behind an alarm, and keep all in Program::alarms
+  ModalState power_on;                            ///< state at the first block
+  std::vector<std::uint32_t> probe_lines;  ///< ascending lines behind which the modal state is kept (Program::probed)
+};
+
+/// Something to tell the user about one place of the text.
+struct Finding {
+  std::uint32_t line = 0;
+  std::string message;
+  std::uint32_t column = 0;
+  int alarm = 0;     ///< the control's number, 0: none
+  std::string file;  ///< name of the text, empty: the program's own
+};
+
+/// Where a line of an expanded program comes from.
+struct LineOrigin {
+  std::uint32_t line = 0;  ///< from 1
+  std::uint32_t file = 0;  ///< into Program::files
+};
+
+/// A block's N word or comment inside a region, and the segment before which it stood.
+struct RegionNote {
+  std::uint32_t segment = 0;
+  std::int32_t n_number = -1;        ///< -1: none
+  std::uint32_t comment_offset = 0;  ///< into the text
+  std::uint32_t comment_length = 0;
+};
+
+/// A run of cutting moves between two stops: what the converter may rewrite.
+struct Region {
+  std::uint32_t first_line = 0;  ///< from 1, first line with a cutting move
+  std::uint32_t last_line = 0;   ///< last line with a cutting move
+  std::size_t text_begin = 0;    ///< byte range of these lines, line ends included
+  std::size_t text_end = 0;
+  std::shared_ptr<const Path> path;  ///< zero-length moves left out
+  std::vector<RegionNote> notes;
+  ModalState entry;                ///< before the first line
+  ModalState exit;                 ///< after the last line
+  bool incremental = false;        ///< moves an axis whose position is not known: origin arbitrary, G91
+  bool exact_stop_at_end = false;  ///< the last block carried G09 or stood in G61
+  bool look_ahead_mode = false;    ///< the program switched a look-ahead mode on before it (G05.1 Q1, G08 P1)
+  std::uint32_t blocks = 0;        ///< source blocks with a cutting move
+};
+
+/// A move or a wait outside of the regions, for the clock only.
+struct OtherMove {
+  Segment segment;       ///< axes of unknown position stay where they are
+  double dwell_s = 0.0;  ///< a wait instead of a move when > 0
+};
+
+/// M, S and T words of one block: what the clock may charge for, and which tool is in use.
+struct MachineFunction {
+  std::array<int, 6> m_codes = {};
+  int m_count = 0;
+  std::int64_t tool = -1;             ///< T, -1 if the block has none
+  double spindle_rev_per_min = -1.0;  ///< S, -1 if the block has none
+};
+
+enum class StepKind : std::uint8_t { region, move, function };
+
+/// What the machine does, in order: a region, another move or dwell, or machine functions.
+struct ProgramStep {
+  StepKind kind = StepKind::move;
+  std::uint32_t index = 0;  ///< into Program::regions, other_moves or functions
+  std::uint32_t line = 0;
+};
+
+/// A program read: the text to the letter, its regions, and everything between them.
+struct Program {
+  std::string text;  ///< as handed over, or expanded
+  /// The text holds calls, macro statements or coordinate modes: `text` is the plain program that they come to, and
+  /// line numbers of regions and steps count its lines; `origins` leads back.
+  bool expanded = false;
+  std::vector<LineOrigin> origins;            ///< one per line of `text`; empty if not expanded
+  std::vector<std::string> files;             ///< names; the first is empty and stands for the program's own file
+  std::vector<std::int64_t> program_numbers;  ///< all O numbers in the file
+  std::vector<Finding> alarms;                ///< with ReaderOptions::collect_alarms
+  std::map<int, double> expanded_radii_mm;    ///< D number -> radius, where cutter compensation was expanded
+  std::uint32_t compensated_moves = 0;        ///< cutting moves under G41/G42 that were expanded
+  std::uint32_t kept_compensated_moves = 0;   ///< and those that are kept as they stand
+  std::string line_end = "\n";
+  std::uint32_t line_count = 0;
+  std::uint32_t block_count = 0;     ///< lines with at least one word
+  std::size_t header_offset = 0;     ///< where a header comment may be inserted: behind the O line
+  std::int64_t program_number = -1;  ///< O number, -1 if none
+  std::vector<std::shared_ptr<Region>> regions;
+  std::vector<OtherMove> other_moves;
+  std::vector<MachineFunction> functions;
+  std::vector<ProgramStep> steps;  ///< all of the three in the order in which they happen
+  std::vector<Finding> warnings;
+  ModalState final_state;
+  std::vector<ModalState> probed;  ///< state behind each of ReaderOptions::probe_lines
+};
+
+/// Reads a program text into regions of canonical moves (FANUC milling dialect; see docs/dialect.md for what is read,
+/// passed through and refused). Pure function of its arguments. Throws Error(program) with line and column.
+[[nodiscard]] Program read_program(std::string text, const ReaderOptions& options = {});
+
+}  // namespace shapegcode

@@ -1,0 +1,175 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "shapegcode/filter.hpp"
+#include "shapegcode/mode.hpp"
+
+namespace shapegcode {
+
+/// An input shaper: amplitudes A_k at times t_k, ascending from t_1 = 0, that add up to one (spec 2). The times are
+/// continuous; `to_fir` puts a shaper whose times lie on a sample grid into the filter cascade. Build one with
+/// `make_shaper`, which checks it.
+struct Shaper {
+  std::vector<double> times_s;     ///< t_k in s, strictly ascending from exactly 0
+  std::vector<double> amplitudes;  ///< A_k, one per time, sum 1 within 1e-9; may be negative
+
+  [[nodiscard]] bool operator==(const Shaper&) const = default;
+};
+
+/// The checked Shaper. `times_s` in s and `amplitudes` (no unit), both of the same length >= 1. Throws Error(argument)
+/// on an empty or unequal pair, a value that is not finite, a first time other than 0, times that do not ascend, or a
+/// sum of the amplitudes that differs from 1 by more than 1e-9. Source: paper 002, eq. 4 and 9.
+[[nodiscard]] Shaper make_shaper(std::vector<double> times_s, std::vector<double> amplitudes);
+
+/// Time of the last tap in s: how much longer the shaped command moves than the unshaped one.
+[[nodiscard]] double duration_s(const Shaper& shaper);
+
+/// First moment sum A_k t_k in s: the mean delay of the shaped command.
+[[nodiscard]] double mean_s(const Shaper& shaper);
+
+/// Second central moment sum A_k (t_k - mean)^2 in s^2: the contour cost, dR/R = variance*(v/R)^2/2 on a circle of
+/// radius R at speed v (spec 0). May be negative where amplitudes are.
+[[nodiscard]] double variance_s2(const Shaper& shaper);
+
+/// True if any amplitude is below zero.
+[[nodiscard]] bool has_negative(const Shaper& shaper);
+
+/// sum |A_k|: 1 for a non-negative shaper; the factor by which the shaper may magnify speed and acceleration.
+[[nodiscard]] double abs_sum(const Shaper& shaper);
+
+/// Residual vibration of `mode` after the last tap, relative to the unshaped one:
+/// V = e^{-zeta*omega*t_N} |sum A_k e^{zeta*omega*t_k} e^{j*omega_d*t_k}| (spec 2; paper 002, eq. 8 sets it to zero).
+/// The rounding floor is about 1e-16*(1 + omega*t_N)*sum|A_k|. Throws Error(argument) as `pole` does.
+[[nodiscard]] double residual_ratio(const Shaper& shaper, const Mode& mode);
+
+/// The shaper as a filter on samples `period_s` (s) apart. Exact or not at all: throws Error(design), naming the time,
+/// if a time differs from a multiple of the period by more than 1e-9 of the larger of time and period (rounding the
+/// times would undo the zeros, spec 2), and Error(argument) if the period is not finite and positive.
+[[nodiscard]] Fir to_fir(const Shaper& shaper, double period_s);
+
+/// Smallest distance |z - 1| of a mode's z = e^{s*period} from +1 at which `grid_polynomial` accepts it: below it a
+/// single mode already has sum |A_k| of some 4e4.
+inline constexpr double grid_least_distance_from_one = 0.01;
+
+/// Largest residual ratio that `grid_polynomial` returns; a design whose rounding leaves more is refused.
+inline constexpr double grid_largest_residual = 1e-10;
+
+/// Shortest shaper with taps at whole multiples of `period_s` (s) that cancels every mode exactly there: the polynomial
+/// with the roots z_i = e^{s_i*period} and their conjugates, scaled to sum 1. Two periods per mode; one for a mode
+/// whose z is real (half a period of it is a multiple of the grid); none for one that aliases onto an earlier one. A
+/// mode above the grid's Nyquist frequency is fine. Amplitudes may be negative and large (46/131 Hz, zeta .02: sum
+/// |A_k| is 1 at 5 ms, 248 at 1 ms): look at `abs_sum` before use.
+///
+/// Throws Error(argument) if `modes` is empty, as `pole` does, or if the period is not finite and positive;
+/// Error(design) if a z_i is closer to +1 than `grid_least_distance_from_one`, or if rounding leaves more than
+/// `grid_largest_residual`. Source: this project (spec 2, grid-exact shapers).
+[[nodiscard]] Shaper grid_polynomial(std::span<const Mode> modes, double period_s);
+
+// One declaration here and one definition in families.cpp per family; those with a tolerated residual are in
+// extra_insensitive.hpp.
+
+/// Zero-vibration shaper of one mode: taps at 0 and half the damped period, amplitudes 1/(1+K) and K/(1+K) with
+/// K = exp(-zeta*pi/sqrt(1-zeta^2)). Throws Error(argument) as `pole` does. Source: paper 002, eq. 1-2 (Smith 1958).
+[[nodiscard]] Shaper zv(const Mode& mode);
+
+/// Most zeros that `repeated_zv` places at a mode.
+inline constexpr int most_repeated_zeros = 20;
+
+/// The ZV shaper in series with itself: `zeros` zeros at the mode, so that V and its first `zeros`-1 derivatives with
+/// respect to the frequency vanish there; 1 is ZV, 2 ZVD, 3 ZVDD. `zeros`+1 non-negative taps, half a damped period
+/// apart. Throws Error(argument) as `pole` does, or if `zeros` is not from 1 to `most_repeated_zeros`. Source: Singer
+/// and Seering 1990.
+[[nodiscard]] Shaper repeated_zv(const Mode& mode, int zeros);
+
+/// Modified ZV: three non-negative taps 3/8 of the damped period apart, amplitudes (1 - 1/sqrt 2, (sqrt 2 - 1) K,
+/// (1 - 1/sqrt 2) K^2) over their sum, K = exp(-zeta*3/4*pi/sqrt(1-zeta^2)). It cancels the mode and also the pole of
+/// the same decay at 5/3 of its damped frequency: half as long again as ZV, and (undamped) .62 of ZV's slope of V at
+/// the mode. Throws Error(argument) as `pole` does. Source: the open printer firmware Klipper, "mzv".
+[[nodiscard]] Shaper mzv(const Mode& mode);
+
+/// The second pole that `mzv` cancels, as a mode: the same decay rate, 5/3 of the damped frequency. Throws
+/// Error(argument) as `pole` does.
+[[nodiscard]] Mode mzv_second_zero(const Mode& mode);
+
+/// Negative zero-vibration shaper of unity magnitude: amplitudes exactly 1, -1, 1; without damping at 0, 1/6 and 1/3 of
+/// the period. The two times solve 1 - e^{-s t2} + e^{-s t3} = 0 to rounding, damped or not, not by a fitted formula.
+/// Throws Error(argument) as `pole` does, Error(design) where the solution ends at high damping. Source of the family:
+/// Singhose, Singer and Seering 1994; of the solution: this project.
+[[nodiscard]] Shaper negative_zv(const Mode& mode);
+
+/// The two shapers in series: cancels what either cancels and lasts as long as both together. Taps whose times agree
+/// within 1e-12 of the duration are merged. Throws Error(argument) if either is not a valid shaper. Source: paper 002,
+/// eq. 3.
+[[nodiscard]] Shaper convolve(const Shaper& first, const Shaper& second);
+
+/// Convolved ZV of one or more modes, the conventional multi-mode shaper: 2^n taps. Throws Error(argument) if `modes`
+/// is empty, and as `pole` does. Source: paper 002, section 2.
+[[nodiscard]] Shaper convolved_zv(std::span<const Mode> modes);
+
+/// Most humps of `extra_insensitive`.
+inline constexpr int most_humps = 3;
+
+/// An extra-insensitive shaper and where its residual vanishes and peaks. The frequencies are natural frequencies of
+/// modes with the damping ratio of the design.
+struct ExtraInsensitive {
+  Shaper shaper;
+  std::vector<double> zeros_hz;  ///< ascending, one more than humps: V = 0
+  std::vector<double> humps_hz;  ///< ascending, between the zeros: V = vibration_limit, its largest there
+};
+
+/// Extra-insensitive shaper of one mode: non-negative taps, `humps`+2 of them, whose residual between its outermost
+/// zeros rises to exactly `vibration_limit` (above 0, below 1) at each of `humps` (1 to `most_humps`) maxima. With an
+/// odd number of humps the middle one lies at the mode, with two the middle zero does.
+///
+/// Without damping it is the Dolph-Chebyshev window over half periods, in closed form; with damping the conditions
+/// themselves (sum, zeros, height and slope at every hump) are solved for amplitudes, times and frequencies by Newton's
+/// method, followed from zero damping: exact to rounding, not a fit. Throws Error(argument) as `pole` does or on a
+/// value outside its range, Error(design) where no such shaper with non-negative taps is reached: with a limit of .05
+/// the solution ends at a damping ratio of some .69, .45 and .32 for one, two and three humps.
+///
+/// Sources: Singhose, Seering and Singer 1994 (EI), Singhose, Porter, Tuttle and Singer 1997 (several humps); the
+/// closed form and the damped solution: this project.
+[[nodiscard]] ExtraInsensitive extra_insensitive(const Mode& mode, double vibration_limit, int humps);
+
+/// Residual ratio of modes with damping ratio `damping_ratio` at each of `frequencies_hz` (natural frequencies), in
+/// their order. Throws Error(argument) as `pole` does. Source: spec 2.
+[[nodiscard]] std::vector<double> sensitivity_curve(const Shaper& shaper, double damping_ratio,
+                                                    std::span<const double> frequencies_hz);
+
+/// The largest residual over a band of frequencies.
+struct WorstResidual {
+  double residual_ratio;  ///< V at `frequency_hz`
+  double frequency_hz;    ///< where in the band it was found
+  double upper_bound;     ///< no frequency of the band has a larger V (up to rounding)
+};
+
+/// Largest residual ratio of a mode with the damping of `mode` and a natural frequency from `lowest_hz` to
+/// `highest_hz`, found and proven: the band is halved until a bound on the derivatives shows that no part of it exceeds
+/// what was found by more than 1e-6 of it, or by 1e-12. Throws Error(argument) as `pole` does or if the band is not
+/// ascending (equal ends are fine), Error(design) if the proof needs more than a million parts, as a band of many
+/// thousand periods of the shaper would. Source: this project.
+[[nodiscard]] WorstResidual worst_residual(const Shaper& shaper, const Mode& mode, double lowest_hz, double highest_hz);
+
+/// A band of frequencies.
+struct FrequencyBand {
+  double lowest_hz;
+  double highest_hz;
+};
+
+/// How far upwards `insensitive_band` looks, in frequencies of the mode.
+inline constexpr double insensitivity_reach = 10.0;
+
+/// The band around `mode` in which the residual stays at or below `vibration_limit` (above 0, below 1): its ends are
+/// where V leaves the limit for the first time, found by steps that a bound on the derivatives proves safe. Both ends
+/// are the mode's frequency if V exceeds the limit there; the upper end is at most `insensitivity_reach` times it. The
+/// limit is forgiven 1e-9 of itself, so that a hump that touches it does not end the band. Throws Error(argument) as
+/// `pole` does or on a limit outside its range. Source: this project.
+[[nodiscard]] FrequencyBand insensitive_band(const Shaper& shaper, const Mode& mode, double vibration_limit);
+
+/// Insensitivity: width of `insensitive_band` over the mode's frequency (no unit); ZV has .064 and EI .399 at 5 %
+/// without damping. Throws as `insensitive_band` does. Source: Singer and Seering 1990.
+[[nodiscard]] double insensitivity(const Shaper& shaper, const Mode& mode, double vibration_limit);
+
+}  // namespace shapegcode

@@ -1,0 +1,107 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "shapegcode/control.hpp"
+#include "shapegcode/program.hpp"
+
+namespace shapegcode {
+
+/// Where the time goes. The parts add up to the whole.
+struct TimeParts {
+  double cutting_s = 0.0;       ///< cutting blocks at their feed (override and axis limits included)
+  double rapid_s = 0.0;         ///< rapids at their rate
+  double in_position_s = 0.0;   ///< waits behind rapids and exact stops
+  double dwell_s = 0.0;         ///< G04, dwells of cycles
+  double acceleration_s = 0.0;  ///< what acceleration adds to cutting blocks and rapids; in look-ahead also what the
+                                ///< limits at corners and on arcs add
+  double tool_change_s = 0.0;   ///< M06
+  double function_s = 0.0;      ///< other M codes
+
+  [[nodiscard]] double total_s() const noexcept {
+    return cutting_s + rapid_s + in_position_s + dwell_s + acceleration_s + tool_change_s + function_s;
+  }
+  TimeParts& operator+=(const TimeParts& other) noexcept;
+};
+
+/// One region of Program::regions.
+struct RegionTime {
+  std::uint32_t first_line = 0;
+  std::uint32_t last_line = 0;
+  std::int64_t tool = -1;  ///< in use; -1: not known
+  double start_s = 0.0;
+  double duration_s = 0.0;  ///< cutting_s + acceleration_s + in_position_s
+  double cutting_s = 0.0;
+  double acceleration_s = 0.0;
+  double in_position_s = 0.0;
+  double length_mm = 0.0;
+};
+
+/// Everything between two tool changes, all uses of a tool together. A T word selects, M06 changes; a program without
+/// any M06 changes tools by T.
+struct ToolTime {
+  std::int64_t tool = -1;        ///< -1: before the first tool is known
+  std::uint32_t first_line = 0;  ///< of its first use
+  TimeParts parts;
+};
+
+enum class BlockKind : std::uint8_t { cutting, rapid, dwell, tool_change, function };
+
+/// One cutting block, rapid, dwell or block with M codes.
+struct BlockTime {
+  std::uint32_t line = 0;
+  BlockKind kind = BlockKind::cutting;
+  double start_s = 0.0;     ///< since the start of the program
+  double duration_s = 0.0;  ///< until its successor starts; the last block of a run has the run's acceleration and wait
+  double feed_mm_per_s = 0.0;  ///< highest speed along the path that it reaches; 0 for what does not move
+};
+
+/// How long a program takes, and where.
+struct CycleTime {
+  TimeParts parts;
+  double outside_regions_s = 0.0;  ///< whole time without cutting_s and acceleration_s of the regions
+  double cutting_length_mm = 0.0;
+  double rapid_length_mm = 0.0;
+  std::vector<RegionTime> regions;
+  std::vector<ToolTime> tools;    ///< in the order of first use
+  std::vector<BlockTime> blocks;  ///< only if asked for
+};
+
+/// Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004, spec section 0), by the
+/// planner in look-ahead. Regions and cutting moves outside of them are runs from rest to rest; cutting moves outside
+/// that follow each other without anything between are one run. Waits for in-position come behind rapids and behind
+/// runs that end with an exact stop (G09, G61). Moves of an axis whose position is not known count what is known of
+/// them. Throws Error(argument) on a model that `check` refuses.
+[[nodiscard]] CycleTime time_program(const Program& program, const ControllerModel& model, bool per_block = false);
+
+/// The same question answered by giving every set-point.
+struct InterpolatedTime {
+  double total_s = 0.0;
+  double cutting_s = 0.0;  ///< runs from rest to rest, acceleration included
+  double rapid_s = 0.0;    ///< acceleration included
+  double in_position_s = 0.0;
+  double dwell_s = 0.0;
+  double tool_change_s = 0.0;
+  double function_s = 0.0;
+  std::uint64_t set_points = 0;
+  std::vector<double> region_s;  ///< per region, wait included
+};
+
+/// Full interpolation of a program, sample by sample: blocks through the acceleration filters, or look-ahead profiles,
+/// until the set-points rest; rapids; the servo loop until the axes are in position. Shares no closed form with
+/// `time_program`. Throws Error(argument) on a model that `check` refuses.
+[[nodiscard]] InterpolatedTime interpolate_program(const Program& program, const ControllerModel& model);
+
+/// What acceleration after interpolation and servo lag make of a circle.
+struct CircleFigures {
+  double command_error_mm = 0.0;  ///< programmed radius minus radius of the set-points behind the acceleration filters
+  double radial_error_mm = 0.0;   ///< programmed radius minus radius of the axes behind the servo loop
+};
+
+/// Runs circles in XY at a constant feed until the transient is gone and measures the mean radius over whole turns. To
+/// second order the result is (sum of the filters' variances + (1 - a^2) / K^2) v^2 / (2 r): the radial error formulas
+/// of the controller manual (fanuc.md B1). Throws Error(argument) on a radius or feed <= 0.
+[[nodiscard]] CircleFigures simulate_circle(double radius_mm, double feed_mm_per_s, const ControllerModel& model);
+
+}  // namespace shapegcode

@@ -1,0 +1,189 @@
+#include "shapegcode/command.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "shapegcode/motion.hpp"
+
+namespace shapegcode {
+namespace {
+
+constexpr int rounds = 9;
+constexpr int raising_rounds = 6;  // behind them speeds are only lowered
+constexpr double aim = 0.97;       // of the tolerance, for the next round
+constexpr double enough = 0.88;    // of the tolerance: what is used so far is not raised
+constexpr double largest_raise = 1.25;
+// A corner that would have to be passed more slowly than this, or than this share of its first speed, is a stop.
+constexpr double creep_mm_per_s = 0.5;
+constexpr double creep_share = 0.02;
+// Curves and lines are never slowed below this share of their speed: what then still deviates is not the feed's doing.
+constexpr double slowest_share = 0.05;
+constexpr float none = std::numeric_limits<float>::infinity();
+
+// Speed at which the next round may pass a place that was passed at `speed` with `deviation`. Deviation grows with the
+// square of the speed on curves, and at least with the speed at corners.
+double next_speed(double speed, double deviation, double tolerance, bool curve) noexcept {
+  const double share = aim * tolerance / std::max(deviation, 1e-3 * tolerance);
+  return speed * (curve ? std::sqrt(share) : share);
+}
+
+class FeedSearch {
+ public:
+  FeedSearch(std::shared_ptr<const Path> path, const MotionLimits& limits, const RunFilter& filter,
+             std::size_t steps_per_half, double tolerance_mm, double least_feed_mm_per_s)
+      : path_(std::move(path)),
+        limits_(limits),
+        filter_(filter),
+        steps_per_half_(steps_per_half),
+        tolerance_(tolerance_mm),
+        least_feed_(least_feed_mm_per_s),
+        caps_{std::vector<float>(path_->size(), none), std::vector<float>(path_->size(), none)} {}
+
+  PlannedRun run() {
+    PlannedRun best;
+    PlannedRun last;
+    for (int round = 0; round < rounds; ++round) {
+      last = measured();
+      const bool within = last.largest_deviation_mm <= tolerance_;
+      if (within && (!best.profile || last.profile->duration_s() < best.profile->duration_s())) {
+        best = last;
+      }
+      bool changed = adjust(round < raising_rounds);
+      if (!stops_.empty()) {
+        last.stops = std::move(stops_);
+        return last;
+      }
+      if (!within && (!changed || round >= raising_rounds) && limits_.law == AccelerationLaw::constant_time) {
+        changed = slow_lines() || changed;
+      }
+      if (!changed || (within && round >= raising_rounds)) {
+        break;
+      }
+    }
+    if (best.profile) {
+      return best;
+    }
+    // Corners that do not answer to a lower speed: what bends them is the change of speed around them.
+    for (std::size_t i = 1; i < path_->size(); ++i) {
+      if (caps_.at_junction[i] < none && deviation_.at_junction[i] > tolerance_ &&
+          junction_change(*path_, i) >= corner_change) {
+        last.stops.push_back(i);
+      }
+    }
+    return last;
+  }
+
+ private:
+  PlannedRun measured() {
+    PlannedRun plan{path_, std::make_shared<const SpeedProfile>(plan_speed(*path_, limits_, &caps_)), 0.0, {}};
+    deviation_.at_junction.assign(path_->size(), 0.0F);
+    deviation_.on_segment.assign(path_->size(), -1.0F);
+    deviation_.near_corner.assign(path_->size(), 0.0F);
+    RunShaper shaper(path_, plan.profile, filter_, run_limits(limits_), steps_per_half_, &deviation_);
+    Vector3 position;
+    for (std::size_t row = 0; row < 2 * static_cast<std::size_t>(shaper.periods()) + 1; ++row) {
+      shaper.next(position);
+    }
+    plan.largest_deviation_mm = std::max(
+        {0.0F, *std::ranges::max_element(deviation_.on_segment), *std::ranges::max_element(deviation_.near_corner)});
+    return plan;
+  }
+
+  // New caps; false if none changed.
+  bool adjust(bool raise) {
+    bool changed = false;
+    const auto adjust_one = [&](float& cap, double speed, double deviation, bool curve, double least) {
+      const bool capped = cap < none;
+      if (deviation <= tolerance_ && !(capped && raise && deviation < enough * tolerance_)) {
+        return;
+      }
+      double next = next_speed(speed, deviation, tolerance_, curve);
+      if (deviation <= tolerance_) {
+        next = std::min(next, largest_raise * speed);
+      } else if (next < least) {
+        next = least;
+        if (speed <= least) {
+          return;
+        }
+      }
+      cap = static_cast<float>(next);
+      changed = true;
+    };
+    for (std::size_t i = 0; i < path_->size(); ++i) {
+      const Segment& segment = (*path_)[i];
+      const double speed = std::min(static_cast<double>(caps_.on_segment[i]), segment_speed_limit(segment, limits_));
+      if (segment.kind == SegmentKind::arc) {
+        const float clear = deviation_.on_segment[i];
+        adjust_one(caps_.on_segment[i], speed, clear >= 0.0F ? clear : deviation_.near_corner[i], true,
+                   slowest(segment_speed_limit(segment, limits_)));
+      }
+      if (i == 0) {
+        continue;
+      }
+      const Segment& before = (*path_)[i - 1];
+      const double change = junction_change(*path_, i);
+      if (change < 1e-6) {
+        continue;  // an arc that begins or ends tangentially is slowed as a whole
+      }
+      const double first = std::min({corner_speed_limit(before, segment, limits_),
+                                     segment_speed_limit(segment, limits_), segment_speed_limit(before, limits_)});
+      const double passed = std::min(first, static_cast<double>(caps_.at_junction[i]));
+      const bool is_curve = change < corner_change;
+      adjust_one(caps_.at_junction[i], passed, deviation_.at_junction[i], is_curve, is_curve ? slowest(first) : 0.0);
+      if (caps_.at_junction[i] < std::max(creep_mm_per_s, creep_share * first)) {
+        stops_.push_back(i);
+      }
+    }
+    return changed;
+  }
+
+  [[nodiscard]] double slowest(double speed) const noexcept {
+    return std::min(speed, std::max(least_feed_, slowest_share * speed));
+  }
+
+  // Where neither arcs nor corners are to blame it is a ramp on a line across the axes, which bends the response of
+  // axes with different modes; a ramp of constant time is as steep as the feed is high.
+  bool slow_lines() {
+    bool changed = false;
+    for (std::size_t i = 0; i < path_->size(); ++i) {
+      const Segment& segment = (*path_)[i];
+      const auto deviation = static_cast<double>(deviation_.on_segment[i]);
+      if (segment.kind == SegmentKind::arc || deviation <= tolerance_) {
+        continue;
+      }
+      const double first = segment_speed_limit(segment, limits_);
+      const double speed = std::min(static_cast<double>(caps_.on_segment[i]), first);
+      const double least = slowest(first);
+      if (speed > least) {
+        caps_.on_segment[i] = static_cast<float>(std::max(least, next_speed(speed, deviation, tolerance_, false)));
+        changed = true;
+      }
+    }
+    return changed;
+  }
+
+  std::shared_ptr<const Path> path_;
+  const MotionLimits& limits_;
+  const RunFilter& filter_;
+  std::size_t steps_per_half_;
+  double tolerance_;
+  double least_feed_;
+  SpeedCaps caps_;
+  RunDeviation deviation_;
+  std::vector<std::size_t> stops_;
+};
+
+}  // namespace
+
+RunLimits run_limits(const MotionLimits& limits) {
+  return {limits.max_feed_mm_per_s, limits.max_acceleration_mm_per_s2};
+}
+
+PlannedRun plan_within_tolerance(std::shared_ptr<const Path> path, const MotionLimits& limits, const RunFilter& filter,
+                                 std::size_t steps_per_half, double tolerance_mm, double least_feed_mm_per_s) {
+  return FeedSearch(std::move(path), limits, filter, steps_per_half, tolerance_mm, least_feed_mm_per_s).run();
+}
+
+}  // namespace shapegcode

@@ -1,0 +1,186 @@
+#include "shapegcode/command.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "shapegcode/error.hpp"
+#include "shapegcode/motion.hpp"
+
+namespace shapegcode {
+namespace {
+
+std::shared_ptr<const Path> sub_path(const std::shared_ptr<const Path>& path, std::size_t first, std::size_t last) {
+  if (first == 0 && last == path->size()) {
+    return path;
+  }
+  const std::vector<Segment>& segments = path->segments();
+  return std::make_shared<const Path>(std::vector<Segment>(segments.begin() + static_cast<std::ptrdiff_t>(first),
+                                                           segments.begin() + static_cast<std::ptrdiff_t>(last)));
+}
+
+// What the search for the highest feed takes over is taken out.
+MotionLimits without_tolerance(MotionLimits limits) {
+  limits.contour_tolerance_mm = MotionLimits::none;
+  limits.filter_variance_s2 = 0.0;
+  limits.filter_mean_deviation_s = 0.0;
+  return limits;
+}
+
+}  // namespace
+
+RegionShaper::RegionShaper(std::shared_ptr<const Path> path, const Fir& shaper,
+                           std::span<const std::uint32_t> marked_segments, ShapingOptions options)
+    : path_(std::move(path)),
+      options_(std::move(options)),
+      filter_(options_.axis_shapers.empty() ? std::span<const Fir>(&shaper, 1) : options_.axis_shapers, options_.target,
+              options_.modes, options_.block_period_s, options_.contour_smoothness, options_.following,
+              options_.mode_tables),
+      marks_(marked_segments.begin(), marked_segments.end()) {
+  const double ticks = options_.block_period_s / options_.interpolation_period_s;
+  if (!(ticks >= 1.0 - 1e-9) || !(std::abs(ticks - std::round(ticks)) <= 1e-6)) {
+    throw Error(ErrorKind::argument, "block period " + std::to_string(options_.block_period_s) +
+                                         " s is not a whole multiple of the interpolation period " +
+                                         std::to_string(options_.interpolation_period_s) + " s");
+  }
+  // The middle of an odd number of ticks lies between two of them.
+  const auto whole = static_cast<std::size_t>(std::lround(ticks));
+  steps_per_half_ = whole % 2 == 0 ? whole / 2 : whole;
+  rest_periods_ = static_cast<std::uint32_t>(std::ceil(options_.rest_at_stop_s / options_.block_period_s - 1e-9));
+  const MotionLimits& limits =
+      options_.target == ContourTarget::none ? options_.limits : without_tolerance(options_.limits);
+  std::vector<std::size_t> borders =
+      forced_stops(path_->segments(), options_.plunge_axis_angle_rad, options_.plunge_corner_angle_rad, limits);
+  borders.push_back(path_->size());
+  std::size_t first = 0;
+  for (const std::size_t border : borders) {
+    pieces_.push_back({first, border});
+    first = border;
+  }
+  std::ranges::reverse(pieces_);
+}
+
+// Plans the next run and starts it; false if there is none.
+bool RegionShaper::begin_run() {
+  if (pieces_.empty()) {
+    return false;
+  }
+  PlannedRun plan;
+  for (;;) {
+    now_ = pieces_.back();
+    pieces_.pop_back();
+    const auto part = sub_path(path_, now_.first, now_.last);
+    if (options_.target == ContourTarget::none) {
+      plan = {part, std::make_shared<const SpeedProfile>(plan_speed(*part, options_.limits)), 0.0, {}};
+      break;
+    }
+    plan = plan_within_tolerance(part, without_tolerance(options_.limits), filter_, steps_per_half_,
+                                 options_.limits.contour_tolerance_mm, options_.least_feed_mm_per_s);
+    if (plan.stops.empty()) {
+      break;
+    }
+    stops_ += static_cast<std::uint32_t>(plan.stops.size());
+    std::size_t last = now_.last;
+    for (std::size_t i = plan.stops.size(); i-- > 0;) {
+      pieces_.push_back({now_.first + plan.stops[i], last});
+      last = now_.first + plan.stops[i];
+    }
+    pieces_.push_back({now_.first, last});
+  }
+  largest_deviation_mm_ = std::max(largest_deviation_mm_, plan.largest_deviation_mm);
+  run_ = std::make_unique<RunShaper>(plan.path, plan.profile, filter_, run_limits(options_.limits), steps_per_half_);
+  given_ = 0;
+  run_->next(at_);
+  note_marks(plan);
+  return true;
+}
+
+void RegionShaper::note_marks(const PlannedRun& run) {
+  const double delay_s = 0.5 * run.profile->jerk_time_s() + filter_.mean_delay_s;
+  std::size_t cursor = 0;
+  while (segment_periods_.size() < marks_.size() && marks_[segment_periods_.size()] < now_.last) {
+    const std::size_t local = marks_[segment_periods_.size()] - now_.first;
+    const double time = local == 0 ? 0.0 : run.profile->time_s(run.path->distance_mm(local), cursor) + delay_s;
+    const auto period = static_cast<std::uint32_t>(std::lround(time / options_.block_period_s));
+    segment_periods_.push_back(period_ + std::min(period, run_->periods()));
+  }
+}
+
+bool RegionShaper::next(ShapedCommand& piece, std::uint32_t periods) {
+  const std::uint32_t first = period_;
+  std::vector<Vector3> grid;
+  std::vector<Vector3> middle;
+  std::vector<std::int8_t> normals;
+  std::vector<std::uint32_t> run_ends;
+  const auto add = [&](const Vector3& half, const Vector3& end, std::int8_t normal) {
+    if (grid.empty()) {
+      grid.push_back(at_);
+    }
+    middle.push_back(half);
+    grid.push_back(end);
+    normals.push_back(normal);
+    at_ = end;
+    ++period_;
+  };
+  while (period_ - first < periods) {
+    if (resting_ > 0) {
+      add(at_, at_, std::int8_t{-1});
+      if (--resting_ == 0) {
+        run_ends.push_back(period_ - first);
+      }
+      continue;
+    }
+    if (!run_ && !begin_run()) {
+      break;
+    }
+    if (given_ < run_->periods()) {
+      const std::int8_t normal = run_->arc_normal();
+      Vector3 half;
+      Vector3 end;
+      run_->next(half);
+      run_->next(end);
+      add(half, end, normal);
+      ++given_;
+    }
+    if (given_ == run_->periods()) {
+      run_.reset();
+      resting_ = pieces_.empty() ? 0 : rest_periods_;
+      if (resting_ == 0) {
+        run_ends.push_back(period_ - first);
+      }
+    }
+  }
+  const bool over = !run_ && resting_ == 0 && pieces_.empty();
+  if (over) {
+    segment_periods_.resize(marks_.size(), period_);
+  }
+  if (grid.empty() && (first > 0 || !over)) {
+    return false;
+  }
+  piece.first_period = first;
+  piece.grid_mm.resize(static_cast<Eigen::Index>(std::max<std::size_t>(grid.size(), 1)), axis_count);
+  piece.middle_mm.resize(static_cast<Eigen::Index>(middle.size()), axis_count);
+  piece.grid_mm.row(0) = at_;
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    piece.grid_mm.row(static_cast<Eigen::Index>(i)) = grid[i];
+  }
+  for (std::size_t i = 0; i < middle.size(); ++i) {
+    piece.middle_mm.row(static_cast<Eigen::Index>(i)) = middle[i];
+  }
+  piece.arc_normal = std::move(normals);
+  piece.run_ends = std::move(run_ends);
+  piece.segment_periods = segment_periods_;
+  return true;
+}
+
+ShapedCommand shape_path(const std::shared_ptr<const Path>& path, const Fir& shaper,
+                         std::span<const std::uint32_t> marked_segments, const ShapingOptions& options) {
+  RegionShaper region(path, shaper, marked_segments, options);
+  ShapedCommand command;
+  static_cast<void>(region.next(command, std::numeric_limits<std::uint32_t>::max()));
+  return command;
+}
+
+}  // namespace shapegcode

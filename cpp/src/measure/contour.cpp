@@ -1,0 +1,295 @@
+#include "shapegcode/measure/contour.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+namespace {
+
+constexpr double two_pi = 2.0 * std::numbers::pi;
+constexpr double window_margin_mm = 1e-3;
+constexpr double longest_retreat_mm = 10.0;
+constexpr double longest_turn_mm = 2.0;
+// Two feet are equally near if their squared distances differ by no more than rounding leaves.
+constexpr double tie_relative = 1e-9;
+constexpr double tie_absolute_mm2 = 1e-18;
+constexpr double retreat_tie_relative = 1e-6;
+constexpr double retreat_tie_absolute_mm2 = 1e-16;
+// A component of the deviation or the travel below this share of the whole is rounding.
+constexpr double negligible_share = 1e-6;
+constexpr std::uint32_t growing_until_lost = 8;
+constexpr double widest_local_window_rad = 1.0;
+
+}  // namespace
+
+void DeviationStats::add(double deviation_mm) noexcept {
+  max_abs_mm = std::max(max_abs_mm, std::abs(deviation_mm));
+  most_positive_mm = std::max(most_positive_mm, deviation_mm);
+  most_negative_mm = std::min(most_negative_mm, deviation_mm);
+  sum_of_squares_mm2 += deviation_mm * deviation_mm;
+  ++count;
+}
+
+void DeviationStats::include_missed(double distance_mm) noexcept { max_abs_mm = std::max(max_abs_mm, distance_mm); }
+
+void DeviationStats::include_extremes(const DeviationStats& others) noexcept {
+  max_abs_mm = std::max(max_abs_mm, others.max_abs_mm);
+  most_positive_mm = std::max(most_positive_mm, others.most_positive_mm);
+  most_negative_mm = std::min(most_negative_mm, others.most_negative_mm);
+}
+
+double DeviationStats::rms_mm() const noexcept {
+  return count == 0 ? 0.0 : std::sqrt(sum_of_squares_mm2 / static_cast<double>(count));
+}
+
+std::shared_ptr<const ContourTracker::Geometry> ContourTracker::geometry_of(const Path& path) {
+  auto geometry = std::make_shared<Geometry>();
+  auto& [pieces, arc_of, arcs] = *geometry;
+  if (path.size() == 0) throw Error(ErrorKind::argument, "contour error needs a path with at least one segment");
+  pieces.reserve(path.size());
+  arc_of.reserve(path.size());
+  Vector3 direction = Vector3::Zero();
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const Segment& segment = path[i];
+    if (segment.length_mm > 0.0) direction = tangent_at(segment, 0.0);
+    pieces.push_back({segment.start_mm, direction, segment.length_mm, path.distance_mm(i)});
+    arc_of.push_back(-1);
+    if (segment.kind != SegmentKind::arc || !(segment.length_mm > 0.0)) continue;
+    Arc arc;
+    arc.segment = segment;
+    arc.n = segment.normal;
+    arc.a = (arc.n + 1) % 3;
+    arc.b = (arc.n + 2) % 3;
+    arc.cosine = std::cos(segment.start_angle_rad);
+    arc.sine = std::sin(segment.start_angle_rad);
+    arc.sense = segment.sweep_rad < 0.0 ? -1.0 : 1.0;
+    arc.turn = std::abs(segment.sweep_rad);
+    arc.radius_rate = (segment.end_radius_mm - segment.start_radius_mm) / arc.turn;
+    arc.pitch = (segment.end_mm[arc.n] - segment.start_mm[arc.n]) / arc.turn;
+    // Radii that differ by rounding only are one circle.
+    if (std::abs(arc.radius_rate) * arc.turn < 1e-12 * segment.start_radius_mm) arc.radius_rate = 0.0;
+    arc.start_tangent = tangent_at(segment, 0.0);
+    arc.end_tangent = tangent_at(segment, segment.length_mm);
+    direction = arc.end_tangent;
+    arc_of.back() = static_cast<std::int32_t>(arcs.size());
+    arcs.push_back(arc);
+  }
+  // Pieces without length at the start take the direction that follows.
+  for (std::size_t i = pieces.size() - 1; i-- > 0;) {
+    if (pieces[i].direction.isZero(0.0)) pieces[i].direction = pieces[i + 1].direction;
+  }
+  return geometry;
+}
+
+ContourTracker::ContourTracker(const Path& path) : geometry_(geometry_of(path)) {
+  last_ = geometry_->pieces.front().start;
+}
+
+Vector3 ContourTracker::start_tangent(std::size_t piece) const noexcept { return geometry_->pieces[piece].direction; }
+
+Vector3 ContourTracker::end_tangent(std::size_t piece) const noexcept {
+  const std::int32_t arc = geometry_->arc_of[piece];
+  return arc < 0 ? geometry_->pieces[piece].direction : geometry_->arcs[static_cast<std::size_t>(arc)].end_tangent;
+}
+
+inline ContourTracker::Foot ContourTracker::foot_on(std::size_t piece, const Vector3& p,
+                                                    const Window& window) const noexcept {
+  if (geometry_->arc_of[piece] >= 0) return foot_on_arc(piece, p, window);
+  const Piece& line = geometry_->pieces[piece];
+  Foot foot;
+  const Vector3 from_start = p - line.start;
+  const double along = std::clamp(from_start.dot(line.direction), 0.0, line.length);
+  foot.offset = from_start - along * line.direction;
+  foot.distance2 = foot.offset.squaredNorm();
+  foot.along = along;
+  return foot;
+}
+
+ContourTracker::Foot ContourTracker::arc_point_foot(const Arc& arc, double u, const Vector3& p) noexcept {
+  const double c = std::cos(u);
+  const double s = std::sin(u) * arc.sense;
+  const double ea = arc.cosine * c - arc.sine * s;
+  const double eb = arc.sine * c + arc.cosine * s;
+  const double radius = arc.segment.start_radius_mm + arc.radius_rate * u;
+  Foot foot;
+  foot.offset[arc.a] = p[arc.a] - (arc.segment.centre_mm[arc.a] + radius * ea);
+  foot.offset[arc.b] = p[arc.b] - (arc.segment.centre_mm[arc.b] + radius * eb);
+  foot.offset[arc.n] = p[arc.n] - (arc.segment.start_mm[arc.n] + arc.pitch * u);
+  foot.tangent[arc.a] = -arc.sense * radius * eb + arc.radius_rate * ea;
+  foot.tangent[arc.b] = arc.sense * radius * ea + arc.radius_rate * eb;
+  foot.tangent[arc.n] = arc.pitch;
+  foot.distance2 = foot.offset.squaredNorm();
+  return foot;
+}
+
+// Angles `u` count from the arc's start in the sense of its turning, without wrapping.
+ContourTracker::Foot ContourTracker::foot_on_arc(std::size_t piece, const Vector3& p,
+                                                 const Window& window) const noexcept {
+  const Piece& base = geometry_->pieces[piece];
+  const Arc& arc = geometry_->arcs[static_cast<std::size_t>(geometry_->arc_of[piece])];
+  const double rad_per_mm = arc.turn / base.length;
+  const double first = std::clamp((window.begin - base.s) * rad_per_mm, 0.0, arc.turn);
+  const double last = std::clamp((window.end - base.s) * rad_per_mm, first, arc.turn);
+  const double here = std::clamp((s_ - base.s) * rad_per_mm, first, last);
+
+  const double x = p[arc.a] - arc.segment.centre_mm[arc.a];
+  const double y = p[arc.b] - arc.segment.centre_mm[arc.b];
+  const double angle = std::atan2(arc.sense * (y * arc.cosine - x * arc.sine), x * arc.cosine + y * arc.sine);
+  const double nearest_turn = angle + two_pi * std::floor((here - angle) / two_pi + 0.5);
+  double u = nearest_turn;
+  if (u < first) {
+    u = std::abs(u + two_pi - last) < first - u ? last : first;
+  } else if (u > last) {
+    u = std::abs(u - two_pi - first) < u - last ? first : last;
+  }
+
+  const double rho2 = x * x + y * y;
+  const bool flat_circle = arc.pitch == 0.0 && arc.radius_rate == 0.0;
+  if (flat_circle && u == nearest_turn && rho2 > 0.0) {
+    const double rho = std::sqrt(rho2);
+    const double outward = (rho - arc.segment.start_radius_mm) / rho;
+    Foot foot;
+    foot.offset[arc.a] = outward * x;
+    foot.offset[arc.b] = outward * y;
+    foot.offset[arc.n] = p[arc.n] - arc.segment.start_mm[arc.n];
+    foot.tangent[arc.a] = -arc.sense * y;
+    foot.tangent[arc.b] = arc.sense * x;
+    foot.distance2 = foot.offset.squaredNorm();
+    foot.along = std::min(u / rad_per_mm, base.length);
+    return foot;
+  }
+  if (!flat_circle) {
+    // Newton on the derivative of half the squared distance, kept within the window.
+    const double rho = std::sqrt(rho2);
+    for (int iteration = 0; iteration < 8; ++iteration) {
+      const double radius = arc.segment.start_radius_mm + arc.radius_rate * u;
+      const double c = rho * std::cos(u - angle);
+      const double s = rho * std::sin(u - angle);
+      const double height = arc.segment.start_mm[arc.n] + arc.pitch * u - p[arc.n];
+      const double slope = radius * arc.radius_rate - arc.radius_rate * c + radius * s + arc.pitch * height;
+      const double bend =
+          radius * c + 2.0 * arc.radius_rate * s + arc.radius_rate * arc.radius_rate + arc.pitch * arc.pitch;
+      if (!(bend > 0.0)) break;
+      const double next = std::clamp(u - slope / bend, first, last);
+      const double moved = std::abs(next - u);
+      u = next;
+      if (moved < 1e-12) break;
+    }
+  }
+  Foot foot = arc_point_foot(arc, u, p);
+  if (!flat_circle && last - first > widest_local_window_rad) {
+    // So wide a window may hold several turns: ask the whole arc too.
+    const Nearest whole = nearest_on(arc.segment, p);
+    const double u_whole = whole.s_mm * rad_per_mm;
+    if (u_whole >= first && u_whole <= last) {
+      const Foot other = arc_point_foot(arc, u_whole, p);
+      if (other.distance2 < foot.distance2 * (1.0 - 1e-6)) {
+        foot = other;
+        u = u_whole;
+      }
+    }
+  }
+  foot.along = u >= arc.turn ? base.length : std::min(u / rad_per_mm, base.length);
+  return foot;
+}
+
+ContourTracker::Found ContourTracker::search(const Vector3& p, double move, const Window& window) const noexcept {
+  Found best{foot_on(cursor_, p, window), cursor_, 0.0};
+  const double advance = geometry_->pieces[cursor_].s + best.foot.along - s_;
+  bool retreats = advance < 0.0;
+  Window forward = window;
+  if (advance < 0.5 * move) {
+    // A filtered command turns back before it reaches the tip: the return leg lies as far behind the tip.
+    const double to_end = geometry_->pieces[cursor_].length - best.foot.along;
+    if (to_end < longest_turn_mm) {
+      forward.end = std::max(
+          forward.end, geometry_->pieces[cursor_].s + geometry_->pieces[cursor_].length + to_end + window_margin_mm);
+    }
+  }
+  for (std::size_t i = cursor_ + 1; i < geometry_->pieces.size() && geometry_->pieces[i].s <= forward.end; ++i) {
+    const Foot foot = foot_on(i, p, forward);
+    const double limit = retreats ? best.foot.distance2 * (1.0 + retreat_tie_relative) + retreat_tie_absolute_mm2
+                                  : best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
+    if (foot.distance2 < limit) {
+      best = {foot, i, 0.0};
+      retreats = false;
+    }
+  }
+  for (std::size_t i = cursor_; i-- > 0 && geometry_->pieces[i].s + geometry_->pieces[i].length >= window.begin;) {
+    const Foot foot = foot_on(i, p, window);
+    if (foot.distance2 < best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2) best = {foot, i, 0.0};
+  }
+  best.s = geometry_->pieces[best.piece].s + best.foot.along;
+  return best;
+}
+
+// 1 left, -1 right; 0 where the deviation or the travel is along Z only.
+double ContourTracker::lateral_side(const Found& found, double distance) const noexcept {
+  const Piece& piece = geometry_->pieces[found.piece];
+  const double from_start = found.foot.along;
+  Vector3 travel = geometry_->arc_of[found.piece] < 0 ? piece.direction : found.foot.tangent;
+  // At a corner one leg alone may see the point on the wrong side: the mean direction decides.
+  if (from_start <= 0.0 && found.piece > 0) {
+    travel = start_tangent(found.piece) + end_tangent(found.piece - 1);
+  } else if (from_start >= piece.length && found.piece + 1 < geometry_->pieces.size()) {
+    travel = end_tangent(found.piece) + start_tangent(found.piece + 1);
+  }
+  const Vector3& offset = found.foot.offset;
+  const double travel_xy2 = travel[0] * travel[0] + travel[1] * travel[1];
+  const double lateral = travel[0] * offset[1] - travel[1] * offset[0];
+  const double negligible = negligible_share * distance;
+  const bool has_side = travel_xy2 > negligible_share * negligible_share * travel.squaredNorm() &&
+                        lateral * lateral > negligible * negligible * travel_xy2;
+  if (!has_side) return 0.0;
+  return lateral < 0.0 ? -1.0 : 1.0;
+}
+
+PathSide ContourTracker::side() const noexcept {
+  // As much along Z as across it is the border.
+  if (2.0 * height_ * height_ > deviation_ * deviation_) return height_ > 0.0 ? PathSide::above : PathSide::below;
+  if (lateral_ == 0.0) return PathSide::none;
+  return lateral_ > 0.0 ? PathSide::left : PathSide::right;
+}
+
+double ContourTracker::step(const Vector3& p) noexcept {
+  // The sum of the components' sizes bounds the step's length without a square root.
+  const double move = (p - last_).lpNorm<1>();
+  if (!std::isfinite(move)) return std::numeric_limits<double>::quiet_NaN();
+  const double retreat = furthest_ - s_;
+  const double behind = move + deviation_ + window_margin_mm;
+  const double ahead = 2.0 * move + 4.0 * (deviation_ + retreat) + window_margin_mm + retreat;
+  Found found = search(p, move, {s_ - behind, s_ + ahead});
+  double distance = std::sqrt(found.foot.distance2);
+  bool jumped = false;
+
+  growing_ = distance > deviation_ + 0.25 * move && move > 0.0 ? growing_ + 1 : 0;
+  if (growing_ >= growing_until_lost && std::has_single_bit(growing_)) {
+    // Widened at 8, 16, 32 … samples only: the cost stays proportional to the samples.
+    const double factor = static_cast<double>(growing_) * static_cast<double>(growing_) / 16.0;
+    const Found wide = search(p, move, {s_ - factor * behind, s_ + factor * ahead});
+    // An overshoot beside another pass is not a lost track: only a much nearer foot is worth the jump.
+    if (wide.foot.distance2 < 0.25 * found.foot.distance2) {
+      found = wide;
+      distance = std::sqrt(found.foot.distance2);
+      jumped = true;
+      growing_ = 0;
+    }
+  }
+
+  cursor_ = found.piece;
+  s_ = found.s;
+  furthest_ = jumped ? s_ : std::clamp(furthest_, s_, s_ + longest_retreat_mm);
+  deviation_ = distance;
+  last_ = p;
+  height_ = found.foot.offset[2];
+  lateral_ = distance == 0.0 ? 0.0 : lateral_side(found, distance);
+  if (lateral_ != 0.0) return lateral_ * distance;
+  return height_ < 0.0 ? -distance : distance;
+}
+
+}  // namespace shapegcode

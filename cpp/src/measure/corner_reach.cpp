@@ -1,0 +1,71 @@
+#include "shapegcode/measure/contour.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace shapegcode {
+namespace {
+
+// Along the path on both sides of a corner: further away its nearest track point does not lie.
+constexpr double window_mm = 1.0;
+// On a reversal, or where the path runs over itself, the foot may be on a later pass while the point is still before
+// the corner. One that seems missed by more than this waits for the point so much longer.
+constexpr double missed_mm = 0.02;
+constexpr double patience_mm = 20.0;
+
+double distance2(const Vector3& p, const Vector3& from, const Vector3& to) noexcept {
+  const Vector3 along = to - from;
+  const double length2 = along.squaredNorm();
+  const double fraction = length2 > 0.0 ? std::clamp((p - from).dot(along) / length2, 0.0, 1.0) : 0.0;
+  return (p - from - fraction * along).squaredNorm();
+}
+
+}  // namespace
+
+CornerReach::CornerReach(const Path& path, double least_angle_rad) {
+  const double straight = std::cos(least_angle_rad);
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    const Vector3 before = tangent_at(path[i - 1], path[i - 1].length_mm);
+    if (before.dot(tangent_at(path[i], 0.0)) <= straight) {
+      corners_.push_back({path[i].start_mm, path.distance_mm(i), std::numeric_limits<double>::infinity()});
+    }
+  }
+  if (path.size() > 0) {
+    corners_.push_back({path[path.size() - 1].end_mm, path.length_mm(), std::numeric_limits<double>::infinity()});
+  }
+}
+
+void CornerReach::step(const Vector3& p, double foot_mm) noexcept {
+  if (!started_) {
+    last_ = p;
+    started_ = true;
+  }
+  while (next_ < corners_.size() && corners_[next_].s <= foot_mm + window_mm) {
+    ++next_;
+  }
+  for (std::size_t i = first_; i < next_; ++i) {
+    corners_[i].best2 = std::min(corners_[i].best2, distance2(corners_[i].point, last_, p));
+  }
+  const auto passed = [foot_mm](const Corner& corner) {
+    const bool met = corner.best2 <= missed_mm * missed_mm;
+    return corner.s < foot_mm - (met ? window_mm : patience_mm);
+  };
+  while (first_ < next_ && passed(corners_[first_])) {
+    largest2_ = std::max(largest2_, corners_[first_].best2);
+    ++first_;
+  }
+  last_ = p;
+}
+
+double CornerReach::largest_passed_mm() const noexcept { return std::sqrt(largest2_); }
+
+double CornerReach::largest_mm() const noexcept {
+  double largest2 = largest2_;
+  for (std::size_t i = first_; i < next_; ++i) {
+    largest2 = std::max(largest2, corners_[i].best2);
+  }
+  return std::sqrt(largest2);
+}
+
+}  // namespace shapegcode

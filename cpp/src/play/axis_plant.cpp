@@ -1,0 +1,92 @@
+#include "play/axis_plant.hpp"
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "shapegcode/control.hpp"
+#include "shapegcode/error.hpp"
+
+namespace shapegcode::detail {
+namespace {
+
+constexpr double watched_share = 0.2;  // of the limit at its end: a swing passes through the band all the time
+
+ModalPlant modal_plant(const PlaybackOptions& options) {
+  return options.drives.empty() ? ModalPlant(options.modes, options.period_s, options.mode_tables)
+                                : ModalPlant({}, options.period_s);
+}
+
+}  // namespace
+
+AxisPlant::AxisPlant(const PlaybackOptions& options) : period_s_(options.period_s), modal_(modal_plant(options)) {
+  if (!options.drives.empty() && options.drives.size() != axis_count) {
+    throw Error(ErrorKind::argument,
+                std::to_string(options.drives.size()) + " feed drives: must be none or one each for X, Y and Z");
+  }
+  drives_.reserve(options.drives.size());
+  for (const FeedDriveParameters& drive : options.drives) {
+    drives_.emplace_back(drive, options.period_s);
+  }
+}
+
+void AxisPlant::reset(const Vector3& position) {
+  modal_.reset(position);
+  for (std::size_t i = 0; i < drives_.size(); ++i) {
+    drives_[i].reset(position[static_cast<Eigen::Index>(i)]);
+  }
+  drive_deflection_.setZero();
+  drive_peak_.setZero();
+}
+
+void AxisPlant::shift(const Vector3& by_mm) noexcept {
+  modal_.shift(by_mm);
+  for (std::size_t i = 0; i < drives_.size(); ++i) {
+    drives_[i].shift(by_mm[static_cast<Eigen::Index>(i)]);
+  }
+}
+
+Vector3 AxisPlant::step_drives(const Vector3& command) {
+  Vector3 response;
+  for (std::size_t i = 0; i < drives_.size(); ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    response[axis] = drives_[i].step(command[axis]);
+  }
+  drive_deflection_ = response - command;
+  drive_peak_ = drive_peak_.cwiseMax(drive_deflection_.cwiseAbs());
+  return response;
+}
+
+void AxisPlant::reset_peak() noexcept {
+  modal_.reset_peak();
+  drive_peak_ = drive_deflection_.cwiseAbs();
+}
+
+AtRest AxisPlant::at_rest(const Vector3& command, double band_mm, double limit_s) const {
+  AtRest result;
+  if (drives_.empty()) {
+    result.residual_mm = modal_.residual_peak();
+    if (!(band_mm > 0.0)) {
+      return result;
+    }
+  }
+  AxisPlant plant = *this;
+  const double periods = whole_periods(limit_s / period_s_);
+  for (double k = 1.0; k <= periods; ++k) {
+    plant.reset_peak();
+    plant.step(command);
+    const Vector3 peak = plant.peak();
+    if (!drives_.empty()) {
+      result.residual_mm = result.residual_mm.cwiseMax(peak);
+    }
+    for (Eigen::Index axis = 0; axis < axis_count && band_mm > 0.0; ++axis) {
+      if (peak[axis] > band_mm) {
+        result.settling_s[axis] =
+            k <= (1.0 - watched_share) * periods ? k * period_s_ : std::numeric_limits<double>::infinity();
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace shapegcode::detail

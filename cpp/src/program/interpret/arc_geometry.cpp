@@ -1,0 +1,76 @@
+#include "program/interpret/arc_geometry.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "base/message.hpp"
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+namespace {
+
+constexpr double two_pi = 2.0 * std::numbers::pi;
+// Below this two programmed points are one: far under any least increment, far over double rounding.
+constexpr double coincident_mm = 1e-7;
+
+}  // namespace
+
+Segment resolve_arc(const ArcWords& words, double feed_mm_per_s, std::uint32_t line, std::uint32_t column) {
+  const int a = (words.normal + 1) % 3;
+  const int b = (words.normal + 2) % 3;
+  const double sense = words.clockwise ? -1.0 : 1.0;
+  const double chord_a = words.end_mm[a] - words.start_mm[a];
+  const double chord_b = words.end_mm[b] - words.start_mm[b];
+  const double chord = std::hypot(chord_a, chord_b);
+  Vector3 centre = words.centre_mm;
+
+  if (words.radius_mm) {
+    const double radius = *words.radius_mm;
+    if (chord <= coincident_mm) {
+      throw Error(ErrorKind::program, "arc by R without a move in its plane: a full circle needs I J K", line, column);
+    }
+    const double half = 0.5 * chord;
+    const double excess = half - std::abs(radius);
+    if (radius == 0.0 || excess > 0.5 * words.tolerance_mm) {
+      throw alarm_error(
+          20,
+          format_message("arc radius R%.4f cannot span its chord of %.4f mm: half the chord is %.4f mm, tolerance %.4f",
+                         radius, chord, half, words.tolerance_mm),
+          line, column);
+    }
+    const double height = std::sqrt(std::max(0.0, radius * radius - half * half));
+    // Counter-clockwise with R > 0 has its centre on the left of the chord; each sign change swaps the side.
+    const double side = sense * (radius > 0.0 ? 1.0 : -1.0) * height / chord;
+    centre[a] = words.start_mm[a] + 0.5 * chord_a - side * chord_b;
+    centre[b] = words.start_mm[b] + 0.5 * chord_b + side * chord_a;
+  }
+
+  const double start_radius = std::hypot(words.start_mm[a] - centre[a], words.start_mm[b] - centre[b]);
+  const double end_radius = std::hypot(words.end_mm[a] - centre[a], words.end_mm[b] - centre[b]);
+  const double difference = std::abs(start_radius - end_radius);
+  if (start_radius <= coincident_mm || end_radius <= coincident_mm || difference > words.tolerance_mm) {
+    constexpr char names[] = "XYZ";
+    throw alarm_error(
+        20,
+        format_message("arc end is %.4f mm off its radius: start (%c%.4f %c%.4f), end (%c%.4f %c%.4f), centre (%c%.4f "
+                       "%c%.4f), start radius %.4f, end radius %.4f, tolerance %.4f mm",
+                       difference, names[a], words.start_mm[a], names[b], words.start_mm[b], names[a], words.end_mm[a],
+                       names[b], words.end_mm[b], names[a], centre[a], names[b], centre[b], start_radius, end_radius,
+                       words.tolerance_mm),
+        line, column);
+  }
+
+  double sweep = two_pi;
+  if (chord > coincident_mm) {
+    const double start_angle = std::atan2(words.start_mm[b] - centre[b], words.start_mm[a] - centre[a]);
+    const double end_angle = std::atan2(words.end_mm[b] - centre[b], words.end_mm[a] - centre[a]);
+    sweep = std::fmod(sense * (end_angle - start_angle), two_pi);
+    if (sweep <= 0.0) {
+      sweep += two_pi;
+    }
+  }
+  return make_arc(words.start_mm, words.end_mm, centre, sense * sweep, words.normal, feed_mm_per_s, line);
+}
+
+}  // namespace shapegcode

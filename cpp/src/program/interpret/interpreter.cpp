@@ -1,0 +1,186 @@
+#include <algorithm>
+
+#include "base/message.hpp"
+#include "program/interpret/interpreter_impl.hpp"
+#include "shapegcode/error.hpp"
+
+namespace shapegcode::detail {
+
+void Interpreter::fail(const std::string& message, std::uint32_t column) const {
+  throw Error(ErrorKind::program, message, line_number_, std::max<std::uint32_t>(column, 1));
+}
+
+void Interpreter::alarm(int number, const std::string& message, std::uint32_t column) const {
+  throw alarm_error(number, message, line_number_, std::max<std::uint32_t>(column, 1));
+}
+
+void Interpreter::warn(const std::string& message) {
+  program_.warnings.push_back({origin_.line, message, 0, 0, program_.files[origin_.file]});
+}
+
+void Interpreter::warn_once(std::uint32_t& seen, const std::string& message) {
+  if (seen++ == 0) {
+    warn(message);
+  }
+}
+
+double Interpreter::length_mm(const Word& word) const noexcept {
+  const bool counts_increments = !word.has_point && !options_.calculator_decimal_point;
+  const double length = counts_increments ? word.value * least_increment(options_, state_.units) : word.value;
+  return length * unit_mm(state_.units);
+}
+
+double Interpreter::feed_mm_per_s(double move_length_mm) const {
+  if (state_.feed_mode == 93) {
+    if (!words_.has('F')) {
+      fail("G93 needs F in every cutting block");
+    }
+    return state_.feed * move_length_mm / 60.0;
+  }
+  const double per_turn = state_.feed_mode == 95 ? state_.spindle_rev_per_min : 1.0;
+  return state_.feed * per_turn * unit_mm(state_.units) / 60.0;
+}
+
+void Interpreter::forget_axes(std::uint32_t letters) noexcept {
+  for (int axis = 0; axis < axis_count; ++axis) {
+    if ((letters >> ('X' - 'A' + axis)) & 1U) {
+      state_.known[static_cast<std::size_t>(axis)] = false;
+    }
+  }
+}
+
+void Interpreter::note(std::size_t segment) {
+  RegionNote entry;
+  entry.segment = static_cast<std::uint32_t>(segment);
+  for (std::size_t i = 0; i < block_.comment_count; ++i) {
+    const std::string_view comment = block_.comments[i];
+    entry.comment_offset = static_cast<std::uint32_t>(comment.data() - program_.text.data());
+    entry.comment_length = static_cast<std::uint32_t>(comment.size());
+    region_->notes.push_back(entry);
+  }
+  if (words_.has('N')) {
+    entry.comment_length = 0;
+    entry.n_number = static_cast<std::int32_t>(words_['N'].value);
+    region_->notes.push_back(entry);
+  }
+}
+
+void Interpreter::close_region() {
+  if (region_ == nullptr) {
+    return;
+  }
+  region_->notes.resize(notes_kept_);
+  if (!segments_.empty()) {
+    region_->path = std::make_shared<const Path>(std::move(segments_));
+    add_step(StepKind::region, program_.regions.size());
+    program_.steps.back().line = region_->first_line;
+    program_.regions.push_back(std::move(region_));
+  }
+  segments_ = {};
+  region_.reset();
+}
+
+void Interpreter::add_step(StepKind kind, std::size_t index) {
+  program_.steps.push_back({kind, static_cast<std::uint32_t>(index), line_number_});
+}
+
+void Interpreter::add_move(const OtherMove& move) {
+  close_region();
+  if (move.dwell_s > 0.0 || move.segment.length_mm > 0.0) {
+    add_step(StepKind::move, program_.other_moves.size());
+    program_.other_moves.push_back(move);
+  }
+}
+
+void Interpreter::scan(std::string_view text, std::uint32_t line) {
+  scan_block(text, line, options_.max_line_length, block_);
+  if (!block_.macro) {
+    detail::sort_words(block_, line, words_);
+  }
+}
+
+void Interpreter::require_plain_words(std::uint32_t line) const {
+  const auto refuse = [&](int number, const Word& word, const std::string& what) {
+    throw alarm_error(number, what + " in address " + std::string(1, word.letter) + ", which takes whole numbers", line,
+                      word.column);
+  };
+  if (words_.fractional != nullptr) {
+    refuse(7, *words_.fractional, "decimal point");
+  }
+  if (words_.negative != nullptr && words_.negative->letter != 'S') {
+    refuse(6, *words_.negative, "minus sign");
+  }
+  if (words_.duplicate != nullptr) {
+    throw Error(ErrorKind::program,
+                "address " + std::string(1, words_.duplicate->letter) + " is given twice in one block", line,
+                words_.duplicate->column);
+  }
+  for (const char letter : {'H', 'D'}) {
+    if (words_.has(letter) && words_[letter].value > 999.0) {
+      throw alarm_error(30,
+                        std::string("offset number ") + letter +
+                            std::to_string(static_cast<int>(words_[letter].value)) + " outside 0 ... 999",
+                        line, words_[letter].column);
+    }
+  }
+  int motion = state_.motion;
+  for (int k = 0; k < words_.g_count; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    motion = words_.g_group[i] == Group::motion ? words_.g_tenths[i] / 10 : motion;
+  }
+  if (words_.has('E') && motion != 33) {
+    throw alarm_error(9, "address E is used with threading G33 only", line, words_['E'].column);
+  }
+}
+
+void Interpreter::finish() {
+  close_region();
+  program_.final_state = state_;
+}
+
+void Interpreter::execute(std::uint32_t line, const LineOrigin& origin, std::size_t begin, std::size_t end) {
+  line_number_ = line;
+  origin_ = origin;
+  require_plain_words(line);
+  if (block_.word_count > 0) {
+    ++program_.block_count;
+  }
+  const ModalState before = state_;
+  const std::uint32_t foreign_before = foreign_;
+  LineFlow flow;
+  flow.stop = block_.optional_skip || words_.has_any(~region_letters & ~letter_mask("G"));
+  read_codes(flow);
+  if (words_.has('F')) {
+    const double feed = words_['F'].value;
+    if (feed < 0.0) {
+      fail(format_message("feed F%g is negative", feed), words_['F'].column);
+    }
+    const bool hundredths = state_.units == 20 && !words_['F'].has_point && !options_.calculator_decimal_point;
+    state_.feed = hundredths ? feed * 0.01 : feed;
+    state_.uncertain_groups &= ~feed_bit;
+  }
+  if (words_.has('S')) {
+    state_.spindle_rev_per_min = words_['S'].value;
+  }
+  flow.motion = words_.has_any(axis_letters | centre_letters) && !one_shot_axes_;
+  if (words_.has_any(other_axis_letters)) {
+    if (state_.motion != 0 && state_.cycle == 80) {
+      warn("move of a rotary or additional axis is passed through untouched");
+    }
+  }
+  if (flow.motion) {
+    move(flow, before, begin, end);
+    forget_uncertain_end();
+  } else if (flow.stop) {
+    close_region();
+  } else if (region_ != nullptr) {
+    note(segments_.size());
+  }
+  m_codes(flow);
+  if (block_.optional_skip && !block_skip(options_, block_.skip_switch)) {
+    optional_skip_block(before);
+    foreign_ |= foreign_before;
+  }
+}
+
+}  // namespace shapegcode::detail

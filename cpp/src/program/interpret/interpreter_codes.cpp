@@ -1,0 +1,343 @@
+// Codes that change the modal state or what is known of the position.
+#include "base/message.hpp"
+#include "program/interpret/interpreter_impl.hpp"
+
+namespace shapegcode::detail {
+
+// Whether a '/' block runs is the operator's choice: whatever it may change is not known afterwards.
+void Interpreter::optional_skip_block(const ModalState& before) {
+  std::uint32_t changed = 0;
+  const auto differ = [&](int a, int b, Group group) {
+    if (a != b) {
+      changed |= bit(group);
+    }
+  };
+  differ(before.motion, state_.motion, Group::motion);
+  differ(before.plane, state_.plane, Group::plane);
+  differ(before.distance, state_.distance, Group::distance);
+  differ(before.feed_mode, state_.feed_mode, Group::feed_mode);
+  differ(before.units, state_.units, Group::units);
+  differ(before.compensation, state_.compensation, Group::compensation);
+  differ(before.length_offset, state_.length_offset, Group::length_offset);
+  differ(before.cycle, state_.cycle, Group::cycle);
+  differ(before.cycle_return, state_.cycle_return, Group::cycle_return);
+  differ(before.coordinate_system, state_.coordinate_system, Group::coordinates);
+  differ(before.exact_stop, state_.exact_stop, Group::exact_stop);
+  if (before.feed != state_.feed) {
+    changed |= feed_bit;
+  }
+  if (changed != 0) {
+    warn("block skip '/' changes the modal state: nothing is shaped until that group is given again");
+  }
+  state_.uncertain_groups |= changed | before.uncertain_groups;
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    const auto i = static_cast<Eigen::Index>(axis);
+    if (before.position_mm[i] != state_.position_mm[i] || before.known[axis] != state_.known[axis]) {
+      state_.known[axis] = false;
+    }
+  }
+}
+
+void Interpreter::read_codes(LineFlow& flow) {
+  explicit_exact_stop_ = false;
+  one_shot_axes_ = false;
+  for (int k = 0; k < words_.g_count; ++k) {
+    const int g = words_.g_tenths[static_cast<std::size_t>(k)];
+    const std::uint32_t column = words_.g_column[static_cast<std::size_t>(k)];
+    const int whole = g / 10;
+    const Group group = words_.g_group[static_cast<std::size_t>(k)];
+    // A no-op (G40 where nothing is compensated) leaves a block inside its region; a change ends it.
+    const auto set = [&](int& field, bool keeps_region) {
+      if (field != whole && !keeps_region) {
+        flow.stop = true;
+      }
+      field = whole;
+      state_.uncertain_groups &= ~bit(group);
+    };
+    switch (group) {
+      case Group::motion:
+        set(state_.motion, true);
+        if (state_.cycle != 80) {
+          state_.cycle = 80;
+          flow.stop = true;
+        }
+        break;
+      case Group::plane:
+        set(state_.plane, true);
+        break;
+      case Group::distance:
+        set(state_.distance, true);
+        distance_given_ = true;
+        break;
+      case Group::feed_mode:
+        if (whole != state_.feed_mode) {
+          state_.feed = 0.0;  // the old F has another unit
+        }
+        set(state_.feed_mode, true);
+        break;
+      case Group::units:
+        set(state_.units, false);
+        break;
+      case Group::compensation:
+        if (whole == 40 && state_.compensation != 40) {
+          // The tool leaves the offset with the next move of the plane; until then its position is not the programmed.
+          const int normal = plane_normal(state_.plane);
+          for (int i : {(normal + 1) % 3, (normal + 2) % 3}) {
+            state_.known[static_cast<std::size_t>(i)] = false;
+          }
+        }
+        set(state_.compensation, false);
+        break;
+      case Group::length_offset:
+        if (whole != state_.length_offset || words_.has('H')) {
+          flow.stop = true;
+        }
+        length_offset(whole);
+        state_.uncertain_groups &= ~bit(group);
+        break;
+      case Group::cycle:
+        flow.stop = true;
+        if (whole == 80) {
+          state_.cycle = 80;
+        } else {
+          if (state_.cycle == 80) {
+            cycle_ = CannedCycle{};
+            cycle_.clearance_mm = options_.peck_clearance_mm;
+            cycle_.initial_mm = state_.position_mm[plane_normal(state_.plane)];
+          }
+          state_.cycle = whole;
+        }
+        state_.uncertain_groups &= ~bit(Group::cycle);
+        break;
+      case Group::cycle_return:
+        set(state_.cycle_return, false);
+        break;
+      case Group::coordinates: {
+        // G54 P7 is G54.1 P7; in a block with a dwell or a cycle P belongs to that.
+        const bool extended = g == 541 || (g == 540 && words_.has('P') && state_.cycle == 80 &&
+                                           (words_.groups & (group_bit(Group::none) | group_bit(Group::cycle))) == 0);
+        const int system = extended ? 541 : whole;
+        const int extra = !extended ? 0 : words_.has('P') ? static_cast<int>(words_['P'].value) : 1;
+        if (extended && (extra < 1 || extra > 300)) {
+          alarm(30, "G54.1 P" + std::to_string(extra) + ": P is 1 ... 300", words_['P'].column);
+        }
+        if (system != state_.coordinate_system || extra != state_.coordinate_number) {
+          change_coordinates(system, extra);
+          flow.stop = true;
+        }
+        state_.coordinate_system = system;
+        state_.coordinate_number = extra;
+        state_.uncertain_groups &= ~bit(group);
+        break;
+      }
+      case Group::exact_stop:
+        set(state_.exact_stop, false);
+        break;
+      case Group::none:
+        one_shot(g, flow);
+        break;
+      case Group::foreign:
+        flow.stop = true;
+        foreign_switch(g);
+        break;
+      case Group::harmless:
+        look_ahead_switch(g);
+        flow.stop = true;
+        one_shot_axes_ = one_shot_axes_ || g == 220;  // the others may share their block with a move
+        break;
+      case Group::unknown_position:
+        if (g == 270 || g == 290) {
+          refuse_in_cycle(g);
+        }
+        flow.stop = true;
+        one_shot_axes_ = true;
+        if (words_.has_any(axis_letters)) {
+          forget_axes(words_.present);
+        } else {
+          forget_all();
+        }
+        warn("G" + std::to_string(whole) + (g % 10 != 0 ? "." + std::to_string(g % 10) : "") +
+             " is passed through untouched: position not known afterwards");
+        break;
+      case Group::refused:
+        fail("G" + std::to_string(whole) + (g % 10 != 0 ? "." + std::to_string(g % 10) : "") +
+                 ": cylindrical interpolation is not supported",
+             column);
+      case Group::invalid:
+      default:
+        alarm(10, "unknown G code G" + std::to_string(whole) + (g % 10 != 0 ? "." + std::to_string(g % 10) : ""),
+              column);
+    }
+  }
+  if (words_.has('H') && (words_.groups & group_bit(Group::length_offset)) == 0 && state_.length_offset != 49 &&
+      (words_.groups & group_bit(Group::none)) == 0) {
+    length_offset(state_.length_offset);  // H alone changes the offset in force
+  }
+}
+
+void Interpreter::dwell() {
+  double seconds = 0.0;
+  const Word* time = nullptr;
+  if (words_.has('P')) {
+    const Word& p = words_['P'];
+    if (p.has_point) {
+      alarm(7, "G04 P takes whole milliseconds: no decimal point", p.column);
+    }
+    seconds = p.value * 1e-3;
+    time = &p;
+  } else if (words_.has('X') || words_.has('U')) {
+    const Word& x = words_[words_.has('X') ? 'X' : 'U'];
+    seconds = x.has_point || options_.calculator_decimal_point ? x.value : x.value * 1e-3;
+    time = &x;
+  } else {
+    fail("G04 needs P (milliseconds) or X (seconds)");
+  }
+  if (seconds < 0.0) {
+    alarm(6, format_message("dwell G04 %c%g is negative", time->letter, time->value), time->column);
+  }
+  add_move({make_line(state_.position_mm, state_.position_mm, 0.0, line_number_), seconds});
+}
+
+void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
+  switch (g_tenths) {
+    case 90:
+      explicit_exact_stop_ = true;
+      flow.stop = flow.stop || !words_.has_any(axis_letters | centre_letters);
+      return;
+    case 40:
+      flow.stop = true;
+      one_shot_axes_ = true;
+      dwell();
+      return;
+    case 100:
+      flow.stop = true;
+      one_shot_axes_ = true;
+      data_setting();
+      return;
+    case 920:
+      flow.stop = true;
+      one_shot_axes_ = true;
+      for (int axis = 0; axis < axis_count; ++axis) {
+        const char letter = static_cast<char>('X' + axis);
+        if (words_.has(letter)) {
+          state_.position_mm[axis] = length_mm(words_[letter]);
+          state_.known[static_cast<std::size_t>(axis)] = true;
+        }
+      }
+      return;
+    case 520:
+      flow.stop = true;
+      one_shot_axes_ = true;
+      for (int axis = 0; axis < axis_count; ++axis) {
+        const char letter = static_cast<char>('X' + axis);
+        if (words_.has(letter)) {
+          const double offset = length_mm(words_[letter]);
+          state_.position_mm[axis] -= offset - local_offset_[axis];
+          local_offset_[axis] = offset;
+          // Behind a G52 that may not have run the step from the old offset is not known.
+          const auto i = static_cast<std::size_t>(axis);
+          state_.known[i] = state_.known[i] && !local_offset_uncertain_[i];
+          local_offset_uncertain_[i] = block_.optional_skip;
+        }
+      }
+      return;
+    default:  // G28, G30, G53: machine coordinates
+      if (g_tenths != 530) {
+        refuse_in_cycle(g_tenths);
+      }
+      if (g_tenths == 300 && words_.has('P') && (words_['P'].value < 2.0 || words_['P'].value > 4.0)) {
+        alarm(46, format_message("G30 P%g: the reference points are P2, P3 and P4", words_['P'].value),
+              words_['P'].column);
+      }
+      flow.stop = true;
+      one_shot_axes_ = true;
+      forget_axes(words_.present);
+      return;
+  }
+}
+
+void Interpreter::foreign_switch(int g_tenths) {
+  std::uint32_t mode = 0;
+  bool on = true;
+  const char* name = "";
+  switch (g_tenths) {
+    case 121:
+    case 131:
+      mode = 32;
+      on = g_tenths == 121;
+      name = "polar interpolation G12.1";
+      break;
+    default:
+      mode = 4;
+      name = "tool axis offset G43.x";
+      state_.known[2] = false;
+  }
+  // G13.1 has no axis words of its own: X Y Z beside it are a move.
+  one_shot_axes_ = one_shot_axes_ || on;
+  if (on && (foreign_ & mode) == 0) {
+    warn(std::string(name) + " is not supported yet: passed through untouched until it is cancelled");
+  }
+  if (on || (foreign_ & mode) != 0) {
+    forget_all();
+  }
+  foreign_ = on ? foreign_ | mode : foreign_ & ~mode;
+}
+
+// G05.1 Q1, G08 P1 and G05 P10000 switch modes on that plan short blocks anew.
+void Interpreter::look_ahead_switch(int g_tenths) {
+  if (g_tenths == 51 && words_.has('Q')) {
+    look_ahead_ = words_['Q'].value != 0.0;
+  } else if ((g_tenths == 80 || g_tenths == 50) && words_.has('P')) {
+    look_ahead_ = words_['P'].value != 0.0;
+  }
+}
+
+void Interpreter::change_coordinates(int number, int extra) {
+  const AxisOffsets before = offsets_.work(state_.coordinate_system, state_.coordinate_number);
+  const AxisOffsets after = offsets_.work(number, extra);
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    if (before[axis] && after[axis]) {
+      state_.position_mm[static_cast<Eigen::Index>(axis)] += *before[axis] - *after[axis];
+    } else {
+      state_.known[axis] = false;
+    }
+  }
+}
+
+void Interpreter::m_codes(LineFlow& flow) {
+  if (words_.has_any(letter_mask("MST"))) {
+    close_region();
+    MachineFunction function;
+    function.m_codes = words_.m_codes;
+    function.m_count = words_.m_count;
+    if (words_.has('T')) {
+      function.tool = static_cast<std::int64_t>(words_['T'].value);
+    }
+    if (words_.has('S')) {
+      function.spindle_rev_per_min = words_['S'].value;
+    }
+    add_step(StepKind::function, program_.functions.size());
+    program_.functions.push_back(function);
+  }
+  for (int k = 0; k < words_.m_count; ++k) {
+    flow.stop = true;
+    switch (words_.m_codes[static_cast<std::size_t>(k)]) {
+      case 2:
+      case 30:
+        close_region();
+        ended_ = ended_ || !block_.optional_skip;
+        break;
+      case 6:
+        for (std::size_t axis = 0; axis < axis_count; ++axis) {
+          if (options_.unknown_after_tool_change[axis]) {
+            state_.known[axis] = false;
+          }
+        }
+        break;
+      default:
+        break;
+    }
+  }
+}
+
+}  // namespace shapegcode::detail

@@ -1,0 +1,129 @@
+// Private to gcode: the reading of plain blocks. Its functions are spread over four files: lines and regions
+// (interpreter.cpp), codes that change the modal state (interpreter_codes.cpp), offsets (interpreter_offsets.cpp), and
+// moves (interpreter_moves.cpp).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "program/interpret/canned_cycle.hpp"
+#include "program/interpret/input_rules.hpp"
+#include "program/interpret/offsets.hpp"
+#include "program/text/block_words.hpp"
+#include "program/text/lexer.hpp"
+#include "shapegcode/program.hpp"
+
+namespace shapegcode::detail {
+
+inline constexpr std::uint32_t axis_letters = letter_mask("XYZ");
+inline constexpr std::uint32_t centre_letters = letter_mask("IJK");
+inline constexpr std::uint32_t other_axis_letters = letter_mask("ABCUVW");
+// What a block of a region may carry beside G codes; any other word makes it a stop.
+inline constexpr std::uint32_t region_letters = letter_mask("XYZIJKRFN");
+
+inline constexpr std::uint32_t feed_bit = 1U;
+inline std::uint32_t bit(Group group) noexcept { return 1U << static_cast<unsigned>(group); }
+
+inline int plane_normal(int plane) noexcept { return plane == 17 ? 2 : plane == 18 ? 1 : 0; }
+
+/// Reads a plain program line by line into regions, moves and functions. Plain: no calls, macro statements or
+/// coordinate modes; those are expanded by the Reader before.
+class Interpreter {
+ public:
+  Interpreter(Program& program, const ReaderOptions& options)
+      : options_(options), program_(program), state_(options.power_on), offsets_(options) {}
+
+  /// Splits a line into words: `block()` and `words()`.
+  void scan(std::string_view text, std::uint32_t line);
+  /// Throws where the words that were scanned could only be arguments of a macro call.
+  void require_plain_words(std::uint32_t line) const;
+  /// Executes the words that were scanned. The text of the line stands at [begin, end) of the program's text.
+  void execute(std::uint32_t line, const LineOrigin& origin, std::size_t begin, std::size_t end);
+  /// Ends an open region: the next line is not part of it.
+  void close_region();
+  void warn(const std::string& message);
+  /// After something whose effect is not known.
+  void forget_all() noexcept { state_.known = {false, false, false}; }
+  /// How the program ended.
+  void finish();
+
+  /// A work offset set by the program: one that is in force shifts the position.
+  void set_work_offset(int coordinate_system, int number, int axis, double value_mm, bool incremental = false);
+
+  [[nodiscard]] const Block& block() const noexcept { return block_; }
+  [[nodiscard]] const BlockWords& words() const noexcept { return words_; }
+  [[nodiscard]] const ModalState& state() const noexcept { return state_; }
+  [[nodiscard]] bool ended() const noexcept { return ended_; }
+  void end() noexcept { ended_ = true; }
+  [[nodiscard]] Offsets& offsets() noexcept { return offsets_; }
+  [[nodiscard]] double length_mm(const Word& word) const noexcept;
+
+ private:
+  struct LineFlow {
+    bool stop = false;    ///< ends a region, text kept
+    bool motion = false;  ///< the block moves axes
+  };
+
+  void optional_skip_block(const ModalState& before);
+  void read_codes(LineFlow& flow);
+  void refuse_in_cycle(int g_tenths) const;
+  void one_shot(int g_tenths, LineFlow& flow);
+  void dwell();
+  void data_setting();
+  void data_work_offset(int coordinate_system, int number);
+  void set_tool_offset(int kind);
+  void m_codes(LineFlow& flow);
+  void length_offset(int whole);
+  void move(LineFlow& flow, const ModalState& before, std::size_t begin, std::size_t end);
+  void cut(const char* why_kept, const ModalState& before, std::size_t begin, std::size_t end);
+  void forget_uncertain_end() noexcept;
+  void check_range() const;
+  void cycle_block();
+  void foreign_switch(int g_tenths);
+  void look_ahead_switch(int g_tenths);
+  void change_coordinates(int number, int extra);
+  void add_move(const OtherMove& move);
+  void add_step(StepKind kind, std::size_t index);
+  void note(std::size_t segment);
+  void warn_once(std::uint32_t& seen, const std::string& message);
+  [[noreturn]] void fail(const std::string& message, std::uint32_t column = 0) const;
+  [[noreturn]] void alarm(int number, const std::string& message, std::uint32_t column = 0) const;
+
+  [[nodiscard]] double feed_mm_per_s(double move_length_mm) const;
+  [[nodiscard]] bool target(Vector3& end, std::array<bool, 3>& known_after, bool& relative) const noexcept;
+  [[nodiscard]] Segment cutting_segment(const Vector3& end) const;
+  void forget_axes(std::uint32_t letters) noexcept;
+
+  const ReaderOptions& options_;
+  Program& program_;
+  ModalState state_;
+  Offsets offsets_;
+  Block block_;
+  BlockWords words_;
+  std::uint32_t line_number_ = 0;
+  LineOrigin origin_;
+  std::shared_ptr<Region> region_;
+  std::vector<Segment> segments_;  ///< of the open region
+  std::size_t notes_kept_ = 0;
+  std::uint32_t foreign_ = 0;  ///< modes passed through untouched that are on
+  bool explicit_exact_stop_ = false;
+  bool one_shot_axes_ = false;  ///< axis words belong to a one-shot code
+  bool distance_given_ = false;
+  bool ended_ = false;
+  bool look_ahead_ = false;  ///< a look-ahead mode was switched on by the program
+  Vector3 local_offset_ = Vector3::Zero();
+  std::array<bool, axis_count> local_offset_uncertain_ = {false, false, false};  ///< set in a '/' block
+  CannedCycle cycle_;
+  std::uint32_t seen_no_point_ = 0;
+  std::uint32_t seen_distance_ = 0;
+  std::uint32_t seen_cycle_point_ = 0;
+  std::uint32_t kept_run_line_ = 0;
+};
+
+}  // namespace shapegcode::detail

@@ -1,0 +1,68 @@
+// Private to gcode: the programs of one reading, in one or several files, and where their lines begin.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "shapegcode/program.hpp"
+
+namespace shapegcode::detail {
+
+/// A text between its '%' lines.
+struct TapeFrame {
+  std::size_t begin = 0;         ///< first byte behind the first '%' line
+  std::size_t end = 0;           ///< the closing '%'
+  std::uint32_t first_line = 1;  ///< line number at `begin`
+  bool framed = false;           ///< has its '%' lines
+};
+
+/// Finds the frame. Throws Error(program) on an empty text, a zero byte, one '%' without the other.
+[[nodiscard]] TapeFrame find_frame(const std::string& text);
+
+/// A place in a text: offset of a line's first byte and the line's number.
+struct LinePlace {
+  std::size_t at = 0;
+  std::uint32_t line = 1;
+};
+
+/// One program: an O number and its lines.
+struct ProgramUnit {
+  std::int64_t number = -1;  ///< -1: the text has no O line
+  std::uint32_t file = 0;
+  const std::string* text = nullptr;
+  LinePlace first;
+  std::size_t end = 0;
+
+  /// The next line from `place`, without its line end; `place` moves behind it. False at the end.
+  bool next_line(LinePlace& place, std::string_view& line, std::size_t& begin) const noexcept;
+  /// The line that carries sequence number N, searched from `from` on, then from the start, as the control does.
+  [[nodiscard]] std::optional<LinePlace> find_n(std::int64_t n, std::size_t from);
+  /// Behind the END of a loop, searched from `from` on.
+  [[nodiscard]] std::optional<LinePlace> behind_end(int loop, const LinePlace& from);
+
+ private:
+  void index_numbers();
+
+  bool indexed_ = false;
+  std::unordered_map<std::int64_t, std::vector<LinePlace>> numbers_;
+  std::map<std::pair<std::size_t, int>, std::optional<LinePlace>> ends_;
+};
+
+class ProgramStore {
+ public:
+  /// Splits a text into its programs. Throws alarm 0073 on an O number given twice.
+  void add(const std::string& text, const TapeFrame& frame, std::uint32_t file);
+  [[nodiscard]] ProgramUnit* find(std::int64_t number) noexcept;
+  [[nodiscard]] const std::vector<std::unique_ptr<ProgramUnit>>& units() const noexcept { return units_; }
+
+ private:
+  std::vector<std::unique_ptr<ProgramUnit>> units_;
+};
+
+}  // namespace shapegcode::detail

@@ -1,0 +1,365 @@
+// Texts, lines, and where they end.
+#include <algorithm>
+
+#include "program/read/reader_impl.hpp"
+#include "shapegcode/error.hpp"
+#include "shapegcode/program.hpp"
+
+namespace shapegcode::detail {
+namespace {
+
+constexpr std::size_t most_alarms = 200;  // collected in one reading
+
+}  // namespace
+
+Reader::Reader(std::string text, const ReaderOptions& options)
+    : options_(options),
+      interpreter_(program_, options),
+      rewriter_(options, program_, interpreter_,
+                [this](std::string_view flat, const LineOrigin& origin) { put(flat, origin); }),
+      control_(options, interpreter_, rewriter_),
+      variables_(options.retained_variables, &control_) {
+  program_.text = std::move(text);
+  program_.files.emplace_back();
+}
+
+void Reader::fail(const std::string& message, std::uint32_t column) const {
+  throw Error(ErrorKind::program, message, here_.line, column);
+}
+
+void Reader::warn(const std::string& message) {
+  program_.warnings.push_back({origin_.line, message, 0, 0, program_.files[origin_.file]});
+}
+
+void Reader::alarm(int number, const std::string& message, std::uint32_t column) const {
+  throw alarm_error(number, message, here_.line, column);
+}
+
+void Reader::load_main() {
+  const TapeFrame frame = find_frame(program_.text);
+  framed_ = frame.framed;
+  const std::string& text = program_.text;
+  const auto end_of_line = text.find('\n');
+  if (end_of_line != std::string::npos && end_of_line > 0 && text[end_of_line - 1] == '\r') {
+    program_.line_end = "\r\n";
+  }
+  program_.header_offset = frame.begin;
+  program_.line_count =
+      static_cast<std::uint32_t>(1 + std::count(text.begin(), text.end(), '\n')) - (text.back() == '\n' ? 1U : 0U);
+  store_.add(text, frame, 0);
+  for (const auto& unit : store_.units()) {
+    if (unit->number >= 0) {
+      program_.program_numbers.push_back(unit->number);
+    }
+  }
+  ProgramUnit* main = options_.program < 0 ? store_.units().front().get() : store_.find(options_.program);
+  if (main == nullptr) {
+    std::string known;
+    for (const std::int64_t number : program_.program_numbers) {
+      known += (known.empty() ? "" : ", ") + std::string("O") + std::to_string(number);
+    }
+    throw alarm_error(78,
+                      "program O" + std::to_string(options_.program) + " is not in the file (it holds " +
+                          (known.empty() ? "no O number" : known) + ")",
+                      1, 1);
+  }
+  program_.program_number = main->number;
+  control_.program = main->number;
+  frames_.push_back({main, main->first, {}, false, false, false, 1, {}});
+  here_ = main->first;
+  if (main != store_.units().front().get()) {
+    // Another program than the first: what is written is this one alone.
+    expand_from(0);
+    if (framed_) {
+      put_raw("%", {1, 0});
+    }
+    program_.header_offset = program_.text.size();
+  }
+}
+
+// From here on the text is written anew; so far it is as handed over.
+void Reader::expand_from(std::size_t begin) {
+  if (program_.expanded) {
+    return;
+  }
+  program_.expanded = true;
+  sources_.push_back({"", std::move(program_.text)});
+  const std::string& original = sources_.back().text;
+  program_.text = original.substr(0, begin);
+  for (const auto& unit : store_.units()) {
+    unit->text = &original;
+  }
+  const auto lines = static_cast<std::size_t>(
+      std::count(original.begin(), original.begin() + static_cast<std::ptrdiff_t>(begin), '\n'));
+  program_.origins.reserve(lines + 1000);
+  for (std::size_t i = 0; i < lines; ++i) {
+    program_.origins.push_back({static_cast<std::uint32_t>(i + 1), 0});
+  }
+}
+
+void Reader::put_raw(std::string_view flat, const LineOrigin& origin) {
+  program_.text += flat;
+  program_.text += program_.line_end;
+  program_.origins.push_back(origin);
+}
+
+void Reader::put(std::string_view flat, const LineOrigin& origin) {
+  const std::size_t begin = program_.text.size();
+  put_raw(flat, origin);
+  const auto number = static_cast<std::uint32_t>(program_.origins.size());
+  const std::size_t end = program_.text.size();
+  try {
+    interpreter_.scan(std::string_view(program_.text).substr(begin, flat.size()), origin.line);
+    interpreter_.execute(number, origin, begin, end);
+  } catch (const Error& error) {
+    // The interpreter counts the lines of the expanded text.
+    throw Error(error.kind(), error.what(), origin.line, error.column(), error.alarm());
+  }
+}
+
+Error Reader::located(const Error& error) const {
+  // An error of a block that waited (compensation, corners) carries that block's line.
+  // Whatever is refused while a text is read is refused because of the text.
+  Error result(ErrorKind::program, error.what() + call_stack(), error.line() > 0 ? error.line() : here_.line,
+               std::max<std::uint32_t>(error.column(), 1), error.alarm());
+  const std::string& file = program_.files[frames_.empty() ? 0 : frames_.back().unit->file];
+  result.set_file(error.file().empty() ? file : error.file());
+  return result;
+}
+
+std::string Reader::call_stack() const {
+  constexpr std::size_t most_callers = 3;
+  std::string stack;
+  for (std::size_t k = frames_.size(); k-- > 1;) {
+    if (frames_.size() - k > most_callers) {
+      return stack + "; and " + std::to_string(k) + " more";
+    }
+    const Frame& caller = frames_[k - 1];
+    const std::string& file = program_.files[caller.unit->file];
+    stack += "; called by " +
+             (caller.unit->number >= 0 ? "O" + std::to_string(caller.unit->number) : std::string("the main program")) +
+             " line " + std::to_string(caller.place.line - 1) + (file.empty() ? "" : " of " + file);
+  }
+  return stack;
+}
+
+bool Reader::record(const Error& error) {
+  if (!options_.collect_alarms) {
+    return false;
+  }
+  const Error at = located(error);
+  program_.alarms.push_back({at.line(), at.what(), at.column(), at.alarm(), at.file()});
+  return program_.alarms.size() < most_alarms;
+}
+
+Program Reader::run() {
+  try {
+    load_main();
+  } catch (const Error& error) {
+    if (!record(error)) {
+      throw;
+    }
+    return std::move(program_);
+  }
+  const auto& probes = options_.probe_lines;
+  program_.probed.reserve(probes.size());
+  const auto probe = [&](std::uint32_t line_done) {
+    while (program_.probed.size() < probes.size() && probes[program_.probed.size()] <= line_done) {
+      program_.probed.push_back(interpreter_.state());
+    }
+  };
+  probe(here_.line - 1);
+  bool running = true;
+  while (running) {
+    try {
+      running = step();
+    } catch (const Error& error) {
+      if (!options_.collect_alarms) {
+        throw located(error);
+      }
+      running = record(error);
+    }
+    probe(program_.expanded ? static_cast<std::uint32_t>(program_.origins.size()) : here_.line);
+  }
+  finish();
+  return std::move(program_);
+}
+
+// Executes the next line. False at the end of the program.
+bool Reader::step() {
+  Frame& frame = frames_.back();
+  std::string_view text;
+  std::size_t begin = 0;
+  here_ = frame.place;
+  if (interpreter_.ended()) {
+    return false;
+  }
+  if (!frame.unit->next_line(frame.place, text, begin)) {
+    if (frames_.size() == 1) {
+      return false;
+    }
+    warn("program O" + std::to_string(frame.unit->number) + " ends without M99");
+    leave();
+    return true;
+  }
+  origin_ = {here_.line, frame.unit->file};
+  if (program_.expanded && ++steps_ > options_.max_steps) {
+    steps_ = 0;
+    interpreter_.end();
+    fail("more than " + std::to_string(options_.max_steps) +
+         " blocks executed (controller.max_program_steps): the program does not seem to end");
+  }
+  line(text, begin, frame.place.at);
+  return true;
+}
+
+void Reader::line(std::string_view text, std::size_t begin, std::size_t end) {
+  interpreter_.scan(text, here_.line);
+  const Block& block = interpreter_.block();
+  if (block.optional_skip && block_skip(options_, block.skip_switch).value_or(false)) {
+    interpreter_.close_region();  // the switch is on: the control does not run it
+    return;                       // an expanded text leaves it out
+  }
+  if (block.macro) {
+    macro_line(text, begin);
+  } else if (interpreter_.words().has('O') && !is_call(interpreter_.words())) {
+    program_line(begin, end);
+  } else {
+    plain_line(text, begin, end);
+  }
+}
+
+// The O line at a program's head: that of a called program becomes a comment.
+void Reader::program_line(std::size_t begin, std::size_t end) {
+  const Block& block = interpreter_.block();
+  interpreter_.require_plain_words(here_.line);
+  const auto number = static_cast<std::int64_t>(interpreter_.words()['O'].value);
+  std::string comments;
+  for (std::size_t i = 0; i < block.comment_count; ++i) {
+    comments += block.comments[i];
+  }
+  if (frames_.size() > 1) {
+    // A call does not stop the motion: its comment may stand inside of a region.
+    rewriter_.comment("(" + program_name(number) + ")" + comments, origin_);
+    return;
+  }
+  interpreter_.close_region();
+  ++program_.block_count;
+  if (program_.expanded) {
+    const std::string line(frames_.back().unit->text->substr(begin, end - begin));
+    put_raw(std::string_view(line).substr(0, line.find_first_of("\r\n")), origin_);
+  }
+  if (program_.regions.empty()) {
+    program_.header_offset = program_.expanded ? program_.text.size() : end;
+  }
+}
+
+void Reader::plain_line(std::string_view text, std::size_t begin, std::size_t end) {
+  const BlockWords& words = interpreter_.words();
+  if (program_.expanded) {
+    run_block(text, text);
+  } else if (is_call(words) || rewriter_.wants(words)) {
+    // The text moves: read the words again from where they stay.
+    const std::string line(text);
+    expand_from(begin);
+    interpreter_.scan(line, here_.line);
+    run_block(line, line);
+  } else {
+    note_words(words);
+    rewriter_.pass(words);
+    interpreter_.execute(here_.line, origin_, begin, end);
+  }
+}
+
+// Executes the block that was scanned from `text`; `raw` is the block as written.
+void Reader::run_block(std::string_view text, std::string_view raw) {
+  const BlockWords& words = interpreter_.words();
+  if (is_call(words)) {
+    note_number(words);
+    call_block(text, raw);
+    return;
+  }
+  note_words(words);
+  put_block(text);
+  modal_calls();
+}
+
+// Executes the block that was scanned from `text` and calls nothing, under the coordinate modes that are on.
+void Reader::put_block(std::string_view text) {
+  if (rewriter_.wants(interpreter_.words())) {
+    rewriter_.block(interpreter_.block(), interpreter_.words(), text, origin_);
+  } else {
+    rewriter_.pass(interpreter_.words());
+    put(text, origin_);
+  }
+}
+
+void Reader::note_number(const BlockWords& words) {
+  if (words.has('N')) {
+    control_.last_n = static_cast<std::int64_t>(words['N'].value);
+  }
+}
+
+// What macro statements may ask about the block before theirs, and modal calls about the one at hand.
+void Reader::note_words(const BlockWords& words) {
+  note_number(words);
+  if (words.m_count > 0) {
+    control_.last_m = words.m_codes[static_cast<std::size_t>(words.m_count - 1)];
+  }
+  moved_ = words.has_any(axis_letters) && (words.groups & (group_bit(Group::none) | group_bit(Group::call))) == 0;
+}
+
+void Reader::finish() {
+  const std::uint32_t last_of_text = std::max<std::uint32_t>(program_.line_count, 1);
+  try {
+    rewriter_.flush();
+  } catch (const Error& error) {
+    if (!record(error)) {
+      throw located(error);
+    }
+  }
+  interpreter_.finish();
+  if (program_.expanded) {
+    if (framed_) {
+      put_raw("%", {program_.line_count, 0});
+    }
+    program_.line_count = static_cast<std::uint32_t>(program_.origins.size());
+  }
+  const std::uint32_t last = here_.line;
+  std::string others;
+  for (const std::int64_t number : program_.program_numbers) {
+    if (number != program_.program_number && !called_.contains(number)) {
+      others += (others.empty() ? "" : ", ") + std::string("O") + std::to_string(number);
+    }
+  }
+  if (!others.empty()) {
+    program_.warnings.push_back({1,
+                                 "O" + std::to_string(program_.program_number) + " is played; the file also holds " +
+                                     others + " (--program picks another)",
+                                 0, 0, ""});
+  }
+  if (!interpreter_.ended() && !framed_) {
+    const Error error(ErrorKind::program, "the program has neither '%' lines nor an end M30 or M02: truncated?",
+                      last_of_text, 1);
+    if (!record(error)) {
+      throw error;
+    }
+  } else if (!interpreter_.ended()) {
+    program_.warnings.push_back({last, "the program does not end with M30 or M02", 0, 0, ""});
+  } else if (!framed_) {
+    program_.warnings.push_back(
+        {last, "the program has no '%' lines; a control that reads it over a line or from a tape needs them", 0, 0,
+         ""});
+  }
+  program_.probed.resize(options_.probe_lines.size(), interpreter_.state());
+}
+
+}  // namespace shapegcode::detail
+
+namespace shapegcode {
+
+Program read_program(std::string text, const ReaderOptions& options) {
+  return detail::Reader(std::move(text), options).run();
+}
+
+}  // namespace shapegcode

@@ -1,0 +1,353 @@
+// Subprograms M98/M99/M198, macro calls G65/G66/G67, codes that the builder bound to programs.
+#include <algorithm>
+#include <cmath>
+
+#include "program/read/reader_impl.hpp"
+#include "shapegcode/error.hpp"
+
+namespace shapegcode::detail {
+namespace {
+
+constexpr int macro_nesting = 4;
+
+bool has_m(const BlockWords& words, int code) noexcept {
+  const auto* end = words.m_codes.data() + words.m_count;
+  return std::find(words.m_codes.data(), end, code) != end;
+}
+
+}  // namespace
+
+std::string program_name(std::int64_t number) {
+  std::string digits = std::to_string(number);
+  digits.insert(0, digits.size() < 4 ? 4 - digits.size() : 0, '0');
+  return "O" + digits;
+}
+
+bool Reader::is_call(const BlockWords& words) const noexcept {
+  if ((words.groups & group_bit(Group::call)) != 0) {
+    return true;
+  }
+  const CodeBindings& bound = options_.bindings;
+  for (int k = 0; k < words.m_count; ++k) {
+    const int m = words.m_codes[static_cast<std::size_t>(k)];
+    if (m == 98 || m == 99 || m == 198 || bound.m_macros.contains(m) || bound.m_subprograms.contains(m)) {
+      return true;
+    }
+  }
+  if (bound.tool_program >= 0 && words.has('T')) {
+    return true;
+  }
+  for (int k = 0; !bound.g_macros.empty() && k < words.g_count; ++k) {
+    if (bound.g_macros.contains(words.g_tenths[static_cast<std::size_t>(k)])) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// `text` holds plain numbers, `raw` the block as written: arguments keep their full precision.
+void Reader::call_block(std::string_view text, std::string_view raw) {
+  const BlockWords& words = interpreter_.words();
+  const Block& block = interpreter_.block();
+  if (block.optional_skip && !block_skip(options_, block.skip_switch).has_value()) {
+    fail(
+        "'/' before a call: whether the block runs decides where the program goes; say it in the machine file "
+        "(input.block_skip)");
+  }
+  for (int k = 0; k < words.g_count; ++k) {
+    const int g = words.g_tenths[static_cast<std::size_t>(k)];
+    if (g == 650 || g == 660 || g == 661 || g == 670) {
+      macro_call(text, raw, g);
+      return;
+    }
+  }
+  if (has_m(words, 99) && (has_m(words, 98) || has_m(words, 198))) {
+    fail("M99 in one block with M98 or M198: a block either calls or returns", words['M'].column);
+  }
+  if (has_m(words, 99)) {
+    subprogram_return(text);
+  } else if (has_m(words, 98) || has_m(words, 198)) {
+    subprogram_call(text);
+  } else {
+    bound_call(text, raw);
+  }
+}
+
+// Executes what stands in the block beside the call.
+void Reader::put_without(std::string_view text, std::string_view letters, std::initializer_list<int> m_codes) {
+  const Block block = interpreter_.block();
+  std::string rest;
+  bool words = false;
+  for (const Word& word : block) {
+    const bool called =
+        word.letter == 'M' && std::find(m_codes.begin(), m_codes.end(), static_cast<int>(word.value)) != m_codes.end();
+    if (called || letters.find(word.letter) != std::string_view::npos) {
+      continue;
+    }
+    words = words || word.letter != 'N';
+    rest += (rest.empty() ? "" : " ");
+    rest += text.substr(word.column - 1, word.end - (word.column - 1));
+  }
+  for (std::size_t i = 0; i < block.comment_count; ++i) {
+    rest += (rest.empty() ? "" : " ");
+    rest += block.comments[i];
+  }
+  if (!words && block.comment_count == 0) {
+    return;
+  }
+  interpreter_.scan(rest, here_.line);
+  put_block(rest);
+}
+
+void Reader::subprogram_call(std::string_view text) {
+  const BlockWords words = interpreter_.words();
+  if (!words.has('P')) {
+    alarm(76, "M98 without a program number P", words['M'].column);
+  }
+  if (words['P'].has_point) {
+    alarm(7, "decimal point in the program number P of M98", words['P'].column);
+  }
+  if (words.has('L') && words['L'].has_point) {
+    alarm(7, "decimal point in the repetitions L of M98", words['L'].column);
+  }
+  const auto p = static_cast<std::int64_t>(words['P'].value);
+  std::int64_t number = p;
+  std::int64_t repeats = 1;
+  if (words.has('L')) {
+    repeats = static_cast<std::int64_t>(words['L'].value);
+  } else if (p > 9999 && store_.find(p) == nullptr) {
+    repeats = p / 10000;  // P0030100: three times O0100
+    number = p % 10000;
+  }
+  if (number < 1 || repeats < 0 || repeats > 99'999'999) {
+    alarm(76, "M98 P" + std::to_string(p) + " names no program", words['P'].column);
+  }
+  const std::uint32_t column = words['P'].column;
+  put_without(text, "PL", {98, 198});
+  if (repeats > 0) {
+    enter(number, {}, false, static_cast<int>(repeats), column, text);
+  }
+}
+
+void Reader::subprogram_return(std::string_view text) {
+  const BlockWords words = interpreter_.words();
+  const std::int64_t target = words.has('P') ? static_cast<std::int64_t>(words['P'].value) : -1;
+  const std::uint32_t column = words.has('P') ? words['P'].column : words['M'].column;
+  put_without(text, target >= 0 ? "P" : "", {99});
+  if (frames_.size() == 1) {
+    if (target >= 0) {
+      jump(target, column);
+      return;
+    }
+    rewriter_.flush();
+    put("M99", origin_);
+    warn("M99 at the end of the main program: it runs for ever; one pass is read");
+    interpreter_.end();
+    return;
+  }
+  const bool again = frames_.back().repeats > 1;
+  leave();
+  if (target >= 0 && !again) {
+    jump(target, column);
+  }
+}
+
+void Reader::macro_call(std::string_view text, std::string_view raw, int g_tenths) {
+  if (g_tenths == 670) {
+    if (!modal_calls_.empty()) {
+      modal_calls_.pop_back();
+    }
+    control_.modal_call = modal_calls_.empty() ? 67 : 66;
+    // Other codes may share the block with G67.
+    std::string rest(text);
+    const Block& block = interpreter_.block();
+    for (const Word& word : block) {
+      if (word.letter == 'G' && word.value == 67.0) {
+        for (std::size_t i = word.column - 1; i < word.end; ++i) {
+          rest[i] = ' ';
+        }
+      }
+    }
+    if (block.word_count > 1) {
+      interpreter_.scan(rest, here_.line);
+      put_without(rest, "", {});
+    }
+    return;
+  }
+  MacroArguments arguments = parse_arguments(raw, here_.line, variables_, argument_scale());
+  if (arguments.program < 1) {
+    alarm(76, "G" + std::to_string(g_tenths / 10) + " without a program number P");
+  }
+  if (arguments.repeats < 0 || arguments.repeats > 99'999'999) {
+    alarm(76, "repetitions L" + std::to_string(arguments.repeats) + " outside 0 ... 99999999");
+  }
+  if (g_tenths == 650) {
+    if (arguments.repeats > 0) {
+      enter(arguments.program, arguments, true, arguments.repeats, 1, text);
+    }
+    return;
+  }
+  if (modal_calls_.size() >= macro_nesting) {
+    alarm(122, "more than 4 modal calls G66 at the same time");
+  }
+  if (lookup(arguments.program) == nullptr) {
+    alarm(78, "program " + program_name(arguments.program) + " of G66 is not found");
+  }
+  modal_calls_.push_back({arguments, g_tenths == 661});
+  control_.modal_call = 66;
+}
+
+// A G, M or T code that the machine builder bound to a program; inside of such a program codes are ordinary.
+void Reader::bound_call(std::string_view text, std::string_view raw) {
+  const BlockWords words = interpreter_.words();
+  const CodeBindings& bound = options_.bindings;
+  const bool inside = std::any_of(frames_.begin(), frames_.end(), [](const Frame& frame) { return frame.by_code; });
+  if (inside) {
+    put_block(text);
+    return;
+  }
+  const auto call = [&](std::int64_t number, const MacroArguments& arguments, bool macro, std::uint32_t column) {
+    if (enter(number, arguments, macro, arguments.repeats, column, text)) {
+      frames_.back().by_code = true;
+    }
+  };
+  const auto call_macro = [&](std::int64_t number, std::uint32_t column) {
+    call(number, parse_arguments(raw, here_.line, variables_, argument_scale()), true, column);
+  };
+  for (const Word& word : interpreter_.block()) {
+    if (word.letter == 'G') {
+      const auto found = bound.g_macros.find(static_cast<int>(std::lround(word.value * 10.0)));
+      if (found != bound.g_macros.end()) {
+        call_macro(found->second, word.column);
+        return;
+      }
+    } else if (word.letter == 'M') {
+      const auto found = bound.m_macros.find(static_cast<int>(word.value));
+      if (found != bound.m_macros.end()) {
+        call_macro(found->second, word.column);
+        return;
+      }
+    }
+  }
+  for (int k = 0; k < words.m_count; ++k) {
+    const int m = words.m_codes[static_cast<std::size_t>(k)];
+    const auto found = bound.m_subprograms.find(m);
+    if (found != bound.m_subprograms.end()) {
+      put_without(text, "", {m});
+      call(found->second, {}, false, 1);
+      return;
+    }
+  }
+  // is_call() left nothing else.
+  variables_.write(149, words['T'].value, here_.line, words['T'].column);
+  put_without(text, "T", {});
+  call(bound.tool_program, {}, false, 1);
+}
+
+// Behind a block with a move: the macro of G66, the one given last first; its own moves call the one before it.
+void Reader::modal_calls() {
+  std::size_t inside = 0;
+  for (const Frame& frame : frames_) {
+    inside += frame.modal ? 1U : 0U;
+  }
+  if (inside >= modal_calls_.size()) {
+    return;
+  }
+  const ModalCall& call = modal_calls_[modal_calls_.size() - 1 - inside];
+  if ((moved_ || call.every_block) && call.arguments.repeats > 0) {
+    if (enter(call.arguments.program, call.arguments, true, call.arguments.repeats, 1, "")) {
+      frames_.back().modal = true;
+    }
+  }
+}
+
+ProgramUnit* Reader::lookup(std::int64_t number) {
+  ProgramUnit* unit = store_.find(number);
+  if (unit != nullptr || !options_.load_program || sought_.contains(number)) {
+    return unit;
+  }
+  sought_.insert(number);
+  auto source = options_.load_program(number);
+  if (!source) {
+    return nullptr;
+  }
+  sources_.push_back(std::move(*source));
+  program_.files.push_back(sources_.back().name);
+  const auto file = static_cast<std::uint32_t>(program_.files.size() - 1);
+  try {
+    store_.add(sources_.back().text, find_frame(sources_.back().text), file);
+  } catch (Error& error) {
+    error.set_file(sources_.back().name);
+    throw;
+  }
+  unit = store_.find(number);
+  if (unit == nullptr && store_.units().back()->number < 0) {
+    store_.units().back()->number = number;  // a file without an O line goes by its name
+    unit = store_.units().back().get();
+  }
+  return unit;
+}
+
+bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool macro, int repeats, std::uint32_t column,
+                   std::string_view text) {
+  ProgramUnit* unit = lookup(number);
+  if (unit == nullptr) {
+    if (!text.empty() && number >= options_.opaque_programs[0] && number <= options_.opaque_programs[1]) {
+      // A macro of the machine or of a probe: kept, and what it did is not known.
+      rewriter_.flush();
+      interpreter_.close_region();
+      put_raw(text, origin_);
+      interpreter_.forget_all();
+      variables_.forget();
+      warn("program " + program_name(number) +
+           " is not at hand: the call is kept, position and variables are not known afterwards");
+      return false;
+    }
+    alarm(78, "program " + program_name(number) + " is not found", column);
+  }
+  std::size_t macros = 0;
+  for (const Frame& frame : frames_) {
+    macros += frame.macro ? 1U : 0U;
+  }
+  if (macro && macros >= macro_nesting) {
+    alarm(122,
+          "macro calls nested deeper than " + std::to_string(macro_nesting) + " at the call of " + program_name(number),
+          column);
+  }
+  if (frames_.size() - macros > static_cast<std::size_t>(options_.subprogram_nesting) && !macro) {
+    alarm(77,
+          "subprograms nested deeper than " + std::to_string(options_.subprogram_nesting) +
+              " (controller.nesting_limit_subprogram) at the call of " + program_name(number),
+          column);
+  }
+  called_.insert(number);
+  if (macro) {
+    variables_.push_level(arguments.locals, here_.line, column);
+  }
+  Frame frame;
+  frame.unit = unit;
+  frame.place = unit->first;
+  frame.macro = macro;
+  frame.repeats = repeats;
+  frame.arguments = arguments;
+  frames_.push_back(std::move(frame));
+  return true;
+}
+
+void Reader::leave() {
+  Frame& frame = frames_.back();
+  if (frame.macro) {
+    variables_.pop_level();
+  }
+  if (--frame.repeats > 0) {
+    if (frame.macro) {
+      variables_.push_level(frame.arguments.locals, here_.line, 1);
+    }
+    frame.place = frame.unit->first;
+    frame.loops.clear();
+    return;
+  }
+  frames_.pop_back();
+}
+
+}  // namespace shapegcode::detail

@@ -1,0 +1,88 @@
+#include "program/rewrite/coordinate_modes.hpp"
+
+#include <cmath>
+
+#include "shapegcode/error.hpp"
+
+namespace shapegcode::detail {
+
+double CoordinateModes::factor(int axis) const noexcept {
+  return (mirror[static_cast<std::size_t>(axis)] ? -1.0 : 1.0) * (scaling ? scale[axis] : 1.0);
+}
+
+bool CoordinateModes::acts_on(int axis) const noexcept {
+  return mixes(axis) || mirror[static_cast<std::size_t>(axis)] || (scaling && scale[axis] != 1.0);
+}
+
+Vector3 CoordinateModes::stretch(const Vector3& programmed) const noexcept {
+  Vector3 point = programmed;
+  for (int axis = 0; axis < axis_count; ++axis) {
+    if (mirror[static_cast<std::size_t>(axis)]) {
+      point[axis] = 2.0 * mirror_at[axis] - point[axis];
+    }
+    if (scaling) {
+      point[axis] = scale_centre[axis] + scale[axis] * (point[axis] - scale_centre[axis]);
+    }
+  }
+  return point;
+}
+
+Vector3 CoordinateModes::rotate(const Vector3& point, double sense) const noexcept {
+  if (!rotation) {
+    return point;
+  }
+  const int a = (rotation_normal + 1) % 3;
+  const int b = (rotation_normal + 2) % 3;
+  const double c = std::cos(rotation_rad);
+  const double s = sense * std::sin(rotation_rad);
+  const double u = point[a] - rotation_centre[a];
+  const double v = point[b] - rotation_centre[b];
+  Vector3 turned = point;
+  turned[a] = rotation_centre[a] + c * u - s * v;
+  turned[b] = rotation_centre[b] + s * u + c * v;
+  return turned;
+}
+
+Vector3 CoordinateModes::undo(const Vector3& work) const noexcept {
+  Vector3 point = rotate(work, -1.0);
+  for (int axis = 0; axis < axis_count; ++axis) {
+    if (scaling) {
+      point[axis] = scale_centre[axis] + (point[axis] - scale_centre[axis]) / scale[axis];
+    }
+    if (mirror[static_cast<std::size_t>(axis)]) {
+      point[axis] = 2.0 * mirror_at[axis] - point[axis];
+    }
+  }
+  return point;
+}
+
+bool CoordinateModes::flips(int normal) const noexcept {
+  return factor((normal + 1) % 3) * factor((normal + 2) % 3) < 0.0;
+}
+
+Segment CoordinateModes::apply(const Segment& programmed, std::uint32_t line) const {
+  Segment segment;
+  if (programmed.kind == SegmentKind::arc) {
+    const int a = (programmed.normal + 1) % 3;
+    const int b = (programmed.normal + 2) % 3;
+    if (std::abs(std::abs(factor(a)) - std::abs(factor(b))) > 1e-9) {
+      throw Error(ErrorKind::program,
+                  "an arc under scaling G51 with different factors of its two axes is no arc any more", line, 1);
+    }
+    if (rotation && programmed.normal != rotation_normal) {
+      throw Error(ErrorKind::program, "an arc of another plane than that of the rotation G68 is not supported", line,
+                  1);
+    }
+    segment = make_arc(apply(programmed.start_mm), apply(programmed.end_mm), apply(programmed.centre_mm),
+                       flips(programmed.normal) ? -programmed.sweep_rad : programmed.sweep_rad, programmed.normal,
+                       programmed.feed_mm_per_s, programmed.line);
+  } else {
+    segment =
+        make_line(apply(programmed.start_mm), apply(programmed.end_mm), programmed.feed_mm_per_s, programmed.line);
+    segment.kind = programmed.kind;
+  }
+  segment.stop_at_end = programmed.stop_at_end;
+  return segment;
+}
+
+}  // namespace shapegcode::detail

@@ -1,0 +1,195 @@
+#include "program/text/lexer.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "base/text.hpp"
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+namespace {
+
+constexpr int max_digits = 8;  // FANUC alarm 003: eight digits, point not counted
+
+constexpr std::array<double, 19> powers_of_ten = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8, 1e9,
+                                                  1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18};
+
+[[noreturn]] void alarm(int number, const std::string& message, std::uint32_t line, std::size_t index) {
+  throw alarm_error(number, message, line, static_cast<std::uint32_t>(index + 1));
+}
+
+[[noreturn]] void fail(const std::string& message, std::uint32_t line, std::size_t index) {
+  throw Error(ErrorKind::program, message, line, static_cast<std::uint32_t>(index + 1));
+}
+
+std::string quoted(char c) {
+  if (c >= ' ' && c <= '~') {
+    return std::string("'") + c + "'";
+  }
+  constexpr const char* hex = "0123456789ABCDEF";
+  const auto byte = static_cast<unsigned char>(c);
+  return std::string("byte 0x") + hex[byte >> 4] + hex[byte & 15];
+}
+
+bool is_macro_keyword(std::string_view text, std::size_t i) noexcept {
+  std::array<char, 5> run{};
+  std::size_t size = 0;
+  for (std::size_t k = i; k < text.size() && is_letter(text[k]) && size < run.size(); ++k) {
+    run[size++] = upper(text[k]);
+  }
+  const std::string_view word(run.data(), size);
+  for (const std::string_view keyword :
+       {"IF", "THEN", "GOTO", "WHILE", "DO", "END", "POPEN", "DPRNT", "PCLOS", "BPRNT"}) {
+    if (word.starts_with(keyword)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// Reads the number behind a letter; i stands on its first character and ends behind it. False at a macro expression or
+// keyword.
+bool scan_number(std::string_view text, std::uint32_t line, std::size_t& i, std::size_t letter_at, Word& word) {
+  const std::size_t n = text.size();
+  while (i < n && (text[i] == ' ' || text[i] == '\t')) {
+    ++i;
+  }
+  bool negative = false;
+  if (i < n && (text[i] == '-' || text[i] == '+')) {
+    negative = text[i] == '-';
+    ++i;
+  }
+  std::uint64_t mantissa = 0;
+  unsigned decimals = 0;
+  unsigned significant = 0;
+  unsigned seen = 0;
+  for (; i < n; ++i) {
+    const char c = text[i];
+    if (is_digit(c)) {
+      ++seen;
+      if (mantissa != 0 || c != '0') {
+        ++significant;
+      }
+      if (significant <= 17) {
+        mantissa = mantissa * 10 + static_cast<unsigned>(c - '0');
+        if (word.has_point) {
+          ++decimals;
+        }
+      }
+    } else if (c == '.' && !word.has_point) {
+      word.has_point = true;
+    } else {
+      break;
+    }
+  }
+  if (seen == 0) {
+    if ((i < n && (text[i] == '#' || text[i] == '[')) || is_macro_keyword(text, letter_at)) {
+      return false;
+    }
+    alarm(5, "address " + std::string(1, upper(text[letter_at])) + " has no number", line, letter_at);
+  }
+  if (significant > max_digits) {
+    alarm(3,
+          "too many digits in address " + std::string(1, word.letter) + ": " + std::to_string(significant) +
+              " (limit " + std::to_string(max_digits) + ")",
+          line, letter_at);
+  }
+  if (decimals >= powers_of_ten.size()) {
+    decimals = static_cast<unsigned>(powers_of_ten.size()) - 1;
+  }
+  // A mantissa of 8 digits over an exact power of ten is the correctly rounded decimal.
+  const double magnitude = static_cast<double>(mantissa) / powers_of_ten[decimals];
+  word.value = negative ? -magnitude : magnitude;
+  word.digits = static_cast<std::uint8_t>(significant);
+  word.end = static_cast<std::uint32_t>(i);
+  return true;
+}
+
+}  // namespace
+
+void scan_block(std::string_view text, std::uint32_t line, std::size_t max_length, Block& block) {
+  block.word_count = 0;
+  block.comment_count = 0;
+  block.optional_skip = false;
+  block.macro = false;
+  const std::size_t n = text.size();
+  if (n > max_length) {
+    fail("line of " + std::to_string(n) + " characters (limit " + std::to_string(max_length) + ")", line, max_length);
+  }
+  std::size_t i = 0;
+  while (i < n) {
+    const char c = text[i];
+    if (is_letter(c)) {
+      if (block.word_count == Block::max_words) {
+        fail("more than " + std::to_string(Block::max_words) + " words in a block", line, i);
+      }
+      const std::size_t letter_at = i;
+      Word& word = block.words[block.word_count];
+      word = Word{};
+      word.letter = upper(c);
+      word.column = static_cast<std::uint32_t>(i + 1);
+      ++i;
+      if (!scan_number(text, line, i, letter_at, word)) {
+        block.macro = true;
+        return;
+      }
+      ++block.word_count;
+    } else if (c == ' ' || c == '\t' || c == '\r' || c == ';') {
+      ++i;
+    } else if (c == '(') {
+      const std::size_t close = text.find(')', i);
+      if (close == std::string_view::npos) {
+        fail("comment does not close: '(' without ')'", line, i);
+      }
+      if (block.comment_count == Block::max_comments) {
+        fail("more than " + std::to_string(Block::max_comments) + " comments in a block", line, i);
+      }
+      block.comments[block.comment_count++] = text.substr(i, close + 1 - i);
+      i = close + 1;
+    } else if (c == '/') {
+      if (block.word_count > 1 || (block.word_count == 1 && block.words[0].letter != 'N')) {
+        fail("'/' inside a block: only a block skip at its start is supported", line, i);
+      }
+      block.optional_skip = true;
+      block.skip_switch = 1;
+      ++i;
+      if (i < n && is_digit(text[i])) {  // /1 ... /9
+        block.skip_switch = std::max(1, text[i] - '0');
+        ++i;
+      }
+    } else if (c == '#' || c == '[' || c == ']' || c == '=') {
+      block.macro = true;
+      return;
+    } else if (c == ',') {
+      // ",R" ",C" corner words: read as a word of their own so that they can be named.
+      const char kind = i + 1 < n ? upper(text[i + 1]) : ' ';
+      if ((kind == 'R' || kind == 'C') && block.word_count < Block::max_words) {
+        const std::size_t letter_at = i + 1;
+        Word& word = block.words[block.word_count];
+        word = Word{};
+        word.letter = kind == 'R' ? '<' : '>';
+        word.column = static_cast<std::uint32_t>(i + 1);
+        i += 2;
+        if (!scan_number(text, line, i, letter_at, word)) {
+          block.macro = true;
+          return;
+        }
+        ++block.word_count;
+      } else {
+        alarm(9, "',' without R or C", line, i);
+      }
+    } else if ((c == '.' || c == '-') && block.word_count > 0 && block.words[block.word_count - 1].end == i) {
+      const char letter = block.words[block.word_count - 1].letter;
+      const std::string name = letter == '<' ? ",R" : letter == '>' ? ",C" : std::string(1, letter);
+      alarm(c == '.' ? 7 : 6,
+            (c == '.' ? "second decimal point in address " : "minus sign behind the number of address ") + name, line,
+            i);
+    } else if (is_digit(c) || c == '.' || c == '-' || c == '+') {
+      alarm(4, quoted(c) + " stands where an address is expected", line, i);
+    } else {
+      alarm(9, quoted(c) + " is no program character", line, i);
+    }
+  }
+}
+
+}  // namespace shapegcode

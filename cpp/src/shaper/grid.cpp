@@ -1,0 +1,111 @@
+#include "shapegcode/shaper.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <iomanip>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+
+namespace {
+
+// Two z closer than this are one root, and an imaginary part below it is none: what the other root would have
+// cancelled stays below the rounding of the amplitudes.
+constexpr double same_root = 1e-14;
+
+/// z = e^{s*period}, and 1 - z without the cancellation of the plain difference.
+struct GridRoot {
+  std::complex<double> z;
+  std::complex<double> one_minus_z;
+};
+
+GridRoot grid_root(const Mode& mode, double period_s) {
+  const std::complex<double> s = pole(mode);
+  // whole turns change nothing, and without them sin and cos see a small angle
+  const double angle = std::remainder(s.imag() * period_s, 2.0 * std::acos(-1.0));
+  const double radius = std::exp(s.real() * period_s);
+  const double half_sine = std::sin(0.5 * angle);
+  return {std::polar(radius, angle),
+          {2.0 * radius * half_sine * half_sine - std::expm1(s.real() * period_s), -radius * std::sin(angle)}};
+}
+
+/// Coefficients in powers of one period's delay, scaled to sum 1.
+std::vector<double> factor(const GridRoot& root) {
+  if (std::abs(root.z.imag()) <= same_root) {
+    return {1.0 / root.one_minus_z.real(), -root.z.real() / root.one_minus_z.real()};
+  }
+  const double scale = 1.0 / std::norm(root.one_minus_z);
+  return {scale, -2.0 * root.z.real() * scale, std::norm(root.z) * scale};
+}
+
+std::vector<double> multiply(const std::vector<double>& a, const std::vector<double>& b) {
+  std::vector<double> product(a.size() + b.size() - 1, 0.0);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (std::size_t k = 0; k < b.size(); ++k) {
+      product[i + k] += a[i] * b[k];
+    }
+  }
+  return product;
+}
+
+[[noreturn]] void refuse_root(const Mode& mode, double period_s, const GridRoot& root) {
+  std::ostringstream message;
+  message << "mode " << mode.frequency_hz << " Hz cannot be cancelled on a " << period_s * 1e3
+          << " ms grid: z = " << std::fixed << std::setprecision(3) << root.z.real() << std::showpos << root.z.imag()
+          << std::noshowpos << "j lies " << std::scientific << std::setprecision(1) << std::abs(root.one_minus_z)
+          << " from +1, limit " << std::defaultfloat << grid_least_distance_from_one << "; choose another block period";
+  throw Error(ErrorKind::design, message.str());
+}
+
+}  // namespace
+
+Shaper grid_polynomial(std::span<const Mode> modes, double period_s) {
+  if (modes.empty()) {
+    throw Error(ErrorKind::argument, "a grid shaper needs at least one mode: 0 given");
+  }
+  if (!std::isfinite(period_s) || period_s <= 0.0) {
+    std::ostringstream message;
+    message << "the period of a shaper's grid is positive: it is " << period_s << " s";
+    throw Error(ErrorKind::argument, message.str());
+  }
+  std::vector<double> amplitudes{1.0};
+  std::vector<std::complex<double>> cancelled;
+  for (const Mode& mode : modes) {
+    const GridRoot root = grid_root(mode, period_s);
+    if (std::abs(root.one_minus_z) < grid_least_distance_from_one) {
+      refuse_root(mode, period_s, root);
+    }
+    const bool known = std::ranges::any_of(cancelled, [&root](const std::complex<double>& z) {
+      return std::abs(z - root.z) <= same_root || std::abs(std::conj(z) - root.z) <= same_root;
+    });
+    if (!known) {
+      cancelled.push_back(root.z);
+      amplitudes = multiply(amplitudes, factor(root));
+    }
+  }
+  std::vector<double> times(amplitudes.size());
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    times[k] = static_cast<double>(k) * period_s;
+  }
+  // make_shaper judges the sum absolutely; taps that are 1e9 times larger than their sum fail below with their reason
+  Shaper shaper{std::move(times), std::move(amplitudes)};
+  for (const Mode& mode : modes) {
+    const double residual = residual_ratio(shaper, mode);
+    if (!(residual <= grid_largest_residual)) {
+      std::ostringstream message;
+      message << "the polynomial of " << modes.size() << " modes on a " << period_s * 1e3
+              << " ms grid has sum |a| = " << abs_sum(shaper) << ", so that rounding leaves " << residual << " of mode "
+              << mode.frequency_hz << " Hz, limit " << grid_largest_residual << "; choose a longer period";
+      throw Error(ErrorKind::design, message.str());
+    }
+  }
+  return make_shaper(std::move(shaper.times_s), std::move(shaper.amplitudes));
+}
+
+}  // namespace shapegcode
