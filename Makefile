@@ -18,7 +18,7 @@ ifneq ($(shell command -v ccache),)
 export CMAKE_CXX_COMPILER_LAUNCHER := ccache
 endif
 
-BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libsundials-dev python3-dev python3-venv doctest-dev
+BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libfmt-dev libsundials-dev python3-dev python3-venv doctest-dev
 TEST_PACKAGES := $(BUILD_PACKAGES) clang-format clang-tidy
 FUZZ_PACKAGES := $(BUILD_PACKAGES) clang-14 libclang-rt-14-dev libomp-14-dev
 FUZZ_SECONDS ?= 600

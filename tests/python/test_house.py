@@ -19,7 +19,21 @@ PACKAGE = ROOT / "python" / "shapegcode"
 
 # The folders of cpp/src from the bottom up: each may include what stands before it. `program` knows nothing of motion,
 # shaping and plants, so that text is read without a machine.
-FOLDERS = "base path filter motion program shaper plant measure identify milling command write play".split()
+FOLDERS = [
+    "base",
+    "path",
+    "filter",
+    "motion",
+    "program",
+    "shaper",
+    "plant",
+    "measure",
+    "identify",
+    "milling",
+    "command",
+    "write",
+    "play",
+]
 NOT_FROM = {"program": {"filter", "motion"}, "measure": {"filter", "motion", "program", "shaper", "plant"}}
 # Public headers whose folder of sources has another name; one that is named like a folder, or lies in it, is its own.
 HEADER_FOLDERS = {
