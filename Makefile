@@ -18,7 +18,10 @@ ifneq ($(shell command -v ccache),)
 export CMAKE_CXX_COMPILER_LAUNCHER := ccache
 endif
 
-BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libfmt-dev libsundials-dev python3-dev python3-venv doctest-dev
+# Where fetch_sundials.sh puts CVODE; what is not there is looked for in the system.
+export SUNDIALS_ROOT := $(CURDIR)/.cache/sundials/usr
+
+BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libfmt-dev python3-dev python3-venv doctest-dev
 TEST_PACKAGES := $(BUILD_PACKAGES) clang-format clang-tidy
 FUZZ_PACKAGES := $(BUILD_PACKAGES) clang-14 libclang-rt-14-dev libomp-14-dev
 FUZZ_SECONDS ?= 600
@@ -26,26 +29,22 @@ FUZZ_FLAGS := -timeout=5 -rss_limit_mb=2048 -max_len=2000 -dict=tests/fuzz/gcode
 
 CPP_HEADERS := $(shell find cpp -name '*.hpp')
 CORE_SOURCES := $(shell find cpp/src -name '*.cpp')
-CPP_FILES := $(shell find cpp bindings tests/cpp tests/fuzz -name '*.[ch]pp')
+CPP_FILES := $(shell find cpp bindings tests/cpp tests/fuzz tests/oracles -name '*.[ch]pp' 2>/dev/null)
 # Folders too: their time changes when a file comes or goes.
 PACKAGE_INPUTS := CMakeLists.txt cmake $(shell find cpp/include cpp/src bindings python \
                     -name __pycache__ -prune -o -print)
-# Groups of sources that clang-tidy reads as one, of about the same cost; a new folder falls into the last one.
-TIDY_program := $(filter cpp/src/program/%, $(CORE_SOURCES))
-TIDY_plant := $(filter cpp/src/plant/% cpp/src/identify/% cpp/src/base/%, $(CORE_SOURCES))
-TIDY_motion := $(filter cpp/src/path/% cpp/src/filter/% cpp/src/motion/% cpp/src/command/% cpp/src/write/% \
-                 cpp/src/play/%, \
-                 $(CORE_SOURCES))
-TIDY_rest := $(filter-out $(TIDY_program) $(TIDY_plant) $(TIDY_motion), $(CORE_SOURCES))
-TIDY_STAMPS := build/tidy/plant.ok build/tidy/rest.ok build/tidy/motion.ok build/tidy/program.ok
+PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
-.PHONY: help demo test lint bench fuzz stubs format clean \
-        build-packages test-packages package dev tidy release sanitize stub-check fuzz-parameters fuzz-merge
+.PHONY: help demo test test-all lint bench coverage fuzz stubs format clean \
+        build-packages test-packages package dev tidy tidy-all release plain sanitize stub-check \
+        test-all-core test-all-python fuzz-parameters fuzz-merge
 
 help:
 	@echo 'make demo    build, convert a first program and a real one of some thousand lines; results in demo-output/'
-	@echo 'make test    everything that must hold: lint, C++ tests plain and with sanitizers, Python tests'
-	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy'
+	@echo 'make test    what must hold, in minutes: lint, C++ tests, stubs, Python tests'
+	@echo 'make test-all  slow tests, sanitizers, the plain build and clang-tidy of everything as well'
+	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy of what changed since the last test-all'
+	@echo 'make coverage  lines of C++ and Python that `make test` runs'
 	@echo 'make bench   measure, with LinuxCNC rs274 as the independent interpreter'
 	@echo 'make fuzz    FUZZ_SECONDS (600) of coverage-guided fuzzing of the program reader; findings in build/fuzz/findings/'
 	@echo 'make stubs   write python/shapegcode/_core.pyi anew from the built module'
@@ -63,17 +62,33 @@ demo: package
 test:
 	$(MAKE) lint
 	$(MAKE) release
-	$(MAKE) sanitize
 	$(MAKE) stub-check
 	tests/tools/fetch_rs274.sh
-	$(BIN)/python -m pytest -n $(JOBS)
+	$(PYTEST) -m 'not slow'
+
+# What takes longer than a person waits; .ci/run does of it what guards a file that changed since it last passed, which
+# tests/full_pass.txt tells. Commit that file with the change.
+test-all:
+	$(MAKE) test
+	$(MAKE) test-all-core
+	$(MAKE) test-all-python
+	$(BIN)/python tests/tools/full_pass.py write
+
+test-all-core:
+	$(MAKE) plain
+	$(MAKE) sanitize
+	$(MAKE) tidy-all
+
+test-all-python: package dev
+	tests/tools/fetch_rs274.sh
+	$(PYTEST) -m slow
 
 lint: test-packages dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --strict python/shapegcode
 	clang-format --dry-run -Werror $(CPP_FILES)
-	$(MAKE) -j$(JOBS) tidy
+	$(MAKE) tidy
 	@echo 'lint: nothing to complain about'
 
 bench: package dev
@@ -120,9 +135,11 @@ clean:
 # --- Steps ------------------------------------------------------------------------------------------------------------
 build-packages:
 	@tests/tools/debian_packages.sh $(BUILD_PACKAGES)
+	@tests/tools/fetch_sundials.sh
 
 test-packages:
 	@tests/tools/debian_packages.sh $(TEST_PACKAGES)
+	@tests/tools/fetch_sundials.sh
 
 .venv/.runtime: pyproject.toml tests/tools/requirements.py | build-packages
 	@$(PYTHON) -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 11))' || \
@@ -156,12 +173,18 @@ release sanitize: test-packages
 	cmake --build --preset $@
 	ctest --preset $@
 
+# Each source and public header by itself: compiled only.
+plain: test-packages
+	cmake --preset plain
+	cmake --build --preset plain
+
 stub-check: package dev
 	$(BIN)/python -m mypy.stubtest --mypy-config-file pyproject.toml \
 	  --allowlist tests/tools/stubtest_allowlist.txt shapegcode._core
 
 build/fuzz/tests/fuzz/fuzz_reader: $(CORE_SOURCES) $(CPP_HEADERS) $(wildcard tests/fuzz/*.[ch]pp) tests/fuzz/CMakeLists.txt
 	@tests/tools/debian_packages.sh $(FUZZ_PACKAGES)
+	@tests/tools/fetch_sundials.sh
 	cmake --preset fuzz
 	cmake --build --preset fuzz
 
@@ -169,12 +192,8 @@ build/release/compile_commands.json: CMakeLists.txt CMakePresets.json $(CORE_SOU
 	cmake --preset release
 	touch $@
 
-build/tidy/program.ok: $(TIDY_program)
-build/tidy/plant.ok: $(TIDY_plant)
-build/tidy/motion.ok: $(TIDY_motion)
-build/tidy/rest.ok: $(TIDY_rest)
-$(TIDY_STAMPS): $(CPP_HEADERS) .clang-tidy tests/tools/tidy.sh build/release/compile_commands.json
-	tests/tools/tidy.sh $(@:.ok=.cpp) $(filter cpp/%.cpp, $^)
-	@touch $@
+tidy: build/release/compile_commands.json
+	$(PYTHON) tests/tools/full_pass.py files | xargs -r tests/tools/tidy.sh
 
-tidy: $(TIDY_STAMPS)
+tidy-all: build/release/compile_commands.json
+	tests/tools/tidy.sh $(CORE_SOURCES)
