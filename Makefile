@@ -102,6 +102,10 @@ bench: package dev
 	$(BIN)/python tests/benchmarks/feed_schedule.py
 	$(BIN)/python tests/benchmarks/milling_force.py
 
+coverage: test-packages dev
+	tests/tools/fetch_rs274.sh
+	tests/tools/coverage.sh -m 'not slow'
+
 # New inputs go to build/, so that the kept corpus grows only by `fuzz-merge`, which adds what covers more.
 fuzz: build/fuzz/tests/fuzz/fuzz_reader
 	mkdir -p build/fuzz/corpus/reader build/fuzz/findings
