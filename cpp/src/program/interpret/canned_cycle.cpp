@@ -1,4 +1,5 @@
 #include "program/interpret/canned_cycle.hpp"
+#include "path/arc_frame.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -30,9 +31,10 @@ Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, doubl
     }
   };
   // G76 and G87 lift the tip off the wall by Q; the direction is a parameter (5148), the way the same.
+  const int side = ArcFrame(axis).a;
   const auto shift = [&](double by) {
     Vector3 target = position;
-    target[(axis + 1) % 3] += by;
+    target[side] += by;
     OtherMove move{make_line(position, target, 0.0, line), 0.0};
     move.segment.kind = SegmentKind::rapid;
     if (move.segment.length_mm > 0.0) {
@@ -42,8 +44,8 @@ Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, doubl
   };
   const Vector3 centre = position;
   const auto unshift = [&] {
-    shift(centre[(axis + 1) % 3] - position[(axis + 1) % 3]);
-    position[(axis + 1) % 3] = centre[(axis + 1) % 3];
+    shift(centre[side] - position[side]);
+    position[side] = centre[side];
   };
   if (cycle.code == 87) {  // back boring goes down beside the bore and cuts upwards
     shift(cycle.peck_mm);
