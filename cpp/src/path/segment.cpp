@@ -1,9 +1,12 @@
 #include "shapegcode/path.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string>
 
 #include "path/arc_frame.hpp"
 #include "shapegcode/error.hpp"
@@ -12,6 +15,8 @@ namespace shapegcode {
 namespace {
 
 constexpr double two_pi = 2.0 * std::numbers::pi;
+
+std::string shown(const Vector3& p) { return fmt::format("({} {} {})", p[0], p[1], p[2]); }
 
 double pitch_mm_per_rad(const Segment& segment) noexcept {
   const int n = segment.normal;
@@ -94,7 +99,18 @@ Segment make_line(const Vector3& start, const Vector3& end, double feed_mm_per_s
 
 Segment make_arc(const Vector3& start, const Vector3& end, const Vector3& centre, double sweep_rad, int normal,
                  double feed_mm_per_s, std::uint32_t line) {
+  if (normal < 0 || normal > 2) {
+    throw Error(ErrorKind::argument, fmt::format("an arc turns about axis 0, 1 or 2, not {}", normal), line);
+  }
   const ArcFrame frame(normal);
+  // The height of the centre has no say.
+  if (!start.allFinite() || !end.allFinite() || !frame.project(centre).allFinite() || !std::isfinite(sweep_rad) ||
+      !std::isfinite(feed_mm_per_s)) {
+    throw Error(ErrorKind::argument,
+                fmt::format("an arc needs finite numbers: start {}, end {}, centre {}, sweep {} rad, feed {} mm/s",
+                            shown(start), shown(end), shown(centre), sweep_rad, feed_mm_per_s),
+                line);
+  }
   Segment segment = make_line(start, end, feed_mm_per_s, line);
   segment.kind = SegmentKind::arc;
   segment.normal = static_cast<std::uint8_t>(normal);
