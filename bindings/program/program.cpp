@@ -194,6 +194,8 @@ void register_gcode(py::module_& module) {
                      "First and last program number whose calls are kept if the program is not found.")
       .def_readwrite("subprogram_nesting", &ReaderOptions::subprogram_nesting, "Deepest nesting of M98.")
       .def_readwrite("max_steps", &ReaderOptions::max_steps, "Blocks executed behind the first call or jump.")
+      .def_readwrite("max_cycle_moves", &ReaderOptions::max_cycle_moves,
+                     "Moves that all drilling cycles of a program come to.")
       .def_readwrite("block_skip", &ReaderOptions::block_skip, "Switch of / ... /9: on, off, or None: not known.")
       .def_readwrite("expand_compensation", &ReaderOptions::expand_compensation,
                      "G41/G42 become plain moves; False: kept as they stand.")

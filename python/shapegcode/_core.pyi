@@ -1224,6 +1224,14 @@ class ReaderOptions:
     def load_program(self, arg1: typing.Any) -> None:
         ...
     @property
+    def max_cycle_moves(self) -> int:
+        """
+        Moves that all drilling cycles of a program come to.
+        """
+    @max_cycle_moves.setter
+    def max_cycle_moves(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
     def max_line_length(self) -> int:
         """
         Characters.

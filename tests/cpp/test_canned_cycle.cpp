@@ -85,3 +85,15 @@ TEST_CASE("canned cycle: along another axis, and upwards") {
   REQUIRE(moves.size() == 3);
   CHECK(moves[1].segment.end_mm == Vector3(0.0, 4.0, 0.0));
 }
+
+TEST_CASE("canned cycle: thousands of pecks reach the bottom") {
+  CannedCycle cycle = cycle_of(73, 0.001);
+  cycle.r_mm = 2.0;
+  cycle.bottom_mm = -18.0;
+  cycle.initial_mm = 10.0;
+  std::vector<OtherMove> moves;
+  (void)expand_cycle(cycle, {0.0, 0.0, 10.0}, 2, 5.0, 1, moves);
+  CHECK(shapegcode::cuts_per_hole(cycle) == 20000.0);
+  REQUIRE(moves.size() > 20000);
+  CHECK(moves[moves.size() - 2].segment.end_mm.z() == -18.0);
+}

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "shapegcode/error.hpp"
@@ -72,6 +74,40 @@ TEST_CASE("segment: an arc without radius or sweep is refused") {
   CHECK_THROWS_AS((void)make_arc({0, 0, 0}, {1, 0, 0}, {0, 0, 0}, 1.0, 2, 1.0), Error);
   CHECK_THROWS_AS((void)make_arc({1, 0, 0}, {0, 0, 0}, {0, 0, 0}, 1.0, 2, 1.0), Error);
   CHECK_THROWS_AS((void)make_arc({1, 0, 0}, {0, 1, 0}, {0, 0, 0}, 0.0, 2, 1.0), Error);
+}
+
+TEST_CASE("segment: an arc about no axis, or of numbers that are not finite, is refused") {
+  const double nan = std::nan("");
+  const double infinite = std::numeric_limits<double>::infinity();
+  const auto refused = [](const Vector3& start, const Vector3& end, const Vector3& centre, double sweep, int normal,
+                          double feed, const char* what) {
+    try {
+      (void)make_arc(start, end, centre, sweep, normal, feed, 17);
+      return false;
+    } catch (const Error& error) {
+      CAPTURE(error.what());
+      CHECK(error.kind() == shapegcode::ErrorKind::argument);
+      CHECK(error.line() == 17);
+      return std::string(error.what()).find(what) != std::string::npos;
+    }
+  };
+  const Vector3 start(1, 0, 0);
+  const Vector3 end(0, 1, 0);
+  const Vector3 centre(0, 0, 0);
+  for (const int normal : {-2, -1, 3, 5, 258}) {
+    CAPTURE(normal);
+    CHECK(refused(start, end, centre, 0.5 * pi, normal, 1.0, ("not " + std::to_string(normal)).c_str()));
+  }
+  for (const double bad : {nan, infinite, -infinite}) {
+    CAPTURE(bad);
+    CHECK(refused({1, 0, bad}, end, centre, 0.5 * pi, 2, 1.0, "finite"));
+    CHECK(refused(start, {bad, 1, 0}, centre, 0.5 * pi, 2, 1.0, "finite"));
+    CHECK(refused(start, end, {0, bad, 0}, 0.5 * pi, 2, 1.0, "finite"));
+    CHECK(refused(start, end, centre, bad, 2, 1.0, "finite"));
+    CHECK(refused(start, end, centre, 0.5 * pi, 2, bad, "finite"));
+  }
+  // The centre's height is nobody's business.
+  CHECK(make_arc(start, end, {0, 0, nan}, 0.5 * pi, 2, 1.0).length_mm == doctest::Approx(0.5 * pi));
 }
 
 TEST_CASE("segment: arcs pass through the points of their circle") {

@@ -68,6 +68,7 @@ inline ReaderOptions options_from(std::span<const std::uint8_t> bytes) {
   }
   // Enough to see what repeats; a fuzzer has no time for the limit that people get.
   options.max_steps = 3000;
+  options.max_cycle_moves = 30'000;
   const std::uint8_t choices = in.byte();
   options.collect_alarms = (choices & 1U) != 0;
   options.expand_compensation = (choices & 2U) == 0;

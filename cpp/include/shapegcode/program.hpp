@@ -79,6 +79,7 @@ struct ReaderOptions {
   std::array<std::int64_t, 2> opaque_programs = {9000, 9999};           ///< if not found: called, but not looked into
   int subprogram_nesting = 10;
   std::uint64_t max_steps = 10'000'000;           ///< blocks executed behind the first call or jump
+  std::uint64_t max_cycle_moves = 2'000'000;      ///< moves that all drilling cycles of a program come to
   std::array<std::optional<bool>, 9> block_skip;  ///< switch on, off, or not known, of / ... /9
   bool expand_compensation = true;                ///< G41/G42 become plain moves; false: kept as they stand
   char compensation_start_up = 'A';               ///< type A or B (parameter 5003)

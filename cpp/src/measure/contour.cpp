@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "path/arc_frame.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -63,8 +64,8 @@ std::shared_ptr<const ContourTracker::Geometry> ContourTracker::geometry_of(cons
     Arc arc;
     arc.segment = segment;
     arc.n = segment.normal;
-    arc.a = (arc.n + 1) % 3;
-    arc.b = (arc.n + 2) % 3;
+    arc.a = ArcFrame(arc.n).a;
+    arc.b = ArcFrame(arc.n).b;
     arc.cosine = std::cos(segment.start_angle_rad);
     arc.sine = std::sin(segment.start_angle_rad);
     arc.sense = segment.sweep_rad < 0.0 ? -1.0 : 1.0;

@@ -1,3 +1,4 @@
+#include "path/arc_frame.hpp"
 #include "shapegcode/measure/contour.hpp"
 
 #include <algorithm>
@@ -33,8 +34,8 @@ OrbitError::OrbitError(const Path& path) {
     const Segment& segment = path[i];
     if (segment.kind != SegmentKind::arc) continue;
     Arc arc{};
-    arc.a = (segment.normal + 1) % 3;
-    arc.b = (segment.normal + 2) % 3;
+    arc.a = ArcFrame(segment.normal).a;
+    arc.b = ArcFrame(segment.normal).b;
     arc.centre_a = segment.centre_mm[arc.a];
     arc.centre_b = segment.centre_mm[arc.b];
     arc.cosine = std::cos(segment.start_angle_rad);

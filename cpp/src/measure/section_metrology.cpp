@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "path/arc_frame.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -141,8 +142,8 @@ SectionMetrology::SectionMetrology(const Path& path, std::vector<PathSection> se
       const Segment& segment = path_[k];
       if (segment.kind != SegmentKind::arc) continue;
       if (track.turn == 0.0) {
-        track.a = (segment.normal + 1) % 3;
-        track.b = (segment.normal + 2) % 3;
+        track.a = ArcFrame(segment.normal).a;
+        track.b = ArcFrame(segment.normal).b;
         track.radius = segment.start_radius_mm;
         track.centre = {segment.centre_mm[track.a], segment.centre_mm[track.b]};
       }

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "path/arc_frame.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -20,8 +21,8 @@ bool continues(const Segment& before, const Segment& next) {
     const Vector3 b = tangent_at(next, 0.0);
     return a.dot(b) > 0.0 && a.cross(b).norm() <= same_direction_rad;
   }
-  const int a = (next.normal + 1) % 3;
-  const int b = (next.normal + 2) % 3;
+  const int a = ArcFrame(next.normal).a;
+  const int b = ArcFrame(next.normal).b;
   return before.normal == next.normal && before.sweep_rad * next.sweep_rad > 0.0 &&
          std::abs(before.centre_mm[a] - next.centre_mm[a]) <= same_circle_mm &&
          std::abs(before.centre_mm[b] - next.centre_mm[b]) <= same_circle_mm &&

@@ -1,10 +1,14 @@
 #include "shapegcode/path.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string>
 
+#include "path/arc_frame.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -12,12 +16,7 @@ namespace {
 
 constexpr double two_pi = 2.0 * std::numbers::pi;
 
-struct PlaneAxes {
-  int first;
-  int second;
-};
-
-PlaneAxes plane_axes(int normal) noexcept { return {(normal + 1) % 3, (normal + 2) % 3}; }
+std::string shown(const Vector3& p) { return fmt::format("({} {} {})", p[0], p[1], p[2]); }
 
 double pitch_mm_per_rad(const Segment& segment) noexcept {
   const int n = segment.normal;
@@ -27,14 +26,11 @@ double pitch_mm_per_rad(const Segment& segment) noexcept {
 double mean_radius(const Segment& segment) noexcept { return 0.5 * (segment.start_radius_mm + segment.end_radius_mm); }
 
 Vector3 arc_point(const Segment& segment, double fraction) noexcept {
-  const auto [a, b] = plane_axes(segment.normal);
+  const ArcFrame frame(segment.normal);
   const double radius = segment.start_radius_mm + (segment.end_radius_mm - segment.start_radius_mm) * fraction;
   const double angle = segment.start_angle_rad + segment.sweep_rad * fraction;
-  Vector3 p;
-  p[a] = segment.centre_mm[a] + radius * std::cos(angle);
-  p[b] = segment.centre_mm[b] + radius * std::sin(angle);
-  const int n = segment.normal;
-  p[n] = segment.start_mm[n] + (segment.end_mm[n] - segment.start_mm[n]) * fraction;
+  Vector3 p = frame.lift(frame.at_angle(segment.centre_mm, radius, angle), segment.start_mm);
+  p[frame.normal] += (segment.end_mm[frame.normal] - segment.start_mm[frame.normal]) * fraction;
   return p;
 }
 
@@ -51,9 +47,8 @@ Nearest nearest_on_line(const Segment& segment, const Vector3& p) noexcept {
 // The in-plane angle gives the foot on a flat arc; on a helix the turn is chosen by height, then one Newton step on the
 // true distance corrects for the pitch.
 Nearest nearest_on_arc(const Segment& segment, const Vector3& p) noexcept {
-  const auto [a, b] = plane_axes(segment.normal);
   const int n = segment.normal;
-  const double angle = std::atan2(p[b] - segment.centre_mm[b], p[a] - segment.centre_mm[a]);
+  const double angle = ArcFrame(n).angle_rad(p, segment.centre_mm);
   const double sense = segment.sweep_rad < 0.0 ? -1.0 : 1.0;
   const double sweep = std::abs(segment.sweep_rad);
   double turn = std::remainder(sense * (angle - segment.start_angle_rad), two_pi);  // in [-pi, pi]
@@ -104,18 +99,29 @@ Segment make_line(const Vector3& start, const Vector3& end, double feed_mm_per_s
 
 Segment make_arc(const Vector3& start, const Vector3& end, const Vector3& centre, double sweep_rad, int normal,
                  double feed_mm_per_s, std::uint32_t line) {
-  const auto [a, b] = plane_axes(normal);
+  if (normal < 0 || normal > 2) {
+    throw Error(ErrorKind::argument, fmt::format("an arc turns about axis 0, 1 or 2, not {}", normal), line);
+  }
+  const ArcFrame frame(normal);
+  // The height of the centre has no say.
+  if (!start.allFinite() || !end.allFinite() || !frame.project(centre).allFinite() || !std::isfinite(sweep_rad) ||
+      !std::isfinite(feed_mm_per_s)) {
+    throw Error(ErrorKind::argument,
+                fmt::format("an arc needs finite numbers: start {}, end {}, centre {}, sweep {} rad, feed {} mm/s",
+                            shown(start), shown(end), shown(centre), sweep_rad, feed_mm_per_s),
+                line);
+  }
   Segment segment = make_line(start, end, feed_mm_per_s, line);
   segment.kind = SegmentKind::arc;
   segment.normal = static_cast<std::uint8_t>(normal);
   segment.centre_mm = centre;
   segment.sweep_rad = sweep_rad;
-  segment.start_radius_mm = std::hypot(start[a] - centre[a], start[b] - centre[b]);
-  segment.end_radius_mm = std::hypot(end[a] - centre[a], end[b] - centre[b]);
+  segment.start_radius_mm = frame.radius(start, centre);
+  segment.end_radius_mm = frame.radius(end, centre);
   if (!(segment.start_radius_mm > 0.0) || !(segment.end_radius_mm > 0.0) || sweep_rad == 0.0) {
     throw Error(ErrorKind::argument, "an arc needs a radius and a sweep greater than zero", line);
   }
-  segment.start_angle_rad = std::atan2(start[b] - centre[b], start[a] - centre[a]);
+  segment.start_angle_rad = frame.angle_rad(start, centre);
   const double travel = std::abs(sweep_rad) * mean_radius(segment);
   segment.length_mm = std::hypot(travel, end[normal] - start[normal]);
   return segment;
@@ -143,16 +149,12 @@ Vector3 tangent_at(const Segment& segment, double s_mm) noexcept {
   if (segment.kind != SegmentKind::arc) {
     return (segment.end_mm - segment.start_mm) / segment.length_mm;
   }
-  const auto [a, b] = plane_axes(segment.normal);
   const double fraction = std::clamp(s_mm / segment.length_mm, 0.0, 1.0);
   const double angle = segment.start_angle_rad + segment.sweep_rad * fraction;
   const double radial_step = segment.end_radius_mm - segment.start_radius_mm;
   const double radius = segment.start_radius_mm + radial_step * fraction;
-  Vector3 tangent;
-  tangent[a] = -radius * segment.sweep_rad * std::sin(angle) + radial_step * std::cos(angle);
-  tangent[b] = radius * segment.sweep_rad * std::cos(angle) + radial_step * std::sin(angle);
-  tangent[segment.normal] = segment.end_mm[segment.normal] - segment.start_mm[segment.normal];
-  return tangent.normalized();
+  const double climb = segment.end_mm[segment.normal] - segment.start_mm[segment.normal];
+  return ArcFrame(segment.normal).direction(angle, radius * segment.sweep_rad, radial_step, climb).normalized();
 }
 
 double curvature(const Segment& segment) noexcept {

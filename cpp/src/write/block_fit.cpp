@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "path/arc_frame.hpp"
 #include "shapegcode/error.hpp"
 #include "write/block_rounding.hpp"
 #include "write/block_shape.hpp"
@@ -96,8 +97,7 @@ class Fitter {
   }
 
   [[nodiscard]] double plane_travel(const Position& from, const Position& to, int normal) const {
-    const Vector3 move = shape_.to_mm(to) - shape_.to_mm(from);
-    return std::hypot(move[(normal + 1) % 3], move[(normal + 2) % 3]);
+    return ArcFrame(normal).radius(shape_.to_mm(to), shape_.to_mm(from));
   }
 
   // Takes one increment of the last way in the plane from the line that made it, or from the line before the last
@@ -105,8 +105,8 @@ class Fitter {
   [[nodiscard]] bool lend_increment(std::vector<FittedBlock>& blocks, int normal) const {
     for (std::size_t i = blocks.size() - 1; i-- > 0;) {
       const Position start = i == 0 ? shape_.rounded(0) : blocks[i - 1].end;
-      const auto a = static_cast<std::size_t>((normal + 1) % 3);
-      const auto b = static_cast<std::size_t>((normal + 2) % 3);
+      const auto a = static_cast<std::size_t>(ArcFrame(normal).a);
+      const auto b = static_cast<std::size_t>(ArcFrame(normal).b);
       const std::size_t axis = blocks[i].end[a] != start[a] ? a : b;
       const std::int64_t way = blocks[i].end[axis] - start[axis];
       Position behind = blocks[i].end;
@@ -139,8 +139,8 @@ class Fitter {
 
   // Deviation of the path's middle from the chord within one period, in the plane of the arc it follows.
   [[nodiscard]] Eigen::Vector2d bump(std::uint32_t k, int normal) const {
-    const int a = (normal + 1) % 3;
-    const int b = (normal + 2) % 3;
+    const int a = ArcFrame(normal).a;
+    const int b = ArcFrame(normal).b;
     return {middle_(k, a) - 0.5 * (grid_(k, a) + grid_(k + 1, a)),
             middle_(k, b) - 0.5 * (grid_(k, b) + grid_(k + 1, b))};
   }

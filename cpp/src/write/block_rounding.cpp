@@ -5,6 +5,7 @@
 #include <complex>
 #include <optional>
 
+#include "path/arc_frame.hpp"
 #include "write/rounding.hpp"
 
 namespace shapegcode {
@@ -174,7 +175,7 @@ class BlockRounder {
       return;
     }
     const ChordArc arc = shape_.arc_of(nearest_start(n), block);
-    const Eigen::Index row = static_cast<std::size_t>((block.normal + 1) % 3) == axis ? 0 : 1;
+    const Eigen::Index row = static_cast<std::size_t>(ArcFrame(block.normal).a) == axis ? 0 : 1;
     double before = arc.at(0.0)[row];
     for (std::uint32_t i = 0; i < block.periods; ++i) {
       const double middle = arc.at((i + 0.5) / block.periods)[row];
@@ -208,7 +209,7 @@ class BlockRounder {
       FittedBlock nearest = block;
       nearest.end = nearest_[n];
       arc = shape_.arc_of(from, nearest);
-      row = static_cast<std::size_t>((block.normal + 1) % 3) == axis ? 0 : 1;
+      row = static_cast<std::size_t>(ArcFrame(block.normal).a) == axis ? 0 : 1;
     }
     for (std::uint32_t i = 1; i < block.periods; ++i) {
       const double fraction = static_cast<double>(i) / block.periods;

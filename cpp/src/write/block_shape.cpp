@@ -1,4 +1,5 @@
 #include "write/block_shape.hpp"
+#include "path/arc_frame.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -85,13 +86,11 @@ void BlockShape::set_feed(FittedBlock& block, double length_mm) const {
 
 std::optional<ChordArc> BlockShape::chord_arc(const BlockPosition& from, const BlockPosition& to, int normal,
                                               const Eigen::Vector2d& middle) const {
-  const int a = (normal + 1) % 3;
-  const int b = (normal + 2) % 3;
+  const ArcFrame frame(normal);
   const Vector3 p = to_mm(from);
-  const Vector3 q = to_mm(to);
   ChordArc arc;
-  arc.start = {p[a], p[b]};
-  const Eigen::Vector2d chord(q[a] - p[a], q[b] - p[b]);
+  arc.start = frame.project(p);
+  const Eigen::Vector2d chord = frame.way(p, to_mm(to));
   arc.chord = chord.norm();
   if (arc.chord < options_.arc_min_chord_mm) {
     return std::nullopt;
@@ -116,13 +115,11 @@ std::optional<ChordArc> BlockShape::chord_arc(const BlockPosition& from, const B
 }
 
 ChordArc BlockShape::arc_of(const BlockPosition& from, const FittedBlock& block) const {
-  const int a = (block.normal + 1) % 3;
-  const int b = (block.normal + 2) % 3;
+  const ArcFrame frame(block.normal);
   const Vector3 p = to_mm(from);
-  const Vector3 q = to_mm(block.end);
-  const Eigen::Vector2d chord(q[a] - p[a], q[b] - p[b]);
+  const Eigen::Vector2d chord = frame.way(p, to_mm(block.end));
   ChordArc arc;
-  arc.start = {p[a], p[b]};
+  arc.start = frame.project(p);
   arc.chord = chord.norm();
   arc.along = chord / arc.chord;
   arc.left = {-arc.along.y(), arc.along.x()};
@@ -136,8 +133,8 @@ ChordArc BlockShape::arc_of(const BlockPosition& from, const FittedBlock& block)
 std::optional<FittedBlock> BlockShape::arc(const BlockPosition& from, const BlockPosition& end, std::uint32_t k,
                                            std::uint32_t j, int normal, std::uint32_t periods,
                                            double tolerance_increments) const {
-  const int a = (normal + 1) % 3;
-  const int b = (normal + 2) % 3;
+  const int a = ArcFrame(normal).a;
+  const int b = ArcFrame(normal).b;
   const std::uint32_t m = j - k;
   Eigen::Vector2d middle;
   if (m % 2 == 1) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/message.hpp"
+#include "path/arc_frame.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -17,8 +18,9 @@ constexpr double coincident_mm = 1e-7;
 }  // namespace
 
 Segment resolve_arc(const ArcWords& words, double feed_mm_per_s, std::uint32_t line, std::uint32_t column) {
-  const int a = (words.normal + 1) % 3;
-  const int b = (words.normal + 2) % 3;
+  const ArcFrame frame(words.normal);
+  const int a = frame.a;
+  const int b = frame.b;
   const double sense = words.clockwise ? -1.0 : 1.0;
   const double chord_a = words.end_mm[a] - words.start_mm[a];
   const double chord_b = words.end_mm[b] - words.start_mm[b];
@@ -46,8 +48,8 @@ Segment resolve_arc(const ArcWords& words, double feed_mm_per_s, std::uint32_t l
     centre[b] = words.start_mm[b] + 0.5 * chord_b + side * chord_a;
   }
 
-  const double start_radius = std::hypot(words.start_mm[a] - centre[a], words.start_mm[b] - centre[b]);
-  const double end_radius = std::hypot(words.end_mm[a] - centre[a], words.end_mm[b] - centre[b]);
+  const double start_radius = frame.radius(words.start_mm, centre);
+  const double end_radius = frame.radius(words.end_mm, centre);
   const double difference = std::abs(start_radius - end_radius);
   if (start_radius <= coincident_mm || end_radius <= coincident_mm || difference > words.tolerance_mm) {
     constexpr char names[] = "XYZ";
@@ -63,8 +65,8 @@ Segment resolve_arc(const ArcWords& words, double feed_mm_per_s, std::uint32_t l
 
   double sweep = two_pi;
   if (chord > coincident_mm) {
-    const double start_angle = std::atan2(words.start_mm[b] - centre[b], words.start_mm[a] - centre[a]);
-    const double end_angle = std::atan2(words.end_mm[b] - centre[b], words.end_mm[a] - centre[a]);
+    const double start_angle = frame.angle_rad(words.start_mm, centre);
+    const double end_angle = frame.angle_rad(words.end_mm, centre);
     sweep = std::fmod(sense * (end_angle - start_angle), two_pi);
     if (sweep <= 0.0) {
       sweep += two_pi;

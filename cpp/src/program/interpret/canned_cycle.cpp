@@ -1,14 +1,29 @@
 #include "program/interpret/canned_cycle.hpp"
+#include "path/arc_frame.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace shapegcode {
 namespace {
 
-constexpr int max_pecks = 10'000;
+bool cuts_in_steps(const CannedCycle& cycle) noexcept {
+  return (cycle.code == 73 || cycle.code == 83) && cycle.peck_mm > 0.0;
+}
+
+double depth_mm(const CannedCycle& cycle) noexcept { return std::abs(cycle.r_mm - cycle.bottom_mm); }
 
 }  // namespace
+
+double cuts_per_hole(const CannedCycle& cycle) noexcept {
+  return cuts_in_steps(cycle) ? std::ceil(depth_mm(cycle) / cycle.peck_mm) : 1.0;
+}
+
+double most_moves_per_cut(const CannedCycle& cycle) noexcept {
+  // Down and back; G83 goes all the way up, so it has to come down again.
+  return !cuts_in_steps(cycle) ? 1.0 : cycle.code == 73 ? 2.0 : 3.0;
+}
 
 Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, double feed_mm_per_s, std::uint32_t line,
                      std::vector<OtherMove>& moves) {
@@ -30,9 +45,10 @@ Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, doubl
     }
   };
   // G76 and G87 lift the tip off the wall by Q; the direction is a parameter (5148), the way the same.
+  const int side = ArcFrame(axis).a;
   const auto shift = [&](double by) {
     Vector3 target = position;
-    target[(axis + 1) % 3] += by;
+    target[side] += by;
     OtherMove move{make_line(position, target, 0.0, line), 0.0};
     move.segment.kind = SegmentKind::rapid;
     if (move.segment.length_mm > 0.0) {
@@ -42,8 +58,8 @@ Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, doubl
   };
   const Vector3 centre = position;
   const auto unshift = [&] {
-    shift(centre[(axis + 1) % 3] - position[(axis + 1) % 3]);
-    position[(axis + 1) % 3] = centre[(axis + 1) % 3];
+    shift(centre[side] - position[side]);
+    position[side] = centre[side];
   };
   if (cycle.code == 87) {  // back boring goes down beside the bore and cuts upwards
     shift(cycle.peck_mm);
@@ -57,13 +73,12 @@ Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, doubl
     return position;
   }
   go(cycle.r_mm, true);
-  const double depth = std::abs(cycle.r_mm - cycle.bottom_mm);
+  const double depth = depth_mm(cycle);
   const double down = cycle.bottom_mm < cycle.r_mm ? -1.0 : 1.0;
-  const bool pecks = (cycle.code == 73 || cycle.code == 83) && cycle.peck_mm > 0.0;
-  if (pecks) {
-    const int count = static_cast<int>(std::min<double>(max_pecks, std::ceil(depth / cycle.peck_mm)));
-    for (int i = 1; i <= count; ++i) {
-      const double reached = std::min(depth, i * cycle.peck_mm);
+  if (cuts_in_steps(cycle)) {
+    const auto count = static_cast<std::int64_t>(cuts_per_hole(cycle));
+    for (std::int64_t i = 1; i <= count; ++i) {
+      const double reached = std::min(depth, static_cast<double>(i) * cycle.peck_mm);
       go(cycle.r_mm + down * reached, false);
       if (i < count) {
         const double back = cycle.code == 83 ? 0.0 : std::max(0.0, reached - cycle.clearance_mm);

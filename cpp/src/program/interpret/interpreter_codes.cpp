@@ -1,5 +1,6 @@
 // Codes that change the modal state or what is known of the position.
 #include "base/message.hpp"
+#include "path/arc_frame.hpp"
 #include "program/interpret/interpreter_impl.hpp"
 
 namespace shapegcode::detail {
@@ -81,8 +82,8 @@ void Interpreter::read_codes(LineFlow& flow) {
       case Group::compensation:
         if (whole == 40 && state_.compensation != 40) {
           // The tool leaves the offset with the next move of the plane; until then its position is not the programmed.
-          const int normal = plane_normal(state_.plane);
-          for (int i : {(normal + 1) % 3, (normal + 2) % 3}) {
+          const ArcFrame plane(plane_normal(state_.plane));
+          for (int i : {plane.a, plane.b}) {
             state_.known[static_cast<std::size_t>(i)] = false;
           }
         }

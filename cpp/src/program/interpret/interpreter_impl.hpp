@@ -3,6 +3,8 @@
 // moves (interpreter_moves.cpp).
 #pragma once
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -85,6 +87,11 @@ class Interpreter {
   void forget_uncertain_end() noexcept;
   void check_range() const;
   void cycle_block();
+  void read_cycle_words(int axis);
+  [[nodiscard]] int cycle_repeats() const;
+  void require_cycle_data() const;
+  void require_room_for_holes(int holes) const;
+  void drill_hole(int axis, double feed_mm_per_s);
   void foreign_switch(int g_tenths);
   void look_ahead_switch(int g_tenths);
   void change_coordinates(int number, int extra);
@@ -120,6 +127,7 @@ class Interpreter {
   Vector3 local_offset_ = Vector3::Zero();
   std::array<bool, axis_count> local_offset_uncertain_ = {false, false, false};  ///< set in a '/' block
   CannedCycle cycle_;
+  std::uint64_t cycle_moves_ = 0;  ///< that the cycles came to so far
   std::uint32_t seen_no_point_ = 0;
   std::uint32_t seen_distance_ = 0;
   std::uint32_t seen_cycle_point_ = 0;

@@ -224,9 +224,8 @@ void Interpreter::cut(const char* why_kept, const ModalState& before, std::size_
   }
 }
 
-void Interpreter::cycle_block() {
-  const int axis = plane_normal(state_.plane);
-  const auto z = static_cast<std::size_t>(axis);
+// Levels, depth of cut and dwell of a drilling cycle, as far as the block gives them.
+void Interpreter::read_cycle_words(int axis) {
   const char depth_letter = static_cast<char>('X' + axis);
   const bool incremental = state_.distance == 91;
   // Levels are kept as levels: a row of holes in G91 behind a cycle in G90 is drilled at the same ones.
@@ -244,7 +243,7 @@ void Interpreter::cycle_block() {
   if (words_.has('P')) {
     // Some post-processors write "P500.": whole milliseconds all the same.
     if (words_['P'].value != std::floor(words_['P'].value)) {
-      alarm(7, format_message("P%g of a drilling cycle: it takes whole milliseconds", words_['P'].value),
+      alarm(7, fmt::format("P{} of a drilling cycle: it takes whole milliseconds", words_['P'].value),
             words_['P'].column);
     }
     if (words_['P'].has_point) {
@@ -254,62 +253,105 @@ void Interpreter::cycle_block() {
   }
   cycle_.code = state_.cycle;
   cycle_.return_to_r = state_.cycle_return == 99;
+}
+
+int Interpreter::cycle_repeats() const {
   int repeats = 1;
   for (char letter : {'K', 'L'}) {
     if (words_.has(letter)) {
       const double count = words_[letter].value;
       if (count < 0.0) {
-        alarm(6, format_message("minus sign in the repetitions %c%g of a drilling cycle", letter, count),
+        alarm(6, fmt::format("minus sign in the repetitions {}{} of a drilling cycle", letter, count),
               words_[letter].column);
       }
       // A computed K carries a point ("K3."): only a fraction is wrong.
       if (count != std::floor(count)) {
-        alarm(7, format_message("repetitions %c%g of a drilling cycle are no whole number", letter, count),
+        alarm(7, fmt::format("repetitions {}{} of a drilling cycle are no whole number", letter, count),
               words_[letter].column);
       }
-      repeats = static_cast<int>(std::min(words_[letter].value, 9999.0));
+      repeats = static_cast<int>(std::min(count, 9999.0));
     }
   }
-  if (!(state_.feed > 0.0) && repeats > 0) {
-    alarm(11, "drilling cycle G" + std::to_string(state_.cycle) + " without a feed F");
+  return repeats;
+}
+
+void Interpreter::require_cycle_data() const {
+  if (!(state_.feed > 0.0)) {
+    alarm(11, fmt::format("drilling cycle G{} without a feed F", state_.cycle));
   }
-  if ((state_.cycle == 73 || state_.cycle == 83) && repeats > 0 && !(cycle_.peck_mm > 0.0)) {
+  if ((state_.cycle == 73 || state_.cycle == 83) && !(cycle_.peck_mm > 0.0)) {
     const bool given = words_.has('Q');
     alarm(45,
-          "drilling cycle G" + std::to_string(state_.cycle) +
-              (given ? " with a depth of cut Q of 0" : " without a depth of cut Q"),
+          fmt::format("drilling cycle G{} {} a depth of cut Q{}", state_.cycle, given ? "with" : "without",
+                      given ? " of 0" : ""),
           given ? words_['Q'].column : 1);
   }
+}
+
+// Before a single hole is expanded: a thousandth of a millimetre for Q fills the memory.
+void Interpreter::require_room_for_holes(int holes) const {
+  const double cuts = cuts_per_hole(cycle_);
+  const double moves = static_cast<double>(cycle_moves_) + holes * cuts * most_moves_per_cut(cycle_);
+  if (moves > static_cast<double>(options_.max_cycle_moves)) {
+    fail(fmt::format("drilling cycle G{} feeds down {:.0f} times in {} hole(s), {:.3f} mm deep: the cycles of the "
+                     "program come to {:.0f} moves (limit {})",
+                     cycle_.code, cuts, holes, std::abs(cycle_.r_mm - cycle_.bottom_mm), moves,
+                     options_.max_cycle_moves),
+         words_.has('Q') ? words_['Q'].column : 1);
+  }
+}
+
+// Moves over the next hole of the block and drills it.
+void Interpreter::drill_hole(int axis, double feed_mm_per_s) {
+  const auto z = static_cast<std::size_t>(axis);
+  const bool incremental = state_.distance == 91;
+  Vector3 hole = state_.position_mm;
+  for (int i = 0; i < axis_count; ++i) {
+    const char letter = static_cast<char>('X' + i);
+    if (i == axis || !words_.has(letter)) {
+      continue;
+    }
+    const double value = length_mm(words_[letter]);
+    hole[i] = incremental ? hole[i] + value : value;
+    if (!incremental) {
+      state_.known[static_cast<std::size_t>(i)] = true;
+    }
+  }
+  OtherMove approach{make_line(state_.position_mm, hole, 0.0, line_number_), 0.0};
+  approach.segment.kind = SegmentKind::rapid;
+  add_move(approach);
+  if (state_.known[z] && feed_mm_per_s > 0.0) {
+    std::vector<OtherMove> moves;
+    state_.position_mm = expand_cycle(cycle_, hole, axis, feed_mm_per_s, line_number_, moves);
+    cycle_moves_ += moves.size();
+    for (const OtherMove& move : moves) {
+      add_move(move);
+    }
+  } else {
+    state_.position_mm = hole;
+    if (cycle_.return_to_r) {
+      state_.position_mm[axis] = cycle_.r_mm;
+      state_.known[z] = !incremental && state_.known[z];
+    }
+  }
+}
+
+void Interpreter::cycle_block() {
+  const int axis = plane_normal(state_.plane);
+  read_cycle_words(axis);
+  const int repeats = cycle_repeats();
+  if (repeats > 0) {
+    require_cycle_data();
+  }
   const double rate = state_.feed_mode != 93 ? feed_mm_per_s(0.0) : 0.0;
-  for (int k = 0; k < repeats && foreign_ == 0; ++k) {
-    Vector3 hole = state_.position_mm;
-    for (int i = 0; i < axis_count; ++i) {
-      const char letter = static_cast<char>('X' + i);
-      if (i == axis || !words_.has(letter)) {
-        continue;
-      }
-      const double value = length_mm(words_[letter]);
-      hole[i] = incremental ? hole[i] + value : value;
-      if (!incremental) {
-        state_.known[static_cast<std::size_t>(i)] = true;
-      }
-    }
-    OtherMove approach{make_line(state_.position_mm, hole, 0.0, line_number_), 0.0};
-    approach.segment.kind = SegmentKind::rapid;
-    add_move(approach);
-    if (state_.known[z] && rate > 0.0) {
-      std::vector<OtherMove> moves;
-      state_.position_mm = expand_cycle(cycle_, hole, axis, rate, line_number_, moves);
-      for (const OtherMove& move : moves) {
-        add_move(move);
-      }
-    } else {
-      state_.position_mm = hole;
-      if (cycle_.return_to_r) {
-        state_.position_mm[axis] = cycle_.r_mm;
-        state_.known[z] = !incremental && state_.known[z];
-      }
-    }
+  if (foreign_ != 0) {
+    return;
+  }
+  if (state_.known[static_cast<std::size_t>(axis)] && rate > 0.0) {
+    require_room_for_holes(repeats);
+  }
+  for (int k = 0; k < repeats; ++k) {
+    drill_hole(axis, rate);
   }
 }
 

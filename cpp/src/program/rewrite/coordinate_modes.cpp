@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "path/arc_frame.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode::detail {
@@ -31,15 +32,13 @@ Vector3 CoordinateModes::rotate(const Vector3& point, double sense) const noexce
   if (!rotation) {
     return point;
   }
-  const int a = (rotation_normal + 1) % 3;
-  const int b = (rotation_normal + 2) % 3;
+  const ArcFrame plane(rotation_normal);
   const double c = std::cos(rotation_rad);
   const double s = sense * std::sin(rotation_rad);
-  const double u = point[a] - rotation_centre[a];
-  const double v = point[b] - rotation_centre[b];
+  const Eigen::Vector2d way = plane.way(rotation_centre, point);
   Vector3 turned = point;
-  turned[a] = rotation_centre[a] + c * u - s * v;
-  turned[b] = rotation_centre[b] + s * u + c * v;
+  turned[plane.a] = rotation_centre[plane.a] + c * way.x() - s * way.y();
+  turned[plane.b] = rotation_centre[plane.b] + s * way.x() + c * way.y();
   return turned;
 }
 
@@ -57,15 +56,15 @@ Vector3 CoordinateModes::undo(const Vector3& work) const noexcept {
 }
 
 bool CoordinateModes::flips(int normal) const noexcept {
-  return factor((normal + 1) % 3) * factor((normal + 2) % 3) < 0.0;
+  const ArcFrame plane(normal);
+  return factor(plane.a) * factor(plane.b) < 0.0;
 }
 
 Segment CoordinateModes::apply(const Segment& programmed, std::uint32_t line) const {
   Segment segment;
   if (programmed.kind == SegmentKind::arc) {
-    const int a = (programmed.normal + 1) % 3;
-    const int b = (programmed.normal + 2) % 3;
-    if (std::abs(std::abs(factor(a)) - std::abs(factor(b))) > 1e-9) {
+    const ArcFrame frame(programmed.normal);
+    if (std::abs(std::abs(factor(frame.a)) - std::abs(factor(frame.b))) > 1e-9) {
       throw Error(ErrorKind::program,
                   "an arc under scaling G51 with different factors of its two axes is no arc any more", line, 1);
     }

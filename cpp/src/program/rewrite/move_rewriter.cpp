@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "path/arc_frame.hpp"
 #include "program/interpret/arc_geometry.hpp"
 #include "shapegcode/error.hpp"
 
@@ -239,8 +240,9 @@ void MoveRewriter::read_target(Item& item, Vector3& end) {
   const BlockWords& words = *words_;
   const bool incremental = programmed_.distance == 91;
   const int normal = plane_normal(programmed_.plane);
-  const int a = (normal + 1) % 3;
-  const int b = (normal + 2) % 3;
+  const ArcFrame plane(normal);
+  const int a = plane.a;
+  const int b = plane.b;
   end = programmed_point_;
   std::array<bool, axis_count> given{};
   for (int axis = 0; axis < axis_count; ++axis) {
@@ -343,8 +345,8 @@ void MoveRewriter::read_move(Item& item) {
   programmed_point_ = end;
   programmed_.position_mm = item.segment.end_mm;
   if (arc) {
-    item.axes[static_cast<std::size_t>((normal + 1) % 3)] = true;
-    item.axes[static_cast<std::size_t>((normal + 2) % 3)] = true;
+    const ArcFrame plane(normal);
+    item.axes[static_cast<std::size_t>(plane.a)] = item.axes[static_cast<std::size_t>(plane.b)] = true;
   }
 }
 

@@ -1,4 +1,5 @@
 #include "program/rewrite/plane_geometry.hpp"
+#include "path/arc_frame.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -71,14 +72,9 @@ std::vector<Vector2> circle_circle(const Locus& a, const Locus& b) {
 
 }  // namespace
 
-Vector2 in_plane(const Vector3& p, int normal) { return {p[(normal + 1) % 3], p[(normal + 2) % 3]}; }
+Vector2 in_plane(const Vector3& p, int normal) { return ArcFrame(normal).project(p); }
 
-Vector3 in_space(const Vector2& p, const Vector3& height, int normal) {
-  Vector3 point = height;
-  point[(normal + 1) % 3] = p.x();
-  point[(normal + 2) % 3] = p.y();
-  return point;
-}
+Vector3 in_space(const Vector2& p, const Vector3& height, int normal) { return ArcFrame(normal).lift(p, height); }
 
 Curve curve_of(const Segment& segment, int normal) {
   Curve curve;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "path/arc_frame.hpp"
 #include "program/rewrite/corner_words.hpp"
 #include "program/rewrite/cutter_compensation.hpp"
 #include "program/rewrite/move_rewriter.hpp"
@@ -15,8 +16,7 @@ namespace {
 constexpr double least_chord_increments = 4.0;
 
 bool in_plane(const Segment& segment, int normal) noexcept {
-  const Vector3 travel = segment.end_mm - segment.start_mm;
-  return segment.kind == SegmentKind::arc || std::hypot(travel[(normal + 1) % 3], travel[(normal + 2) % 3]) > 1e-9;
+  return segment.kind == SegmentKind::arc || ArcFrame(normal).radius(segment.end_mm, segment.start_mm) > 1e-9;
 }
 
 }  // namespace
@@ -46,8 +46,9 @@ void MoveRewriter::append_axis(std::string& text, const Item& item, int axis, do
 // I J K from the rounded start point, chosen among the neighbours so that start and end radius agree best: rounding
 // must not make a control refuse the arc.
 void MoveRewriter::append_centre(std::string& text, const Item& item, const Segment& arc) const {
-  const int a = (arc.normal + 1) % 3;
-  const int b = (arc.normal + 2) % 3;
+  const ArcFrame frame(arc.normal);
+  const int a = frame.a;
+  const int b = frame.b;
   const double increment = increment_mm(item.units);
   const Vector3& start = interpreter_.state().position_mm;
   const auto grid = [&](double value) { return std::round(value / increment) * increment; };
