@@ -67,8 +67,8 @@ struct Arma {
 /// common, numerators (initial states) each record's own. Errors as in arma_driven.
 [[nodiscard]] Arma arma_decay(Responses responses, int n_modes, bool plain = false);
 
-/// Modes of discrete poles, ascending in frequency: omega = |ln lambda|/period, zeta = -Re(ln lambda)/|ln lambda| (spec
-/// 8; the same as paper 003, eq. 5-6). Kept are complex pairs that are stable: real poles (among them those at the
+/// Modes of discrete poles, ascending in frequency: omega = |ln lambda|/period, zeta = -Re(ln lambda)/|ln lambda|
+/// (paper 003, eq. 5-6). Kept are complex pairs that are stable: real poles (among them those at the
 /// Nyquist frequency) and poles on or outside the unit circle are no modes. Throws Error(argument) on the period.
 [[nodiscard]] NaturalModes poles_to_modes(std::span<const std::complex<double>> poles, double period_s);
 

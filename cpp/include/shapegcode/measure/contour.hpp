@@ -115,7 +115,7 @@ class ContourTracker {
 };
 
 /// Orbit error of every arc of a path: area between the moving point's track and the programmed arc, divided by the
-/// area of the programmed sector (spec section 3; for a quarter arc the sector is the quarter disc). The area is
+/// area of the programmed sector (paper 000; for a quarter arc the sector is the quarter disc). The area is
 /// the integral of |R^2 - r^2|/2 over the arc's own angular range, in the arc's plane, with r^2 linear in the angle
 /// between samples; the angle is unwrapped, so that arcs of several turns and helices count every turn. A move back
 /// takes off what the move forward added.
