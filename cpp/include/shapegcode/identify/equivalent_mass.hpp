@@ -63,7 +63,7 @@ struct EquivalentMass {
 /// Mass with which the oscillator answers the force with the measured RMS. The response is proportional to 1/m, so one
 /// simulation with 1 kg tells: m = its RMS / measured RMS.
 ///
-/// Throws Error(argument) on signals that check_taps refuses (with an impulse, the force may be zero), a response that
+/// Throws Error(argument) on signals that arma_driven refuses (with an impulse, the force may be zero), a response that
 /// is zero throughout, a frequency that is not above 0, a damping ratio outside 0 ... 1, and as wilson_theta. Source:
 /// paper 003, section 2.2; that one simulation is enough, because the RMS goes as 1/m: this project.
 [[nodiscard]] EquivalentMass equivalent_mass_closed_form(const MassProblem& problem);

@@ -81,6 +81,12 @@ class ContourTracker {
   struct Window {
     double begin, end;  // mm from the path's start
   };
+  struct Turns {
+    double first, last;  // rad from the arc's start, in the sense of its turning
+  };
+  struct Polar {
+    double radius, angle;  // of a point about an arc's centre, from its start direction
+  };
   struct Found {
     Foot foot;
     std::size_t piece;
@@ -89,6 +95,9 @@ class ContourTracker {
 
   [[nodiscard]] Foot foot_on(std::size_t piece, const Vector3& p, const Window& window) const noexcept;
   [[nodiscard]] Foot foot_on_arc(std::size_t piece, const Vector3& p, const Window& window) const noexcept;
+  /// Newton on the derivative of half the squared distance from `u` on, kept within `turns`.
+  [[nodiscard]] static double refined_foot(const Arc& arc, const Vector3& p, const Polar& polar, const Turns& turns,
+                                           double u) noexcept;
   [[nodiscard]] static Foot arc_point_foot(const Arc& arc, double u, const Vector3& p) noexcept;
   [[nodiscard]] Found search(const Vector3& p, double move, const Window& window) const noexcept;
   [[nodiscard]] double lateral_side(const Found& found, double distance) const noexcept;
