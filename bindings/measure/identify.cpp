@@ -230,7 +230,7 @@ Returns:
 Raises:
     ArgumentError: The period is not positive.
 
-Source: spec 8; paper 003, eq. 5-6.)");
+Source: paper 003, eq. 5-6.)");
   m.def(
       "stabilisation_poles",
       [](const std::vector<VectorArray>& responses, int n_max, const std::optional<std::vector<VectorArray>>& forces) {
@@ -327,7 +327,7 @@ Returns:
 Raises:
     ArgumentError: Records as in arma_driven, a start or option outside its range, or too few samples.
 
-Source: spec 8; L. Ljung, System Identification, ch. 7; G. Golub, V. Pereyra 2003.)");
+Source: L. Ljung, System Identification, ch. 7; G. Golub, V. Pereyra 2003.)");
   py::class_<DecayFit> decay(m, "DecayFit", "Modes fitted to free decays by fit_decay, with their covariance.");
   add_quality(decay);
   decay
@@ -368,7 +368,7 @@ Returns:
 Raises:
     ArgumentError: As fit_modes.
 
-Source: spec 8; G. Golub, V. Pereyra 2003.)");
+Source: G. Golub, V. Pereyra 2003.)");
   m.def(
       "modal_response",
       [](const VectorArray& force_n, double period_s, const VectorArray& omega_rad_s, const VectorArray& damping_ratio,
@@ -397,7 +397,7 @@ Returns:
 Raises:
     ArgumentError: Unequal lengths or a value outside its range.
 
-Source: spec 8.)");
+Source: this project.)");
 }
 
 void register_ranking(py::module_& m) {
@@ -519,7 +519,7 @@ Returns:
 Raises:
     ArgumentError: A value outside its range, or a force or response that is zero throughout.
 
-Source: spec 8; paper 003, section 2.2.)");
+Source: paper 003, section 2.2.)");
   m.def(
       "equivalent_mass_bisection",
       [](const VectorArray& force_n, const VectorArray& response, double period_s, double omega_rad_s,

@@ -299,7 +299,7 @@ void define_surface(py::module_& module) {
       "wall_error_um",
       [](MillingForce& force, const ToolBeam& beam, const MatrixArray& arcs, double feed_mm_per_min, WallSide side,
          const VectorArray& height_mm, double tolerance_rad) {
-        return wall_error_um(force, beam, arcs_from(arcs), feed_mm_per_min, side, span_of(height_mm), tolerance_rad);
+        return wall_error_um(force, beam, arcs_from(arcs), feed_mm_per_min, {side, span_of(height_mm), tolerance_rad});
       },
       py::arg("force"), py::arg("beam"), py::arg("arcs"), py::arg("feed_mm_per_min"), py::arg("side"),
       py::arg("height_mm"), py::arg("tolerance_rad") = wall_tolerance_rad,
@@ -328,7 +328,7 @@ Raises:
         Eigen::MatrixXd map;
         {
           const py::gil_scoped_release release;
-          map = wall_errors_um(force, beam, track, feeds, side, heights, tolerance_rad);
+          map = wall_errors_um(force, beam, track, feeds, {side, heights, tolerance_rad});
         }
         return take(std::move(map));
       },

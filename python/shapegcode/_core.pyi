@@ -75,7 +75,7 @@ class Mode:
     @property
     def pole(self) -> complex:
         """
-        Pole -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s (spec 2; paper 002, eq. 7).
+        Pole -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s (paper 002, eq. 7).
         """
 class Shaper:
     """
@@ -117,7 +117,7 @@ class Shaper:
         Returns:
             The ratio V (no unit), 0 where the shaper cancels the mode.
         
-        Source: spec 2; paper 002, eq. 8.
+        Source: paper 002, eq. 8.
         """
     @property
     def abs_sum(self) -> float:
@@ -152,7 +152,7 @@ class Shaper:
     @property
     def variance_s2(self) -> float:
         """
-        Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2 (spec 0).
+        Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2.
         """
 class ExtraInsensitive:
     """
@@ -283,7 +283,7 @@ class MinimalBranches:
         """
 class Fir:
     """
-    Weights on the sample grid that add up to one: an acceleration filter (moving average) or an input shaper. One filter type for both (spec section 0).
+    Weights on the sample grid that add up to one: an acceleration filter (moving average) or an input shaper. One filter type for both.
     """
     @staticmethod
     def exponential(time_constant_samples: typing.SupportsFloat | typing.SupportsIndex, rest: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> Fir:
@@ -2534,7 +2534,7 @@ class ContourSolver:
     Raises:
         ArgumentError: An empty or not finite kernel, or a smoothness that is not above 0.
     
-    Source: spec 5.
+    Source: this project.
     """
     def __init__(self, kernel: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], smoothness: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
@@ -5277,7 +5277,7 @@ def equivalent_mass_closed_form(force_n: typing.Annotated[numpy.typing.ArrayLike
     Raises:
         ArgumentError: A value outside its range, or a force or response that is zero throughout.
     
-    Source: spec 8; paper 003, section 2.2.
+    Source: paper 003, section 2.2.
     """
 def extra_insensitive(mode: Mode, vibration_limit: typing.SupportsFloat | typing.SupportsIndex, humps: typing.SupportsInt | typing.SupportsIndex = 1) -> ExtraInsensitive:
     """
@@ -5335,7 +5335,7 @@ def fit_decay(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.
     Raises:
         ArgumentError: As fit_modes.
     
-    Source: spec 8; G. Golub, V. Pereyra 2003.
+    Source: G. Golub, V. Pereyra 2003.
     """
 def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, quantity: str = 'acceleration', with_offset: bool = True, with_mass_line: bool = False, with_compliance: bool = False, coloured_residuals: bool = False, hold: str = 'linear', force_noise_n: typing.SupportsFloat | typing.SupportsIndex = 0.0, most_iterations: typing.SupportsInt | typing.SupportsIndex = 60) -> ModalFit:
     """
@@ -5368,7 +5368,7 @@ def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.Arr
     Raises:
         ArgumentError: Records as in arma_driven, a start or option outside its range, or too few samples.
     
-    Source: spec 8; L. Ljung, System Identification, ch. 7; G. Golub, V. Pereyra 2003.
+    Source: L. Ljung, System Identification, ch. 7; G. Golub, V. Pereyra 2003.
     """
 def gaussian_low_pass(profile_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], spacing_mm: typing.SupportsFloat | typing.SupportsIndex, cutoff_mm: typing.SupportsFloat | typing.SupportsIndex) -> numpy.ndarray:
     """
@@ -5392,7 +5392,7 @@ def grid_polynomial(modes: collections.abc.Sequence[Mode], period_s: typing.Supp
         ArgumentError: No mode, or a period that is not positive.
         DesignError: A z closer to +1 than 0.01, or so large an abs_sum that rounding leaves more than 1e-10.
     
-    Source: this project (spec 2, grid-exact shapers).
+    Source: this project.
     """
 def in_position_wait_behind_s(error_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], moved: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(3)"], model: ControllerModel) -> float:
     """
@@ -5583,7 +5583,7 @@ def modal_response(force_n: typing.Annotated[numpy.typing.ArrayLike, numpy.float
     Raises:
         ArgumentError: Unequal lengths or a value outside its range.
     
-    Source: spec 8.
+    Source: this project.
     """
 def mzv(mode: Mode) -> Shaper:
     """
@@ -5685,7 +5685,7 @@ def poles_to_modes(poles: collections.abc.Sequence[complex | typing.SupportsComp
     Raises:
         ArgumentError: The period is not positive.
     
-    Source: spec 8; paper 003, eq. 5-6.
+    Source: paper 003, eq. 5-6.
     """
 def rank_modes(responses: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], period_s: typing.SupportsFloat | typing.SupportsIndex, omega_rad_s: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], damping_ratio: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], most: typing.SupportsInt | typing.SupportsIndex, forces: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]] | None = None, quantity: str = 'acceleration', kept: typing.SupportsInt | typing.SupportsIndex = 0) -> ModeRanking:
     """
@@ -5760,7 +5760,7 @@ def sensitivity_curve(shaper: Shaper, damping_ratio: typing.SupportsFloat | typi
     Raises:
         ArgumentError: A value is outside its range.
     
-    Source: spec 2.
+    Source: paper 002, eq. 8.
     """
 def shape_path(path: Path, shaper: Fir, marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> ShapedCommand:
     """

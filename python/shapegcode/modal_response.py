@@ -35,7 +35,7 @@ class ModalRun:
 
 
 def respond(modes: Sequence[_core.Mode], command: FloatArray, period_s: float) -> ModalRun:
-    """Base-excited modes, each alone, under a command that is linear between its samples (spec 3 and 6).
+    """Base-excited modes, each alone, under a command that is linear between its samples (first-order hold).
 
     Args:
         modes: at least one; the participation scales the deflection.

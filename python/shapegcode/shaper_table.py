@@ -29,7 +29,7 @@ _PARETO_OF_A_FAMILY = 3  # rows, beside the preferred one
 
 
 def radial_error_um(design: Design, speed_mm_per_s: float, radius_mm: float) -> float:
-    """By how much a circle comes out too small, µm: variance*v²/(2R) (spec 0)."""
+    """By how much a circle comes out too small, µm: variance*v²/(2R)."""
     return design.variance_s2 * speed_mm_per_s**2 / (2.0 * radius_mm) * 1e3
 
 

@@ -215,24 +215,28 @@ TEST_CASE("corners that cannot be made are refused with value and limit") {
     change(cut);
     return message_of([&] { shapegcode::check(cut); });
   };
-  CHECK(refusal([](CornerCut& c) { c.tool_radius_mm = 0.0; }) == "tool radius is 0.000000 mm, must be above 0");
+  CHECK(refusal([](CornerCut& c) { c.tool_radius_mm = 0.0; }) == "tool radius is 0 mm, must be above 0");
   CHECK(refusal([](CornerCut& c) { c.allowance_mm = 4.5; }) ==
-        "allowance is 4.500000 mm, must be above 0 and at most the tool radius, 4.000000 mm");
+        "allowance is 4.5 mm, must be above 0 and at most the tool radius, 4 mm");
   CHECK(refusal([](CornerCut& c) { c.rough_radius_mm = 3.0; }) ==
-        "rough corner radius is 3.000000 mm, must be at least the tool radius, 4.000000 mm");
+        "rough corner radius is 3 mm, must be at least the tool radius, 4 mm");
   CHECK(refusal([](CornerCut& c) { c.finish_radius_mm = 3.0; }) ==
-        "finish corner radius is 3.000000 mm, must be at least the tool radius, 4.000000 mm");
+        "finish corner radius is 3 mm, must be at least the tool radius, 4 mm");
   CHECK(refusal([](CornerCut& c) {
           c.rough_radius_mm = 4.0;
           c.finish_radius_mm = 12.0;
-        }) == "a rough corner radius of 4.000000 mm cuts into the finished corner of 12.000000 mm by 2.182338 mm");
-  CHECK(refusal([](CornerCut& c) { c.turn_rad = pi; }) == "the corner turns by 180.000000 degrees, must be 1 to 179");
-  CHECK(refusal([](CornerCut& c) { c.before_mm = -1.0; }) ==
-        "a straight at the corner is -1.000000 mm, must be at least 0");
+        }) == "a rough corner radius of 4 mm cuts into the finished corner of 12 mm by 2.18234 mm");
+  CHECK(refusal([](CornerCut& c) { c.turn_rad = pi; }) == "the corner turns by 180 degrees, must be 1 to 179");
+  CHECK(refusal([](CornerCut& c) { c.before_mm = -1.0; }) == "a straight at the corner is -1 mm, must be at least 0");
   const CornerCut cut;
-  CHECK(message_of([&] { (void)corner_engagement(cut, 100.0); }).starts_with("place on the corner's path is 100.0"));
+  CHECK(message_of([&] { (void)corner_engagement(cut, 100.0); }).starts_with("place on the corner's path is 100 mm"));
   CHECK(message_of([&] { (void)corner_stock(cut, 0.0); }) ==
-        "the stock reaches 0.000000 mm beyond the walls, must be above 0");
-  CHECK(message_of([&] { (void)corner_track(cut, 0.0, 0.1); }) == "axial depth is 0.000000 mm, must be above 0");
-  CHECK(message_of([&] { (void)corner_track(cut, 1.0, 0.0); }) == "step is 0.000000 mm, must be above 0");
+        "the stock reaches 0 mm beyond the walls, must be above 0");
+  CHECK(message_of([&] { (void)corner_track(cut, 0.0, 0.1); }) == "axial depth is 0 mm, must be above 0");
+  CHECK(message_of([&] { (void)corner_track(cut, 1.0, 0.0); }) == "step is 0 mm, must be above 0");
+  CHECK(message_of([&] { (void)corner_track(cut, -1e-7, 0.1); }) == "axial depth is -1e-07 mm, must be above 0");
+  CHECK(message_of([&] { (void)corner_track(cut, 1.0, 1e-300); }).starts_with("a step of 1e-300 mm cuts "));
+  CornerCut wide;
+  wide.rough_radius_mm = 1e300;
+  CHECK(message_of([&] { (void)corner_stock(wide, 1.0); }).starts_with("a chord of "));
 }

@@ -20,6 +20,7 @@ using shapegcode::ForceCurve;
 using shapegcode::ForceFigures;
 using shapegcode::MillingForce;
 using shapegcode::SpindleSense;
+using shapegcode::ToolBeam;
 
 namespace {
 
@@ -395,5 +396,19 @@ TEST_CASE("cutting force: refusals") {
         EngagedArc{-1.0, 0.5, -1.0, 5.0}, EngagedArc{-1.0, 0.5, 5.0, 4.0}, EngagedArc{nan, 0.5, 0.0, 5.0}}) {
     CHECK_THROWS_AS((void)force.figures(Arcs{bad}, 100.0), Error);
   }
+  // Azimuths that no integer can count, and more flutes than a spindle's turn can hold.
+  const ToolBeam beam{.overhang_mm = 40.0,
+                      .fluted_length_mm = 20.0,
+                      .effective_diameter_mm = 6.0,
+                      .shank_diameter_mm = 8.0,
+                      .young_modulus_gpa = 600.0};
+  for (const double turned : {nan, 1e300}) {
+    CHECK_THROWS_AS((void)force.deflection_um(good, 100.0, turned, 1.0, beam), Error);
+    CHECK_THROWS_AS((void)force.force_centre_mm(good, 100.0, turned, 40.0), Error);
+  }
+  MillingForce wound({.diameter_mm = 8.0, .flutes = 2, .helix_rad = 0.8}, constant, 1000.0);
+  CHECK_THROWS_AS((void)wound.figures(Arcs{{-1.0, 0.5, 0.0, 1e12}}, 100.0), Error);
+  CHECK_THROWS_AS((void)wound.curve(Arcs{{-1.0, 0.5, 0.0, 1e12}}, 100.0, 4), Error);
+  CHECK_THROWS_AS(check(EndMill{.diameter_mm = 8.0, .flutes = 2'000'000'000}), Error);
   CHECK(force.figures(good, 100.0).peak_resultant_n > 0.0);  // a refusal leaves nothing behind
 }

@@ -15,7 +15,6 @@ using shapegcode::EngagedArc;
 using shapegcode::Error;
 using shapegcode::ForceCurve;
 using shapegcode::MillingForce;
-using shapegcode::tip_compliance_um_per_n;
 using shapegcode::ToolBeam;
 
 namespace {
@@ -60,10 +59,10 @@ TEST_CASE("deflection: textbook cantilever") {
   const ToolBeam beam = uniform(50.0, 10.0, 210.0);
   const double second_moment = pi * 1e4 / 64.0;  // mm4
   const double stiffness = 210e3 * second_moment;
-  CHECK(tip_compliance_um_per_n(beam, 0.0) ==
+  CHECK(compliance_um_per_n(beam, 0.0, 0.0) ==
         doctest::Approx(1e3 * std::pow(50.0, 3) / (3.0 * stiffness)).epsilon(1e-12));
   // Load at a from the clamped end: at the tip a^2 (3 L - a) / (6 E I), under the load a^3 / (3 E I).
-  CHECK(tip_compliance_um_per_n(beam, 20.0) ==
+  CHECK(compliance_um_per_n(beam, 0.0, 20.0) ==
         doctest::Approx(1e3 * 900.0 * (150.0 - 30.0) / (6.0 * stiffness)).epsilon(1e-12));
   CHECK(compliance_um_per_n(beam, 20.0, 20.0) == doctest::Approx(1e3 * 27000.0 / (3.0 * stiffness)).epsilon(1e-12));
   CHECK(compliance_um_per_n(beam, 50.0, 0.0) == 0.0);
@@ -101,7 +100,7 @@ TEST_CASE("deflection: the tip under the spread load of the flutes") {
     const double low = 12.0 * i / slices;
     const double high = 12.0 * (i + 1) / slices;
     const ForceCurve curve = force.curve(std::vector<EngagedArc>{{-pi / 2, -0.3, low, high}}, 600.0, angles);
-    tip += curve.force_n * tip_compliance_um_per_n(stepped, 0.5 * (low + high));
+    tip += curve.force_n * compliance_um_per_n(stepped, 0.0, 0.5 * (low + high));
     moment += curve.force_n * (40.0 - 0.5 * (low + high));
   }
   const ForceCurve whole = force.curve(arcs, 600.0, angles);
@@ -129,7 +128,7 @@ TEST_CASE("deflection: a load without helix acts at the middle of its height") {
   CHECK(centre.x() == doctest::Approx(35.0).epsilon(1e-9));
   CHECK(centre.y() == doctest::Approx(35.0).epsilon(1e-9));
   // Uniform over the height: mean of the influence, by Simpson's rule exact for a cubic.
-  const auto influence = [](double z) { return tip_compliance_um_per_n(stepped, z); };
+  const auto influence = [](double z) { return compliance_um_per_n(stepped, 0.0, z); };
   const double mean = (influence(2.0) + 4.0 * influence(5.0) + influence(8.0)) / 6.0;
   const Eigen::Vector2d bent = force.deflection_um(arcs, 400.0, curve.turned_rad[1], 0.0, stepped);
   CHECK((bent - mean * curve.force_n.row(1).transpose()).norm() < 1e-4 * bent.norm());

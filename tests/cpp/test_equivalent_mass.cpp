@@ -81,6 +81,7 @@ TEST_CASE("equivalent mass: refusals") {
   CHECK_THROWS_AS((void)shapegcode::wilson_theta(reference, force, 0.005, 0.9), Error);
   CHECK_THROWS_AS((void)shapegcode::wilson_theta({5.0, -1.0, 4000.0}, force, 0.005), Error);
   CHECK_THROWS_AS((void)shapegcode::wilson_theta({5.0, 1.0, 0.0}, force, 0.005), Error);
+  CHECK_THROWS_AS((void)shapegcode::wilson_theta(reference, force, 0.005, 1.4, std::nan("")), Error);
   CHECK_THROWS_AS((void)shapegcode::equivalent_mass_closed_form({{force, none}, 0.005, 28.0, 0.07}), Error);
   CHECK_THROWS_AS((void)shapegcode::equivalent_mass_closed_form({{none, force}, 0.005, 28.0, 0.07}), Error);
   CHECK_THROWS_AS((void)shapegcode::equivalent_mass_closed_form({{force, force}, 0.005, 0.0, 0.07}), Error);

@@ -15,7 +15,7 @@ using shapegcode::Shaper;
 
 namespace {
 
-/// V of spec 2 written out, not as the library sums it.
+/// The residual ratio V written out, not as the library sums it.
 double left_of(const Shaper& shaper, double frequency_hz, double zeta) {
   const double omega = 2.0 * std::numbers::pi * frequency_hz;
   double cosine = 0.0;

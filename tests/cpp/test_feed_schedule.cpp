@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <limits>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "shapegcode/error.hpp"
@@ -183,5 +184,21 @@ TEST_CASE("bad feed schedules are refused") {
   CHECK_THROWS_AS((void)schedule_feed(blocks, {{1.0, 2.0}, {100.0, 0.0}}, {}), Error);
   CHECK_THROWS_AS((void)schedule_feed(blocks, {{2.0, 1.0}, {100.0, 100.0}}, {}), Error);
   CHECK_THROWS_AS((void)schedule_feed(blocks, stations, {0.0, infinity, 0.1}), Error);
+  const auto refusal = [](const std::vector<FeedBlock>& of, const FeedStations& at,
+                          const FeedScheduleOptions& options) {
+    try {
+      (void)schedule_feed(of, at, options);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  CHECK(refusal({{0.0, 0.0, true}}, {{0.0}, {100.0}}, {}) ==
+        "the blocks of a feed schedule end at 0 mm, must have a length");
+  CHECK(refusal({{infinity, 0.0, true}}, {{infinity}, {100.0}}, {}) ==
+        "blocks of a feed schedule must ascend: one ends at inf mm");
+  CHECK(refusal(blocks, stations, {1e-300, infinity, 0.1}) ==
+        "a quarter of the least length of 2.5e-301 mm cuts 2 mm into 8e+300 pieces, limit 1e+08");
+  CHECK(refusal({{1e-7, 0.0, true}}, {{1e-5}, {100.0}}, {}) == "the stations end at 1e-05 mm, the blocks at 1e-07 mm");
   CHECK_THROWS_AS((void)with_feeds(Path({make_line({0, 0, 0}, {2, 0, 0}, 1.0)}), std::vector<FeedStretch>{}), Error);
 }

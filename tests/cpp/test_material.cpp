@@ -194,20 +194,23 @@ TEST_CASE("no stock, no layers or no memory is said so") {
   CHECK(refusal({{{0, 0}, {1, 0}, {nan, 1}}}, one_layer, 0.1) == "point 2 of ring 0 of the stock is not finite");
   CHECK(refusal({{{0, 0}, {1, 0}, {2, 0}}}, one_layer, 0.1) == "ring 0 of the stock encloses no area");
   CHECK(refusal({rings[0], rings[0]}, one_layer, 0.1) ==
-        "the outlines of the stock enclose no material at a resolution of 0.100000 mm");
+        "the outlines of the stock enclose no material at a resolution of 0.1 mm");
   CHECK(refusal(rings, {0.0}, 0.1) == "the stock has 1 heights between layers, must have at least 2");
-  CHECK(refusal(rings, {0.0, 0.0}, 0.1) ==
-        "height 0.000000 mm between layers must lie above its predecessor, 0.000000 mm");
+  CHECK(refusal(rings, {0.0, 0.0}, 0.1) == "height 0 mm between layers must lie above its predecessor, 0 mm");
   CHECK(refusal(rings, {0.0, nan}, 0.1) == "height 1 between layers is not finite");
-  CHECK(refusal(rings, one_layer, 0.0) == "resolution is 0.000000 mm, must be above 0");
+  CHECK(refusal(rings, one_layer, 0.0) == "resolution is 0 mm, must be above 0");
   CHECK(refusal(rings, one_layer, nan) == "resolution is nan mm, must be above 0");
-  CHECK(refusal(rings, one_layer, 1e-6).find("limit 2147.483648 MB") != std::string::npos);
+  CHECK(refusal(rings, one_layer, 1e308) == "resolution is 1e+308 mm, limit 1e+09 mm");
+  // Nodes and outline would fall onto the same few numbers.
+  CHECK(refusal({box(1e13, 1e13, 1e13 + 0.01, 1e13 + 0.01)}, one_layer, 1e-4).find("limit 1e+08 mm") !=
+        std::string::npos);
+  CHECK(refusal(rings, one_layer, 1e-6).find("limit 2147.48 MB") != std::string::npos);
   // Enough for the stock but not for what is cut into it.
   Material small(rings, one_layer, 0.01, 1'000'000);
   const auto cut = message_of([&] {
     for (double y = 0.5; y < 10.0; y += 0.3) small.remove(0, ToolStep({0.0, y}, {10.0, y}), 0.1, false);
   });
-  CHECK(cut.find("limit 1.000000 MB") != std::string::npos);
+  CHECK(cut.find("limit 1 MB") != std::string::npos);
   CHECK(message_of([&] { (void)small.heights_mm({0, 0}, {1, 1}, 0, 5); }).find("0 x 5") != std::string::npos);
 }
 
@@ -228,7 +231,9 @@ TEST_CASE("layers end where a program cuts on a level, and are thin where it ram
   for (std::size_t i = 3; i + 1 < borders.size(); ++i) CHECK(borders[i] - borders[i - 1] <= 0.5 + 1e-9);
   CHECK(layer_borders({}, -1.0, 0.0, 0.1) == std::vector<double>{-1.0, 0.0});
   CHECK(message_of([] { (void)layer_borders({}, 0.0, 0.0, 0.1); }) ==
-        "the stock reaches from 0.000000 to 0.000000 mm, its bottom must lie below its top");
+        "the stock reaches from 0 to 0 mm, its bottom must lie below its top");
   CHECK(message_of([] { (void)layer_borders({}, -1.0, 0.0, 0.0); }) ==
-        "layers of ramps are 0.000000 mm thick, must be above 0");
+        "layers of ramps are 0 mm thick, must be above 0");
+  CHECK(message_of([] { (void)layer_borders({}, -1.0, 0.0, 1e-300); }) ==
+        "a layer of 1e-300 mm cuts 1 mm into 1e+300 pieces, limit 1e+08");
 }

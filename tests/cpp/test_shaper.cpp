@@ -49,7 +49,7 @@ TEST_CASE("shaper: refuses taps that are none") {
   CHECK(kind_of_refusal({0.0, 0.2}, {0.5, 0.5 + 2e-9}) == ErrorKind::argument);
 }
 
-TEST_CASE("shaper: residual ratio is V(omega, zeta) of the spec") {
+TEST_CASE("shaper: residual ratio is V(omega, zeta), summed directly") {
   const Mode mode{7.0, 0.05};
   const Shaper shaper = shapegcode::make_shaper({0.0, 0.03, 0.11}, {0.4, -0.1, 0.7});
   const double omega = 2.0 * std::acos(-1.0) * 7.0;

@@ -40,7 +40,7 @@ TEST_CASE("surface: one flute, one wall, in small steps along the flute") {
   MillingForce force({.diameter_mm = 10.0, .flutes = 1, .helix_rad = 0.6}, steel, 2000.0);
   const std::vector<double> heights{0.0, 1.0, 4.0, 7.5, 9.9};
   const Eigen::VectorXd error =
-      wall_error_um(force, beam, Arcs{{-pi / 2, to, 0.0, 10.0}}, 160.0, WallSide::right, heights);
+      wall_error_um(force, beam, Arcs{{-pi / 2, to, 0.0, 10.0}}, 160.0, {WallSide::right, heights});
   for (std::size_t k = 0; k < heights.size(); ++k) {
     CAPTURE(heights[k]);
     // As the flute passes -pi/2 at this height, what is above it is still in the arc.
@@ -62,12 +62,12 @@ TEST_CASE("surface: only where the engagement reaches the wall") {
   MillingForce force({.diameter_mm = 10.0, .flutes = 4, .helix_rad = 0.6}, steel, 2000.0);
   const std::vector<double> heights{1.0, 6.0, 9.0};
   const Arcs arcs{{-pi / 2, -0.5, 0.0, 5.0}, {-pi / 2 + 0.1, -0.5, 5.0, 8.0}};
-  const Eigen::VectorXd right = wall_error_um(force, beam, arcs, 640.0, WallSide::right, heights);
+  const Eigen::VectorXd right = wall_error_um(force, beam, arcs, 640.0, {WallSide::right, heights});
   CHECK(std::isfinite(right[0]));
   CHECK(std::isnan(right[1]));
   CHECK(std::isnan(right[2]));
-  CHECK(wall_error_um(force, beam, arcs, 640.0, WallSide::right, heights, 0.11).head(2).allFinite());
-  CHECK(wall_error_um(force, beam, arcs, 640.0, WallSide::left, heights).array().isNaN().all());
+  CHECK(wall_error_um(force, beam, arcs, 640.0, {WallSide::right, heights, 0.11}).head(2).allFinite());
+  CHECK(wall_error_um(force, beam, arcs, 640.0, {WallSide::left, heights}).array().isNaN().all());
 }
 
 TEST_CASE("surface: a counter-clockwise spindle is the mirror image") {
@@ -76,12 +76,12 @@ TEST_CASE("surface: a counter-clockwise spindle is the mirror image") {
   MillingForce counter(tool, steel, 2000.0, SpindleSense::counter_clockwise);
   const std::vector<double> heights{0.5, 3.0, 7.0};
   const Eigen::VectorXd a =
-      wall_error_um(clockwise, beam, Arcs{{-pi / 2, 0.3, 0.0, 8.0}}, 480.0, WallSide::right, heights);
+      wall_error_um(clockwise, beam, Arcs{{-pi / 2, 0.3, 0.0, 8.0}}, 480.0, {WallSide::right, heights});
   const Eigen::VectorXd b =
-      wall_error_um(counter, beam, Arcs{{-0.3, pi / 2, 0.0, 8.0}}, 480.0, WallSide::left, heights);
+      wall_error_um(counter, beam, Arcs{{-0.3, pi / 2, 0.0, 8.0}}, 480.0, {WallSide::left, heights});
   CHECK((a - b).cwiseAbs().maxCoeff() < 1e-9);
   const Eigen::VectorXd up =
-      wall_error_um(clockwise, beam, Arcs{{-0.3, pi / 2, 0.0, 8.0}}, 480.0, WallSide::left, heights);
+      wall_error_um(clockwise, beam, Arcs{{-0.3, pi / 2, 0.0, 8.0}}, 480.0, {WallSide::left, heights});
   CHECK((a - up).cwiseAbs().maxCoeff() > 0.1);  // up milling is not the same as down milling
 }
 
@@ -91,7 +91,7 @@ TEST_CASE("surface: of flutes with runout the longest makes the wall") {
   MillingForce force({.diameter_mm = 10.0, .flutes = 2, .helix_rad = 0.6, .runout_mm = {-0.003, 0.003}}, steel, 2000.0);
   const std::vector<double> heights{2.0};
   const Eigen::VectorXd error =
-      wall_error_um(force, rigid, Arcs{{-pi / 2, 0.3, 0.0, 8.0}}, 480.0, WallSide::right, heights);
+      wall_error_um(force, rigid, Arcs{{-pi / 2, 0.3, 0.0, 8.0}}, 480.0, {WallSide::right, heights});
   CHECK(error[0] == doctest::Approx(-3.0).epsilon(1e-3));
 }
 
@@ -104,13 +104,14 @@ TEST_CASE("surface: along a track, and refusals") {
   track.first_arc = {0, 0, 1};
   const std::vector<double> feeds{640.0, 320.0};
   const std::vector<double> heights{1.0, 4.0};
-  const Eigen::MatrixXd map = shapegcode::wall_errors_um(force, beam, track, feeds, WallSide::right, heights);
+  const Eigen::MatrixXd map = shapegcode::wall_errors_um(force, beam, track, feeds, {WallSide::right, heights});
   CHECK(map.rows() == 2);
   CHECK(map.cols() == 2);
   CHECK(map.row(0).array().isNaN().all());
-  CHECK(map.row(1).transpose() == wall_error_um(force, beam, track.arcs, 320.0, WallSide::right, heights));
+  CHECK(map.row(1).transpose() == wall_error_um(force, beam, track.arcs, 320.0, {WallSide::right, heights}));
   CHECK_THROWS_AS(
-      (void)shapegcode::wall_errors_um(force, beam, track, std::vector<double>{1.0}, WallSide::right, heights), Error);
-  CHECK_THROWS_AS((void)wall_error_um(force, beam, track.arcs, 320.0, WallSide::right, std::vector<double>{-1.0}),
+      (void)shapegcode::wall_errors_um(force, beam, track, std::vector<double>{1.0}, {WallSide::right, heights}),
+      Error);
+  CHECK_THROWS_AS((void)wall_error_um(force, beam, track.arcs, 320.0, {WallSide::right, std::vector<double>{-1.0}}),
                   Error);
 }

@@ -345,14 +345,20 @@ TEST_CASE("what cannot be swept is refused with value and limit") {
     }
     return "no error";
   };
-  CHECK(refusal(path, 0.0, {}) == "tool diameter is 0.000000 mm, must be above 0");
+  CHECK(refusal(path, 0.0, {}) == "tool diameter is 0 mm, must be above 0");
   CHECK(refusal(path, std::nan(""), {}) == "tool diameter is nan mm, must be above 0");
   SweepOptions options;
   options.step_mm = -1.0;
-  CHECK(refusal(path, 8.0, options) == "step is -1.000000 mm, must be above 0, or 0 for a fortieth of the diameter");
+  CHECK(refusal(path, 8.0, options) == "step is -1 mm, must be above 0, or 0 for a fortieth of the diameter");
   options = {};
   options.touch_mm = -1.0;
-  CHECK(refusal(path, 8.0, options) == "touch is -1.000000 mm, must be at least 0");
+  CHECK(refusal(path, 8.0, options) == "touch is -1 mm, must be at least 0");
+  options = {};
+  options.step_mm = 1e-300;
+  CHECK(refusal(path, 8.0, options) == "a step of 1e-300 mm cuts 1 mm into 1e+300 pieces, limit 1e+08");
+  CHECK(refusal(path, 1e300, {}).starts_with("a grid of "));
+  options.step_mm = -1e-7;
+  CHECK(refusal(path, 8.0, options) == "step is -1e-07 mm, must be above 0, or 0 for a fortieth of the diameter");
   const Path upright({make_arc({0, 0, 0}, {0, 2, 0}, {0, 1, 0}, pi, 0, 10.0, 17)});
   CHECK(refusal(upright, 8.0, {}) == "line 17: arc outside of the XY plane (G17)");
 }

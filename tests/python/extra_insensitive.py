@@ -55,7 +55,7 @@ def ei_convolved(bands: Sequence[ModeBand]) -> tuple[FloatArray, FloatArray]:
 
 
 def worst_over_bands(times_s: FloatArray, amplitudes: FloatArray, bands: Sequence[ModeBand], samples: int) -> float:
-    """V of spec 2, written out, at its largest on a plain grid of frequencies."""
+    """The residual ratio V, written out, at its largest on a plain grid of frequencies."""
     worst = 0.0
     for band in bands:
         zeta = band.mode.damping_ratio

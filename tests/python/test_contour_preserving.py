@@ -1,4 +1,4 @@
-"""Contour-preserving shaping (spec 5), held against its figures on the emitted text by the judge's player and plant."""
+"""Contour-preserving shaping, held against its figures on the emitted text by the judge's player and plant."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def target_um(target: str, found: Figures) -> float:
 
 
 def test_the_plain_figures_are_those_of_the_specification() -> None:
-    # Spec 5: unshaped response 42 um; on the 5 ms grid plain shaping leaves .426 % and 43.6 um.
+    # Continuous command at 200 mm/s: unshaped response 42 um; on the 5 ms grid plain shaping leaves .426 % and 43.6 um.
     assert paper_unshaped().response_um == pytest.approx(42.0, abs=0.5)
     plain = paper("off")
     assert plain.orbit_percent == pytest.approx(0.426, abs=0.002)

@@ -152,7 +152,7 @@ def test_wall(case: str, sense: SpindleSense) -> None:
 
 
 def test_paper_001() -> None:
-    """Spec 7: what eq. 7 gives in the corner, and what holds the force."""
+    """What eq. 7 of paper 001 gives in the corner, and what holds the force."""
     cutter = CASES["paper"]
     force = model(cutter)
     entry = np.array([[-pi / 2, asin(0.8 / 4 - 1), 0.0, 15.0]])
@@ -181,7 +181,7 @@ def test_paper_001() -> None:
 
 @pytest.mark.parametrize(("discs", "whole", "held"), [(50, True, 81.7), (150, True, 80.0), (60, False, 80.75)])
 def test_feed_that_holds_the_peak_depends_on_discs(discs: int, whole: bool, held: float) -> None:
-    """Spec 7 has 81.3: whole discs scatter about it."""
+    """By integration along the flute 81.3: whole discs scatter about it."""
 
     def peak(radial_depth: float, feed: float) -> float:
         arcs = np.array([[-pi / 2, asin(radial_depth / 4 - 1), 0.0, 15.0]])

@@ -1,4 +1,4 @@
-"""``shapegcode demo shaper``: paper 002's figures against the closed forms and the reference values of the spec."""
+"""``shapegcode demo shaper``: paper 002's figures against the closed forms and this project's reference values."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_every_statement_that_can_be_compared_agrees(demo: ShaperDemo) -> None:
 
 
 def test_branches_hold_the_uniform_families(demo: ShaperDemo) -> None:
-    """Spec 2: times 0, t, 2t with t = k/(f1+f2) or k/(f2-f1), amplitudes as (1, -2cos 2πf1t, 1)."""
+    """Closed form: times 0, t, 2t with t = k/(f1+f2) or k/(f2-f1), amplitudes as (1, -2cos 2πf1t, 1)."""
     branches = demo.branches
     compared = 0
     for place in range(0, len(branches.ratios), 20):

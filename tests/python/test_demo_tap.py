@@ -1,4 +1,4 @@
-"""``shapegcode demo tap``: paper 003's figures against closed forms, SciPy and the reference values of the spec."""
+"""``shapegcode demo tap``: paper 003's figures against closed forms, SciPy and this project's reference values."""
 
 from __future__ import annotations
 

@@ -153,7 +153,7 @@ def test_no_stock_is_said_so(rings: list[np.ndarray], message: str) -> None:
 
 
 def test_too_fine_a_grid_is_said_so() -> None:
-    with pytest.raises(sg.ArgumentError, match=r"limit 1000\.000000 MB"):
+    with pytest.raises(sg.ArgumentError, match=r"limit 1000 MB"):
         core.Material([box(0, 0, 300, 300)], BORDERS, 1e-4, 1_000_000_000)
 
 

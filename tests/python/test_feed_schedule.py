@@ -83,7 +83,7 @@ def test_the_corner_is_cut_at_the_force_of_the_straight(corner: sg.FeedSchedule)
     near = load.after.peak_resultant_n[inside] > 0.95 * STRAIGHT_N
     lengths = np.diff(np.concatenate(([0.0], load.s_mm)))[inside]
     assert lengths[near].sum() / lengths.sum() > 0.8
-    # The constant feed at which the worst point of the corner is within the limit (spec section 7): 81.3 mm/min.
+    # The constant feed at which the worst point of the corner is within the limit: 81.3 mm/min.
     constant_s = corner.survey.regions[0].region.path.length_mm / 81.3 * 60.0
     assert corner.report["cycle_time_s"]["after"] < 0.85 * constant_s
     assert corner.within_limits

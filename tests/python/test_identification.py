@@ -135,7 +135,7 @@ def test_other_courses_of_the_force(blow: str) -> None:
 
 
 def test_paper_003_from_its_record() -> None:
-    """Spec 8: 5 kg, 20 N s/m, 4000 N/m, a blow of 1 N s at the first sample, 1024 samples of 5 ms."""
+    """Paper 003, section 3: 5 kg, 20 N s/m, 4000 N/m, a blow of 1 N s at the first sample, 1024 samples of 5 ms."""
     omega, zeta = np.sqrt(800.0), 20.0 / (2.0 * np.sqrt(5.0 * 4000.0))
     s = -zeta * omega + 1j * omega * np.sqrt(1.0 - zeta**2)
     response = np.imag(s**2 * np.exp(s * 0.005 * np.arange(1024))) / (s.imag * 5.0)

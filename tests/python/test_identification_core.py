@@ -128,7 +128,7 @@ def test_iterated_model_finds_the_poles_of_the_wilson_method(theta: float) -> No
 
 
 def test_reference_of_paper_003_from_the_wilson_response() -> None:
-    # What spec 8 states: plain least squares, the third pole of the method in the way.
+    # Plain least squares, the third pole of the method in the way.
     plain = _core.arma_decay([wilson_after_impulse(1.4)], 1, plain=True)
     assert reference_figures(plain) == pytest.approx([1.9610, -0.9806, 4.484, 0.0695], abs=5e-4)
     assert reference_figures(plain)[:2] == pytest.approx([1.9610, -0.9806], abs=5e-5)

@@ -100,7 +100,7 @@ def test_player_refuses_what_it_cannot_know() -> None:
 
 
 def paper_path(speed: float, reduction: float, step_s: float) -> Vector:
-    """Set-points of the path of spec section 3: line 20, quarter arc R20, line 20; 50 ms ramps."""
+    """Set-points of the path of paper 000: line 20, quarter arc R20, line 20; 50 ms ramps."""
     ramp, on_arc, arc = 0.05, speed * (1 - reduction), math.pi * 10
     steady = (20 - speed / 2 * ramp - (speed + on_arc) / 2 * ramp) / speed
     times = np.cumsum([0, ramp, steady, ramp, arc / on_arc, ramp, steady, ramp])
@@ -140,7 +140,7 @@ def test_ideal_minimal_shaper_and_its_staircase() -> None:
     blocks = fine[::2500]
     blocks = np.concatenate([blocks, fine[-1:]])
     late = residual_um(blocks, MODES, 5e-3, still_mm=1e-9, delay_s=0.03)
-    assert late[0] < 1.0 and 3.5 < late[1] < 6.0  # spec section 4: 0.2 and 4.7, depending on the phase
+    assert late[0] < 1.0 and 3.5 < late[1] < 6.0  # 0.2 and 4.7, depending on the phase
 
 
 def test_grid_exact_shaper_survives_the_staircase() -> None:
@@ -182,7 +182,7 @@ def test_modes_per_axis() -> None:
 
 
 def test_a_table_on_a_circle_swings_outwards() -> None:
-    """Steady state on a circle at Ω: radius R/(1 − (Ω/ω)²) (spec section 5)."""
+    """Steady state on a circle at Ω: radius R/(1 − (Ω/ω)²)."""
     speed, radius = 198.0, 20.0
     moves = cuts(f"G3 I-{radius} F{speed * 60}\n" + f"I-{radius}\n" * 5)
     _, _, moved = response(play(moves, acceleration_samples=100), [(46.0, 0.02)] * 2 + [None], 1e-3)

@@ -1,4 +1,4 @@
-"""Minimal multi-mode shapers: the spec's figures, SciPy's own searches, and vibration simulated step by step."""
+"""Minimal multi-mode shapers: the figures of paper 002, SciPy's own searches, and vibration simulated step by step."""
 
 from __future__ import annotations
 

@@ -255,7 +255,7 @@ def test_varying_filters_by_step_and_by_batch_agree_and_refuse() -> None:
 
 
 def residual_of(taps: np.ndarray, mode: Mode, period_s: float) -> float:
-    """V of spec 2 for taps on a grid, written out."""
+    """The residual ratio V for taps on a grid, written out."""
     omega, zeta = 2.0 * np.pi * mode.frequency_hz, mode.damping_ratio
     t = np.arange(len(taps)) * period_s
     swing = np.exp(1j * omega * np.sqrt(1.0 - zeta**2) * t)

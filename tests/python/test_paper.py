@@ -1,4 +1,4 @@
-"""Paper 000, held against the project's figures (spec 3 and 4): orbit error, program listing, emitted blocks, times."""
+"""Paper 000, held against this project's figures: orbit error, program listing, emitted blocks, times."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from shapegcode.emit import motion_limits
 
 Vector = npt.NDArray[np.float64]
 
-# Spec 3: feed mm/s, arc feed ratio, orbit error in % of the zeta = .02 model, time added by the ideal command in %.
+# Feed mm/s, arc feed ratio, orbit error in % of the zeta = .02 model, time added by the ideal command in %.
 CONDITIONS = [
     (100, 0.60, 0.0270, 31.5),
     (200, 0.60, 0.1074, 33.4),
@@ -117,11 +117,11 @@ def test_listing_of_the_paper(stretch: tuple[list[tuple[float, float]], list[flo
 
 
 def test_emitted_program_leaves_what_the_project_promises() -> None:
-    """Spec 4: 200 mm/s, 1 %, 5 ms blocks, 1 um words: at most 8 % on X and 15 % on Y, under both block ends."""
+    """200 mm/s, 1 %, 5 ms blocks, 1 um words: at most 8 % on X and 15 % on Y, under both block ends."""
     judged = convert(paper_text(200), vx500(), arc_feed_ratio=0.99, block_period_s=0.005)
     whole_periods(judged)
     before = unshaped_residual_um(200, 0.99)
-    # Spec 4 gives the continuous command's; 1 ms set-points smooth the 131 Hz of Y a little.
+    # Those of the continuous command; 1 ms set-points smooth the 131 Hz of Y a little.
     assert unshaped_residual_um(200, 0.99, 1e-4)[:2] == pytest.approx([16.7, 8.4], rel=0.02)
     assert before[:2] == pytest.approx([16.7, 8.4], rel=0.15)
     assert judged.conversion.report["block_period_s"] == 0.005
@@ -137,7 +137,7 @@ def test_emitted_program_leaves_what_the_project_promises() -> None:
 
 
 def test_rounding_the_paper_s_own_design_to_the_block_grid_loses_the_benefit() -> None:
-    """Spec 4: what the grid-exact shaper is for. The ideal command in 5 ms pieces leaves over half of Y's vibration."""
+    """What the grid-exact shaper is for. The ideal command in 5 ms pieces leaves over half of Y's vibration."""
     command, _ = ideal(200, 0.99)
     coarse = command[::500]
     clock = np.arange(0.0, (len(coarse) - 1) * 5 + 1) / 5

@@ -23,7 +23,7 @@ MODES = (
 
 
 def left(fir: Fir, mode: Mode, period_s: float) -> float:
-    """V of spec 2 from the last tap on, written out."""
+    """The residual ratio V from the last tap on, written out."""
     omega, zeta = 2.0 * math.pi * mode.frequency_hz, mode.damping_ratio
     t = (np.array(fir.delays) - fir.delays[-1]) * period_s
     damped = omega * math.sqrt(1.0 - zeta**2)

@@ -33,7 +33,7 @@ PAPER = [ModeBand(Mode(46.0, 0.02), 0.05), ModeBand(Mode(131.0, 0.02))]
 
 
 def residual(times_s: list[float], amplitudes: list[float], frequency_hz: float, zeta: float) -> float:
-    """V of spec 2, written out."""
+    """The residual ratio V, written out."""
     omega, end = 2.0 * math.pi * frequency_hz, times_s[-1]
     damped = omega * math.sqrt(1.0 - zeta**2)
     total = sum(
@@ -216,7 +216,7 @@ def test_no_family_vanishes() -> None:
 
 
 def test_reference_residuals_at_a_frequency_ratio_of_two() -> None:
-    """Spec 2: zeta .03 and ±5 %: minimal 11.1 %, convolved ZV 6.8 %; undamped 12.7 and 7.75 %."""
+    """Two modes at a ratio of 2, zeta .03 and ±5 %: minimal 11.1 %, convolved ZV 6.8 %; undamped 12.7 and 7.75 %."""
     for zeta, minimal, convolved in ((0.03, 11.1, 6.8), (0.0, 12.7, 7.75)):
         bands = [ModeBand(Mode(10.0, zeta), 0.05), ModeBand(Mode(20.0, zeta), 0.05)]
         one, other = (band.mode for band in bands)
@@ -284,7 +284,7 @@ def test_without_a_period_continuous_times_and_the_best_grids() -> None:
     result = sg.choose_shaper(["46:0.02", "131:0.02"], families=FEW)
     periods_s = {each.period_s for each in result.designs}
     assert None in periods_s
-    assert {0.001, 0.002} <= {round(each, 9) for each in periods_s if each is not None}  # spec 2: 12 ms at both
+    assert {0.001, 0.002} <= {round(each, 9) for each in periods_s if each is not None}  # 12 ms at both
     assert result.options.max_duration_s == 0.066  # three periods of 46 Hz
     on_grid = result.grid_index
     assert on_grid is not None
@@ -298,7 +298,7 @@ def test_a_machine_gives_modes_bands_and_grids() -> None:
     assert [band.mode for band in result.bands] == [Mode(46.0, 0.02), Mode(131.0, 0.02)]
     exact = next(each for each in result.designs if each.family == "non-negative")
     assert exact.period_s == pytest.approx(0.005)
-    assert exact.duration_s == pytest.approx(0.02)  # spec 2: T = 5 ms
+    assert exact.duration_s == pytest.approx(0.02)  # T = 5 ms
     np.testing.assert_allclose(exact.shaper.amplitudes, [0.20394, 0.16162, 0.31387, 0.15731, 0.16327], atol=1e-5)
     assert result.design.duration_s <= exact.duration_s
     assert result.best_by_period[0.005] == result.grid_index == result.index
@@ -316,7 +316,7 @@ def test_a_machine_gives_modes_bands_and_grids() -> None:
 
 def test_long_shapers_only_where_no_short_one_is_good() -> None:
     data = sg.Machine.load("vx500").model_dump(exclude_none=True)
-    data["emission"]["block_period_s"] = 0.008  # spec 2: the shortest non-negative one lasts 96 ms
+    data["emission"]["block_period_s"] = 0.008  # the shortest non-negative one lasts 96 ms
     result = sg.choose_shaper(machine=sg.Machine.from_data(data, "test"), families=["zvd", "non-negative"])
     assert result.options.max_duration_s == 0.25
     assert min(each.duration_s for each in result.designs) == pytest.approx(0.096)

@@ -202,7 +202,7 @@ def test_residual_curve_is_zero_at_the_modes() -> None:
 
 
 def test_responses_of_modes_against_scipy() -> None:
-    """Any number of modes side by side; the transfer function of spec 3 by SciPy."""
+    """Any number of modes side by side; the transfer function of a base-excited mode by SciPy."""
     modes = [Mode(3.0, 0.1), Mode(11.0, 0.02), Mode(7.0, 0.0), Mode(1.0, 0.05)]
     rng = np.random.default_rng(5)
     command = np.cumsum(rng.normal(size=400))

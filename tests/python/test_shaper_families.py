@@ -39,7 +39,7 @@ TOLERANT = ("ei", "ei3", "si")
 
 
 def left_of(shaper: Shaper, frequency_hz: float, zeta: float) -> float:
-    """V of spec 2, written out."""
+    """The residual ratio V, written out."""
     omega = 2.0 * np.pi * frequency_hz
     t = shaper.times_s
     terms = shaper.amplitudes * np.exp((zeta + 1j * math.sqrt(1.0 - zeta**2)) * omega * t)

@@ -1,4 +1,4 @@
-"""Shaper designs: the spec's reference figures, and residuals judged by NumPy and by simulation alone."""
+"""Shaper designs: the reference figures of 46 and 131 Hz, and residuals judged by NumPy and by simulation alone."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LIMIT = 1e-10
 
 
 def left_of(shaper: Shaper, mode: Mode) -> float:
-    """V of spec 2, written out."""
+    """The residual ratio V, written out."""
     omega, zeta = 2.0 * np.pi * mode.frequency_hz, mode.damping_ratio
     t = shaper.times_s
     terms = shaper.amplitudes * np.exp(zeta * omega * t) * np.exp(1j * omega * math.sqrt(1.0 - zeta**2) * t)

@@ -157,7 +157,7 @@ def test_the_corner_of_paper_001() -> None:
 
 
 def test_radial_depth_in_the_corner_is_that_of_paper_001() -> None:
-    """Largest radial depth 2.103 mm at 14 degrees, from the polygon alone (spec, paper 001 case 1)."""
+    """Largest radial depth 2.103 mm at 14 degrees, from the polygon alone (paper 001, case 1)."""
     (piece,) = stock_polygons(allowance(), [corner()], RADIUS)
     rough = shapely.Polygon(piece.rings[0])
     depths = []

@@ -29,14 +29,14 @@ enum class ContourTarget {
 /// that cancels the modes leaves a kernel hardly longer than itself; the tail of one that does not is cut where less
 /// than 1e-4 of it is left, or at four times the shaper, and the outer taps mended so that sum and mean delay
 /// are the shaper's.
-/// Throws Error(argument) as ModalPlant does. Source: spec 5.
+/// Throws Error(argument) as ModalPlant does. Source: this project.
 [[nodiscard]] std::vector<double> contour_kernel(const Fir& shaper, std::span<const Mode> modes, double period_s,
                                                  ContourTarget target);
 
 /// Finds, for one axis, the correction c of a command before shaping that brings the shaped command (or the plant's
 /// response to it) back to the programmed path: it minimises |e + f*c|^2 + sum_k w_k (c_k - 2 c_{k-1} + c_{k-2})^2,
 /// where f is the kernel from the command before shaping to what shall follow the path and e the deviation without
-/// correction (spec 5).
+/// correction.
 ///
 /// The error is counted as far as the correction reaches, so the normal matrix is a banded Toeplitz matrix whatever the
 /// length of the window: its Cholesky factor is worked out once, until its rows no longer change, and every window then
@@ -120,7 +120,7 @@ struct RunDeviation {
 
 /// One run from rest to rest as a shaped command on half the block grid: row 2k is the border k of block periods, row
 /// 2k+1 the middle of period k. With a target, the command before shaping is corrected so that the shaped command or
-/// the response keeps to the path (spec 5): windows around the places where it would leave it, solved per axis, carried
+/// the response keeps to the path: windows around the places where it would leave it, solved per axis, carried
 /// on where they are long; memory does not grow with the run. The correction is zero at both ends of the run: nothing
 /// moves before the start and nothing is added behind the stop.
 ///
@@ -233,7 +233,7 @@ struct ShapingOptions {
   double plunge_axis_angle_rad = 0.26;  ///< see forced_stops
   double plunge_corner_angle_rad = 0.78;
   double rest_at_stop_s = 0.0;  ///< pause at a forced stop, so that a filter behind the program runs out
-  /// What is brought back to the path behind the shaper (spec 5). With a target, `limits.contour_tolerance_mm` is its
+  /// What is brought back to the path behind the shaper. With a target, `limits.contour_tolerance_mm` is its
   /// tolerance, kept by the highest feed that does; without one, `limits` holds the bounds that plain shaping needs.
   ContourTarget target = ContourTarget::none;
   AxisModes modes;  ///< of the response; nothing else is done with them

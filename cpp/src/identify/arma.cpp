@@ -10,6 +10,7 @@
 #include "base/linear_algebra.hpp"
 #include "identify/fit_common.hpp"
 #include "identify/separable_fit.hpp"
+#include "identify/signals.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {

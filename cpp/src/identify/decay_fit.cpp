@@ -7,7 +7,7 @@
 #include "identify/fit_common.hpp"
 #include "identify/one_pole.hpp"
 #include "identify/separable_fit.hpp"
-#include "shapegcode/error.hpp"
+#include "identify/signals.hpp"
 
 namespace shapegcode {
 namespace {

@@ -2,18 +2,26 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
-#include "shapegcode/error.hpp"
+#include "base/refuse.hpp"
+#include "identify/signals.hpp"
 
 namespace shapegcode {
 namespace {
 
+using detail::refuse;
+
 void check_positive(double value, const char* what) {
-  if (value > 0.0 && std::isfinite(value)) return;
-  std::ostringstream message;
-  message << what << " is " << value << ", must be finite and above 0";
-  throw Error(ErrorKind::argument, message.str());
+  if (!(value > 0.0 && std::isfinite(value))) refuse("{} is {:g}, must be finite and above 0", what, value);
+}
+
+void check_oscillator(const EquivalentOscillator& oscillator) {
+  check_positive(oscillator.mass_kg, "mass in kg");
+  check_positive(oscillator.stiffness_n_per_m, "stiffness in N/m");
+  const double damping = oscillator.damping_n_s_per_m;
+  if (!(damping >= 0.0) || !std::isfinite(damping)) {
+    refuse("damping is {:g} N s/m, must be finite and at least 0", damping);
+  }
 }
 
 double rms(std::span<const double> values) {
@@ -27,7 +35,7 @@ class SimulatedRms {
  public:
   explicit SimulatedRms(const MassProblem& problem) : problem_(problem) {
     check_period(problem.period_s);
-    if (!std::isfinite(problem.impulse_n_s)) throw Error(ErrorKind::argument, "impulse is not finite");
+    if (!std::isfinite(problem.impulse_n_s)) refuse("impulse is not finite");
     const std::span<const double> responses[] = {problem.tap.response};
     const TapSignals taps[] = {problem.tap};
     if (problem.impulse_n_s == 0.0 || problem.tap.force_n.size() != problem.tap.response.size()) {
@@ -37,12 +45,10 @@ class SimulatedRms {
     }
     check_positive(problem.omega_rad_s, "natural frequency in rad/s");
     if (!(problem.damping_ratio >= 0.0) || !(problem.damping_ratio <= 1.0)) {
-      std::ostringstream message;
-      message << "damping ratio is " << problem.damping_ratio << ", must be between 0 and 1";
-      throw Error(ErrorKind::argument, message.str());
+      refuse("damping ratio is {:g}, must be between 0 and 1", problem.damping_ratio);
     }
     measured_ = rms(problem.tap.response);
-    if (measured_ == 0.0) throw Error(ErrorKind::argument, "response is zero throughout");
+    if (measured_ == 0.0) refuse("response is zero throughout");
   }
 
   [[nodiscard]] double measured() const { return measured_; }
@@ -69,20 +75,13 @@ class SimulatedRms {
 OscillatorMotion wilson_theta(const EquivalentOscillator& oscillator, std::span<const double> force_n, double period_s,
                               double theta, double displacement_m, double velocity_m_per_s) {
   check_period(period_s);
-  check_positive(oscillator.mass_kg, "mass in kg");
-  check_positive(oscillator.stiffness_n_per_m, "stiffness in N/m");
-  if (!(oscillator.damping_n_s_per_m >= 0.0) || !std::isfinite(oscillator.damping_n_s_per_m)) {
-    std::ostringstream message;
-    message << "damping is " << oscillator.damping_n_s_per_m << " N s/m, must be finite and at least 0";
-    throw Error(ErrorKind::argument, message.str());
-  }
-  if (!(theta >= 1.0) || !std::isfinite(theta)) {
-    std::ostringstream message;
-    message << "theta is " << theta << ", must be finite and at least 1";
-    throw Error(ErrorKind::argument, message.str());
+  check_oscillator(oscillator);
+  if (!(theta >= 1.0) || !std::isfinite(theta)) refuse("theta is {:g}, must be finite and at least 1", theta);
+  if (!std::isfinite(displacement_m) || !std::isfinite(velocity_m_per_s)) {
+    refuse("start is {} m, {} m/s, must be finite", displacement_m, velocity_m_per_s);
   }
   if (force_n.empty() || !std::ranges::all_of(force_n, [](double force) { return std::isfinite(force); })) {
-    throw Error(ErrorKind::argument, "force is empty or holds a value that is not finite");
+    refuse("force is empty or holds a value that is not finite");
   }
   const double m = oscillator.mass_kg;
   const double c = oscillator.damping_n_s_per_m;

@@ -3,34 +3,29 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <sstream>
-#include <string>
 #include <utility>
 
-#include "shapegcode/error.hpp"
+#include "base/refuse.hpp"
 
 namespace shapegcode::identification {
 
+using detail::refuse;
+
 void check_modes(const NaturalModes& modes, double period_s) {
   const std::size_t count = modes.omega_rad_s.size();
-  std::ostringstream message;
   if (count == 0 || count != modes.damping_ratio.size()) {
-    message << count << " natural frequencies and " << modes.damping_ratio.size()
-            << " damping ratios: at least one of each, and as many, needed";
-    throw Error(ErrorKind::argument, message.str());
+    refuse("{} natural frequencies and {} damping ratios: at least one of each, and as many, needed", count,
+           modes.damping_ratio.size());
   }
   const double nyquist = std::numbers::pi / period_s;
   for (std::size_t m = 0; m < count; ++m) {
     const double omega = modes.omega_rad_s[m];
     const double zeta = modes.damping_ratio[m];
     if (!(omega > 0.0) || !(omega < nyquist)) {
-      message << "mode " << m << " has " << omega << " rad/s, must be above 0 and below the Nyquist frequency "
-              << nyquist << " rad/s";
-      throw Error(ErrorKind::argument, message.str());
+      refuse("mode {} has {:g} rad/s, must be above 0 and below the Nyquist frequency {:g} rad/s", m, omega, nyquist);
     }
     if (!(zeta > 0.0) || !(zeta < 1.0)) {
-      message << "mode " << m << " has damping ratio " << zeta << ", must be above 0 and below 1";
-      throw Error(ErrorKind::argument, message.str());
+      refuse("mode {} has damping ratio {:g}, must be above 0 and below 1", m, zeta);
     }
   }
 }
@@ -38,14 +33,12 @@ void check_modes(const NaturalModes& modes, double period_s) {
 void check_mode_count(int n_modes) {
   constexpr int most = 50;
   if (n_modes >= 1 && n_modes <= most) return;
-  throw Error(ErrorKind::argument,
-              "model of " + std::to_string(n_modes) + " modes asked for, 1 to " + std::to_string(most) + " can be");
+  refuse("model of {} modes asked for, 1 to {} can be", n_modes, most);
 }
 
 void check_enough(std::size_t samples, std::size_t parameters) {
   if (samples > parameters) return;
-  throw Error(ErrorKind::argument, std::to_string(samples) + " samples for " + std::to_string(parameters) +
-                                       " parameters: more samples than parameters needed");
+  refuse("{} samples for {} parameters: more samples than parameters needed", samples, parameters);
 }
 
 Eigen::VectorXd logarithms(const NaturalModes& modes) {

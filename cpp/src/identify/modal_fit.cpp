@@ -4,17 +4,19 @@
 #include <cmath>
 #include <complex>
 #include <sstream>
-#include <string>
 #include <utility>
 
+#include "base/refuse.hpp"
 #include "identify/fit_common.hpp"
 #include "identify/held_force.hpp"
 #include "identify/one_pole.hpp"
 #include "identify/separable_fit.hpp"
-#include "shapegcode/error.hpp"
+#include "identify/signals.hpp"
 
 namespace shapegcode {
 namespace {
+
+using detail::refuse;
 
 using Complex = std::complex<double>;
 using Eigen::Index;
@@ -60,11 +62,27 @@ class PeriodInput {
   std::vector<Complex> derivative_;
 };
 
-/// Response of a mode of unit mass, in `column`, and its derivatives to ln omega and ln zeta in the two others, if they
-/// are wanted. Written in real numbers: complex products of the standard look for NaN at each sample.
-void mode_columns(const HeldForce& held, std::span<const double> force, double period_s, double omega, double zeta,
-                  const ModalFitOptions& options, Eigen::Ref<VectorXd> column, Eigen::Ref<VectorXd>* to_omega,
-                  Eigen::Ref<VectorXd>* to_zeta) {
+/// A force and how it is taken.
+struct Driven {
+  const HeldForce& held;
+  std::span<const double> force;
+  double period_s;
+  const ModalFitOptions& options;
+};
+
+/// The columns that one mode fills: its response, and the derivatives of that to ln omega and ln zeta if they are
+/// wanted.
+struct ModeColumns {
+  Eigen::Ref<VectorXd> response;
+  Eigen::Ref<VectorXd>* to_omega = nullptr;
+  Eigen::Ref<VectorXd>* to_zeta = nullptr;
+};
+
+/// Response of a mode of unit mass. Written in real numbers: complex products of the standard look for NaN at each
+/// sample.
+void fill_mode(const Driven& driven, double omega, double zeta, ModeColumns columns) {
+  const auto& [held, force, period_s, options] = driven;
+  auto& [column, to_omega, to_zeta] = columns;
   const ModeTerms terms = mode_terms(omega, zeta, static_cast<int>(options.quantity));
   const OnePole pole = one_pole(terms.pole, period_s);
   const PeriodInput input(terms.pole, period_s, held.steps());
@@ -185,8 +203,8 @@ class TapModel final : public identification::SeparableModel {
     for (Index m = 0; m < modes_; ++m) {
       Eigen::Ref<VectorXd> to_omega(columns.col(derivative + 2 * m).head(n));
       Eigen::Ref<VectorXd> to_zeta(columns.col(derivative + 2 * m + 1).head(n));
-      mode_columns(held_[record], tap.force_n, period_s_, std::exp(theta[2 * m]), std::exp(theta[2 * m + 1]), options_,
-                   columns.col(first + m).head(n), &to_omega, &to_zeta);
+      fill_mode({held_[record], tap.force_n, period_s_, options_}, std::exp(theta[2 * m]), std::exp(theta[2 * m + 1]),
+                {columns.col(first + m).head(n), &to_omega, &to_zeta});
     }
     columns.topRows(n).middleCols(first + modes_, extra()) = lines_[record];
     columns.col(width() - 1).head(n) = Eigen::Map<const VectorXd>(tap.response.data(), n);
@@ -220,7 +238,7 @@ VectorXd model_response(const ModalFit& fit, std::span<const double> force, doub
   VectorXd column(response.size());
   const HeldForce held(force, options.hold);
   for (std::size_t m = 0; m < fit.omega_rad_s.size(); ++m) {
-    mode_columns(held, force, period_s, fit.omega_rad_s[m], fit.damping_ratio[m], options, column, nullptr, nullptr);
+    fill_mode({held, force, period_s, options}, fit.omega_rad_s[m], fit.damping_ratio[m], {column});
     response += fit.inverse_mass[m] * column;
   }
   if (fit.mass_line != 0.0) response += fit.mass_line * mass_line(force, period_s, options.quantity);
@@ -352,9 +370,7 @@ ModalFit fit_modes(std::span<const TapSignals> taps, double period_s, const Natu
   check_period(period_s);
   identification::check_modes(start, period_s);
   if (!(options.force_noise_n >= 0.0) || !std::isfinite(options.force_noise_n)) {
-    std::ostringstream message;
-    message << "noise of the force is " << options.force_noise_n << " N, must be finite and at least 0";
-    throw Error(ErrorKind::argument, message.str());
+    refuse("noise of the force is {:g} N, must be finite and at least 0", options.force_noise_n);
   }
   TapModel model(taps, period_s, start.omega_rad_s.size(), options);
   check_taps(taps, static_cast<std::size_t>(model.width()));
@@ -399,8 +415,7 @@ Eigen::VectorXd modal_response(std::span<const double> force_n, double period_s,
   check_period(period_s);
   identification::check_modes(modes, period_s);
   if (inverse_mass.size() != modes.omega_rad_s.size()) {
-    throw Error(ErrorKind::argument, std::to_string(inverse_mass.size()) + " residues for " +
-                                         std::to_string(modes.omega_rad_s.size()) + " modes");
+    refuse("{} residues for {} modes", inverse_mass.size(), modes.omega_rad_s.size());
   }
   ModalFit fit;
   fit.omega_rad_s = modes.omega_rad_s;

@@ -4,16 +4,18 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <string>
 #include <utility>
 
 #include "base/linear_algebra.hpp"
+#include "base/refuse.hpp"
 #include "identify/fit_common.hpp"
 #include "identify/one_pole.hpp"
-#include "shapegcode/error.hpp"
+#include "identify/signals.hpp"
 
 namespace shapegcode {
 namespace {
+
+using detail::refuse;
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -94,9 +96,9 @@ ModeRanking rank(std::vector<Products> problems, double total, Index candidates,
 }
 
 void check_numbers(std::size_t most, std::size_t kept, std::size_t candidates) {
-  if (most < 1) throw Error(ErrorKind::argument, "no mode to be chosen, at least 1 needed");
+  if (most < 1) refuse("no mode to be chosen, at least 1 needed");
   if (kept > candidates) {
-    throw Error(ErrorKind::argument, std::to_string(kept) + " candidates to be kept of " + std::to_string(candidates));
+    refuse("{} candidates to be kept of {}", kept, candidates);
   }
 }
 

@@ -1,5 +1,7 @@
 #include "identify/separable_fit.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -173,6 +175,20 @@ void complete(const SeparableModel& model, const Linearised& at, SeparableFit& f
   }
 }
 
+/// Whether the search ended well, and if not, why.
+void conclude(bool at_bound, bool has_dependent_columns, SeparableFit& fit) {
+  if (at_bound) {
+    fit.converged = false;
+    fit.reason = "a frequency or damping ratio ran to the end of its range";
+  } else if (!fit.converged) {
+    fit.reason = fmt::format("no minimum after {} steps", fit.iterations);
+  }
+  if (has_dependent_columns) {
+    fit.converged = false;
+    fit.reason = "two modes cannot be told apart, or one has no share in the response";
+  }
+}
+
 }  // namespace
 
 void triangulate(MatrixXd& matrix) {
@@ -233,16 +249,7 @@ SeparableFit fit_separable(const SeparableModel& model, VectorXd theta, int most
       damping = std::max(10.0 * damping, 1e-6);
     }
   }
-  if (at_bound) {
-    fit.converged = false;
-    fit.reason = "a frequency or damping ratio ran to the end of its range";
-  } else if (!fit.converged) {
-    fit.reason = "no minimum after " + std::to_string(fit.iterations) + " steps";
-  }
-  if (at.dependent_columns || has_dependent(at.factor, common + nonlinear)) {
-    fit.converged = false;
-    fit.reason = "two modes cannot be told apart, or one has no share in the response";
-  }
+  conclude(at_bound, at.dependent_columns || has_dependent(at.factor, common + nonlinear), fit);
   complete(model, at, fit);
   return fit;
 }

@@ -1,59 +1,50 @@
-#include "shapegcode/identify/arma.hpp"
+#include "identify/signals.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <sstream>
-#include <string>
 
-#include "shapegcode/error.hpp"
+#include "base/refuse.hpp"
 
 namespace shapegcode {
 namespace {
 
+using detail::refuse;
+
 void check_signal(std::span<const double> values, const char* what, std::size_t record, std::size_t least_samples) {
-  std::ostringstream message;
   if (values.size() < least_samples) {
-    message << what << " of record " << record << " has " << values.size() << " samples, at least " << least_samples
-            << " needed";
-    throw Error(ErrorKind::argument, message.str());
+    refuse("{} of record {} has {} samples, at least {} needed", what, record, values.size(), least_samples);
   }
   const auto bad = std::ranges::find_if(values, [](double value) { return !std::isfinite(value); });
-  if (bad != values.end()) {
-    message << what << " of record " << record << " is not finite at sample " << bad - values.begin();
-    throw Error(ErrorKind::argument, message.str());
-  }
+  if (bad != values.end()) refuse("{} of record {} is not finite at sample {}", what, record, bad - values.begin());
 }
 
 }  // namespace
 
 void check_responses(Responses responses, std::size_t least_samples) {
-  if (responses.empty()) throw Error(ErrorKind::argument, "no record: at least one is needed");
+  if (responses.empty()) refuse("no record: at least one is needed");
   for (std::size_t r = 0; r < responses.size(); ++r) check_signal(responses[r], "response", r, least_samples);
 }
 
 void check_taps(std::span<const TapSignals> taps, std::size_t least_samples) {
-  if (taps.empty()) throw Error(ErrorKind::argument, "no record: at least one is needed");
+  if (taps.empty()) refuse("no record: at least one is needed");
   for (std::size_t r = 0; r < taps.size(); ++r) {
     const TapSignals& tap = taps[r];
     if (tap.force_n.size() != tap.response.size()) {
-      throw Error(ErrorKind::argument, "record " + std::to_string(r) + " has " + std::to_string(tap.force_n.size()) +
-                                           " samples of force and " + std::to_string(tap.response.size()) +
-                                           " of response: both must be sampled together");
+      refuse("record {} has {} samples of force and {} of response: both must be sampled together", r,
+             tap.force_n.size(), tap.response.size());
     }
     check_signal(tap.force_n, "force", r, least_samples);
     check_signal(tap.response, "response", r, least_samples);
     if (std::ranges::all_of(tap.force_n, [](double force) { return force == 0.0; })) {
-      throw Error(ErrorKind::argument, "force of record " + std::to_string(r) + " is zero throughout");
+      refuse("force of record {} is zero throughout", r);
     }
   }
 }
 
 void check_period(double period_s) {
   if (!(period_s > 0.0) || !std::isfinite(period_s)) {
-    std::ostringstream message;
-    message << "time between samples is " << period_s << " s, must be finite and above 0";
-    throw Error(ErrorKind::argument, message.str());
+    refuse("time between samples is {} s, must be finite and above 0", period_s);
   }
 }
 

@@ -9,6 +9,7 @@
 
 #include "base/linear_algebra.hpp"
 #include "identify/fit_common.hpp"
+#include "identify/signals.hpp"
 #include "shapegcode/identify/arma.hpp"
 
 namespace shapegcode {

@@ -1,15 +1,19 @@
 #include "shapegcode/measure/sections.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 
+#include "base/refuse.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
+
+using detail::refuse;
 
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
@@ -44,7 +48,7 @@ Circle pratt_fit(std::span<const Vector2d> points, const Vector2d& mean) {
   const double mz = mxx + myy;
   const double covariance = mxx * myy - mxy * mxy;
   if (!(covariance > straight_share * mz * mz)) {
-    throw Error(ErrorKind::argument, "the points lie on a line: no circle fits them");
+    refuse("the points lie on a line: no circle fits them");
   }
   const double variance_z = mzz - mz * mz;
   // The smallest root of the characteristic polynomial, found from 0 on.
@@ -92,7 +96,7 @@ Normal normal_equations(std::span<const Vector2d> points, const Vector2d& mean, 
 
 CircleFit fit_circle(std::span<const Vector2d> points_mm) {
   if (points_mm.size() < 3) {
-    throw Error(ErrorKind::argument, std::to_string(points_mm.size()) + " points given, a circle needs at least 3");
+    refuse("{} points given, a circle needs at least 3", points_mm.size());
   }
   Vector2d mean = Vector2d::Zero();
   for (const Vector2d& point : points_mm) mean += point;
@@ -122,8 +126,7 @@ CircleFit fit_circle(std::span<const Vector2d> points_mm) {
     }
     if (small) break;
     if (++steps > most_fit_steps) {
-      throw Error(ErrorKind::numeric,
-                  "the circle fit did not converge in " + std::to_string(most_fit_steps) + " steps");
+      throw Error(ErrorKind::numeric, fmt::format("the circle fit did not converge in {} steps", most_fit_steps));
     }
   }
   CircleFit fit;

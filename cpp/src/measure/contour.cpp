@@ -6,11 +6,13 @@
 #include <limits>
 #include <numbers>
 
+#include "base/refuse.hpp"
 #include "path/arc_frame.hpp"
-#include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
+
+using detail::refuse;
 
 constexpr double two_pi = 2.0 * std::numbers::pi;
 constexpr double window_margin_mm = 1e-3;
@@ -51,7 +53,7 @@ double DeviationStats::rms_mm() const noexcept {
 std::shared_ptr<const ContourTracker::Geometry> ContourTracker::geometry_of(const Path& path) {
   auto geometry = std::make_shared<Geometry>();
   auto& [pieces, arc_of, arcs] = *geometry;
-  if (path.size() == 0) throw Error(ErrorKind::argument, "contour error needs a path with at least one segment");
+  if (path.size() == 0) refuse("contour error needs a path with at least one segment");
   pieces.reserve(path.size());
   arc_of.reserve(path.size());
   Vector3 direction = Vector3::Zero();
@@ -128,6 +130,25 @@ ContourTracker::Foot ContourTracker::arc_point_foot(const Arc& arc, double u, co
   return foot;
 }
 
+double ContourTracker::refined_foot(const Arc& arc, const Vector3& p, const Polar& polar, const Turns& turns,
+                                    double u) noexcept {
+  for (int iteration = 0; iteration < 8; ++iteration) {
+    const double radius = arc.segment.start_radius_mm + arc.radius_rate * u;
+    const double c = polar.radius * std::cos(u - polar.angle);
+    const double s = polar.radius * std::sin(u - polar.angle);
+    const double height = arc.segment.start_mm[arc.n] + arc.pitch * u - p[arc.n];
+    const double slope = radius * arc.radius_rate - arc.radius_rate * c + radius * s + arc.pitch * height;
+    const double bend =
+        radius * c + 2.0 * arc.radius_rate * s + arc.radius_rate * arc.radius_rate + arc.pitch * arc.pitch;
+    if (!(bend > 0.0)) break;
+    const double next = std::clamp(u - slope / bend, turns.first, turns.last);
+    const double moved = std::abs(next - u);
+    u = next;
+    if (moved < 1e-12) break;
+  }
+  return u;
+}
+
 // Angles `u` count from the arc's start in the sense of its turning, without wrapping.
 ContourTracker::Foot ContourTracker::foot_on_arc(std::size_t piece, const Vector3& p,
                                                  const Window& window) const noexcept {
@@ -164,24 +185,7 @@ ContourTracker::Foot ContourTracker::foot_on_arc(std::size_t piece, const Vector
     foot.along = std::min(u / rad_per_mm, base.length);
     return foot;
   }
-  if (!flat_circle) {
-    // Newton on the derivative of half the squared distance, kept within the window.
-    const double rho = std::sqrt(rho2);
-    for (int iteration = 0; iteration < 8; ++iteration) {
-      const double radius = arc.segment.start_radius_mm + arc.radius_rate * u;
-      const double c = rho * std::cos(u - angle);
-      const double s = rho * std::sin(u - angle);
-      const double height = arc.segment.start_mm[arc.n] + arc.pitch * u - p[arc.n];
-      const double slope = radius * arc.radius_rate - arc.radius_rate * c + radius * s + arc.pitch * height;
-      const double bend =
-          radius * c + 2.0 * arc.radius_rate * s + arc.radius_rate * arc.radius_rate + arc.pitch * arc.pitch;
-      if (!(bend > 0.0)) break;
-      const double next = std::clamp(u - slope / bend, first, last);
-      const double moved = std::abs(next - u);
-      u = next;
-      if (moved < 1e-12) break;
-    }
-  }
+  if (!flat_circle) u = refined_foot(arc, p, {std::sqrt(rho2), angle}, {first, last}, u);
   Foot foot = arc_point_foot(arc, u, p);
   if (!flat_circle && last - first > widest_local_window_rad) {
     // So wide a window may hold several turns: ask the whole arc too.

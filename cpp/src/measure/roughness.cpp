@@ -5,13 +5,15 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
-#include <string>
 
 #include "base/linear_algebra.hpp"
-#include "shapegcode/error.hpp"
+#include "base/refuse.hpp"
+#include "measure/profile.hpp"
 
 namespace shapegcode {
 namespace {
+
+using detail::refuse;
 
 constexpr double least_circle_rad = std::numbers::pi / 10.0;
 constexpr double least_stations_per_cutoff = 5.0;
@@ -24,8 +26,10 @@ std::vector<double> less_fit(std::span<const double> profile, const Eigen::Matri
   return {rest.begin(), rest.end()};
 }
 
-std::size_t whole_spacings(double length_mm, double spacing_mm) {
-  return static_cast<std::size_t>(std::floor(length_mm / spacing_mm * (1.0 + rounding_share)));
+/// How many spacings fit into a length; no more than `most` are counted.
+std::size_t whole_spacings(double length_mm, double spacing_mm, std::size_t most) {
+  const double count = std::floor(length_mm / spacing_mm * (1.0 + rounding_share));
+  return count < static_cast<double>(most) ? static_cast<std::size_t>(count) : most;
 }
 
 double mean_magnitude(std::span<const double> values, double reference) {
@@ -44,11 +48,11 @@ double mean(std::span<const double> values) {
 
 std::vector<double> gaussian_low_pass(std::span<const double> profile_mm, double spacing_mm, double cutoff_mm) {
   if (!(spacing_mm > 0.0 && cutoff_mm > 0.0 && std::isfinite(cutoff_mm))) {
-    throw Error(ErrorKind::argument, "spacing " + std::to_string(spacing_mm) + " mm and cut-off " +
-                                         std::to_string(cutoff_mm) + " mm must be > 0");
+    refuse("spacing {} mm and cut-off {} mm must be > 0", spacing_mm, cutoff_mm);
   }
   const double alpha = std::sqrt(std::numbers::ln2 / std::numbers::pi);
-  std::vector<double> weights(whole_spacings(cutoff_mm, spacing_mm) + 1);
+  // Weights further away than the profile is long are never asked for.
+  std::vector<double> weights(whole_spacings(cutoff_mm, spacing_mm, profile_mm.size()) + 1);
   for (std::size_t i = 0; i < weights.size(); ++i) {
     const double x = static_cast<double>(i) * spacing_mm / (alpha * cutoff_mm);
     weights[i] = std::exp(-std::numbers::pi * x * x);
@@ -83,12 +87,11 @@ Roughness measure_roughness(std::span<const double> profile_mm, double spacing_m
   std::vector<double> primary(profile_mm.begin(), profile_mm.end());
   if (lambda_s_mm > 0.0) primary = gaussian_low_pass(primary, spacing_mm, lambda_s_mm);
   const std::vector<double> waviness = gaussian_low_pass(primary, spacing_mm, cutoff_mm);
-  const std::size_t cut = whole_spacings(cutoff_mm, spacing_mm);
+  const std::size_t cut = whole_spacings(cutoff_mm, spacing_mm, primary.size());
   const std::size_t per_length = std::max<std::size_t>(1, cut);
   if (primary.size() < 2 * cut + per_length) {
-    throw Error(ErrorKind::argument, "a profile of " + std::to_string(primary.size()) + " stations of " +
-                                         std::to_string(spacing_mm) + " mm is too short for a cut-off of " +
-                                         std::to_string(cutoff_mm) + " mm: three cut-offs are needed");
+    refuse("a profile of {} stations of {} mm is too short for a cut-off of {} mm: three cut-offs are needed",
+           primary.size(), spacing_mm, cutoff_mm);
   }
   const std::span<const double> kept(waviness.begin() + static_cast<std::ptrdiff_t>(cut), primary.size() - 2 * cut);
   std::vector<double> roughness(kept.size());

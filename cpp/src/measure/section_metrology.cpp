@@ -4,14 +4,16 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <string>
 #include <utility>
 
+#include "base/refuse.hpp"
+#include "measure/profile.hpp"
 #include "path/arc_frame.hpp"
-#include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
+
+using detail::refuse;
 
 using Eigen::Vector2d;
 
@@ -20,21 +22,19 @@ constexpr double least_cutoffs = 3.0;
 
 const MetrologyOptions& checked(const Path& path, const std::vector<PathSection>& sections,
                                 const MetrologyOptions& options) {
-  if (!(path.length_mm() > 0.0)) throw Error(ErrorKind::argument, "a path without length cannot be measured");
+  if (!(path.length_mm() > 0.0)) refuse("a path without length cannot be measured");
   std::size_t next = 0;
   for (const PathSection& section : sections) {
     if (section.first < next || section.last < section.first || section.last >= path.size()) {
-      throw Error(ErrorKind::argument, "section of segments " + std::to_string(section.first) + " to " +
-                                           std::to_string(section.last) + " does not follow on a path of " +
-                                           std::to_string(path.size()) + " segments");
+      refuse("section of segments {} to {} does not follow on a path of {} segments", section.first, section.last,
+             path.size());
     }
     next = section.last + 1;
   }
   const auto finite = [](double value) { return std::isfinite(value) && value >= 0.0; };
   if (!finite(options.least_rest_s) || !finite(options.cutoff_mm) || !finite(options.lambda_s_mm)) {
-    throw Error(ErrorKind::argument, "least rest " + std::to_string(options.least_rest_s) + " s, cut-off " +
-                                         std::to_string(options.cutoff_mm) + " mm and lambda s " +
-                                         std::to_string(options.lambda_s_mm) + " mm must be finite and >= 0");
+    refuse("least rest {} s, cut-off {} mm and lambda s {} mm must be finite and >= 0", options.least_rest_s,
+           options.cutoff_mm, options.lambda_s_mm);
   }
   return options;
 }

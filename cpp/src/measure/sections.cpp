@@ -3,13 +3,14 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <optional>
-#include <string>
 
+#include "base/refuse.hpp"
 #include "path/arc_frame.hpp"
-#include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
+
+using detail::refuse;
 
 constexpr double same_direction_rad = 1e-4;
 constexpr double same_circle_mm = 1e-3;
@@ -62,7 +63,7 @@ PathSection run_from(const Path& path, std::size_t first) {
 
 std::vector<PathSection> path_sections(const Path& path, double short_mm) {
   if (!(std::isfinite(short_mm) && short_mm >= 0.0)) {
-    throw Error(ErrorKind::argument, "short sections of " + std::to_string(short_mm) + " mm: must be finite and >= 0");
+    refuse("short sections of {} mm: must be finite and >= 0", short_mm);
   }
   std::vector<PathSection> sections;
   bool last_is_short = false;
@@ -82,15 +83,12 @@ std::vector<PathSection> path_sections(const Path& path, double short_mm) {
 
 std::vector<PathSection> line_sections(const Path& path, std::span<const LineRange> ranges) {
   for (std::size_t i = 0; i < ranges.size(); ++i) {
-    const auto words = [](const LineRange& range) {
-      return std::to_string(range.first) + " to " + std::to_string(range.last);
-    };
     if (ranges[i].first > ranges[i].last) {
-      throw Error(ErrorKind::argument, "lines " + words(ranges[i]) + ": the first must not be behind the last");
+      refuse("lines {} to {}: the first must not be behind the last", ranges[i].first, ranges[i].last);
     }
     for (std::size_t k = 0; k < i; ++k) {
       if (ranges[i].first <= ranges[k].last && ranges[k].first <= ranges[i].last) {
-        throw Error(ErrorKind::argument, "lines " + words(ranges[k]) + " and " + words(ranges[i]) + " overlap");
+        refuse("lines {} to {} and {} to {} overlap", ranges[k].first, ranges[k].last, ranges[i].first, ranges[i].last);
       }
     }
   }

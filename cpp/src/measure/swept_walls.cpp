@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 
-#include "shapegcode/error.hpp"
+#include "base/refuse.hpp"
 
 namespace shapegcode {
 namespace {
+
+using detail::refuse;
 
 using Eigen::Vector2d;
 
@@ -39,8 +40,7 @@ SweptWalls::SweptWalls(const Path& path, const std::vector<PathSection>& section
                        double spacing_mm, std::size_t most_stations)
     : radius_(tool_radius_mm) {
   if (!(tool_radius_mm > 0.0 && std::isfinite(tool_radius_mm) && spacing_mm > 0.0 && std::isfinite(spacing_mm))) {
-    throw Error(ErrorKind::argument, "tool radius " + std::to_string(tool_radius_mm) + " mm and station spacing " +
-                                         std::to_string(spacing_mm) + " mm must be > 0");
+    refuse("tool radius {} mm and station spacing {} mm must be > 0", tool_radius_mm, spacing_mm);
   }
   double length = 0.0;
   for (const PathSection& section : sections) length += section.length_mm();

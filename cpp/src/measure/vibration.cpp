@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 
-#include "shapegcode/error.hpp"
+#include "base/refuse.hpp"
 
 namespace shapegcode {
 namespace {
+
+using detail::refuse;
 
 constexpr double still_mm = 1e-9;
 constexpr double unproved_share = 0.125;
@@ -25,8 +26,7 @@ double vertex(double before, double middle, double after) noexcept {
 
 VibrationWatch::VibrationWatch(double period_s, double band_mm) : period_(period_s), band_(band_mm) {
   if (!(period_s > 0.0 && std::isfinite(period_s) && band_mm > 0.0 && std::isfinite(band_mm))) {
-    throw Error(ErrorKind::argument,
-                "period " + std::to_string(period_s) + " s and band " + std::to_string(band_mm) + " mm must be > 0");
+    refuse("period {} s and band {} mm must be > 0", period_s, band_mm);
   }
 }
 

@@ -5,16 +5,16 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
-#include "milling/refuse.hpp"
+#include "milling/checks.hpp"
 #include "shapegcode/milling/force.hpp"
 
 namespace shapegcode {
 namespace {
 
+using detail::check_positive;
 using detail::refuse;
 
 using Eigen::Vector2d;
@@ -141,33 +141,29 @@ Vector3 at_height(const Vector2d& v, double z) { return {v.x(), v.y(), z}; }
 }  // namespace
 
 void check(const CornerCut& cut) {
-  const auto length = [](double value) { return std::to_string(value) + " mm"; };
-  if (!(cut.tool_radius_mm > 0.0) || !std::isfinite(cut.tool_radius_mm)) {
-    refuse("tool radius is " + length(cut.tool_radius_mm) + ", must be above 0");
-  }
+  check_positive(cut.tool_radius_mm, "tool radius", "mm");
   if (!(cut.allowance_mm > 0.0 && cut.allowance_mm <= cut.tool_radius_mm)) {
-    refuse("allowance is " + length(cut.allowance_mm) + ", must be above 0 and at most the tool radius, " +
-           length(cut.tool_radius_mm));
+    refuse("allowance is {} mm, must be above 0 and at most the tool radius, {} mm", cut.allowance_mm,
+           cut.tool_radius_mm);
   }
   for (const auto& [name, radius] : {std::pair{"rough", cut.rough_radius_mm}, {"finish", cut.finish_radius_mm}}) {
     if (!(radius >= cut.tool_radius_mm) || !std::isfinite(radius)) {
-      refuse(std::string(name) + " corner radius is " + length(radius) + ", must be at least the tool radius, " +
-             length(cut.tool_radius_mm));
+      refuse("{} corner radius is {} mm, must be at least the tool radius, {} mm", name, radius, cut.tool_radius_mm);
     }
   }
   if (!(cut.turn_rad >= degree && cut.turn_rad <= 179.0 * degree)) {
-    refuse("the corner turns by " + std::to_string(cut.turn_rad / degree) + " degrees, must be 1 to 179");
+    refuse("the corner turns by {:g} degrees, must be 1 to 179", cut.turn_rad / degree);
   }
   // Left between both boundaries on the bisector, times cos(turn / 2).
   const double cosine = std::cos(0.5 * cut.turn_rad);
   const double left = cut.allowance_mm + (cut.rough_radius_mm - cut.finish_radius_mm) * (1.0 - cosine);
   if (!(left > 0.0)) {
-    refuse("a rough corner radius of " + length(cut.rough_radius_mm) + " cuts into the finished corner of " +
-           length(cut.finish_radius_mm) + " by " + length(-left / cosine));
+    refuse("a rough corner radius of {} mm cuts into the finished corner of {} mm by {:g} mm", cut.rough_radius_mm,
+           cut.finish_radius_mm, -left / cosine);
   }
   for (const double straight : {cut.before_mm, cut.after_mm}) {
     if (!(straight >= 0.0) || !std::isfinite(straight)) {
-      refuse("a straight at the corner is " + length(straight) + ", must be at least 0");
+      refuse("a straight at the corner is {} mm, must be at least 0", straight);
     }
   }
 }
@@ -180,16 +176,16 @@ double corner_length_mm(const CornerCut& cut) {
 CornerEngagement corner_engagement(const CornerCut& cut, double s_mm, bool behind_vertex) {
   const double length = corner_length_mm(cut);
   if (!(s_mm >= -place_tolerance_mm && s_mm <= length + place_tolerance_mm)) {
-    refuse("place on the corner's path is " + std::to_string(s_mm) + " mm, must be 0 to " + std::to_string(length));
+    refuse("place on the corner's path is {} mm, must be 0 to {}", s_mm, length);
   }
   const Geometry g(cut);
   const Place tool = place_at(cut, g, std::clamp(s_mm, 0.0, length), behind_vertex);
   const std::optional<Entry> met = entry_of(cut, g, tool);
   if (!met || distance_from_way(cut, g, tool, met->place) < cut.tool_radius_mm - place_tolerance_mm) {
-    refuse("at " + std::to_string(s_mm) +
-           " mm the tool meets the rough pocket only where it has been itself: " + "no closed form for a turn of " +
-           std::to_string(cut.turn_rad / degree) + " degrees from a rough radius of " +
-           std::to_string(cut.rough_radius_mm) + " mm to " + std::to_string(cut.finish_radius_mm) + " mm");
+    refuse(
+        "at {} mm the tool meets the rough pocket only where it has been itself: no closed form for a turn of {:g} "
+        "degrees from a rough radius of {} mm to {} mm",
+        s_mm, cut.turn_rad / degree, cut.rough_radius_mm, cut.finish_radius_mm);
   }
   const Entry& entry = *met;
   const Vector2d arm = entry.place - tool.centre;
@@ -231,7 +227,7 @@ Path corner_path(const CornerCut& cut, double feed_mm_per_s, double z_mm) {
 Ring corner_stock(const CornerCut& cut, double beyond_mm) {
   check(cut);
   if (!(beyond_mm > 0.0) || !std::isfinite(beyond_mm)) {
-    refuse("the stock reaches " + std::to_string(beyond_mm) + " mm beyond the walls, must be above 0");
+    refuse("the stock reaches {} mm beyond the walls, must be above 0", beyond_mm);
   }
   const Geometry g(cut);
   const double before = g.finish_tangent + cut.before_mm + beyond_mm;
@@ -239,6 +235,7 @@ Ring corner_stock(const CornerCut& cut, double beyond_mm) {
   Ring ring;
   ring.emplace_back(-before * g.along[0] + cut.allowance_mm * g.inward[0]);
   const double step = std::sqrt(8.0 * chord_error_mm / cut.rough_radius_mm);
+  detail::check_pieces(cut.turn_rad * cut.rough_radius_mm, step * cut.rough_radius_mm, "a chord");
   const double pieces = std::ceil(cut.turn_rad / step);
   for (double k = 0.0; k <= pieces; ++k) {
     const double angle = cut.turn_rad * k / pieces - 0.5 * pi;
@@ -253,11 +250,9 @@ Ring corner_stock(const CornerCut& cut, double beyond_mm) {
 }
 
 EngagementTrack corner_track(const CornerCut& cut, double axial_depth_mm, double step_mm) {
-  if (!(axial_depth_mm > 0.0) || !std::isfinite(axial_depth_mm)) {
-    refuse("axial depth is " + std::to_string(axial_depth_mm) + " mm, must be above 0");
-  }
-  if (!(step_mm > 0.0)) refuse("step is " + std::to_string(step_mm) + " mm, must be above 0");
-  check(cut);
+  check_positive(axial_depth_mm, "axial depth", "mm");
+  if (!(step_mm > 0.0)) refuse("step is {} mm, must be above 0", step_mm);
+  detail::check_pieces(corner_length_mm(cut), step_mm, "a step");
   const Geometry g(cut);
   EngagementTrack track;
   track.first_arc.push_back(0);

@@ -4,23 +4,25 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <string>
 #include <utility>
 
 #include "milling/azimuth.hpp"
-#include "milling/refuse.hpp"
+#include "milling/checks.hpp"
 #include "milling/revolution.hpp"
 
 namespace shapegcode {
 
 namespace {
 
+using detail::check_positive;
 using detail::half_pi;
 using detail::refuse;
 
 constexpr double arc_slack_rad = 1e-9;
 constexpr double same_end_rad = 1e-9;
 constexpr double pieces_per_overhang = 10.0;  // of a load on the beam
+constexpr double most_turns = 1000.0;         // of a flute around the tool
+constexpr double largest_angle_rad = 1e9;     // beyond it too little is left of an angle within one turn
 
 bool same(std::span<const EngagedArc> a, const std::vector<EngagedArc>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const EngagedArc& p, const EngagedArc& q) {
@@ -64,6 +66,12 @@ void weighted_pieces(std::span<const EngagedPiece> arcs, double overhang_mm, con
   }
 }
 
+void check_angle(double turned_rad) {
+  if (!(std::abs(turned_rad) <= largest_angle_rad)) {
+    refuse("the spindle has turned by {} rad, limit {:g}", turned_rad, largest_angle_rad);
+  }
+}
+
 double sum_of(const ChipTable::Values& by, const ChipTable::Values& integrals, std::size_t size) {
   double sum = 0.0;
   for (std::size_t k = 0; k < size; ++k) sum += by[k] * integrals[k];
@@ -73,20 +81,19 @@ double sum_of(const ChipTable::Values& by, const ChipTable::Values& integrals, s
 }  // namespace
 
 void check(const CuttingCoefficients& c) {
-  const auto number = [](double value, const char* what, double least, const char* unit) {
-    if (!(std::isfinite(value) && value >= least)) {
-      refuse(std::string(what) + " is " + std::to_string(value) + " " + unit + ", must be at least " +
-             std::to_string(least));
-    }
+  const auto number = [](double value, const char* what, const char* unit) {
+    if (!(std::isfinite(value) && value >= 0.0)) refuse("{} is {}{}, must be at least 0", what, value, unit);
   };
-  number(c.specific_n_per_mm2, "specific cutting force", 0.0, "N/mm2");
-  number(c.ratio, "ratio of radial to tangential force", 0.0, "");
-  number(c.tangential_edge_n_per_mm, "tangential edge force", 0.0, "N/mm");
-  number(c.radial_edge_n_per_mm, "radial edge force", 0.0, "N/mm");
+  number(c.specific_n_per_mm2, "specific cutting force", " N/mm2");
+  number(c.ratio, "ratio of radial to tangential force", "");
+  number(c.tangential_edge_n_per_mm, "tangential edge force", " N/mm");
+  number(c.radial_edge_n_per_mm, "radial edge force", " N/mm");
   for (const double exponent : {c.specific_exponent, c.specific_exponent + c.ratio_exponent}) {
     if (!(std::isfinite(exponent) && exponent > -1.0)) {
-      refuse("exponent of the specific cutting force is " + std::to_string(exponent) +
-             " (radial: sum of both), must be above -1: the force would not grow with the chip");
+      refuse(
+          "exponent of the specific cutting force is {} (radial: sum of both), must be above -1: the force would not "
+          "grow with the chip",
+          exponent);
     }
   }
 }
@@ -141,7 +148,7 @@ struct MillingForce::Impl {
   // Takes an engagement and feed; false: nothing is cut.
   bool take(std::span<const EngagedArc> engagement, double feed_mm_per_min) {
     if (!(feed_mm_per_min >= 0.0 && std::isfinite(feed_mm_per_min))) {
-      refuse("feed is " + std::to_string(feed_mm_per_min) + " mm/min, must be 0 or above");
+      refuse("feed is {} mm/min, must be 0 or above", feed_mm_per_min);
     }
     if (!same(engagement, arcs)) {
       pieces.clear();
@@ -174,9 +181,12 @@ struct MillingForce::Impl {
                         arc.bottom_mm >= 0.0 && arc.from_rad <= arc.to_rad && arc.bottom_mm <= arc.top_mm &&
                         std::isfinite(arc.top_mm);
       if (!fits) {
-        refuse("engaged arc " + std::to_string(arc.from_rad) + " ... " + std::to_string(arc.to_rad) + " rad, height " +
-               std::to_string(arc.bottom_mm) + " ... " + std::to_string(arc.top_mm) +
-               " mm, must rise within -pi/2 ... pi/2 and above the tip");
+        refuse("engaged arc {} ... {} rad, height {} ... {} mm, must rise within -pi/2 ... pi/2 and above the tip",
+               arc.from_rad, arc.to_rad, arc.bottom_mm, arc.top_mm);
+      }
+      const double turns = set.lag_rad_per_mm * arc.top_mm / (2.0 * std::numbers::pi);
+      if (turns > most_turns) {
+        refuse("a flute winds {:g} times around the tool up to {} mm, limit {}", turns, arc.top_mm, most_turns);
       }
       const bool mirrored = mirror < 0.0;
       const double from = std::max(mirrored ? -arc.to_rad : arc.from_rad, -half_pi);
@@ -324,8 +334,7 @@ struct MillingForce::Impl {
   void check_below_clamp(double overhang_mm) const {
     for (const EngagedPiece& piece : pieces) {
       if (piece.top_mm > overhang_mm) {
-        refuse("engagement reaches " + std::to_string(piece.top_mm) + " mm above the tip, the tool's overhang is " +
-               std::to_string(overhang_mm) + " mm");
+        refuse("engagement reaches {} mm above the tip, the tool's overhang is {} mm", piece.top_mm, overhang_mm);
       }
     }
   }
@@ -335,9 +344,7 @@ MillingForce::MillingForce(EndMill tool, CuttingCoefficients coefficients, doubl
                            SpindleSense sense) {
   check(tool);
   check(coefficients);
-  if (!(spindle_rev_per_min > 0.0) || !std::isfinite(spindle_rev_per_min)) {
-    refuse("spindle speed is " + std::to_string(spindle_rev_per_min) + " 1/min, must be above 0");
-  }
+  check_positive(spindle_rev_per_min, "spindle speed", "1/min");
   impl_ = std::make_unique<Impl>(std::move(tool), coefficients, spindle_rev_per_min, sense);
 }
 
@@ -362,7 +369,7 @@ ForceFigures MillingForce::quick_figures(std::span<const EngagedArc> arcs, doubl
 }
 
 ForceCurve MillingForce::curve(std::span<const EngagedArc> arcs, double feed_mm_per_min, int angles) {
-  if (angles < 1) refuse("angles of a revolution are " + std::to_string(angles) + ", must be at least 1");
+  if (angles < 1) refuse("angles of a revolution are {}, must be at least 1", angles);
   ForceCurve curve;
   curve.turned_rad.resize(angles);
   for (int i = 0; i < angles; ++i) curve.turned_rad[i] = 2.0 * std::numbers::pi * i / angles;
@@ -395,7 +402,7 @@ double MillingForce::peak_deflection_um(std::span<const EngagedArc> arcs, double
     check(beam);
     impl.check_below_clamp(beam.overhang_mm);
     weighted_pieces(
-        impl.pieces, beam.overhang_mm, [&](double z) { return tip_compliance_um_per_n(beam, z); }, impl.weighted);
+        impl.pieces, beam.overhang_mm, [&](double z) { return compliance_um_per_n(beam, 0.0, z); }, impl.weighted);
     prepare(impl.set);
     impl.bent.build(impl.set, impl.pieces, impl.weighted);
     impl.bent_beam = beam;
@@ -407,6 +414,7 @@ double MillingForce::peak_deflection_um(std::span<const EngagedArc> arcs, double
 Eigen::Vector2d MillingForce::deflection_um(std::span<const EngagedArc> arcs, double feed_mm_per_min, double turned_rad,
                                             double height_mm, const ToolBeam& beam) {
   check(beam);
+  check_angle(turned_rad);
   Impl& impl = *impl_;
   if (!impl.take(arcs, feed_mm_per_min)) return Eigen::Vector2d::Zero();
   impl.check_below_clamp(beam.overhang_mm);
@@ -419,9 +427,8 @@ Eigen::Vector2d MillingForce::deflection_um(std::span<const EngagedArc> arcs, do
 
 Eigen::Vector2d MillingForce::force_centre_mm(std::span<const EngagedArc> arcs, double feed_mm_per_min,
                                               double turned_rad, double overhang_mm) {
-  if (!(overhang_mm > 0.0) || !std::isfinite(overhang_mm)) {
-    refuse("overhang of the tool is " + std::to_string(overhang_mm) + " mm, must be above 0");
-  }
+  check_positive(overhang_mm, "overhang of the tool", "mm");
+  check_angle(turned_rad);
   const double none = std::numeric_limits<double>::quiet_NaN();
   Impl& impl = *impl_;
   if (!impl.take(arcs, feed_mm_per_min)) return {none, none};

@@ -2,14 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
-#include <string>
 
-#include "shapegcode/error.hpp"
+#include "milling/checks.hpp"
 
 namespace shapegcode {
 
 namespace {
+
+using detail::check_positive;
 
 /// Second moment of area of a round bar, m^4.
 double second_moment_m4(double diameter_mm) {
@@ -20,18 +22,14 @@ double second_moment_m4(double diameter_mm) {
 }  // namespace
 
 void check(const ToolBeam& beam) {
-  const auto positive = [](double value, const char* what, const char* unit, bool may_be_infinite) {
-    if (value > 0.0 && (may_be_infinite || std::isfinite(value))) return;
-    throw Error(ErrorKind::argument,
-                std::string(what) + " is " + std::to_string(value) + " " + unit + ", must be above 0");
-  };
-  positive(beam.overhang_mm, "overhang of the tool", "mm", false);
-  positive(beam.fluted_length_mm, "fluted length of the tool", "mm", false);
-  positive(beam.effective_diameter_mm, "effective diameter of the fluted part", "mm", false);
-  positive(beam.shank_diameter_mm, "diameter of the shank", "mm", false);
-  positive(beam.young_modulus_gpa, "modulus of elasticity", "GPa", false);
-  positive(beam.holder_n_per_um, "stiffness of the holder", "N/um", true);
-  positive(beam.spindle_n_per_um, "stiffness of the spindle", "N/um", true);
+  check_positive(beam.overhang_mm, "overhang of the tool", "mm");
+  check_positive(beam.fluted_length_mm, "fluted length of the tool", "mm");
+  check_positive(beam.effective_diameter_mm, "effective diameter of the fluted part", "mm");
+  check_positive(beam.shank_diameter_mm, "diameter of the shank", "mm");
+  check_positive(beam.young_modulus_gpa, "modulus of elasticity", "GPa");
+  constexpr double rigid = std::numeric_limits<double>::infinity();
+  if (beam.holder_n_per_um != rigid) check_positive(beam.holder_n_per_um, "stiffness of the holder", "N/um");
+  if (beam.spindle_n_per_um != rigid) check_positive(beam.spindle_n_per_um, "stiffness of the spindle", "N/um");
 }
 
 double compliance_um_per_n(const ToolBeam& beam, double at_mm, double load_mm) noexcept {

@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
-#include "shapegcode/error.hpp"
+#include "base/refuse.hpp"
 
 namespace shapegcode {
 
 namespace {
+
+using detail::refuse;
 
 // Accepted share of the binding limit, and the one that is aimed at, so that a step lands on the safe side.
 constexpr double accepted = 1.0 - 2e-4;
@@ -104,8 +105,7 @@ class Search {
 
 void check_range(double lowest, double highest) {
   if (!(lowest > 0.0 && lowest <= highest && std::isfinite(highest))) {
-    throw Error(ErrorKind::argument, "feeds to choose from are " + std::to_string(lowest) + " ... " +
-                                         std::to_string(highest) + " mm/min, must be above 0 and in order");
+    refuse("feeds to choose from are {} ... {} mm/min, must be above 0 and in order", lowest, highest);
   }
 }
 
@@ -120,8 +120,7 @@ bool same_arcs(std::span<const EngagedArc> a, std::span<const EngagedArc> b) {
 void check(const FeedLimits& limits) {
   const auto positive = [](double value, const char* what) {
     if (!(value > 0.0)) {
-      throw Error(ErrorKind::argument,
-                  std::string("limit of the ") + what + " is " + std::to_string(value) + ", must be above 0");
+      refuse("limit of the {} is {}, must be above 0", what, value);
     }
   };
   positive(limits.mean_resultant_n, "mean resultant force in N");
@@ -133,8 +132,8 @@ void check(const FeedLimits& limits) {
   positive(limits.peak_chip_mm, "chip thickness in mm");
   if (limits.beam) check(*limits.beam);
   if (limits.peak_deflection_um < FeedLimits::none && !limits.beam) {
-    throw Error(ErrorKind::argument, "limit of the deflection is " + std::to_string(limits.peak_deflection_um) +
-                                         " um, but the tool's overhang and diameters are not given");
+    refuse("limit of the deflection is {} um, but the tool's overhang and diameters are not given",
+           limits.peak_deflection_um);
   }
 }
 

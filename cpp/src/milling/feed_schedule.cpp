@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <string>
+#include <limits>
 #include <utility>
 
-#include "milling/refuse.hpp"
+#include "milling/checks.hpp"
 
 namespace shapegcode {
 namespace {
@@ -26,20 +26,20 @@ void check(std::span<const FeedBlock> blocks, const FeedStations& stations, cons
   }
   double before = 0.0;
   for (const FeedBlock& block : blocks) {
-    if (!(block.end_mm >= before)) {
-      refuse("blocks of a feed schedule must ascend: one ends at " + std::to_string(block.end_mm) + " mm");
+    if (!(block.end_mm >= before) || !std::isfinite(block.end_mm)) {
+      refuse("blocks of a feed schedule must ascend: one ends at {} mm", block.end_mm);
     }
     before = block.end_mm;
   }
-  if (std::abs(stations.s_mm.back() - before) > 1e-6) {
-    refuse("the stations end at " + std::to_string(stations.s_mm.back()) + " mm, the blocks at " +
-           std::to_string(before) + " mm");
+  if (!(before > 0.0)) refuse("the blocks of a feed schedule end at {} mm, must have a length", before);
+  if (!(std::abs(stations.s_mm.back() - before) <= 1e-6)) {
+    refuse("the stations end at {} mm, the blocks at {} mm", stations.s_mm.back(), before);
   }
   before = 0.0;
   for (std::size_t i = 0; i < stations.s_mm.size(); ++i) {
     if (!(stations.s_mm[i] >= before) || !(stations.feed_mm_per_min[i] > 0.0)) {
-      refuse("station at " + std::to_string(stations.s_mm[i]) + " mm with feed " +
-             std::to_string(stations.feed_mm_per_min[i]) + " mm/min: must ascend, feeds above 0");
+      refuse("station at {} mm with feed {} mm/min: must ascend, feeds above 0", stations.s_mm[i],
+             stations.feed_mm_per_min[i]);
     }
     before = stations.s_mm[i];
   }
@@ -47,6 +47,7 @@ void check(std::span<const FeedBlock> blocks, const FeedStations& stations, cons
       !(options.resolution_mm_per_min > 0.0)) {
     refuse("least length, largest change and resolution of a feed schedule must be above 0");
   }
+  detail::check_pieces(blocks.back().end_mm, options.least_length_mm / candidates, "a quarter of the least length");
 }
 
 // Lowest feed over a stretch; stretches are asked for in ascending order.
@@ -222,7 +223,7 @@ std::vector<FeedStretch> schedule_feed(std::span<const FeedBlock> blocks, const 
 
 Path with_feeds(const Path& path, std::span<const FeedStretch> stretches) {
   if (stretches.empty() || std::abs(stretches.back().end_mm - path.length_mm()) > same_place_mm) {
-    refuse("the stretches of a feed schedule must cover the path of " + std::to_string(path.length_mm()) + " mm");
+    refuse("the stretches of a feed schedule must cover the path of {} mm", path.length_mm());
   }
   std::vector<Segment> pieces;
   pieces.reserve(path.size() + stretches.size());

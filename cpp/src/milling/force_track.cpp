@@ -1,17 +1,13 @@
 // Figures of the cutting force along a whole track.
-#include <string>
 
-#include "shapegcode/error.hpp"
+#include "milling/checks.hpp"
 #include "shapegcode/milling/force.hpp"
 
 namespace shapegcode {
 
 Eigen::MatrixXd figures_of(MillingForce& force, const EngagementTrack& track, std::span<const double> feed_mm_per_min,
                            const ToolBeam* beam) {
-  if (feed_mm_per_min.size() != track.size()) {
-    throw Error(ErrorKind::argument, "feeds are " + std::to_string(feed_mm_per_min.size()) + " for a track of " +
-                                         std::to_string(track.size()) + " samples");
-  }
+  detail::check_feeds(feed_mm_per_min.size(), track);
   Eigen::MatrixXd table(static_cast<Eigen::Index>(track.size()), force_columns);
   for (std::size_t i = 0; i < track.size(); ++i) {
     const auto arcs = track.arcs_of(i);

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 #include <utility>
 
-#include "milling/refuse.hpp"
+#include "milling/checks.hpp"
 
 namespace shapegcode {
 namespace {
 
+using detail::check_positive;
 using detail::refuse;
 
 using Eigen::Vector2d;
@@ -19,6 +19,8 @@ constexpr double level_mm = 1e-6;  // a move that climbs by less stays on its le
 constexpr double same_height_mm = 1e-3;
 constexpr double least_slope = 1e-3;  // horizontal share below which a move is a plunge
 constexpr double megabyte = 1e6;
+constexpr double largest_mm = 1e9;        // resolution
+constexpr double most_nodes_away = 1e12;  // so far from the origin three digits of a place within its cell are left
 
 double cross(const Vector2d& a, const Vector2d& b) noexcept { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -27,29 +29,27 @@ void check_rings(std::span<const Ring> rings) {
   for (std::size_t r = 0; r < rings.size(); ++r) {
     const Ring& ring = rings[r];
     if (ring.size() < 3) {
-      refuse("ring " + std::to_string(r) + " of the stock has " + std::to_string(ring.size()) +
-             " points, must have at least 3");
+      refuse("ring {} of the stock has {} points, must have at least 3", r, ring.size());
     }
     double doubled_area = 0.0;
     for (std::size_t k = 0; k < ring.size(); ++k) {
       if (!ring[k].allFinite()) {
-        refuse("point " + std::to_string(k) + " of ring " + std::to_string(r) + " of the stock is not finite");
+        refuse("point {} of ring {} of the stock is not finite", k, r);
       }
       doubled_area += cross(ring[k] - ring[0], ring[(k + 1) % ring.size()] - ring[0]);
     }
-    if (doubled_area == 0.0) refuse("ring " + std::to_string(r) + " of the stock encloses no area");
+    if (doubled_area == 0.0) refuse("ring {} of the stock encloses no area", r);
   }
 }
 
 void check_borders(std::span<const double> borders) {
   if (borders.size() < 2) {
-    refuse("the stock has " + std::to_string(borders.size()) + " heights between layers, must have at least 2");
+    refuse("the stock has {} heights between layers, must have at least 2", borders.size());
   }
   for (std::size_t i = 0; i < borders.size(); ++i) {
-    if (!std::isfinite(borders[i])) refuse("height " + std::to_string(i) + " between layers is not finite");
+    if (!std::isfinite(borders[i])) refuse("height {} between layers is not finite", i);
     if (i > 0 && !(borders[i] > borders[i - 1])) {
-      refuse("height " + std::to_string(borders[i]) + " mm between layers must lie above its predecessor, " +
-             std::to_string(borders[i - 1]) + " mm");
+      refuse("height {} mm between layers must lie above its predecessor, {} mm", borders[i], borders[i - 1]);
     }
   }
 }
@@ -61,9 +61,8 @@ Material::Material(std::span<const Ring> rings, std::span<const double> borders_
     : borders_(borders_mm.begin(), borders_mm.end()), memory_limit_(memory_limit_bytes) {
   check_rings(rings);
   check_borders(borders_mm);
-  if (!(resolution_mm > 0.0) || !std::isfinite(resolution_mm)) {
-    refuse("resolution is " + std::to_string(resolution_mm) + " mm, must be above 0");
-  }
+  check_positive(resolution_mm, "resolution", "mm");
+  if (resolution_mm > largest_mm) refuse("resolution is {} mm, limit {:g} mm", resolution_mm, largest_mm);
   double outline_mm = 0.0;
   low_ = high_ = rings[0][0];
   for (const Ring& ring : rings) {
@@ -73,6 +72,11 @@ Material::Material(std::span<const Ring> rings, std::span<const double> borders_
       outline_mm += (ring[(k + 1) % ring.size()] - ring[k]).norm();
     }
   }
+  const double furthest_mm = std::max(low_.cwiseAbs().maxCoeff(), high_.cwiseAbs().maxCoeff());
+  if (!(furthest_mm <= resolution_mm * most_nodes_away)) {
+    refuse("the stock reaches to {} mm from the origin, limit {:g} mm at a resolution of {} mm", furthest_mm,
+           resolution_mm * most_nodes_away, resolution_mm);
+  }
   // The flags of all tiles, and the tiles along the outline: an estimate before anything is allocated.
   const double tile_mm = resolution_mm * MaterialLayer::tile_nodes;
   const Vector2d size = (high_ - low_) / tile_mm;
@@ -81,15 +85,14 @@ Material::Material(std::span<const Ring> rings, std::span<const double> borders_
                         (all_tiles * sizeof(std::int32_t) +
                          std::min(all_tiles, outline_mm / tile_mm) * static_cast<double>(MaterialLayer::tile_bytes));
   if (!(needed < static_cast<double>(memory_limit_))) {
-    refuse("the stock needs at least " + std::to_string(needed / megabyte) + " MB in " +
-           std::to_string(borders_.size() - 1) + " layers at a resolution of " + std::to_string(resolution_mm) +
-           " mm, limit " + std::to_string(static_cast<double>(memory_limit_) / megabyte) + " MB");
+    refuse("the stock needs at least {:g} MB in {} layers at a resolution of {} mm, limit {:g} MB", needed / megabyte,
+           borders_.size() - 1, resolution_mm, static_cast<double>(memory_limit_) / megabyte);
   }
   for (std::size_t i = 1; i < borders_.size(); ++i) middles_.push_back(0.5 * (borders_[i - 1] + borders_[i]));
   layers_.assign(middles_.size(), MaterialLayer(rings, resolution_mm));
   for (const MaterialLayer& layer : layers_) tiles_ += layer.tiles();
   if (!layers_.front().has_material()) {
-    refuse("the outlines of the stock enclose no material at a resolution of " + std::to_string(resolution_mm) + " mm");
+    refuse("the outlines of the stock enclose no material at a resolution of {} mm", resolution_mm);
   }
 }
 
@@ -126,8 +129,7 @@ double Material::volume_in_cylinder_mm3(double x_mm, double y_mm, double radius_
 Eigen::MatrixXd Material::heights_mm(const Vector2d& low_mm, const Vector2d& high_mm, std::ptrdiff_t rows,
                                      std::ptrdiff_t columns) const {
   if (rows < 1 || columns < 1) {
-    refuse("a picture of " + std::to_string(rows) + " x " + std::to_string(columns) +
-           " points, must have at least one row and column");
+    refuse("a picture of {} x {} points, must have at least one row and column", rows, columns);
   }
   const auto share = [](std::ptrdiff_t k, std::ptrdiff_t count) {
     return count > 1 ? static_cast<double>(k) / static_cast<double>(count - 1) : 0.5;
@@ -173,20 +175,19 @@ void Material::compact() {
 
 void Material::check_memory(std::size_t needed) const {
   if (needed <= memory_limit_) return;
-  refuse("what is left of the stock needs " + std::to_string(static_cast<double>(needed) / megabyte) +
-         " MB at a resolution of " + std::to_string(resolution_mm()) + " mm, limit " +
-         std::to_string(static_cast<double>(memory_limit_) / megabyte) + " MB");
+  refuse("what is left of the stock needs {:g} MB at a resolution of {} mm, limit {:g} MB",
+         static_cast<double>(needed) / megabyte, resolution_mm(), static_cast<double>(memory_limit_) / megabyte);
 }
 
 std::vector<double> layer_borders(std::span<const Path* const> paths, double bottom_mm, double top_mm,
                                   double ramp_step_mm) {
   if (!(bottom_mm < top_mm) || !std::isfinite(bottom_mm) || !std::isfinite(top_mm)) {
-    refuse("the stock reaches from " + std::to_string(bottom_mm) + " to " + std::to_string(top_mm) +
-           " mm, its bottom must lie below its top");
+    refuse("the stock reaches from {} to {} mm, its bottom must lie below its top", bottom_mm, top_mm);
   }
   if (!(ramp_step_mm > 0.0)) {
-    refuse("layers of ramps are " + std::to_string(ramp_step_mm) + " mm thick, must be above 0");
+    refuse("layers of ramps are {} mm thick, must be above 0", ramp_step_mm);
   }
+  detail::check_pieces(top_mm - bottom_mm, ramp_step_mm, "a layer");
   std::vector<double> levels{bottom_mm, top_mm};
   std::vector<std::pair<double, double>> ramps;
   for (const Path* path : paths) {

@@ -84,13 +84,25 @@ MaterialLayer::MaterialLayer(std::span<const Ring> rings, double resolution_mm)
   fill(rings);
 }
 
-void MaterialLayer::fill(std::span<const Ring> rings) {
+/// The stock's boundary as the grid meets it.
+struct MaterialLayer::Boundary {
   struct Edge {
     Vector2d a;
     Vector2d b;
   };
-  std::vector<std::pair<std::int64_t, Edge>> near;                                     // to which tiles
-  std::vector<std::vector<double>> crossings(static_cast<std::size_t>(rows_ * edge));  // of the boundary, per grid row
+  std::vector<std::pair<std::int64_t, Edge>> near;  // to which tiles, ascending
+  std::vector<std::vector<double>> crossings;       // per grid row, ascending
+
+  [[nodiscard]] bool inside(std::size_t row, double x) const {
+    const std::vector<double>& at = crossings[row];
+    return (std::upper_bound(at.begin(), at.end(), x) - at.begin()) % 2 == 1;
+  }
+};
+
+MaterialLayer::Boundary MaterialLayer::boundary_of(std::span<const Ring> rings) const {
+  Boundary boundary;
+  auto& [near, crossings] = boundary;
+  crossings.resize(static_cast<std::size_t>(rows_ * edge));
   const double tile_mm = spacing_ * edge;
   const double tile_reach = tile_mm * std::sqrt(0.5) + band_;
   const auto tile_of = [&](double from_origin, std::int64_t count) {
@@ -98,7 +110,7 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
   };
   for (const Ring& ring : rings) {
     for (std::size_t k = 0; k < ring.size(); ++k) {
-      const Edge e{ring[k], ring[(k + 1) % ring.size()]};
+      const Boundary::Edge e{ring[k], ring[(k + 1) % ring.size()]};
       const Vector2d low = e.a.cwiseMin(e.b) - Vector2d(x0_ + band_, y0_ + band_);
       const Vector2d high = e.a.cwiseMax(e.b) - Vector2d(x0_ - band_, y0_ - band_);
       for (std::int64_t row = tile_of(low.y(), rows_); row <= tile_of(high.y(), rows_); ++row) {
@@ -121,10 +133,15 @@ void MaterialLayer::fill(std::span<const Ring> rings) {
   }
   for (std::vector<double>& row : crossings) std::sort(row.begin(), row.end());
   std::sort(near.begin(), near.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  return boundary;
+}
+
+void MaterialLayer::fill(std::span<const Ring> rings) {
+  const Boundary boundary = boundary_of(rings);
+  const auto& near = boundary.near;
   auto next = near.cbegin();
   const auto inside = [&](std::int64_t i, std::int64_t j) {
-    const std::vector<double>& row = crossings[static_cast<std::size_t>(j)];
-    return (std::upper_bound(row.begin(), row.end(), x_of(i)) - row.begin()) % 2 == 1;
+    return boundary.inside(static_cast<std::size_t>(j), x_of(i));
   };
   for (std::int64_t t = 0; t < columns_ * rows_; ++t) {
     const auto first = next;

@@ -37,12 +37,12 @@ void FluteSet::add(const EngagedPiece& piece, const ChipTable& table, double azi
   ChipTable::Values lower;
   table.cumulated(low, lower);
   table.cumulated(high, upper);
-  add_between(piece, table, azimuth, low, lower, high, upper, sum);
+  add_stretch(piece, table, azimuth, {low, high, lower, upper}, sum);
 }
 
-void FluteSet::add_between(const EngagedPiece& piece, const ChipTable& table, double azimuth, double low,
-                           const ChipTable::Values& lower, double high, const ChipTable::Values& upper,
-                           ChipTable::Values& sum) const noexcept {
+void FluteSet::add_stretch(const EngagedPiece& piece, const ChipTable& table, double azimuth,
+                           const FluteStretch& stretch, ChipTable::Values& sum) const noexcept {
+  const auto& [low, high, lower, upper] = stretch;
   const double share = 1.0 / lag_rad_per_mm;
   if (piece.slope_per_mm == 0.0) {
     const double weight = piece.weight * share;
@@ -156,8 +156,8 @@ void Revolution::add(const FluteSet& set, const EngagedPiece& piece, std::size_t
       const ChipTable::Values& low = tip_inside ? lower : at_from;
       const ChipTable::Values& high = top_inside ? upper : at_to;
       ChipTable::Values value{};
-      set.add_between(piece, table, azimuth, tip_inside ? tip : piece.from_rad, low, top_inside ? top : piece.to_rad,
-                      high, value);
+      set.add_stretch(piece, table, azimuth,
+                      {tip_inside ? tip : piece.from_rad, top_inside ? top : piece.to_rad, low, high}, value);
       for (std::size_t k = 0; k < size_; ++k) to[k * n + j] += value[k];
     }
   }

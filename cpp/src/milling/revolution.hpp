@@ -30,6 +30,14 @@ struct ChipMix {
   ChipTable::Values tangential{};
 };
 
+/// What of a flute is in a piece: from azimuth `low` to `high`, with the integrals of ChipTable at both.
+struct FluteStretch {
+  double low;
+  double high;
+  const ChipTable::Values& lower;
+  const ChipTable::Values& upper;
+};
+
 /// The helix of the flutes. Tables: one for all flutes, or one for each.
 struct FluteSet {
   int flutes = 1;
@@ -41,9 +49,8 @@ struct FluteSet {
   [[nodiscard]] bool straight(const EngagedPiece& piece) const noexcept {
     return lag_rad_per_mm * (piece.top_mm - piece.bottom_mm) < 1e-6;
   }
-  /// Adds the force between two azimuths of a piece, the flute's tip at `azimuth`, from the integrals at both ends.
-  void add_between(const EngagedPiece& piece, const ChipTable& table, double azimuth, double low,
-                   const ChipTable::Values& lower, double high, const ChipTable::Values& upper,
+  /// Adds the force over a stretch of a piece, the flute's tip at `azimuth`.
+  void add_stretch(const EngagedPiece& piece, const ChipTable& table, double azimuth, const FluteStretch& stretch,
                    ChipTable::Values& sum) const noexcept;
   /// Adds what a flute whose tip stands at `azimuth` has in a piece.
   void add(const EngagedPiece& piece, const ChipTable& table, double azimuth, ChipTable::Values& sum) const noexcept;

@@ -1,5 +1,7 @@
 #include "shapegcode/milling/material.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,17 +9,18 @@
 #include <deque>
 #include <limits>
 #include <numbers>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "milling/azimuth.hpp"
+#include "milling/checks.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
 
 using detail::half_pi;
+using detail::refuse;
 
 using Eigen::Vector2d;
 
@@ -51,13 +54,14 @@ struct AzimuthRange {
   double to;
 };
 
+double step_of(const SweepOptions& options, double diameter_mm) {
+  return options.step_mm > 0.0 ? options.step_mm : diameter_mm / steps_per_diameter;
+}
+
 class Sweeper {
  public:
   Sweeper(Material& material, double diameter, const SweepOptions& options)
-      : material_(material),
-        radius_(0.5 * diameter),
-        step_(options.step_mm > 0.0 ? options.step_mm : diameter / steps_per_diameter),
-        options_(options) {
+      : material_(material), radius_(0.5 * diameter), step_(step_of(options, diameter)), options_(options) {
     const double h = material.resolution_mm();
     const double look = std::min(h / radius_, widest_look_rad);
     const auto looks = static_cast<std::size_t>(std::ceil(2.0 * half_pi / look));
@@ -84,7 +88,7 @@ class Sweeper {
   void run_segment(const Segment& segment, double begin_mm, std::size_t index) {
     if (!(segment.length_mm > 0.0)) return;
     if (segment.kind == SegmentKind::arc && segment.normal != 2) {
-      throw Error(ErrorKind::argument, "line " + std::to_string(segment.line) + ": arc outside of the XY plane (G17)",
+      throw Error(ErrorKind::argument, fmt::format("line {}: arc outside of the XY plane (G17)", segment.line),
                   segment.line);
     }
     index_ = static_cast<std::uint32_t>(index);
@@ -386,16 +390,15 @@ class Sweeper {
 }  // namespace
 
 EngagementTrack sweep(Material& material, const Path& path, double tool_diameter_mm, const SweepOptions& options) {
-  const auto refuse = [](const std::string& message) { throw Error(ErrorKind::argument, message); };
-  if (!(tool_diameter_mm > 0.0) || !std::isfinite(tool_diameter_mm)) {
-    refuse("tool diameter is " + std::to_string(tool_diameter_mm) + " mm, must be above 0");
-  }
+  detail::check_positive(tool_diameter_mm, "tool diameter", "mm");
   if (!(options.step_mm >= 0.0) || !std::isfinite(options.step_mm)) {
-    refuse("step is " + std::to_string(options.step_mm) + " mm, must be above 0, or 0 for a fortieth of the diameter");
+    refuse("step is {} mm, must be above 0, or 0 for a fortieth of the diameter", options.step_mm);
   }
   if (!(options.touch_mm >= 0.0) || !std::isfinite(options.touch_mm)) {
-    refuse("touch is " + std::to_string(options.touch_mm) + " mm, must be at least 0");
+    refuse("touch is {} mm, must be at least 0", options.touch_mm);
   }
+  detail::check_pieces(std::numbers::pi * tool_diameter_mm, material.resolution_mm(), "a grid");
+  detail::check_pieces(path.length_mm(), step_of(options, tool_diameter_mm), "a step");
   return Sweeper(material, tool_diameter_mm, options).run(path);
 }
 

@@ -92,7 +92,7 @@ double curvature_speed(double curvature_per_mm, const MotionLimits& limits, doub
   }
   double speed = std::sqrt(centripetal / curvature_per_mm);
   if (limits.filter_variance_s2 > 0.0) {
-    // spec section 0: radial error = variance * v^2 * curvature / 2
+    // Radial error on a circle: variance * v^2 * curvature / 2
     speed = std::min(speed, std::sqrt(2.0 * tolerance_mm / (limits.filter_variance_s2 * curvature_per_mm)));
   }
   return speed;

@@ -98,7 +98,7 @@ def choose_block_period(
         ArgumentError: No mode, a time outside its range, or no multiple of the interpolation period in the
         range. DesignError: No candidate has a non-negative shaper within `max_duration_s`.
 
-    Source: this project (spec 2: the block period is a design choice; spec 4).
+    Source: this project.
     """
     periods_s = _periods(modes, interpolation_period_s, block_time_s, max_block_period_s, max_duration_s)
     candidates = tuple(_exact_candidate(modes, period_s, max_duration_s) for period_s in periods_s)
@@ -144,7 +144,7 @@ def choose_robust_grid(
         DesignError: No candidate has a design: the modes without a band cannot be cancelled within
         `max_duration_s`, or every grid has a frequency of the bands that swings a whole number of times per period.
 
-    Source: this project (spec 2 and 4).
+    Source: this project.
     """
     if not any(band.uncertainty for band in bands):
         modes = [band.mode for band in bands]
@@ -191,7 +191,7 @@ def robust_candidate(
         ArgumentError: No mode, or a value outside its range.
         DesignError: Neither exists; the message tells why.
 
-    Source: this project (spec 2 and 4).
+    Source: this project.
     """
     check_modes_and_times(bands, period_s=period_s, max_duration_s=max_duration_s)
     if not any(band.uncertainty for band in bands):

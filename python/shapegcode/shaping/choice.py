@@ -166,7 +166,7 @@ def choose(
         ArgumentError: no mode, equal modes, no period, or a limit, a name or a period that cannot be.
         DesignError: a mode cannot be cancelled on any of the grids, or no family has a design within the limits.
 
-    Source: this project (spec 2, the trade-off).
+    Source: this project.
     """
     options = options or DesignOptions()
     _check(bands, periods_s, options, objective)

@@ -1,7 +1,7 @@
 """Exact shaper designs on a sample grid that need an optimiser.
 
 A shaper survives being written as blocks only if its taps lie on the block grid and its zeros are exact there
-(spec 2 and 4). The shortest exact design is a polynomial (:func:`shapegcode._core.grid_polynomial`), but its
+(sum a_k z_i^-k = 0, z_i = e^(s_i T)). The shortest exact design is a polynomial (:func:`shapegcode._core.grid_polynomial`), but its
 taps may be wild; :func:`shortest_non_negative` spends a few more taps on a design that never reverses.
 """
 
@@ -58,7 +58,7 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
         ArgumentError: No mode, or a period or duration that is not finite and positive.
         DesignError: No such shaper within `max_duration_s`; the message tells what the polynomial would be.
 
-    Source: this project (spec 2, grid-exact shapers).
+    Source: this project.
     """
     check_modes_and_times(modes, period_s=period_s, max_duration_s=max_duration_s)
     most = math.floor(max_duration_s / period_s + _ON_GRID)

@@ -1,6 +1,6 @@
 """The families of shapers on a sample grid: what defines them, imposed exactly there.
 
-Rounding the times of a continuous design to a grid undoes its zeros (spec 2). So a family is taken here by the
+Rounding the times of a continuous design to a grid undoes its zeros. So a family is taken here by the
 conditions that define it, and the shortest taps on the grid that meet them are looked for: zeros, with their
 multiplicity, hold at ``z = e^{s*period}`` to rounding; a tolerated residual holds over its whole band, proven by
 :func:`shapegcode._core.worst_residual`. A zero is linear in the taps. A limit on the residual is linear for each

@@ -1,6 +1,6 @@
 """A shaper for each axis: shorter than one that cancels the modes of all of them.
 
-Different shapers on the axes of a machine distort the path; with the contour brought back behind them (spec 5) they
+Different shapers on the axes of a machine distort the path; with the contour brought back behind them they
 become usable, if their mean delays are equal: what is left of the distortion is of second order in time.
 """
 
@@ -39,7 +39,7 @@ def design_per_axis(axis_modes: Sequence[Sequence[Mode]], period_s: float, max_d
     Raises:
         ArgumentError: no axis has a mode, or a period that is not above 0.
 
-    Source: this project (spec 5).
+    Source: this project.
     """
     if not any(axis_modes):
         raise ArgumentError("shapers for each axis need at least one mode: 0 given")

@@ -110,7 +110,7 @@ FAMILIES: tuple[Family, ...] = (
         "any modes; shorter than ZV, sum |a| 3 for one mode; excites faster modes", True, True, solvers.negative,
     ),
     Family(
-        "simultaneous", "shortest without negative taps, all modes at once", "this project (spec 2)",
+        "simultaneous", "shortest without negative taps, all modes at once", "this project",
         "any modes at continuous times; on a grid it is the family non-negative", True, False, solvers.simultaneous,
     ),
     Family(

@@ -2,7 +2,7 @@
 
 A mode's frequency is never known exactly: an identification gives it with an interval, and it moves with the load. The
 designs here bound the residual ratio over a whole band of each mode, on the grid, so that they survive being written as
-blocks (spec 2 and 4). What is best is proven: the cutting planes of :mod:`shapegcode.shaping.cutting_planes` give
+blocks. What is best is proven: the cutting planes of :mod:`shapegcode.shaping.cutting_planes` give
 a bound that no other design can beat, and a sweep with a bound on what lies between its samples judges the taps.
 
 A mode without a band (uncertainty 0) is cancelled exactly at its frequency, as the plain grid designs do.
@@ -68,7 +68,7 @@ def least_worst(
         DesignError: the exact zeros have no solution of this duration, or no band was given and so no duration is
             better than another; the message tells what there is.
 
-    Source: this project (spec 2, grid-exact shapers).
+    Source: this project.
     """
     task = Task.checked(bands, period_s, non_negative, max_abs_sum, zeros_at_nominal)
     check_time("duration_s", duration_s)
@@ -117,7 +117,7 @@ def minimax_robust(
         DesignError: no such design within `max_duration_s`. With hints the message says what the longest allowed one
             reaches, which duration would do (up to four times the longest), and which period would do better.
 
-    Source: this project (spec 2, grid-exact shapers).
+    Source: this project.
     """
     task = Task.checked(bands, period_s, non_negative, max_abs_sum, zeros_at_nominal)
     check_time("max_duration_s", max_duration_s)

@@ -41,7 +41,7 @@ def simultaneous_zv(modes: Sequence[Mode], max_duration_s: float) -> Shaper:
     Raises:
         DesignError: there is none within the duration.
 
-    Source: this project (spec 2: simultaneous multi-mode, numerical optimum).
+    Source: this project (numerical optimum over all modes at once).
     """
     fastest_hz = max(mode.frequency_hz for mode in modes)
     title = joint_title("simultaneous shaper without negative taps", modes)

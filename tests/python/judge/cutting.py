@@ -1,6 +1,6 @@
 """Forces of an end mill over one pitch or revolution: a stack of discs, summed up; shares no code with the core.
 
-Law (spec, section 7): chip t = feed per tooth * cos(azimuth); dF_t = k1 t dz + K_te dz against the tooth's motion,
+Law (paper 001, eq. 1-3): chip t = feed per tooth * cos(azimuth); dF_t = k1 t dz + K_te dz against the tooth's motion,
 dF_r = k2 k1 t dz + K_re dz towards the axis; k1 and k2 power laws of the mean (or local) chip. Azimuth counts from the
 feed to its left; the spindle turns clockwise seen from above; a right-hand helix lags upwards.
 """

@@ -28,16 +28,6 @@ struct NaturalModes {
   std::vector<double> damping_ratio;
 };
 
-/// Throws Error(argument), naming record and sample, if there is no record, one of fewer than `least_samples`, or a
-/// value that is not finite.
-void check_responses(Responses responses, std::size_t least_samples);
-
-/// As check_responses, and if force and response differ in length or a record's force is zero throughout.
-void check_taps(std::span<const TapSignals> taps, std::size_t least_samples);
-
-/// Throws Error(argument) unless the time between samples, in s, is finite and above 0.
-void check_period(double period_s);
-
 /// ARMA(2n, 2n-1) model of n modes: response = B(z)/A(z) force, A = 1 - phi_1/z - ... - phi_2n/z^2n.
 struct Arma {
   /// phi_1 ... phi_2n in the sign convention of paper 003, eq. 1: lambda^2n - phi_1 lambda^(2n-1) - ... - phi_2n = 0.
@@ -60,15 +50,16 @@ struct Arma {
 /// Without noise and with the right number of modes both are exact.
 ///
 /// The numerator has 2n+1 terms: with a force linear between samples the acceleration follows it at once.
-/// Throws Error(argument) on signals that check_taps refuses, n_modes outside 1 ... 50, or fewer samples than terms.
+/// Throws Error(argument), naming record and sample, if there is no record, a value is not finite, force and response
+/// differ in length or a force is zero throughout; on n_modes outside 1 ... 50, or fewer samples than terms.
 [[nodiscard]] Arma arma_driven(std::span<const TapSignals> taps, int n_modes, bool plain = false);
 
 /// Joint model of several free decays: the same with a unit impulse at the first sample for the force; poles are
 /// common, numerators (initial states) each record's own. Errors as in arma_driven.
 [[nodiscard]] Arma arma_decay(Responses responses, int n_modes, bool plain = false);
 
-/// Modes of discrete poles, ascending in frequency: omega = |ln lambda|/period, zeta = -Re(ln lambda)/|ln lambda| (spec
-/// 8; the same as paper 003, eq. 5-6). Kept are complex pairs that are stable: real poles (among them those at the
+/// Modes of discrete poles, ascending in frequency: omega = |ln lambda|/period, zeta = -Re(ln lambda)/|ln lambda|
+/// (paper 003, eq. 5-6). Kept are complex pairs that are stable: real poles (among them those at the
 /// Nyquist frequency) and poles on or outside the unit circle are no modes. Throws Error(argument) on the period.
 [[nodiscard]] NaturalModes poles_to_modes(std::span<const std::complex<double>> poles, double period_s);
 
@@ -81,7 +72,7 @@ struct Arma {
 /// delays of one or more samples each, such that the highest frequency with content is sampled at least twice; where
 /// that is more than one, a mode of which the spectrum shows nothing (60 dB below the strongest) may appear aliased.
 ///
-/// Throws Error(argument) on signals that check_taps or check_responses refuses, n_max outside 1 ... 50, or records too
+/// Throws Error(argument) on signals that arma_driven or arma_decay refuses, n_max outside 1 ... 50, or records too
 /// short for n_max (8 n_max + 8 samples needed).
 [[nodiscard]] std::vector<std::vector<std::complex<double>>> stabilisation_poles(std::span<const TapSignals> taps,
                                                                                  int n_max);

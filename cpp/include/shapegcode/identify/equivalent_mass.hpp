@@ -28,8 +28,7 @@ struct OscillatorMotion {
 /// little.
 ///
 /// Throws Error(argument) on an empty force or one that is not finite, a mass, stiffness or period that is not above 0,
-/// damping below 0 or theta below 1. Source: spec 8; paper 003, section 2.2; K.-J. Bathe, Finite Element
-/// Procedures, 9.2.
+/// damping below 0 or theta below 1. Source: paper 003, section 2.2; K.-J. Bathe, Finite Element Procedures, 9.2.
 [[nodiscard]] OscillatorMotion wilson_theta(const EquivalentOscillator& oscillator, std::span<const double> force_n,
                                             double period_s, double theta = 1.4, double displacement_m = 0.0,
                                             double velocity_m_per_s = 0.0);
@@ -64,9 +63,9 @@ struct EquivalentMass {
 /// Mass with which the oscillator answers the force with the measured RMS. The response is proportional to 1/m, so one
 /// simulation with 1 kg tells: m = its RMS / measured RMS.
 ///
-/// Throws Error(argument) on signals that check_taps refuses (with an impulse, the force may be zero), a response that
+/// Throws Error(argument) on signals that arma_driven refuses (with an impulse, the force may be zero), a response that
 /// is zero throughout, a frequency that is not above 0, a damping ratio outside 0 ... 1, and as wilson_theta. Source:
-/// spec 8; paper 003, section 2.2.
+/// paper 003, section 2.2; that one simulation is enough, because the RMS goes as 1/m: this project.
 [[nodiscard]] EquivalentMass equivalent_mass_closed_form(const MassProblem& problem);
 
 /// The same by halving the range of masses until the RMS agree: paper 003's steps 1 to 7, kept as the check. Errors

@@ -81,6 +81,12 @@ class ContourTracker {
   struct Window {
     double begin, end;  // mm from the path's start
   };
+  struct Turns {
+    double first, last;  // rad from the arc's start, in the sense of its turning
+  };
+  struct Polar {
+    double radius, angle;  // of a point about an arc's centre, from its start direction
+  };
   struct Found {
     Foot foot;
     std::size_t piece;
@@ -89,6 +95,9 @@ class ContourTracker {
 
   [[nodiscard]] Foot foot_on(std::size_t piece, const Vector3& p, const Window& window) const noexcept;
   [[nodiscard]] Foot foot_on_arc(std::size_t piece, const Vector3& p, const Window& window) const noexcept;
+  /// Newton on the derivative of half the squared distance from `u` on, kept within `turns`.
+  [[nodiscard]] static double refined_foot(const Arc& arc, const Vector3& p, const Polar& polar, const Turns& turns,
+                                           double u) noexcept;
   [[nodiscard]] static Foot arc_point_foot(const Arc& arc, double u, const Vector3& p) noexcept;
   [[nodiscard]] Found search(const Vector3& p, double move, const Window& window) const noexcept;
   [[nodiscard]] double lateral_side(const Found& found, double distance) const noexcept;
@@ -115,7 +124,7 @@ class ContourTracker {
 };
 
 /// Orbit error of every arc of a path: area between the moving point's track and the programmed arc, divided by the
-/// area of the programmed sector (spec section 3; for a quarter arc the sector is the quarter disc). The area is
+/// area of the programmed sector (paper 000; for a quarter arc the sector is the quarter disc). The area is
 /// the integral of |R^2 - r^2|/2 over the arc's own angular range, in the arc's plane, with r^2 linear in the angle
 /// between samples; the angle is unwrapped, so that arcs of several turns and helices count every turn. A move back
 /// takes off what the move forward added.

@@ -43,23 +43,11 @@ struct Roughness {
 [[nodiscard]] std::vector<double> gaussian_low_pass(std::span<const double> profile_mm, double spacing_mm,
                                                     double cutoff_mm);
 
-/// The largest of the cut-offs 0.8, 0.25 and 0.08 mm of ISO 4288 of which five sampling lengths and one cut-off more at
-/// either end fit into a profile, and that is at least five stations long; none if there is none.
-[[nodiscard]] std::optional<double> standard_cutoff_mm(double length_mm, double spacing_mm) noexcept;
-
 /// Roughness and waviness of an evenly spaced profile. `lambda_s_mm` > 0 smooths it first (0: no such filter). What is
 /// waviness is measured from its own mean: form has to be removed before. Throws Error(argument) if less than one
 /// sampling length remains, or as gaussian_low_pass() does.
 [[nodiscard]] Roughness measure_roughness(std::span<const double> profile_mm, double spacing_mm, double cutoff_mm,
                                           double lambda_s_mm = 0.0);
-
-/// The profile less its least-squares straight line. Empty stays empty.
-[[nodiscard]] std::vector<double> without_line(std::span<const double> profile_mm);
-
-/// The profile of a circle's wall less its least-squares circle: mean, sine and cosine of the angle, which steps by
-/// `step_rad` from one value to the next. Where this spans less than a twentieth of a turn only the mean and the slope
-/// can be told apart, and the line is taken off instead.
-[[nodiscard]] std::vector<double> without_circle(std::span<const double> profile_mm, double step_rad);
 
 /// What a plant does while its command stands still.
 struct RestVibration {
@@ -205,7 +193,7 @@ struct MetrologyOptions {
   double station_spacing_mm = 0.05;  ///< largest distance of two stations; see SweptWalls
   double band_mm = 0.001;            ///< settled is what stays within this of the command
   double least_rest_s = 0.02;        ///< a shorter standstill inside of the path is no stop
-  double cutoff_mm = 0.0;            ///< lambda_c; 0: standard_cutoff_mm() of each section
+  double cutoff_mm = 0.0;            ///< lambda_c; 0: that of ISO 4288 for each section's length
   double lambda_s_mm = 0.0;          ///< 0: none
 };
 

@@ -31,7 +31,7 @@ struct EndMill {
 };
 
 /// Throws Error(argument) on a diameter or number of flutes that is not positive, a helix outside 0 ... 80 degrees, or
-/// a runout that is not one finite number per flute or reaches the radius.
+/// a runout that is not one finite number per flute or reaches the radius; also on more than 1000 flutes.
 void check(const EndMill& tool);
 
 /// A stretch of the tool's circumference that is in material, over a stretch of its length. Azimuths in rad from the
@@ -65,92 +65,6 @@ struct EngagementTrack {
   }
 };
 
-/// A short way of the tool's axis in the XY plane, a line or an arc of less than half a turn, and the distance from it.
-/// A line is an arc without curvature; coordinates count from the start, so that large arcs lose no digits.
-class ToolStep {
- public:
-  /// `curvature_per_mm` > 0 turns left, < 0 right, 0 is a line. Start and end may be the same point.
-  ToolStep(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double curvature_per_mm = 0.0)
-      : from_(from), chord_(to - from), curvature_(curvature_per_mm) {
-    const double length = chord_.norm();
-    if (length > 0.0) {
-      const Eigen::Vector2d along = chord_ / length;
-      const double sine = std::clamp(0.5 * length * curvature_, -1.0, 1.0);
-      const double cosine = std::sqrt(1.0 - sine * sine);
-      const Eigen::Vector2d left(-along.y(), along.x());
-      start_tangent_ = cosine * along - sine * left;
-      end_tangent_ = cosine * along + sine * left;
-    } else {
-      curvature_ = 0.0;  // a line across the X axis without length: beside it only where this is the distance, too
-      start_tangent_ = end_tangent_ = Eigen::Vector2d::UnitX();
-    }
-  }
-
-  [[nodiscard]] const Eigen::Vector2d& from() const noexcept { return from_; }
-  [[nodiscard]] const Eigen::Vector2d& chord() const noexcept { return chord_; }
-  [[nodiscard]] double curvature() const noexcept { return curvature_; }
-  [[nodiscard]] const Eigen::Vector2d& start_tangent() const noexcept { return start_tangent_; }
-
-  /// What the distance is made of at a place (x, y) from the start. Beside the arc (weight 1) it is
-  /// |offset / (1 + sqrt(square))|, where `square` is the squared ratio of the place's distance from the arc's centre
-  /// to its radius; elsewhere (weight 0) it is the root of `end`, the squared distance of the nearer end. In between,
-  /// for 1 nm, both are the same. A weight instead of a choice keeps rows of a grid free of branches.
-  template <typename Scalar>
-  struct Parts {
-    Scalar offset;
-    Scalar square;
-    Scalar end;
-    Scalar beside;
-
-    /// The squared distance; `root` is that of `square`, 1 on a line.
-    [[nodiscard]] Scalar squared(Scalar root) const noexcept {
-      const Scalar aside = offset / (Scalar(1) + root);
-      return end + beside * (aside * aside - end);
-    }
-  };
-
-  /// The constants of a step as the kernels want them: double for single places, float for rows of a grid.
-  template <typename Scalar>
-  struct Shape {
-    explicit Shape(const ToolStep& step)
-        : curvature(static_cast<Scalar>(step.curvature_)),
-          t0x(static_cast<Scalar>(step.start_tangent_.x())),
-          t0y(static_cast<Scalar>(step.start_tangent_.y())),
-          t1x(static_cast<Scalar>(step.end_tangent_.x())),
-          t1y(static_cast<Scalar>(step.end_tangent_.y())),
-          cx(static_cast<Scalar>(step.chord_.x())),
-          cy(static_cast<Scalar>(step.chord_.y())) {}
-
-    [[nodiscard]] Parts<Scalar> parts(Scalar x, Scalar y) const noexcept {
-      const Scalar squared = x * x + y * y;
-      const Scalar ex = x - cx;
-      const Scalar ey = y - cy;
-      const Scalar offset = curvature * squared - Scalar(2) * (y * t0x - x * t0y);
-      const Scalar square = std::abs(Scalar(1) + curvature * offset);  // below 0 by rounding only
-      const Scalar end = std::min(squared, ex * ex + ey * ey);
-      const Scalar within = std::min(x * t0x + y * t0y, -(ex * t1x + ey * t1y));  // mm from the nearer end's normal
-      const Scalar beside = std::min(std::max(within * Scalar(1e6), Scalar(0)), Scalar(1));
-      return {offset, square, end, beside};
-    }
-
-    Scalar curvature, t0x, t0y, t1x, t1y, cx, cy;
-  };
-
-  /// Distance of a place from the step, mm.
-  [[nodiscard]] double distance_mm(const Eigen::Vector2d& place) const noexcept {
-    const Eigen::Vector2d v = place - from_;
-    const Parts<double> p = Shape<double>(*this).parts(v.x(), v.y());
-    return std::sqrt(p.squared(std::sqrt(p.square)));
-  }
-
- private:
-  Eigen::Vector2d from_;
-  Eigen::Vector2d chord_;
-  double curvature_;
-  Eigen::Vector2d start_tangent_;
-  Eigen::Vector2d end_tangent_;
-};
-
 /// An end mill as a beam that is clamped at its overhang: a shank, and below it the fluted part, which is as stiff as a
 /// round bar of an effective diameter. Heights count from the tip.
 struct ToolBeam {
@@ -172,11 +86,6 @@ void check(const ToolBeam& beam);
 /// in closed form, springs added. The same when both heights change places. Heights beyond the overhang count as
 /// clamped. The beam is taken as checked.
 [[nodiscard]] double compliance_um_per_n(const ToolBeam& beam, double at_mm, double load_mm) noexcept;
-
-/// Deflection of the tip under a load of 1 N at a height, um/N.
-[[nodiscard]] inline double tip_compliance_um_per_n(const ToolBeam& beam, double load_mm) noexcept {
-  return compliance_um_per_n(beam, 0.0, load_mm);
-}
 
 /// Which chip thickness the specific cutting force belongs to.
 enum class ChipThickness : std::uint8_t {
@@ -233,7 +142,8 @@ struct ForceCurve {
 ///
 /// Holds the tables that many engagements share, and the last engagement, so make one and keep it. Not for several
 /// threads at a time. All members throw Error(argument) on an arc that does not lie within -pi/2 ... pi/2 and above the
-/// tip, or on a feed that is negative or not finite; a feed of 0 and an empty engagement give zeros.
+/// tip, or up to which a flute winds more than 1000 times around the tool, on a feed that is negative or not finite, or
+/// an angle of the spindle beyond 1e9 rad; a feed of 0 and an empty engagement give zeros.
 class MillingForce {
  public:
   /// Throws Error(argument) on a tool or coefficients that `check` refuses, or a speed that is not positive.
@@ -313,6 +223,13 @@ enum class WallSide : std::uint8_t {
 /// leaves open.
 inline constexpr double wall_tolerance_rad = 0.02;
 
+/// Where a wall is looked at.
+struct WallHeights {
+  WallSide side = WallSide::right;
+  std::span<const double> height_mm = {};     ///< above the tip, as long as the caller keeps them
+  double tolerance_rad = wall_tolerance_rad;  ///< an arc that ends this close to +-pi/2 reaches the wall
+};
+
 /// Form error of the wall across itself, um, at heights above the tip: + material is left standing, - the wall is cut
 /// too deep. Each height is finished as a flute passes +-pi/2 there; the error is what the beam is deflected at that
 /// height under all forces of that moment, and of several flutes with runout the one that reaches deepest counts (from
@@ -320,14 +237,11 @@ inline constexpr double wall_tolerance_rad = 0.02;
 /// where the engagement does not reach the wall. Throws Error(argument) as MillingForce::deflection_um, or on a height
 /// below the tip or not finite.
 [[nodiscard]] Eigen::VectorXd wall_error_um(MillingForce& force, const ToolBeam& beam, std::span<const EngagedArc> arcs,
-                                            double feed_mm_per_min, WallSide side, std::span<const double> height_mm,
-                                            double tolerance_rad = wall_tolerance_rad);
+                                            double feed_mm_per_min, const WallHeights& wall);
 
 /// The same along a track, (n_samples, n_heights); feeds along the path, one per sample (its horizontal part makes the
 /// chip). Throws also on another number of feeds.
 [[nodiscard]] Eigen::MatrixXd wall_errors_um(MillingForce& force, const ToolBeam& beam, const EngagementTrack& track,
-                                             std::span<const double> feed_mm_per_min, WallSide side,
-                                             std::span<const double> height_mm,
-                                             double tolerance_rad = wall_tolerance_rad);
+                                             std::span<const double> feed_mm_per_min, const WallHeights& wall);
 
 }  // namespace shapegcode
