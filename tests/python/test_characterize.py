@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from characterization_figures import deviations
 
 import shapegcode as sg
-from characterization_figures import deviations
 from judge.characterization import controllers, fill_in_logs, fill_in_times, write_csv
 from judge.controller_simulator import Hidden, play, servo_log
 from shapegcode.characterize.findings import Finding
@@ -150,7 +150,7 @@ PUBLISHED_WATCH = re.compile(r"block time|in-position time|cutting time constant
 
 @pytest.mark.slow
 def test_logs_give_the_hidden_truth_within_2_percent() -> None:
-    # The documented figures come from more draws: tests/python/characterization_figures.py.
+    # The documented figures come from more draws: tests/benchmarks/characterization_figures.py.
     found, wrong = deviations(range(5), log=True)
     assert wrong == []
     for each in found:
