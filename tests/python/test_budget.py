@@ -7,9 +7,8 @@ import itertools
 import json
 import math
 import os
-import subprocess
-import sys
 from pathlib import Path
+from subprocess import CompletedProcess
 from typing import Any
 
 import numpy as np
@@ -19,10 +18,10 @@ from hypothesis import strategies as st
 
 import shapegcode as sg
 from acceptance import Judged, convert, machine_with, read_sample
+from command import run as run_command
 from judge.player import durations
 from shapegcode.budget import busiest_per_s
 
-COMMAND = Path(sys.executable).with_name("shapegcode")
 HEAD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\n"
 TAIL = "G0Z50.\nM30\n%\n"
 FEEDS = (9000, 60, 3000, 600, 12000, 1500, 6000)
@@ -337,12 +336,9 @@ def test_a_limit_is_finite_and_positive(name: str, value: float) -> None:
         sg.Budget(**{name: value})  # type: ignore[arg-type]
 
 
-def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+def run(folder: Path, *words: str) -> CompletedProcess[str]:
     (folder / "part.nc").write_text(PART)
-    return subprocess.run(
-        [COMMAND, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", *words],
-        cwd=folder, capture_output=True, text=True, check=False, timeout=60, env=dict(os.environ),
-    )  # fmt: skip
+    return run_command(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc", *words)
 
 
 def test_command(tmp_path: Path) -> None:
