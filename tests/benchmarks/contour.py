@@ -19,13 +19,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import solveh_banded
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
 
+from contour_figures import arcs_and_corners
 from table import Row, Sample, comparison_table, markdown
 
 import shapegcode as sg
 from acceptance import machine_with
-from contour_figures import arcs_and_corners
 from shapegcode import _core
 from shapegcode.block_grid import Grid, choose_grid
 from shapegcode.emit import motion_limits, shaping_options

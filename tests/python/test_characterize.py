@@ -6,15 +6,15 @@ import json
 import math
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import numpy as np
 import pytest
+from characterization_figures import deviations
 
 import shapegcode as sg
-from characterization_figures import deviations
+from command import run
 from judge.characterization import controllers, fill_in_logs, fill_in_times, write_csv
 from judge.controller_simulator import Hidden, play, servo_log
 from shapegcode.characterize.findings import Finding
@@ -26,7 +26,6 @@ from shapegcode.characterize.results import read_results
 from shapegcode.characterize.timing import Timing, part_time_s, program_time_s
 from shapegcode.controller import controller_model
 
-RUN = "import sys; from shapegcode.cli import main; sys.exit(main())"
 MACHINE = sg.Machine.load("vx500")
 BOXES = ["0:100,0:100,0:20", "-50:50,-80:0,-5:30", "0:40,-40:0,0:10", "-300:0,0:250,0:200"]
 
@@ -43,8 +42,8 @@ def folder(written: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(written, tmp_path / "tests"))
 
 
-def shell(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", RUN, *words], capture_output=True, text=True, check=False, timeout=120)
+def shell(*words: str | Path) -> CompletedProcess[str]:
+    return run(Path.cwd(), *words)
 
 
 def by_name(findings: list[Finding]) -> dict[str, Finding]:
@@ -150,7 +149,7 @@ PUBLISHED_WATCH = re.compile(r"block time|in-position time|cutting time constant
 
 @pytest.mark.slow
 def test_logs_give_the_hidden_truth_within_2_percent() -> None:
-    # The documented figures come from more draws: tests/python/characterization_figures.py.
+    # The documented figures come from more draws: tests/benchmarks/characterization_figures.py.
     found, wrong = deviations(range(5), log=True)
     assert wrong == []
     for each in found:

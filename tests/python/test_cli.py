@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -15,23 +13,11 @@ import pytest
 
 import shapegcode as sg
 from acceptance import PROGRAMS
+from command import run, run_process
 
-COMMAND = Path(sys.executable).with_name("shapegcode")
 GOOD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X20.F6000\nG3X40.Y20.R20.\nG1Y40.\nG0Z50.\nM30\n%\n"
 PAIR = {"original", "emitted"}
 AXES = {"x", "y", "z"}
-
-
-def run(folder: Path, *words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [COMMAND, *words],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-        env={**os.environ, **environment},
-    )
 
 
 @pytest.fixture
@@ -48,7 +34,7 @@ def files(folder: Path) -> list[str]:
 
 
 def test_convert_writes_the_program_of_the_api(folder: Path) -> None:
-    done = run(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc")
+    done = run_process(folder, "convert", "part.nc", "-m", "vx500", "-o", "out.nc")
     assert (done.returncode, done.stderr) == (0, "")
     assert files(folder) == ["out.nc", "part.nc"]
     machine = sg.Machine.load("vx500")
@@ -281,6 +267,6 @@ def test_help(folder: Path, command: str) -> None:
 
 
 def test_version_and_debug(folder: Path) -> None:
-    assert re.fullmatch(r"shapegcode \d+\.\d+\.\d+\S*\n", run(folder, "--version").stdout)
-    traced = run(folder, "--debug", "convert", "nothing.nc", "-m", "vx500", "-o", "out.nc")
+    assert re.fullmatch(r"shapegcode \d+\.\d+\.\d+\S*\n", run_process(folder, "--version").stdout)
+    traced = run_process(folder, "--debug", "convert", "nothing.nc", "-m", "vx500", "-o", "out.nc")
     assert "Traceback" in traced.stderr

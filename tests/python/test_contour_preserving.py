@@ -6,9 +6,6 @@ import itertools
 
 import numpy as np
 import pytest
-
-import shapegcode as sg
-from acceptance import BLOCK_ENDS, machine_with
 from contour_figures import (
     TOLERANCES_UM,
     Figures,
@@ -19,6 +16,9 @@ from contour_figures import (
     paper_unshaped,
     within,
 )
+
+import shapegcode as sg
+from acceptance import BLOCK_ENDS, machine_with
 from shapegcode import _core
 from shapegcode.block_grid import choose_grid
 from shapegcode.emit import motion_limits, shaping_options

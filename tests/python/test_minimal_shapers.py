@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from minimal_figures import random_sets, solve
 from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import fsolve, least_squares
 
-from minimal_figures import random_sets, solve
 from shapegcode._core import (
     ArgumentError,
     DesignError,

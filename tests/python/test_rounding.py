@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rounding_figures import PATHS, PERIODS_S, UNITS, Outcome, machine, outcomes, path
 
 import shapegcode as sg
-from rounding_figures import PATHS, PERIODS_S, UNITS, Outcome, machine, outcomes, path
 from shapegcode.converter import convert
 
 

@@ -331,11 +331,12 @@ def test_refusals_say_what_there_is() -> None:
             shortest_non_negative(PAPER_MODES, 0.005, bad)
 
 
-def test_acceptance_200_random_pairs() -> None:
+@pytest.mark.parametrize("pairs", [40, pytest.param(200, marks=pytest.mark.slow)])
+def test_acceptance_of_random_pairs(pairs: int) -> None:
     """Each design leaves at most 1e-10 and none is shorter, or there is none within 250 ms."""
     rng = np.random.default_rng(20250)
     designs, refusals, worst = 0, 0, 0.0
-    for pair in range(200):
+    for pair in range(pairs):
         frequencies_hz, ratios = rng.uniform(15.0, 150.0, 2).tolist(), rng.uniform(0.0, 0.05, 2).tolist()
         modes = [Mode(f, zeta) for f, zeta in zip(frequencies_hz, ratios, strict=True)]
         for period_s in PERIODS_S:
@@ -357,8 +358,8 @@ def test_acceptance_200_random_pairs() -> None:
             if pair % 10 == 0:
                 assert max(simulated_residual(shaper, mode) for mode in modes) < LIMIT
     assert worst <= LIMIT
-    assert designs + refusals == 1000
-    assert designs > 900
+    assert designs + refusals == len(PERIODS_S) * pairs
+    assert designs > 0.9 * len(PERIODS_S) * pairs
     print(f"{designs} designs, {refusals} refusals, worst residual {worst:.1e}")
 
 

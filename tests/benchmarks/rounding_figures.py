@@ -1,16 +1,20 @@
-"""The figures of vibration-aware rounding: `python tests/python/rounding_figures.py` prints them."""
+"""The figures of vibration-aware rounding: `python tests/benchmarks/rounding_figures.py` prints them."""
 
 from __future__ import annotations
 
 import math
 import random
+import sys
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from unittest import mock
 
 import numpy as np
 import numpy.typing as npt
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
 
 import shapegcode as sg
 from judge.interpreter import interpret

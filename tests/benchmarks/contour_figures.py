@@ -1,4 +1,4 @@
-"""The figures of contour-preserving shaping: `python tests/python/contour_figures.py` prints them.
+"""The figures of contour-preserving shaping: `python tests/benchmarks/contour_figures.py` prints them.
 
 Everything is measured on the emitted text by an interpreter, player and plant that share no code with the tool.
 """
@@ -8,11 +8,15 @@ from __future__ import annotations
 import argparse
 import functools
 import math
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
 
 import shapegcode as sg
 from acceptance import Judged, convert, machine_with
