@@ -74,16 +74,16 @@ TEST_CASE("minimal_shapers: the boxes of two modes find what the two-mode search
       const std::array<std::complex<double>, 2> poles{shapegcode::pole({1.0, damping}),
                                                       shapegcode::pole({ratio, damping})};
       const double omega = std::abs(poles[1]);
-      const System<2> system(poles, omega);
+      const System system(poles, omega);
       const Region region{duration * omega * (1.0 + 1e-9), 10.0, 1e-4};
-      Collection<2> collection(system, region);
-      const BoxCounts counts = BoxSearch<2>(system, region, 1'000'000, collection).run();
+      Collection collection(system, region);
+      const BoxCounts counts = BoxSearch(system, region, 1'000'000, collection).run();
       CHECK(counts.unresolved == 0);
       CHECK(counts.settled >= duration * omega);
       const std::vector<Shaper> listed = minimal_two_mode({1.0, damping}, {ratio, damping}, duration);
-      const std::vector<Taps<2>> taps = collection.taps();
+      const std::vector<Taps> taps = collection.taps();
       REQUIRE(taps.size() == listed.size());
-      for (const Taps<2>& each : taps) {
+      for (const Taps& each : taps) {
         CHECK(with_times(listed, {0.0, each.phases(0) / omega, each.phases(1) / omega}, 1e-9) != nullptr);
       }
     }

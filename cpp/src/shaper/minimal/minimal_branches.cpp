@@ -165,7 +165,7 @@ class Tracer {
     const std::array<std::complex<double>, 2> poles{pole(first_), pole({first_.frequency_hz * ratio, second_damping_})};
     const double omega = std::max(std::abs(poles[0]), std::abs(poles[1]));
     const Times expected = curve.expected(ratio);
-    const auto taps = minimal::System<2>(poles, omega).newton(expected * omega, 2.0 * max_duration_s_ * omega);
+    const auto taps = minimal::System(poles, omega).newton(expected * omega, 2.0 * max_duration_s_ * omega);
     if (!taps || (taps->phases - expected * omega).cwiseAbs().maxCoeff() > farthest) {
       return false;
     }

@@ -19,10 +19,10 @@ namespace shapegcode {
 namespace {
 
 using minimal::duration_slack;
+using minimal::most_modes;
 using minimal::most_periods;
 using minimal::same_pole;
 
-constexpr std::size_t most_modes = 6;
 constexpr double apart = 1e-4;                     // rad of the fastest mode: closer taps are one
 constexpr double largest_listed_residual = 1e-12;  // of a listed shaper
 
@@ -101,26 +101,24 @@ bool serves(const Shaper& shaper, std::span<const Mode> modes) {
       modes, [&shaper](const Mode& mode) { return residual_ratio(shaper, mode) <= largest_listed_residual; });
 }
 
-template <int N>
-Shaper as_shaper(const minimal::Taps<N>& taps, double omega) {
+Shaper as_shaper(const minimal::Taps& taps, double omega) {
   Shaper out{{0.0}, {taps.amplitudes(0)}};
-  for (int k = 0; k < N; ++k) {
+  for (Eigen::Index k = 0; k < taps.phases.size(); ++k) {
     out.times_s.push_back(taps.phases(k) / omega);
     out.amplitudes.push_back(taps.amplitudes(k + 1));
   }
   return out;
 }
 
-template <int N>
 void search(std::span<const Mode> modes, const Poles& poles, const MinimalOptions& options, MinimalShapers& result) {
   const double omega = largest_size(poles);
-  const minimal::System<N> system(poles, omega);
+  const minimal::System system(poles, omega);
   const minimal::Region region{result.max_duration_s * omega * (1.0 + duration_slack), options.max_abs_sum, apart};
-  minimal::Collection<N> collection(system, region);
+  minimal::Collection collection(system, region);
   const minimal::StartCounts starts = minimal::search_from_starts(system, region, options.max_starts, collection);
-  const minimal::BoxCounts boxes = minimal::BoxSearch<N>(system, region, options.max_boxes, collection).run();
-  for (const minimal::Taps<N>& taps : collection.taps()) {
-    Shaper shaper = as_shaper<N>(taps, omega);
+  const minimal::BoxCounts boxes = minimal::BoxSearch(system, region, options.max_boxes, collection).run();
+  for (const minimal::Taps& taps : collection.taps()) {
+    Shaper shaper = as_shaper(taps, omega);
     if (serves(shaper, modes)) {
       result.shapers.push_back(std::move(shaper));
     }
@@ -160,19 +158,7 @@ MinimalShapers minimal_shapers(std::span<const Mode> modes, double max_duration_
                                        : minimal_two_mode(modes[0], modes[1], max_duration_s, options.max_abs_sum);
     result.complete_up_to_s = max_duration_s;
   } else {
-    switch (modes.size()) {
-      case 3:
-        search<3>(modes, poles, options, result);
-        break;
-      case 4:
-        search<4>(modes, poles, options, result);
-        break;
-      case 5:
-        search<5>(modes, poles, options, result);
-        break;
-      default:
-        search<6>(modes, poles, options, result);
-    }
+    search(modes, poles, options, result);
     add_reduced(modes, options, result);
     std::ranges::sort(result.shapers, [](const Shaper& a, const Shaper& b) {
       const double end = std::max(duration_s(a), duration_s(b));
