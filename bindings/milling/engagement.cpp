@@ -176,7 +176,9 @@ void register_material(py::module_& module) {
           py::arg("low_mm"), py::arg("high_mm"), py::arg("rows"), py::arg("columns"),
           "Top of the material over a rectangle, (rows, columns), mm, from its low corner on; NaN where there is none. "
           "Raises ArgumentError on less than one row or column.");
+}
 
+void register_layer_borders(py::module_& module) {
   module.def(
       "layer_borders",
       [](const std::vector<std::shared_ptr<Path>>& paths, double bottom, double top, double ramp_step) {
@@ -280,6 +282,7 @@ void register_engagement(py::module_& module) {
   register_tool(module);
   register_track(module);
   register_material(module);
+  register_layer_borders(module);
   register_sweep(module);
   register_corner(module);
 }
