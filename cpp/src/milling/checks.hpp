@@ -11,7 +11,7 @@
 namespace shapegcode::detail {
 
 /// So many samples, chords or layers of one path are never meant: a step that is wrong by orders of magnitude.
-inline constexpr double most_pieces = 1e8;
+inline constexpr double most_pieces = 1e9;
 
 inline void check_positive(double value, std::string_view what, std::string_view unit) {
   if (!(value > 0.0 && std::isfinite(value))) refuse("{} is {} {}, must be above 0", what, value, unit);

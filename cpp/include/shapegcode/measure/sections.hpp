@@ -146,7 +146,8 @@ class SweptWalls {
   };
 
   /// `spacing_mm` is the largest distance of two stations; it becomes wider where the path would need more than
-  /// `most_stations`. Throws Error(argument) on a tool radius or spacing that is not > 0.
+  /// `most_stations`. Throws Error(argument) on a tool radius or spacing that is not > 0, or a path of more than 1e8
+  /// tool radii.
   SweptWalls(const Path& path, const std::vector<PathSection>& sections, double tool_radius_mm, double spacing_mm,
              std::size_t most_stations = 500'000);
 

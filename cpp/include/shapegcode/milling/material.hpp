@@ -252,7 +252,8 @@ class Material {
 
 /// Heights between layers for these paths in a stock from `bottom_mm` to `top_mm`: the heights at which the tool moves
 /// on a level (taken as one within 1 um), the lowest points of ramps and plunges that cut, and steps of at most
-/// `ramp_step_mm` wherever a ramp or helix passes. Throws Error(argument) unless bottom < top and the step is positive.
+/// `ramp_step_mm` wherever a ramp or helix passes. Throws Error(argument) unless bottom < top and the step is positive
+/// and not below 1e-9 of the height.
 [[nodiscard]] std::vector<double> layer_borders(std::span<const Path* const> paths, double bottom_mm, double top_mm,
                                                 double ramp_step_mm);
 
@@ -270,8 +271,9 @@ struct SweepOptions {
 /// is cut there; on ramps the heights are those of the layers. What stands in the tool at the start of the path counts
 /// as gone. A rapid is swept like any other move: a section above 0 is a collision. Layers with the same azimuths
 /// (within 1e-4 rad) share an arc. Section times feed is the material removal rate, downward moves included.
-/// Throws Error(argument) on a diameter, step or touch that is not a positive number (touch: below 0), an arc that is
-/// not in the XY plane, or if the material needs more memory than its limit; the material is then cut up to there.
+/// Throws Error(argument) on a diameter, step or touch that is not a positive number (touch: below 0), a step below
+/// 1e-9 of the path, an arc that is not in the XY plane, or if the material needs more memory than its limit; the
+/// material is then cut up to there.
 [[nodiscard]] EngagementTrack sweep(Material& material, const Path& path, double tool_diameter_mm,
                                     const SweepOptions& options = {});
 
