@@ -162,7 +162,7 @@ void register_material(py::module_& module) {
           "distance_mm",
           [](const Material& self, std::size_t layer, double x, double y) {
             if (layer >= self.size()) throw py::index_error("layer index out of range");
-            return self.layer(layer).distance_mm(x, y);
+            return self.distance_mm(layer, x, y);
           },
           py::arg("layer"), py::arg("x_mm"), py::arg("y_mm"),
           "Distance from the boundary of a layer, positive in material, limited to two nodes of the grid, mm.")

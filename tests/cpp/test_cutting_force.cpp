@@ -395,6 +395,8 @@ TEST_CASE("cutting force: refusals") {
        {EngagedArc{-2.0, 0.5, 0.0, 5.0}, EngagedArc{0.5, -1.0, 0.0, 5.0}, EngagedArc{-1.0, 2.0, 0.0, 5.0},
         EngagedArc{-1.0, 0.5, -1.0, 5.0}, EngagedArc{-1.0, 0.5, 5.0, 4.0}, EngagedArc{nan, 0.5, 0.0, 5.0}}) {
     CHECK_THROWS_AS((void)force.figures(Arcs{bad}, 100.0), Error);
+    CHECK_THROWS_AS((void)force.figures(Arcs{good[0], bad}, 100.0), Error);
+    CHECK(force.figures({}, 100.0).peak_resultant_n == 0.0);
   }
   // Azimuths that no integer can count, and more flutes than a spindle's turn can hold.
   const ToolBeam beam{.overhang_mm = 40.0,

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "milling/material_layer.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/milling/material.hpp"
 

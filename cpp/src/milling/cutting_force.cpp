@@ -151,8 +151,8 @@ struct MillingForce::Impl {
       refuse("feed is {} mm/min, must be 0 or above", feed_mm_per_min);
     }
     if (!same(engagement, arcs)) {
+      for (const EngagedArc& arc : engagement) check_arc(arc);  // before anything is changed
       pieces.clear();
-      arcs.clear();  // should the check throw
       take_arcs(engagement);
       arcs.assign(engagement.begin(), engagement.end());
       built = false;
@@ -173,21 +173,24 @@ struct MillingForce::Impl {
     return true;
   }
 
+  void check_arc(const EngagedArc& arc) const {
+    const bool fits = arc.from_rad >= -half_pi - arc_slack_rad && arc.to_rad <= half_pi + arc_slack_rad &&
+                      arc.bottom_mm >= 0.0 && arc.from_rad <= arc.to_rad && arc.bottom_mm <= arc.top_mm &&
+                      std::isfinite(arc.top_mm);
+    if (!fits) {
+      refuse("engaged arc {} ... {} rad, height {} ... {} mm, must rise within -pi/2 ... pi/2 and above the tip",
+             arc.from_rad, arc.to_rad, arc.bottom_mm, arc.top_mm);
+    }
+    const double turns = set.lag_rad_per_mm * arc.top_mm / (2.0 * std::numbers::pi);
+    if (turns > most_turns) {
+      refuse("a flute winds {:g} times around the tool up to {} mm, limit {}", turns, arc.top_mm, most_turns);
+    }
+  }
+
   void take_arcs(std::span<const EngagedArc> engagement) {
     double cosine = 0.0;
     double extent = 0.0;
     for (const EngagedArc& arc : engagement) {
-      const bool fits = arc.from_rad >= -half_pi - arc_slack_rad && arc.to_rad <= half_pi + arc_slack_rad &&
-                        arc.bottom_mm >= 0.0 && arc.from_rad <= arc.to_rad && arc.bottom_mm <= arc.top_mm &&
-                        std::isfinite(arc.top_mm);
-      if (!fits) {
-        refuse("engaged arc {} ... {} rad, height {} ... {} mm, must rise within -pi/2 ... pi/2 and above the tip",
-               arc.from_rad, arc.to_rad, arc.bottom_mm, arc.top_mm);
-      }
-      const double turns = set.lag_rad_per_mm * arc.top_mm / (2.0 * std::numbers::pi);
-      if (turns > most_turns) {
-        refuse("a flute winds {:g} times around the tool up to {} mm, limit {}", turns, arc.top_mm, most_turns);
-      }
       const bool mirrored = mirror < 0.0;
       const double from = std::max(mirrored ? -arc.to_rad : arc.from_rad, -half_pi);
       const double to = std::min(mirrored ? -arc.from_rad : arc.to_rad, half_pi);
