@@ -1,8 +1,10 @@
 // What the parts of milling refuse alike.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <span>
 #include <string_view>
 
 #include "base/refuse.hpp"
@@ -26,6 +28,12 @@ inline void check_pieces(double way_mm, double step_mm, std::string_view step) {
 
 inline void check_feeds(std::size_t feeds, const EngagementTrack& track) {
   if (feeds != track.size()) refuse("feeds are {} for a track of {} samples", feeds, track.size());
+}
+
+inline bool same_arcs(std::span<const EngagedArc> a, std::span<const EngagedArc> b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const EngagedArc& p, const EngagedArc& q) {
+    return p.from_rad == q.from_rad && p.to_rad == q.to_rad && p.bottom_mm == q.bottom_mm && p.top_mm == q.top_mm;
+  });
 }
 
 }  // namespace shapegcode::detail
