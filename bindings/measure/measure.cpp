@@ -180,13 +180,7 @@ void register_figures(py::module_& module) {
       .def_readonly("response_sides", &RunFigures::response_sides, "By sides, without missed corners.");
 }
 
-}  // namespace
-
-void register_metrology(py::module_& module) {
-  register_sections(module);
-  register_fits(module);
-  register_figures(module);
-
+void register_options(py::module_& module) {
   py::class_<MetrologyOptions>(module, "MetrologyOptions", "With what a run is measured.")
       .def(py::init<>())
       .def_readwrite("period_s", &MetrologyOptions::period_s, "Between two samples, s.")
@@ -196,7 +190,9 @@ void register_metrology(py::module_& module) {
       .def_readwrite("least_rest_s", &MetrologyOptions::least_rest_s, "A shorter standstill is no stop, s.")
       .def_readwrite("cutoff_mm", &MetrologyOptions::cutoff_mm, "Cut-off lambda c, mm; 0: by the section's length.")
       .def_readwrite("lambda_s_mm", &MetrologyOptions::lambda_s_mm, "Short-wave cut-off, mm; 0: none.");
+}
 
+void register_section_metrology(py::module_& module) {
   py::class_<SectionMetrology>(module, "SectionMetrology",
                                "Measures what a run of samples does to the sections of a path.")
       .def(py::init([](const std::shared_ptr<Path>& path, std::vector<PathSection> sections,
@@ -248,6 +244,16 @@ void register_metrology(py::module_& module) {
           "(n, 2).")
       .def_property_readonly("station_spacing_mm", &SectionMetrology::station_spacing_mm,
                              "Largest distance of two stations, mm.");
+}
+
+}  // namespace
+
+void register_metrology(py::module_& module) {
+  register_sections(module);
+  register_fits(module);
+  register_figures(module);
+  register_options(module);
+  register_section_metrology(module);
 }
 
 }  // namespace shapegcode::bindings

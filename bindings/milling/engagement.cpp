@@ -162,7 +162,7 @@ void register_material(py::module_& module) {
           "distance_mm",
           [](const Material& self, std::size_t layer, double x, double y) {
             if (layer >= self.size()) throw py::index_error("layer index out of range");
-            return self.layer(layer).distance_mm(x, y);
+            return self.distance_mm(layer, x, y);
           },
           py::arg("layer"), py::arg("x_mm"), py::arg("y_mm"),
           "Distance from the boundary of a layer, positive in material, limited to two nodes of the grid, mm.")
@@ -176,7 +176,9 @@ void register_material(py::module_& module) {
           py::arg("low_mm"), py::arg("high_mm"), py::arg("rows"), py::arg("columns"),
           "Top of the material over a rectangle, (rows, columns), mm, from its low corner on; NaN where there is none. "
           "Raises ArgumentError on less than one row or column.");
+}
 
+void register_layer_borders(py::module_& module) {
   module.def(
       "layer_borders",
       [](const std::vector<std::shared_ptr<Path>>& paths, double bottom, double top, double ramp_step) {
@@ -280,6 +282,7 @@ void register_engagement(py::module_& module) {
   register_tool(module);
   register_track(module);
   register_material(module);
+  register_layer_borders(module);
   register_sweep(module);
   register_corner(module);
 }

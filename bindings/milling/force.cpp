@@ -131,9 +131,10 @@ void define_figures(py::module_& module) {
       .def_readonly("flute_n", &ForceCurve::flute_n, "Of each flute, (n_angles, 2), N.");
 }
 
-void define_force(py::module_& module) {
-  py::class_<MillingForce>(module, "MillingForce",
-                           R"(Forces of an end mill at one engagement; make one and keep it.
+/// The members come with define_force_members and define_track_figures.
+py::class_<MillingForce> define_force(py::module_& module) {
+  py::class_<MillingForce> type(module, "MillingForce",
+                                R"(Forces of an end mill at one engagement; make one and keep it.
 
 The chip at azimuth p is feed per tooth * cos p thick (paper 001 eq. 1); with runout that of flute i is the least of
 m * feed per tooth * cos p + r_i - r_(i-m), m >= 1, and not below 0. A counter-clockwise spindle mirrors everything,
@@ -142,15 +143,19 @@ in mm above the tip. `feed_mm_per_min`: along the path. Not for several threads 
 
 Raises:
     ArgumentError: A speed that is not positive; in all members also an arc beyond -pi/2 ... pi/2 or below the tip, or a
-        feed that is negative or not finite.)")
-      .def(py::init<EndMill, CuttingCoefficients, double, SpindleSense>(), py::arg("tool"), py::arg("coefficients"),
+        feed that is negative or not finite.)");
+  type.def(py::init<EndMill, CuttingCoefficients, double, SpindleSense>(), py::arg("tool"), py::arg("coefficients"),
            py::arg("spindle_rev_per_min"), py::arg("sense") = SpindleSense::clockwise,
            "Spindle speed in 1/min. Raises ArgumentError unless it is positive.")
       .def_property_readonly("tool", &MillingForce::tool, "The cutter.")
       .def_property_readonly("coefficients", &MillingForce::coefficients, "The power laws.")
       .def_property_readonly("spindle_rev_per_min", &MillingForce::spindle_rev_per_min, "1/min.")
-      .def_property_readonly("sense", &MillingForce::sense, "M03 or M04.")
-      .def(
+      .def_property_readonly("sense", &MillingForce::sense, "M03 or M04.");
+  return type;
+}
+
+void define_force_members(py::class_<MillingForce>& type) {
+  type.def(
           "figures",
           [](MillingForce& self, const MatrixArray& arcs, double feed_mm_per_min) {
             return self.figures(arcs_from(arcs), feed_mm_per_min);
@@ -190,21 +195,24 @@ Raises:
           },
           py::arg("arcs"), py::arg("feed_mm_per_min"), py::arg("turned_rad"), py::arg("overhang_mm"),
           "Centre of the force along x and along y (paper 001 eq. 6), distance from the clamped end, (2,), mm; NaN "
-          "where that force is 0.")
-      .def(
-          "figures_of",
-          [](MillingForce& self, const EngagementTrack& track, const VectorArray& feed_mm_per_min,
-             const std::optional<ToolBeam>& beam) {
-            const auto feeds = span_of(feed_mm_per_min);
-            Eigen::MatrixXd table;
-            {
-              const py::gil_scoped_release release;
-              table = figures_of(self, track, feeds, beam ? &*beam : nullptr);
-            }
-            return columns(table);
-          },
-          py::arg("track"), py::arg("feed_mm_per_min"), py::arg("beam") = py::none(),
-          R"(Figures of a whole track, a feed along the path for each sample.
+          "where that force is 0.");
+}
+
+void define_track_figures(py::class_<MillingForce>& type) {
+  type.def(
+      "figures_of",
+      [](MillingForce& self, const EngagementTrack& track, const VectorArray& feed_mm_per_min,
+         const std::optional<ToolBeam>& beam) {
+        const auto feeds = span_of(feed_mm_per_min);
+        Eigen::MatrixXd table;
+        {
+          const py::gil_scoped_release release;
+          table = figures_of(self, track, feeds, beam ? &*beam : nullptr);
+        }
+        return columns(table);
+      },
+      py::arg("track"), py::arg("feed_mm_per_min"), py::arg("beam") = py::none(),
+      R"(Figures of a whole track, a feed along the path for each sample.
 
 Returns:
     Arrays (n_samples,) by name: mean_x_n, mean_y_n (frame of the tool), mean_resultant_n, peak_resultant_n,
@@ -212,6 +220,9 @@ Returns:
 
 Raises:
     ArgumentError: Another number of feeds, or as the class.)");
+}
+
+void define_machine_frame(py::module_& module) {
   module.def(
       "machine_frame", &machine_frame, py::arg("tool_frame"), py::arg("direction_rad"),
       "A force (2,) in the frame of the tool, in the frame of the machine (paper 001 eq. 4, 5); direction of feed "
@@ -255,7 +266,9 @@ void define_limits(py::module_& module) {
       .def_readonly("feed_mm_per_min", &LimitedFeed::feed_mm_per_min, "mm/min.")
       .def_readonly("limit", &LimitedFeed::limit, "The limit that is reached first.")
       .def_readonly("within", &LimitedFeed::within, "False: even the lowest feed, which this is, is beyond the limit.");
+}
 
+void define_largest_feeds(py::module_& module) {
   module.def(
       "largest_feed",
       [](MillingForce& force, const MatrixArray& arcs, const FeedLimits& limits, double lowest, double highest) {
@@ -344,8 +357,12 @@ void register_milling(py::module_& module) {
   define_coefficients(module);
   define_beam(module);
   define_figures(module);
-  define_force(module);
+  py::class_<MillingForce> force = define_force(module);
+  define_force_members(force);
+  define_track_figures(force);
+  define_machine_frame(module);
   define_limits(module);
+  define_largest_feeds(module);
   define_surface(module);
 }
 

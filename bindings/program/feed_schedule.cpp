@@ -65,15 +65,15 @@ void register_travel(py::module_& module) {
       "How blocks at their feed are travelled, followed along `along`; else as travel_path.");
 }
 
-}  // namespace
-
-void register_feed_schedule(py::module_& module) {
+void define_stretches(py::module_& module) {
   py::class_<FeedStretch>(module, "FeedStretch", "A stretch of one feed.")
       .def(py::init<double, double, double>(), py::arg("begin_mm"), py::arg("end_mm"), py::arg("feed_mm_per_min"))
       .def_readonly("begin_mm", &FeedStretch::begin_mm, "Along the path, mm.")
       .def_readonly("end_mm", &FeedStretch::end_mm, "Along the path, mm.")
       .def_readonly("feed_mm_per_min", &FeedStretch::feed_mm_per_min, "mm/min.");
+}
 
+void define_schedule(py::module_& module) {
   module.def(
       "schedule_feed",
       [](const VectorArray& ends, const VectorArray& kept, const std::vector<bool>& divisible,
@@ -123,7 +123,9 @@ void register_feed_schedule(py::module_& module) {
       "The feeds (n,), mm/min, lowered around each station whose load allows less (`load_mm_per_min`, (n,)), because "
       "the "
       "travel lags behind a change: `before_s` and `behind_s` (n,) times the feed that the load allows.");
+}
 
+void define_feed_writer(py::module_& module) {
   py::class_<FeedWriterOptions>(module, "FeedWriterOptions", "How new feeds are written into a region's blocks.")
       .def(py::init([](double increment_mm, double unit_mm, int position_decimals, bool absolute_centres,
                        double modal_feed, bool restore_feed) {
@@ -161,6 +163,14 @@ void register_feed_schedule(py::module_& module) {
       py::arg("program"), py::arg("region"), py::arg("stretches"), py::arg("options"),
       "The region's lines with the feeds of stretches that cover its path; what else stands in them stays. Raises "
       "ArgumentError if they do not cover it, or end within a block that cannot be divided.");
+}
+
+}  // namespace
+
+void register_feed_schedule(py::module_& module) {
+  define_stretches(module);
+  define_schedule(module);
+  define_feed_writer(module);
   register_travel(module);
 }
 

@@ -74,4 +74,6 @@ TEST_CASE("circle fit: refuses what is no circle") {
   CHECK_THROWS_AS(static_cast<void>(fit_circle(std::vector<Vector2d>{{0, 0}, {1, 1}, {2, 2}, {3, 3}})),
                   shapegcode::Error);
   CHECK_THROWS_AS(static_cast<void>(fit_circle(std::vector<Vector2d>(5, {1.0, 2.0}))), shapegcode::Error);
+  CHECK_THROWS_WITH_AS(static_cast<void>(fit_circle(std::vector<Vector2d>{{0, 0}, {1, 1}, {2, std::nan("")}, {0, 1}})),
+                       "point 2 is not finite", shapegcode::Error);
 }

@@ -395,6 +395,8 @@ TEST_CASE("cutting force: refusals") {
        {EngagedArc{-2.0, 0.5, 0.0, 5.0}, EngagedArc{0.5, -1.0, 0.0, 5.0}, EngagedArc{-1.0, 2.0, 0.0, 5.0},
         EngagedArc{-1.0, 0.5, -1.0, 5.0}, EngagedArc{-1.0, 0.5, 5.0, 4.0}, EngagedArc{nan, 0.5, 0.0, 5.0}}) {
     CHECK_THROWS_AS((void)force.figures(Arcs{bad}, 100.0), Error);
+    CHECK_THROWS_AS((void)force.figures(Arcs{good[0], bad}, 100.0), Error);
+    CHECK(force.figures({}, 100.0).peak_resultant_n == 0.0);
   }
   // Azimuths that no integer can count, and more flutes than a spindle's turn can hold.
   const ToolBeam beam{.overhang_mm = 40.0,
@@ -406,6 +408,7 @@ TEST_CASE("cutting force: refusals") {
     CHECK_THROWS_AS((void)force.deflection_um(good, 100.0, turned, 1.0, beam), Error);
     CHECK_THROWS_AS((void)force.force_centre_mm(good, 100.0, turned, 40.0), Error);
   }
+  CHECK_THROWS_AS((void)force.deflection_um(good, 100.0, 0.0, nan, beam), Error);
   MillingForce wound({.diameter_mm = 8.0, .flutes = 2, .helix_rad = 0.8}, constant, 1000.0);
   CHECK_THROWS_AS((void)wound.figures(Arcs{{-1.0, 0.5, 0.0, 1e12}}, 100.0), Error);
   CHECK_THROWS_AS((void)wound.curve(Arcs{{-1.0, 0.5, 0.0, 1e12}}, 100.0, 4), Error);

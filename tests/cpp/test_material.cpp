@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "milling/material_layer.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/milling/material.hpp"
 
@@ -235,5 +236,5 @@ TEST_CASE("layers end where a program cuts on a level, and are thin where it ram
   CHECK(message_of([] { (void)layer_borders({}, -1.0, 0.0, 0.0); }) ==
         "layers of ramps are 0 mm thick, must be above 0");
   CHECK(message_of([] { (void)layer_borders({}, -1.0, 0.0, 1e-300); }) ==
-        "a layer of 1e-300 mm cuts 1 mm into 1e+300 pieces, limit 1e+08");
+        "a layer of 1e-300 mm cuts 1 mm into 1e+300 pieces, limit 1e+09");
 }

@@ -158,4 +158,8 @@ TEST_CASE("modal fit: refusals") {
   CHECK_THROWS_AS((void)shapegcode::fit_modes(taps, period_s, start, noise), Error);
   const std::vector<double> two{1.0, 2.0};
   CHECK_THROWS_AS((void)shapegcode::modal_response(force, period_s, start, two, Quantity::velocity), Error);
+  const std::vector<double> one{1.0};
+  CHECK_THROWS_WITH_AS((void)shapegcode::modal_response(std::vector<double>{0.0, std::nan("")}, period_s, start, one,
+                                                        Quantity::velocity),
+                       "force is not finite at entry 1", Error);
 }

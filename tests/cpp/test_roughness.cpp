@@ -85,6 +85,10 @@ TEST_CASE("roughness: cut-offs of the standard, and what is too short") {
   CHECK_FALSE(standard_cutoff_mm(1.0, 0.05).has_value());
   CHECK_THROWS_AS(static_cast<void>(measure_roughness(wave(1.0, 1.0, 200), spacing, 0.8)), shapegcode::Error);
   CHECK_THROWS_AS(static_cast<void>(gaussian_low_pass(wave(1.0, 1.0), 0.0, 0.8)), shapegcode::Error);
+  CHECK_THROWS_WITH_AS(static_cast<void>(gaussian_low_pass(wave(1.0, 1.0), 1e-7, -1e-7)),
+                       "spacing 1e-07 mm and cut-off -1e-07 mm must be > 0", shapegcode::Error);
+  CHECK_THROWS_WITH_AS(static_cast<void>(gaussian_low_pass(std::vector<double>{0.0, std::nan("")}, 0.01, 0.8)),
+                       "the profile is not finite at station 1", shapegcode::Error);
   // A cut-off of more spacings than an integer counts: the mean, and no profile is long enough.
   CHECK(gaussian_low_pass(std::vector<double>{1.0, 3.0}, 1e-300, 1e300) == std::vector<double>{2.0, 2.0});
   CHECK_THROWS_AS(static_cast<void>(measure_roughness(wave(1.0, 1.0, 200), 1e-300, 0.8)), shapegcode::Error);

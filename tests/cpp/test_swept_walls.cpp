@@ -164,6 +164,11 @@ TEST_CASE("walls: a swing at the end widens the slot there and nowhere else") {
 }
 
 TEST_CASE("walls: bounded by stations; refuses what is no tool; a plunge has no wall") {
+  const Path metre({make_line({0, 0, 0}, {1000, 0, 0}, 10.0)});
+  CHECK_THROWS_WITH_AS((void)SweptWalls(metre, shapegcode::path_sections(metre), 1e-12, 0.1),
+                       "tool radius 1e-12 mm on a path of 1000 mm: 1e+15 radii, limit 1e+08", shapegcode::Error);
+  const Path spiral({make_arc({0.01, 0, 0}, {1e-200, 0, 0}, {0, 0, 0}, 2.0 * pi, 2, 10.0)});
+  CHECK(SweptWalls(spiral, shapegcode::path_sections(spiral, 0.0), 1.5, 0.01).station_count(0) == 4);
   const Path path({make_line({0, 0, 0}, {1000, 0, 0}, 100.0)});
   const std::vector<shapegcode::PathSection> sections = path_sections(path);
   CHECK(SweptWalls(path, sections, 1.5, 0.05, 1000).station_count(0) <= 1000);

@@ -80,9 +80,8 @@ OscillatorMotion wilson_theta(const EquivalentOscillator& oscillator, std::span<
   if (!std::isfinite(displacement_m) || !std::isfinite(velocity_m_per_s)) {
     refuse("start is {} m, {} m/s, must be finite", displacement_m, velocity_m_per_s);
   }
-  if (force_n.empty() || !std::ranges::all_of(force_n, [](double force) { return std::isfinite(force); })) {
-    refuse("force is empty or holds a value that is not finite");
-  }
+  if (force_n.empty()) refuse("force is empty");
+  check_finite(force_n, "force");
   const double m = oscillator.mass_kg;
   const double c = oscillator.damping_n_s_per_m;
   const double k = oscillator.stiffness_n_per_m;

@@ -417,6 +417,8 @@ Eigen::VectorXd modal_response(std::span<const double> force_n, double period_s,
   if (inverse_mass.size() != modes.omega_rad_s.size()) {
     refuse("{} residues for {} modes", inverse_mass.size(), modes.omega_rad_s.size());
   }
+  check_finite(force_n, "force");
+  check_finite(inverse_mass, "1/m");
   ModalFit fit;
   fit.omega_rad_s = modes.omega_rad_s;
   fit.damping_ratio = modes.damping_ratio;

@@ -42,6 +42,11 @@ void check_taps(std::span<const TapSignals> taps, std::size_t least_samples) {
   }
 }
 
+void check_finite(std::span<const double> values, const char* what) {
+  const auto bad = std::ranges::find_if(values, [](double value) { return !std::isfinite(value); });
+  if (bad != values.end()) refuse("{} is not finite at entry {}", what, bad - values.begin());
+}
+
 void check_period(double period_s) {
   if (!(period_s > 0.0) || !std::isfinite(period_s)) {
     refuse("time between samples is {} s, must be finite and above 0", period_s);

@@ -15,6 +15,9 @@ void check_responses(Responses responses, std::size_t least_samples);
 /// As check_responses, and if force and response differ in length or a record's force is zero throughout.
 void check_taps(std::span<const TapSignals> taps, std::size_t least_samples);
 
+/// Throws Error(argument), naming the entry, on a value that is not finite.
+void check_finite(std::span<const double> values, const char* what);
+
 /// Throws Error(argument) unless the time between samples, in s, is finite and above 0.
 void check_period(double period_s);
 

@@ -98,6 +98,8 @@ CircleFit fit_circle(std::span<const Vector2d> points_mm) {
   if (points_mm.size() < 3) {
     refuse("{} points given, a circle needs at least 3", points_mm.size());
   }
+  const auto bad = std::ranges::find_if(points_mm, [](const Vector2d& point) { return !point.allFinite(); });
+  if (bad != points_mm.end()) refuse("point {} is not finite", bad - points_mm.begin());
   Vector2d mean = Vector2d::Zero();
   for (const Vector2d& point : points_mm) mean += point;
   mean /= static_cast<double>(points_mm.size());

@@ -50,6 +50,8 @@ std::vector<double> gaussian_low_pass(std::span<const double> profile_mm, double
   if (!(spacing_mm > 0.0 && cutoff_mm > 0.0 && std::isfinite(cutoff_mm))) {
     refuse("spacing {} mm and cut-off {} mm must be > 0", spacing_mm, cutoff_mm);
   }
+  const auto bad = std::ranges::find_if(profile_mm, [](double value) { return !std::isfinite(value); });
+  if (bad != profile_mm.end()) refuse("the profile is not finite at station {}", bad - profile_mm.begin());
   const double alpha = std::sqrt(std::numbers::ln2 / std::numbers::pi);
   // Weights further away than the profile is long are never asked for.
   std::vector<double> weights(whole_spacings(cutoff_mm, spacing_mm, profile_mm.size()) + 1);

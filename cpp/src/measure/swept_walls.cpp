@@ -17,6 +17,8 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double no_wall = std::numeric_limits<double>::quiet_NaN();
 // The programmed path is swept in chords that leave an arc by no more than this.
 constexpr double chord_error_mm = 1e-5;
+constexpr double least_chord_mm = 1e-6;  // also where a spiral ends in its centre
+constexpr double most_discs = 1e8;       // tool radii along the path
 // How far a disc reaches depends on the largest deviation; so far it may have been less than it will be.
 constexpr double least_deviation_mm = 0.01;
 constexpr double growth = 2.0;
@@ -42,6 +44,10 @@ SweptWalls::SweptWalls(const Path& path, const std::vector<PathSection>& section
   if (!(tool_radius_mm > 0.0 && std::isfinite(tool_radius_mm) && spacing_mm > 0.0 && std::isfinite(spacing_mm))) {
     refuse("tool radius {} mm and station spacing {} mm must be > 0", tool_radius_mm, spacing_mm);
   }
+  if (path.length_mm() / tool_radius_mm > most_discs) {
+    refuse("tool radius {} mm on a path of {} mm: {:g} radii, limit {:g}", tool_radius_mm, path.length_mm(),
+           path.length_mm() / tool_radius_mm, most_discs);
+  }
   double length = 0.0;
   for (const PathSection& section : sections) length += section.length_mm();
   deviation_ = least_deviation_mm;
@@ -66,7 +72,8 @@ void SweptWalls::take_reference(const Path& path) {
     const Segment& segment = path[i];
     double step = segment.length_mm;
     if (segment.kind == SegmentKind::arc) {
-      step = std::min(step, std::sqrt(8.0 * std::min(segment.start_radius_mm, segment.end_radius_mm) * chord_error_mm));
+      const double narrowest = std::min(segment.start_radius_mm, segment.end_radius_mm);
+      step = std::min(step, std::max(std::sqrt(8.0 * narrowest * chord_error_mm), least_chord_mm));
     }
     const double pieces = std::max(1.0, std::ceil(segment.length_mm / std::min(step, radius_)));
     for (double k = 0.0; k < pieces; ++k) {

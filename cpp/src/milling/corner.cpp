@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "milling/checks.hpp"
+#include "milling/tool_step.hpp"
 #include "shapegcode/milling/force.hpp"
 
 namespace shapegcode {

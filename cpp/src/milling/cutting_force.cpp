@@ -24,12 +24,6 @@ constexpr double pieces_per_overhang = 10.0;  // of a load on the beam
 constexpr double most_turns = 1000.0;         // of a flute around the tool
 constexpr double largest_angle_rad = 1e9;     // beyond it too little is left of an angle within one turn
 
-bool same(std::span<const EngagedArc> a, const std::vector<EngagedArc>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const EngagedArc& p, const EngagedArc& q) {
-    return p.from_rad == q.from_rad && p.to_rad == q.to_rad && p.bottom_mm == q.bottom_mm && p.top_mm == q.top_mm;
-  });
-}
-
 bool same(const ToolBeam& a, const ToolBeam& b) {
   return a.overhang_mm == b.overhang_mm && a.fluted_length_mm == b.fluted_length_mm &&
          a.effective_diameter_mm == b.effective_diameter_mm && a.shank_diameter_mm == b.shank_diameter_mm &&
@@ -150,9 +144,9 @@ struct MillingForce::Impl {
     if (!(feed_mm_per_min >= 0.0 && std::isfinite(feed_mm_per_min))) {
       refuse("feed is {} mm/min, must be 0 or above", feed_mm_per_min);
     }
-    if (!same(engagement, arcs)) {
+    if (!detail::same_arcs(engagement, arcs)) {
+      for (const EngagedArc& arc : engagement) check_arc(arc);  // before anything is changed
       pieces.clear();
-      arcs.clear();  // should the check throw
       take_arcs(engagement);
       arcs.assign(engagement.begin(), engagement.end());
       built = false;
@@ -173,21 +167,24 @@ struct MillingForce::Impl {
     return true;
   }
 
+  void check_arc(const EngagedArc& arc) const {
+    const bool fits = arc.from_rad >= -half_pi - arc_slack_rad && arc.to_rad <= half_pi + arc_slack_rad &&
+                      arc.bottom_mm >= 0.0 && arc.from_rad <= arc.to_rad && arc.bottom_mm <= arc.top_mm &&
+                      std::isfinite(arc.top_mm);
+    if (!fits) {
+      refuse("engaged arc {} ... {} rad, height {} ... {} mm, must rise within -pi/2 ... pi/2 and above the tip",
+             arc.from_rad, arc.to_rad, arc.bottom_mm, arc.top_mm);
+    }
+    const double turns = set.lag_rad_per_mm * arc.top_mm / (2.0 * std::numbers::pi);
+    if (turns > most_turns) {
+      refuse("a flute winds {:g} times around the tool up to {} mm, limit {}", turns, arc.top_mm, most_turns);
+    }
+  }
+
   void take_arcs(std::span<const EngagedArc> engagement) {
     double cosine = 0.0;
     double extent = 0.0;
     for (const EngagedArc& arc : engagement) {
-      const bool fits = arc.from_rad >= -half_pi - arc_slack_rad && arc.to_rad <= half_pi + arc_slack_rad &&
-                        arc.bottom_mm >= 0.0 && arc.from_rad <= arc.to_rad && arc.bottom_mm <= arc.top_mm &&
-                        std::isfinite(arc.top_mm);
-      if (!fits) {
-        refuse("engaged arc {} ... {} rad, height {} ... {} mm, must rise within -pi/2 ... pi/2 and above the tip",
-               arc.from_rad, arc.to_rad, arc.bottom_mm, arc.top_mm);
-      }
-      const double turns = set.lag_rad_per_mm * arc.top_mm / (2.0 * std::numbers::pi);
-      if (turns > most_turns) {
-        refuse("a flute winds {:g} times around the tool up to {} mm, limit {}", turns, arc.top_mm, most_turns);
-      }
       const bool mirrored = mirror < 0.0;
       const double from = std::max(mirrored ? -arc.to_rad : arc.from_rad, -half_pi);
       const double to = std::min(mirrored ? -arc.from_rad : arc.to_rad, half_pi);
@@ -415,6 +412,7 @@ Eigen::Vector2d MillingForce::deflection_um(std::span<const EngagedArc> arcs, do
                                             double height_mm, const ToolBeam& beam) {
   check(beam);
   check_angle(turned_rad);
+  if (!std::isfinite(height_mm)) refuse("height above the tip is {} mm, must be finite", height_mm);
   Impl& impl = *impl_;
   if (!impl.take(arcs, feed_mm_per_min)) return Eigen::Vector2d::Zero();
   impl.check_below_clamp(beam.overhang_mm);

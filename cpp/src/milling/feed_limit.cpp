@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/refuse.hpp"
+#include "milling/checks.hpp"
 
 namespace shapegcode {
 
@@ -109,12 +109,6 @@ void check_range(double lowest, double highest) {
   }
 }
 
-bool same_arcs(std::span<const EngagedArc> a, std::span<const EngagedArc> b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const EngagedArc& p, const EngagedArc& q) {
-    return p.from_rad == q.from_rad && p.to_rad == q.to_rad && p.bottom_mm == q.bottom_mm && p.top_mm == q.top_mm;
-  });
-}
-
 }  // namespace
 
 void check(const FeedLimits& limits) {
@@ -161,7 +155,7 @@ std::vector<LimitedFeed> largest_feeds(MillingForce& force, const EngagementTrac
       feeds.push_back({highest, FeedLimit::none, true});
       continue;
     }
-    if (i > 0 && level == track.horizontal[i - 1] && same_arcs(arcs, track.arcs_of(i - 1))) {
+    if (i > 0 && level == track.horizontal[i - 1] && detail::same_arcs(arcs, track.arcs_of(i - 1))) {
       feeds.push_back(feeds.back());
       continue;
     }

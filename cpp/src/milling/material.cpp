@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "milling/checks.hpp"
+#include "milling/material_layer.hpp"
 
 namespace shapegcode {
 namespace {
@@ -58,7 +59,7 @@ void check_borders(std::span<const double> borders) {
 
 Material::Material(std::span<const Ring> rings, std::span<const double> borders_mm, double resolution_mm,
                    std::size_t memory_limit_bytes)
-    : borders_(borders_mm.begin(), borders_mm.end()), memory_limit_(memory_limit_bytes) {
+    : borders_(borders_mm.begin(), borders_mm.end()), resolution_(resolution_mm), memory_limit_(memory_limit_bytes) {
   check_rings(rings);
   check_borders(borders_mm);
   check_positive(resolution_mm, "resolution", "mm");
@@ -94,6 +95,18 @@ Material::Material(std::span<const Ring> rings, std::span<const double> borders_
   if (!layers_.front().has_material()) {
     refuse("the outlines of the stock enclose no material at a resolution of {} mm", resolution_mm);
   }
+}
+
+Material::~Material() = default;
+Material::Material(const Material& other) = default;
+Material::Material(Material&& other) noexcept = default;
+Material& Material::operator=(const Material& other) = default;
+Material& Material::operator=(Material&& other) noexcept = default;
+
+const MaterialLayer& Material::layer(std::size_t i) const noexcept { return layers_[i]; }
+
+double Material::distance_mm(std::size_t layer, double x_mm, double y_mm) const noexcept {
+  return layers_[layer].distance_mm(x_mm, y_mm);
 }
 
 std::size_t Material::lowest_cut(double tip_mm) const noexcept {

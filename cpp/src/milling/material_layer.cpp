@@ -1,4 +1,4 @@
-#include "shapegcode/milling/material.hpp"
+#include "milling/material_layer.hpp"
 
 #include <algorithm>
 #include <cmath>

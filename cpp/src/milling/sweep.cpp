@@ -14,6 +14,7 @@
 
 #include "milling/azimuth.hpp"
 #include "milling/checks.hpp"
+#include "milling/material_layer.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {

@@ -80,7 +80,7 @@ struct ModalFit {
                                  const ModalFitOptions& options);
 
 /// Response of given modes to a force, in the unit of `quantity`: the model of fit_modes. Throws Error(argument) on
-/// unequal numbers of parameters or a value outside its range.
+/// unequal numbers of parameters, or a value outside its range or not finite.
 [[nodiscard]] Eigen::VectorXd modal_response(std::span<const double> force_n, double period_s,
                                              const NaturalModes& modes, std::span<const double> inverse_mass,
                                              Quantity quantity, ForceHold hold = ForceHold::linear);

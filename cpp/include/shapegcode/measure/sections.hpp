@@ -24,7 +24,7 @@ struct CircleFit {
 
 /// Geometric fit: the start is Pratt's algebraic fit (Chernov, Circular and Linear Regression, 2010, section 5.6),
 /// which also holds on short arcs; Gauss-Newton steps with Levenberg's damping follow. Throws Error(argument) on fewer
-/// than three points or points on a line, Error(numeric) if the steps do not converge.
+/// than three points, one that is not finite, or points on a line, Error(numeric) if the steps do not converge.
 [[nodiscard]] CircleFit fit_circle(std::span<const Eigen::Vector2d> points_mm);
 
 /// Figures of a profile after ISO 4287 (ISO 21920-2), in mm.
@@ -39,7 +39,7 @@ struct Roughness {
 /// Gaussian low-pass of ISO 16610-21: weight exp(-pi (x / (alpha L))^2) / (alpha L), alpha = sqrt(ln 2 / pi), so that a
 /// wave of length L comes through with one half. The weights end at one L to either side (where they are 1e-6 of the
 /// middle) and are made to sum to one, also where the profile ends within them. Throws Error(argument) unless spacing
-/// and cut-off are > 0.
+/// and cut-off are > 0 and the profile is finite.
 [[nodiscard]] std::vector<double> gaussian_low_pass(std::span<const double> profile_mm, double spacing_mm,
                                                     double cutoff_mm);
 
@@ -146,7 +146,8 @@ class SweptWalls {
   };
 
   /// `spacing_mm` is the largest distance of two stations; it becomes wider where the path would need more than
-  /// `most_stations`. Throws Error(argument) on a tool radius or spacing that is not > 0.
+  /// `most_stations`. Throws Error(argument) on a tool radius or spacing that is not > 0, or a path of more than 1e8
+  /// tool radii.
   SweptWalls(const Path& path, const std::vector<PathSection>& sections, double tool_radius_mm, double spacing_mm,
              std::size_t most_stations = 500'000);
 

@@ -88,8 +88,8 @@ struct FeedStretch {
 /// lowest feed of its stations. The borders are chosen together (dynamic programming), with a charge for each of one
 /// percent of the shortest stretch's time, so that none is made for nothing. O(stations + length).
 ///
-/// Throws Error(argument) on stations or blocks that do not ascend to one end, a feed that is not above 0, or options
-/// outside their range.
+/// Throws Error(argument) on stations or blocks that do not ascend to one end above 0, a feed that is not above 0, or
+/// options outside their range.
 [[nodiscard]] std::vector<FeedStretch> schedule_feed(std::span<const FeedBlock> blocks, const FeedStations& stations,
                                                      const FeedScheduleOptions& options);
 
