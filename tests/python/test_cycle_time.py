@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Callable
@@ -304,6 +305,7 @@ VARIANTS = [
 ]  # fmt: skip
 
 
+@functools.cache
 def program(path: Path) -> tuple[sg.Program, sg.Machine]:
     of = machine_with(SAMPLE_KEYS.get(path.name))
     return sg.Program.read(path, of), of
