@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import functools
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -39,9 +41,14 @@ MOVE_KINDS = {_core.SegmentKind.rapid: "rapid", _core.SegmentKind.line: "line", 
 HEADER_LINE = re.compile(r"\([A-Z0-9 .-]{1,60}\)\r?")
 
 
+@functools.cache
+def _builtin(name: str) -> dict[str, Any]:
+    return sg.Machine.load(name).model_dump(exclude_none=True)
+
+
 def machine_with(keys: Mapping[str, Any] | None = None, base: str = "vx500") -> sg.Machine:
     """A built-in machine with other values for some dotted keys."""
-    data = sg.Machine.load(base).model_dump(exclude_none=True)
+    data = copy.deepcopy(_builtin(base))
     for key, value in (keys or {}).items():
         *tables, last = key.split(".")
         table = data

@@ -22,6 +22,7 @@ from shapegcode.cli import main
 
 REJECTED = Path(__file__).parents[1] / "rejected"
 CASES = sorted(path.stem for path in REJECTED.glob("*.nc"))
+PLAIN = machine_with()
 GOOD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X10.F600\nY10.\nG0Z50.\nM30\n%\n"
 
 
@@ -364,7 +365,7 @@ def test_many_changed_bytes_never_crash() -> None:
 @settings(max_examples=200, suppress_health_check=list(HealthCheck))
 @given(st.binary(max_size=300))
 def test_binary_never_crashes(data: bytes) -> None:
-    survives(data, machine_with())
+    survives(data, PLAIN)
 
 
 LETTERS = st.sampled_from(
@@ -379,8 +380,22 @@ NUMBERS = st.one_of(
 )
 
 
-@settings(max_examples=200, suppress_health_check=list(HealthCheck))
-@given(st.lists(st.tuples(LETTERS, NUMBERS), max_size=60))
-def test_words_at_random_never_crash(words: list[tuple[str, str]]) -> None:
+WORDS = st.lists(st.tuples(LETTERS, NUMBERS), max_size=60)
+
+
+def words_survive(words: list[tuple[str, str]]) -> None:
     body = "".join(a + b for a, b in words)
-    survives(f"%\nG21G17G90G94\nG0X0Y0Z0F500.\n{body}\nM30\n%\n".encode(), machine_with())
+    survives(f"%\nG21G17G90G94\nG0X0Y0Z0F500.\n{body}\nM30\n%\n".encode(), PLAIN)
+
+
+@settings(max_examples=60, suppress_health_check=list(HealthCheck))
+@given(WORDS)
+def test_words_at_random_never_crash(words: list[tuple[str, str]]) -> None:
+    words_survive(words)
+
+
+@pytest.mark.slow
+@settings(max_examples=200, suppress_health_check=list(HealthCheck))
+@given(WORDS)
+def test_many_words_at_random_never_crash(words: list[tuple[str, str]]) -> None:
+    words_survive(words)

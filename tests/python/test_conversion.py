@@ -50,7 +50,8 @@ def sample(name: str) -> Judged:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "BOTTLE.NC" else name for name in SAMPLES]
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow) if name in ("BOTTLE.NC", "PARALLEL.NC") else name for name in SAMPLES],
 )
 def test_sample_program(name: str) -> None:
     """Text, states, end points, sweeps and N words (in `convert`); then block durations and the report's figures."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Callable
@@ -89,12 +90,8 @@ def sequences(draw: st.DrawFn) -> tuple[_core.ControllerModel, list[Vector], lis
     return made, kernels, found
 
 
-@settings(max_examples=1000, deadline=None)
-@given(sequences())
-def test_block_overlap_is_the_moving_average(
-    case: tuple[_core.ControllerModel, list[Vector], list[tuple[Vector, Vector]]],
-) -> None:
-    """10 000 sequences: the closed form is the time until the convolved increments end, to one period."""
+def check_block_overlap(case: tuple[_core.ControllerModel, list[Vector], list[tuple[Vector, Vector]]]) -> None:
+    """The closed form is the time until the convolved increments end, to one period."""
     made, kernels, found = case
     for lengths, feeds in found:
         way = increments(lengths, feeds, made.period_s, made.block_end)
@@ -104,6 +101,23 @@ def test_block_overlap_is_the_moving_average(
         moving_s = (np.flatnonzero(way > 0.0)[-1] + 1) * made.period_s
         closed_s = _core.block_overlap_time_s(lengths, feeds, made)
         assert abs(closed_s - moving_s) <= made.period_s * (1.0 + 1e-6)
+
+
+@settings(max_examples=200, deadline=None)
+@given(sequences())
+def test_block_overlap_is_the_moving_average(
+    case: tuple[_core.ControllerModel, list[Vector], list[tuple[Vector, Vector]]],
+) -> None:
+    check_block_overlap(case)
+
+
+@pytest.mark.slow
+@settings(max_examples=1000, deadline=None)
+@given(sequences())
+def test_block_overlap_of_10000_sequences_is_the_moving_average(
+    case: tuple[_core.ControllerModel, list[Vector], list[tuple[Vector, Vector]]],
+) -> None:
+    check_block_overlap(case)
 
 
 @given(
@@ -291,6 +305,7 @@ VARIANTS = [
 ]  # fmt: skip
 
 
+@functools.cache
 def program(path: Path) -> tuple[sg.Program, sg.Machine]:
     of = machine_with(SAMPLE_KEYS.get(path.name))
     return sg.Program.read(path, of), of

@@ -28,9 +28,8 @@ def _compare(found: dict[str, list[Outcome]]) -> None:
     assert sum(row.size for row in vibration) < 1.01 * sum(row.size for row in nearest)
 
 
-@pytest.mark.parametrize("period_s", PERIODS_S)
-def test_a_third_of_the_residual_is_left(period_s: float) -> None:
-    _compare(outcomes(range(12), period_s))
+def test_a_third_of_the_residual_is_left() -> None:
+    _compare(outcomes(range(12), 0.005))
 
 
 @pytest.mark.slow

@@ -194,7 +194,13 @@ def test_same_path_read(name: str, tmp_path: Path) -> None:
     assert agree(program, for_rs274(expanded, machine), machine, tmp_path) > 0
 
 
-@pytest.mark.parametrize("name", [*SAMPLES, *SHAPED])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow) if name in ("BOTTLE.NC", "PARALLEL.NC") else name
+        for name in (*SAMPLES, *SHAPED)
+    ],
+)
 def test_same_path_written(name: str, tmp_path: Path) -> None:
     machine = machine_with({"input.compensation": "expand", **SETTINGS.get(name, {})})
     emitted = sg.convert(sg.Program.from_text(source(name), machine, source=name), machine).text

@@ -221,7 +221,7 @@ def brute_force(first: Mode, second: Mode, max_duration_s: float, points: int) -
     [
         (Mode(1.0, 0.0), Mode(4.0, 0.0), 0.8, 7),
         (Mode(131.0, 0.02), Mode(46.0, 0.02), 0.03, 9),
-        (Mode(1.0, 0.3), Mode(4.7, 0.1), 1.0, None),
+        pytest.param(Mode(1.0, 0.3), Mode(4.7, 0.1), 1.0, None, marks=pytest.mark.slow),
         (Mode(1.0, 0.05), Mode(2.3, 0.0), 1.5, None),
     ],
 )
