@@ -1,5 +1,6 @@
 #include "shapegcode/minimal_shapers.hpp"
 
+#include <fmt/format.h>
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
@@ -8,7 +9,6 @@
 #include <limits>
 #include <numbers>
 #include <optional>
-#include <sstream>
 
 #include "shapegcode/error.hpp"
 #include "shaper/minimal/minimal_system.hpp"
@@ -53,22 +53,18 @@ struct Curve {
 };
 
 void check_ratios(std::span<const double> ratios) {
-  std::ostringstream message;
-  message.precision(12);
   if (ratios.empty()) {
-    message << "a map over the frequency ratio needs at least one ratio: 0 given";
-  } else {
-    const auto bad = std::ranges::find_if(ratios, [](double each) { return !(std::isfinite(each) && each > 0.0); });
-    const auto falling = std::ranges::adjacent_find(ratios, [](double a, double b) { return !(a < b); });
-    if (bad != ratios.end()) {
-      message << "frequency ratios are finite and above 0: one is " << *bad;
-    } else if (falling != ratios.end()) {
-      message << "frequency ratios ascend: " << *(falling + 1) << " follows " << *falling;
-    } else {
-      return;
-    }
+    throw Error(ErrorKind::argument, "a map over the frequency ratio needs at least one ratio: 0 given");
   }
-  throw Error(ErrorKind::argument, message.str());
+  const auto bad = std::ranges::find_if(ratios, [](double each) { return !(std::isfinite(each) && each > 0.0); });
+  if (bad != ratios.end()) {
+    throw Error(ErrorKind::argument, fmt::format("frequency ratios are finite and above 0: one is {:.12g}", *bad));
+  }
+  const auto falling = std::ranges::adjacent_find(ratios, [](double a, double b) { return !(a < b); });
+  if (falling != ratios.end()) {
+    throw Error(ErrorKind::argument,
+                fmt::format("frequency ratios ascend: {:.12g} follows {:.12g}", *(falling + 1), *falling));
+  }
 }
 
 class Tracer {
