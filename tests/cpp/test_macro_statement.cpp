@@ -1,7 +1,6 @@
 #include <doctest/doctest.h>
 
 #include <cstdint>
-#include <random>
 #include <string>
 #include <string_view>
 
@@ -13,7 +12,6 @@ using shapegcode::Error;
 using shapegcode::ErrorKind;
 using shapegcode::execute_assignment;
 using shapegcode::go_to_target;
-using shapegcode::has_macro;
 using shapegcode::MacroStatement;
 using shapegcode::MacroStatementKind;
 using shapegcode::MacroValue;
@@ -65,64 +63,6 @@ void check_kind(std::string_view line, MacroStatementKind kind, std::string_view
 }
 
 }  // namespace
-
-TEST_CASE("has_macro: signs and keywords outside comments") {
-  for (const char* line : {"", "%", "N10 X1.5 Y2.(TEXT [A])", "G1X1.Y2.F100", "O0001(IF [#1 EQ 2] GOTO 3)", "(#1=2)",
-                           "(A)(B)G1", "/N10 G0", "G01 X 1 Y 2 ,R5. ,C2", "g1x1y1", "X1(AB", "(AB", "X-.5Y+3*",
-                           "G1(A)X1", "M30;", "N1 (A) (BC) X1", "\xff\xfe"}) {
-    CAPTURE(line);
-    CHECK_FALSE(has_macro(line));
-  }
-  for (const char* line : {"#1=2", "X#1", "X[1]", "=", "GOTO 10", "N10 END1", "goto10", "IF", "(A)#1", "X1(A) DO 1",
-                           "POPEN", "(A)AB", "WHILE[#1LT2]DO1", "X1 Y2 (TEXT) F[3]", "N1XX"}) {
-    CAPTURE(line);
-    CHECK(has_macro(line));
-  }
-}
-
-TEST_CASE("has_macro agrees with its definition read one character at a time") {
-  const auto definition = [](std::string_view line) {
-    bool in_comment = false;
-    bool after_letter = false;
-    for (const char c : line) {
-      const bool letter = (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
-      if (in_comment) {
-        in_comment = c != ')';
-        continue;
-      }
-      if (c == '(') {
-        in_comment = true;
-      } else if (c == '#' || c == '[' || c == '=' || (letter && after_letter)) {
-        return true;
-      }
-      after_letter = letter;
-    }
-    return false;
-  };
-  std::mt19937 random(3);
-  for (int value = 0; value < 256; ++value) {
-    for (std::size_t at = 0; at < 17; ++at) {
-      std::string line(17, '1');
-      line[at] = static_cast<char>(value);
-      CHECK(has_macro(line) == definition(line));
-    }
-  }
-  int with = 0;
-  constexpr int count = 200000;
-  for (int n = 0; n < count; ++n) {
-    static constexpr std::string_view plain = "0123456789.-+ /;,%)@`{Zz\xe1\xdb";
-    static constexpr std::string_view telling = "#[=((AZaz";
-    std::string line(random() % 40, ' ');
-    for (char& c : line) {
-      c = random() % 10 != 0 ? plain[random() % plain.size()] : telling[random() % telling.size()];
-    }
-    with += definition(line) ? 1 : 0;
-    CAPTURE(line);
-    REQUIRE(has_macro(line) == definition(line));
-  }
-  CHECK(with > count / 10);
-  CHECK(with < count * 9 / 10);
-}
 
 TEST_CASE("kinds of statements") {
   check_kind("", MacroStatementKind::nc_block);

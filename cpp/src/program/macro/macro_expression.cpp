@@ -5,14 +5,15 @@
 #include <string>
 
 #include "program/macro/macro_text.hpp"
+#include "program/text/number_scan.hpp"
 
 namespace shapegcode {
 namespace macro {
 
 namespace {
 
-constexpr int max_brackets = 5;          // alarm 118
-constexpr int max_constant_digits = 12;  // 30i and 0i-D; older controls take 8
+constexpr int max_brackets = 5;               // alarm 118
+constexpr unsigned max_constant_digits = 12;  // 30i and 0i-D; older controls take 8
 constexpr int max_variable_number = 999999;
 
 struct Value {
@@ -133,14 +134,11 @@ class Parser {
     if (i_ >= text_.size() || !is_digit(text_[i_])) {
       fail(114, "'#' is followed by " + name_at(text_, i_) + ": a number or '[' is expected", line_, start);
     }
-    int number = 0;
-    for (; i_ < text_.size() && is_digit(text_[i_]); ++i_) {
-      number = number * 10 + (text_[i_] - '0');
-      if (number > max_variable_number) {
-        fail(115, "variable number above " + std::to_string(max_variable_number), line_, start);
-      }
+    const std::int64_t number = scan_whole(text_, i_);
+    if (number > max_variable_number) {
+      fail(115, fmt::format("variable number above {}", max_variable_number), line_, start);
     }
-    return number;
+    return static_cast<int>(number);
   }
 
   // i stands on '['; the level is not counted for the bracket of a condition.

@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <string>
 
 #include "program/macro/macro_text.hpp"
+#include "program/text/number_scan.hpp"
 
 namespace shapegcode {
 
@@ -46,33 +45,6 @@ Keyword keyword_of(std::string_view run) noexcept {
   }
   return Keyword::none;
 }
-
-// Eight characters at once, the first in the lowest byte: bit 7 of a byte tells what the character is.
-struct EightCharacters {
-  std::uint64_t letters;
-  std::uint64_t signs;
-  std::uint64_t comments;
-
-  static constexpr std::uint64_t ones = 0x0101010101010101U;
-  static constexpr std::uint64_t tops = 0x80U * ones;
-
-  explicit EightCharacters(const char* text) noexcept {
-    std::uint64_t bytes = 0;
-    std::memcpy(&bytes, text, sizeof bytes);
-    const std::uint64_t is_ascii = ~bytes & tops;
-    bytes &= ~tops;
-    const std::uint64_t small = bytes | (0x20U * ones);
-    letters = (small + (0x80U - 'a') * ones) & ~(small + (0x7fU - 'z') * ones) & is_ascii;
-    signs = (equal(bytes, '#') | equal(bytes, '[') | equal(bytes, '=')) & is_ascii;
-    comments = equal(bytes, '(') & is_ascii;
-  }
-
- private:
-  // Bit 7 where the seven bits of the byte are `c`; other bits mean nothing.
-  static std::uint64_t equal(std::uint64_t bytes, char c) noexcept {
-    return ~((bytes ^ (static_cast<std::uint64_t>(c) * ones)) + 0x7fU * ones);
-  }
-};
 
 // Blanks and comments.
 void skip_filling(std::string_view line, std::size_t& i, std::uint32_t line_number) {
@@ -151,11 +123,8 @@ void check_nc_block(std::string_view line, std::size_t i, std::uint32_t line_num
 void read_loop_number(std::string_view line, std::size_t i, std::uint32_t line_number, MacroStatement& statement) {
   skip_blanks(line, i);
   const std::size_t start = i;
-  std::int64_t number = 0;
-  for (; i < line.size() && is_digit(line[i]); ++i) {
-    number = std::min<std::int64_t>(number * 10 + (line[i] - '0'), max_sequence_number);
-  }
-  if (i == start) {
+  const std::int64_t number = scan_whole(line, i);
+  if (number < 0) {
     fail(126, "number 1 ... 3 expected behind DO or END, " + name_at(line, i) + " found", line_number, start);
   }
   if (number < 1 || number > 3) {
@@ -224,23 +193,16 @@ void read_head(std::string_view line, std::size_t& i, std::uint32_t line_number,
                     macro::column_of(i));
       }
       statement.optional_skip = true;
-      ++i;
-      if (i < line.size() && is_digit(line[i])) {
-        statement.skip_switch = line[i] == '0' ? 1 : line[i] - '0';
-        ++i;
-      }
+      statement.skip_switch = scan_skip_switch(line, i);
     } else if (upper(line[i]) == 'N' && statement.n_number < 0) {
       std::size_t k = i + 1;
       skip_blanks(line, k);
-      if (k == line.size() || !is_digit(line[k])) {
+      const std::int64_t number = scan_whole(line, k);
+      if (number < 0) {
         return;  // not a sequence number: refused with the words of the block
       }
-      std::int64_t number = 0;
-      for (; k < line.size() && is_digit(line[k]); ++k) {
-        number = number * 10 + (line[k] - '0');
-        if (number > max_sequence_number) {
-          fail(3, "sequence number of more than 8 digits", line_number, i);
-        }
+      if (number > max_sequence_number) {
+        fail(3, "sequence number of more than 8 digits", line_number, i);
       }
       statement.n_number = number;
       i = k;
@@ -267,42 +229,6 @@ void read_head(std::string_view line, std::size_t& i, std::uint32_t line_number,
 }
 
 }  // namespace
-
-bool has_macro(std::string_view line) noexcept {
-  const char* p = line.data();
-  const char* const end = p + line.size();
-  bool after_letter = false;
-  while (p != end) {
-    if constexpr (std::endian::native == std::endian::little) {
-      while (end - p >= 8) {
-        const EightCharacters eight(p);
-        if (eight.comments != 0) {
-          break;  // one by one up to the end of the comment
-        }
-        if (eight.signs != 0 || (eight.letters & ((eight.letters << 8) | (after_letter ? 0x80U : 0U))) != 0) {
-          return true;
-        }
-        after_letter = (eight.letters >> 63) != 0;
-        p += 8;
-      }
-    }
-    for (int k = 0; k < 8 && p != end; ++k) {
-      const char c = *p++;
-      if (c == '(') {
-        p = std::find(p, end, ')');
-        p += p != end ? 1 : 0;
-        after_letter = false;
-        break;
-      }
-      const bool is_one = is_letter(c);
-      if (c == '#' || c == '[' || c == '=' || (is_one && after_letter)) {
-        return true;
-      }
-      after_letter = is_one;
-    }
-  }
-  return false;
-}
 
 MacroStatement parse_statement(std::string_view line, std::uint32_t line_number) {
   MacroStatement statement;

@@ -10,10 +10,6 @@
 
 namespace shapegcode {
 
-/// Whether a line needs what stands below: outside comments it holds '#', '[', '=' or two letters in a row (a keyword).
-/// One pass without allocation: every line of a program goes through here.
-[[nodiscard]] bool has_macro(std::string_view line) noexcept;
-
 enum class MacroStatementKind : std::uint8_t {
   nc_block,    ///< words only; operands may be variables: `substitute`, or `parse_arguments` for a macro call
   assignment,  ///< #i = expression

@@ -1,8 +1,11 @@
 #include "program/macro/macro_text.hpp"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <charconv>
-#include <cmath>
+
+#include "program/text/number_scan.hpp"
 
 namespace shapegcode::macro {
 
@@ -52,35 +55,17 @@ void skip_comment(std::string_view text, std::size_t& i, std::uint32_t line) {
   i = close + 1;
 }
 
-Constant scan_constant(std::string_view text, std::size_t& i, std::uint32_t line, int max_digits) {
-  constexpr int max_decimals = 18;
+Constant scan_constant(std::string_view text, std::size_t& i, std::uint32_t line, unsigned max_digits) {
+  constexpr unsigned max_decimals = 18;
   const std::size_t start = i;
-  std::uint64_t mantissa = 0;
-  int decimals = 0;
-  int significant = 0;
-  bool has_digit = false;
-  Constant constant;
-  for (; i < text.size(); ++i) {
-    if (text[i] == '.' && !constant.has_point) {
-      constant.has_point = true;
-    } else if (is_digit(text[i])) {
-      has_digit = true;
-      significant += mantissa != 0 || text[i] != '0' ? 1 : 0;
-      decimals += constant.has_point ? 1 : 0;
-      if (significant > max_digits || decimals > max_decimals) {
-        fail(3, "number of more than " + std::to_string(max_digits) + " digits", line, start);
-      }
-      mantissa = mantissa * 10 + static_cast<unsigned>(text[i] - '0');
-    } else {
-      break;
-    }
+  const ScannedNumber number = scan_number(text, i);
+  if (number.significant > max_digits || number.decimals > max_decimals) {
+    fail(3, fmt::format("number of more than {} digits", max_digits), line, start);
   }
-  if (!has_digit) {
+  if (number.digits == 0) {
     fail(114, "number expected, " + name_at(text, start) + " found", line, start);
   }
-  // At most 12 digits over an exact power of ten: the correctly rounded decimal.
-  constant.value = static_cast<double>(mantissa) / std::pow(10.0, decimals);
-  return constant;
+  return {number.value, number.has_point};
 }
 
 }  // namespace shapegcode::macro

@@ -40,12 +40,12 @@ bool abbreviates(std::string_view run, std::string_view name) noexcept;
 /// `i` stands on '('; goes behind the ')'. Throws Error(program) if the comment does not close.
 void skip_comment(std::string_view text, std::size_t& i, std::uint32_t line);
 
-/// A constant without its sign: 12 significant digits at most.
+/// A constant without its sign, or alarm 3 if it has more than `max_digits` significant digits.
 struct Constant {
   double value = 0.0;
   bool has_point = false;
 };
-Constant scan_constant(std::string_view text, std::size_t& i, std::uint32_t line, int max_digits);
+Constant scan_constant(std::string_view text, std::size_t& i, std::uint32_t line, unsigned max_digits);
 
 /// `i` stands on '#': the number of the variable; `i` ends behind it.
 int variable_number(std::string_view text, std::size_t& i, std::uint32_t line, VariableAccess& variables);

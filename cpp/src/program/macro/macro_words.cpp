@@ -8,6 +8,7 @@
 #include "program/macro/macro_statement.hpp"
 #include "program/macro/macro_text.hpp"
 #include "program/text/number_format.hpp"
+#include "program/text/number_scan.hpp"
 
 namespace shapegcode {
 
@@ -125,11 +126,8 @@ bool has_dwell(std::string_view line) noexcept {
     } else if (upper(line[i]) == 'G') {
       std::size_t k = i + 1;
       skip_blanks(line, k);
-      while (k < line.size() && line[k] == '0') {
-        ++k;
-      }
-      if (k < line.size() && line[k] == '4' &&
-          (k + 1 == line.size() || (!is_digit(line[k + 1]) && line[k + 1] != '.'))) {
+      const ScannedNumber code = scan_number(line, k);
+      if (code.value == 4.0 && !code.has_point) {
         return true;
       }
     }
@@ -260,7 +258,7 @@ class ArgumentReader {
       if (line_[i] == '(') {
         macro::skip_comment(line_, i, line_number_);
       } else if (line_[i] == '/' && !called_) {
-        i += i + 1 < line_.size() && is_digit(line_[i + 1]) ? 2 : 1;
+        scan_skip_switch(line_, i);
       } else if (is_letter(line_[i])) {
         return true;
       } else {
@@ -283,7 +281,7 @@ class ArgumentReader {
       ++i;
       skip_blanks(line_, i);
     }
-    const macro::Constant constant = macro::scan_constant(line_, i, line_number_, max_digits);
+    const macro::Constant constant = macro::scan_constant(line_, i, line_number_, unsigned{max_digits});
     has_point = constant.has_point;
     return negative ? 0.0 - constant.value : constant.value;
   }

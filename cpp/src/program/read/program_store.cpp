@@ -5,37 +5,26 @@
 #include <cstring>
 
 #include "base/text.hpp"
+#include "program/text/number_scan.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode::detail {
 namespace {
 
-std::size_t skip_blanks(std::string_view line, std::size_t i) noexcept {
-  while (i < line.size() && (line[i] == ' ' || line[i] == '\t')) {
-    ++i;
-  }
-  return i;
-}
-
 // The number behind a letter at the start of a line ("N10", "/2 N10", "O0001"), -1 if the line has none.
 std::int64_t leading_number(std::string_view line, char letter) noexcept {
-  std::size_t i = skip_blanks(line, 0);
+  std::size_t i = 0;
+  skip_spaces(line, i);
   if (i < line.size() && line[i] == '/') {
-    ++i;
-    if (i < line.size() && is_digit(line[i])) {
-      ++i;
-    }
-    i = skip_blanks(line, i);
+    scan_skip_switch(line, i);
+    skip_spaces(line, i);
   }
   if (i >= line.size() || upper(line[i]) != letter) {
     return -1;
   }
-  i = skip_blanks(line, i + 1);
-  std::int64_t number = -1;
-  for (; i < line.size() && is_digit(line[i]) && number < 1'000'000'000; ++i) {
-    number = (number < 0 ? 0 : number) * 10 + (line[i] - '0');
-  }
-  return number;
+  ++i;
+  skip_spaces(line, i);
+  return scan_whole(line, i);
 }
 
 // The number of "DO m" or "END m" at the end of a macro line: 0 if it is none. A comment may hold anything.
@@ -212,7 +201,9 @@ void ProgramStore::add(const std::string& text, const TapeFrame& frame, std::uin
     const std::size_t newline = at == 0 ? std::string::npos : text.rfind('\n', at - 1);
     const std::size_t begin = std::max(newline == std::string::npos ? 0 : newline + 1, frame.begin);
     const std::int64_t number = leading_number(std::string_view(text).substr(begin, frame.end - begin), 'O');
-    if (number < 0 || skip_blanks(std::string_view(text).substr(0, at), begin) != at) {
+    std::size_t first = begin;
+    skip_spaces(text, first);
+    if (number < 0 || first != at) {
       continue;
     }
     counted.line += static_cast<std::uint32_t>(std::count(text.begin() + static_cast<std::ptrdiff_t>(counted.at),

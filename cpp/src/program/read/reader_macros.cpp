@@ -5,6 +5,7 @@
 #include "base/text.hpp"
 #include "program/macro/macro_expression.hpp"
 #include "program/read/reader_impl.hpp"
+#include "program/text/number_scan.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode::detail {
@@ -45,11 +46,10 @@ std::string number_text(double value) {
 
 // The number of "#500=..." at `at` if it outlives the program, else 0.
 int lasting_target(std::string_view text, std::size_t at) noexcept {
-  int target = 0;
-  for (std::size_t i = at + 1; i < text.size() && (is_digit(text[i]) || text[i] == ' ') && target < 1'000'000; ++i) {
-    target = text[i] == ' ' ? target : target * 10 + (text[i] - '0');
-  }
-  return target >= first_lasting_variable ? target : 0;
+  std::size_t i = at + 1;
+  skip_spaces(text, i);
+  const std::int64_t target = scan_whole(text, i);
+  return target >= first_lasting_variable && target < 1'000'000 ? static_cast<int>(target) : 0;
 }
 
 }  // namespace
@@ -154,13 +154,10 @@ std::string Reader::with_values(std::string_view text) {
       continue;
     }
     std::size_t k = i + 1;
-    int number = 0;
-    while (k < text.size() && is_digit(text[k]) && number < 1'000'000) {
-      number = number * 10 + (text[k++] - '0');
-    }
+    const std::int64_t number = scan_whole(text, k);
     MacroValue value;
     if (number > 0 && number < first_lasting_variable) {
-      value = variables_.read(number, here_.line, static_cast<std::uint32_t>(i + 1));
+      value = variables_.read(static_cast<int>(number), here_.line, static_cast<std::uint32_t>(i + 1));
     }
     if (number >= first_lasting_variable || !value) {
       result += number >= first_lasting_variable ? std::string(text.substr(i, k - i)) : "#0";

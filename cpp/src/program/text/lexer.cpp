@@ -1,18 +1,17 @@
 #include "program/text/lexer.hpp"
 
-#include <algorithm>
+#include <fmt/format.h>
+
 #include <string>
 
 #include "base/text.hpp"
+#include "program/text/number_scan.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
 
-constexpr int max_digits = 8;  // FANUC alarm 003: eight digits, point not counted
-
-constexpr std::array<double, 19> powers_of_ten = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8, 1e9,
-                                                  1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18};
+constexpr unsigned max_digits = 8;  // FANUC alarm 003: eight digits, point not counted
 
 [[noreturn]] void alarm(int number, const std::string& message, std::uint32_t line, std::size_t index) {
   throw alarm_error(number, message, line, static_cast<std::uint32_t>(index + 1));
@@ -49,58 +48,28 @@ bool is_macro_keyword(std::string_view text, std::size_t i) noexcept {
 
 // Reads the number behind a letter; i stands on its first character and ends behind it. False at a macro expression or
 // keyword.
-bool scan_number(std::string_view text, std::uint32_t line, std::size_t& i, std::size_t letter_at, Word& word) {
+bool scan_operand(std::string_view text, std::uint32_t line, std::size_t& i, std::size_t letter_at, Word& word) {
   const std::size_t n = text.size();
-  while (i < n && (text[i] == ' ' || text[i] == '\t')) {
-    ++i;
-  }
+  skip_spaces(text, i);
   bool negative = false;
   if (i < n && (text[i] == '-' || text[i] == '+')) {
     negative = text[i] == '-';
     ++i;
   }
-  std::uint64_t mantissa = 0;
-  unsigned decimals = 0;
-  unsigned significant = 0;
-  unsigned seen = 0;
-  for (; i < n; ++i) {
-    const char c = text[i];
-    if (is_digit(c)) {
-      ++seen;
-      if (mantissa != 0 || c != '0') {
-        ++significant;
-      }
-      if (significant <= 17) {
-        mantissa = mantissa * 10 + static_cast<unsigned>(c - '0');
-        if (word.has_point) {
-          ++decimals;
-        }
-      }
-    } else if (c == '.' && !word.has_point) {
-      word.has_point = true;
-    } else {
-      break;
-    }
-  }
-  if (seen == 0) {
+  const ScannedNumber number = scan_number(text, i);
+  if (number.digits == 0) {
     if ((i < n && (text[i] == '#' || text[i] == '[')) || is_macro_keyword(text, letter_at)) {
       return false;
     }
-    alarm(5, "address " + std::string(1, upper(text[letter_at])) + " has no number", line, letter_at);
+    alarm(5, fmt::format("address {} has no number", upper(text[letter_at])), line, letter_at);
   }
-  if (significant > max_digits) {
-    alarm(3,
-          "too many digits in address " + std::string(1, word.letter) + ": " + std::to_string(significant) +
-              " (limit " + std::to_string(max_digits) + ")",
+  if (number.significant > max_digits) {
+    alarm(3, fmt::format("too many digits in address {}: {} (limit {})", word.letter, number.significant, max_digits),
           line, letter_at);
   }
-  if (decimals >= powers_of_ten.size()) {
-    decimals = static_cast<unsigned>(powers_of_ten.size()) - 1;
-  }
-  // A mantissa of 8 digits over an exact power of ten is the correctly rounded decimal.
-  const double magnitude = static_cast<double>(mantissa) / powers_of_ten[decimals];
-  word.value = negative ? -magnitude : magnitude;
-  word.digits = static_cast<std::uint8_t>(significant);
+  word.value = negative ? -number.value : number.value;
+  word.has_point = number.has_point;
+  word.digits = static_cast<std::uint8_t>(number.significant);
   word.end = static_cast<std::uint32_t>(i);
   return true;
 }
@@ -114,14 +83,14 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
   block.macro = false;
   const std::size_t n = text.size();
   if (n > max_length) {
-    fail("line of " + std::to_string(n) + " characters (limit " + std::to_string(max_length) + ")", line, max_length);
+    fail(fmt::format("line of {} characters (limit {})", n, max_length), line, max_length);
   }
   std::size_t i = 0;
   while (i < n) {
     const char c = text[i];
     if (is_letter(c)) {
       if (block.word_count == Block::max_words) {
-        fail("more than " + std::to_string(Block::max_words) + " words in a block", line, i);
+        fail(fmt::format("more than {} words in a block", Block::max_words), line, i);
       }
       const std::size_t letter_at = i;
       Word& word = block.words[block.word_count];
@@ -129,7 +98,7 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
       word.letter = upper(c);
       word.column = static_cast<std::uint32_t>(i + 1);
       ++i;
-      if (!scan_number(text, line, i, letter_at, word)) {
+      if (!scan_operand(text, line, i, letter_at, word)) {
         block.macro = true;
         return;
       }
@@ -142,7 +111,7 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
         fail("comment does not close: '(' without ')'", line, i);
       }
       if (block.comment_count == Block::max_comments) {
-        fail("more than " + std::to_string(Block::max_comments) + " comments in a block", line, i);
+        fail(fmt::format("more than {} comments in a block", Block::max_comments), line, i);
       }
       block.comments[block.comment_count++] = text.substr(i, close + 1 - i);
       i = close + 1;
@@ -151,12 +120,7 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
         fail("'/' inside a block: only a block skip at its start is supported", line, i);
       }
       block.optional_skip = true;
-      block.skip_switch = 1;
-      ++i;
-      if (i < n && is_digit(text[i])) {  // /1 ... /9
-        block.skip_switch = std::max(1, text[i] - '0');
-        ++i;
-      }
+      block.skip_switch = scan_skip_switch(text, i);
     } else if (c == '#' || c == '[' || c == ']' || c == '=') {
       block.macro = true;
       return;
@@ -170,7 +134,7 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
         word.letter = kind == 'R' ? '<' : '>';
         word.column = static_cast<std::uint32_t>(i + 1);
         i += 2;
-        if (!scan_number(text, line, i, letter_at, word)) {
+        if (!scan_operand(text, line, i, letter_at, word)) {
           block.macro = true;
           return;
         }
