@@ -48,8 +48,8 @@ py::array_t<double> stream_step(FirStream& stream, const py::array_t<double, py:
     throw Error(ErrorKind::argument, "position must have the shape (n_axes,)");
   }
   py::array_t<double> out(position.shape(0));
-  std::copy_n(position.data(), position.shape(0), out.mutable_data());
-  stream.step({out.mutable_data(), static_cast<std::size_t>(position.shape(0))});
+  const auto axes = static_cast<std::size_t>(n_axes);
+  stream.step({position.data(), axes}, {out.mutable_data(), axes});
   return out;
 }
 
@@ -131,7 +131,7 @@ Raises:
             if (position.size() != self.n_axes) {
               throw Error(ErrorKind::argument, "position must have n_axes values");
             }
-            self.stream.step(position, place);
+            self.stream.step(position, position, place);
             return position;
           },
           py::arg("position"), py::arg("place"), "Filtered sample, n_axes values.");

@@ -30,7 +30,10 @@ Eigen::VectorXd stepped(LinearPlant& plant, const Eigen::VectorXd& input) {
     throw Error(ErrorKind::argument, "input of a linear plant of " + std::to_string(plant.inputs()) +
                                          " inputs must be as many finite values, got " + std::to_string(input.size()));
   }
-  return plant.step(input);
+  Eigen::VectorXd output(plant.outputs());
+  plant.step({input.data(), static_cast<std::size_t>(input.size())},
+             {output.data(), static_cast<std::size_t>(output.size())});
+  return output;
 }
 
 py::array response(LinearPlant& plant, const Eigen::MatrixXd& inputs, const std::optional<Eigen::VectorXd>& state) {

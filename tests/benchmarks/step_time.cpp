@@ -17,11 +17,11 @@
 #include <utility>
 #include <vector>
 
-#include "shapegcode/filter.hpp"
-#include "shapegcode/program.hpp"
 #include "shapegcode/control.hpp"
+#include "shapegcode/filter.hpp"
 #include "shapegcode/motion.hpp"
 #include "shapegcode/plant/modal.hpp"
+#include "shapegcode/program.hpp"
 
 namespace {
 
@@ -143,11 +143,11 @@ void run(const char* paper_file, const char* long_file) {
   for (Vector3& setpoint : setpoints) source.step(setpoint);
 
   FirStream fir_start(Fir({0, 7, 11}, {0.4, 0.3, 0.3}), axis_count);
-  fir_start.reset({setpoints.front().data(), axis_count});
+  fir_start.reset(values_of(setpoints.front()));
   report.measure("fir_stream", setpoints.size(), [&] {
     return [&setpoints, stream = fir_start](std::size_t i) mutable {
       Vector3 position = setpoints[i];
-      stream.step({position.data(), axis_count});
+      stream.step(values_of(position), values_of(position));
       consume(position);
     };
   });

@@ -139,7 +139,7 @@ int main() {
       stream.reset({position.data(), 3});
       for (int i = 0; i < 5000; ++i) {
         position = Vector3(1.0 + i, 2.0, 3.0 - 0.5 * i);
-        stream.step({position.data(), 3});
+        stream.step(values_of(position), values_of(position));
         sink += position.sum();
       }
       return 5000L;
@@ -152,7 +152,7 @@ int main() {
     varying.reset({position.data(), 3});
     for (int i = 0; i < 5000; ++i) {
       position = Vector3(0.1 * i, 2.0, 3.0 - 0.5 * i);
-      varying.step({position.data(), 3}, following.place(position[0]));
+      varying.step(values_of(position), values_of(position), following.place(position[0]));
       sink += position.sum();
     }
     return 5000L;
@@ -191,11 +191,13 @@ int main() {
   LinearPlant linear({Eigen::MatrixXd::Constant(6, 6, -1.0), Eigen::MatrixXd::Ones(6, 2), Eigen::MatrixXd::Ones(3, 6),
                       Eigen::MatrixXd::Ones(3, 2)},
                      1e-3);
-  Eigen::VectorXd input = Eigen::VectorXd::Zero(2);
+  std::array<double, 2> input{};
+  std::array<double, 3> output{};
   expect_none("LinearPlant::step", [&] {
     for (int i = 0; i < 5000; ++i) {
-      input[i % 2] = 0.1 * i;
-      sink += linear.step(input).sum() + linear.output().sum();
+      input[static_cast<std::size_t>(i % 2)] = 0.1 * i;
+      linear.step(input, output);
+      sink += output[0] + linear.output().sum();
     }
     return 5000L;
   });

@@ -226,3 +226,34 @@ TEST_CASE("block player: a pause behind a later block, and pauses that cannot be
   while (other.block() == 0) REQUIRE(other.step(position));
   CHECK_THROWS_AS(other.pause_after(0, 0.001), Error);
 }
+
+TEST_CASE("block player: thousands of blocks that end within one period are passed in groups, to the same set-points") {
+  // Blocks of no length under `ceil`, of 10 ns under `carry`, between two of 2.5 periods, and a pause among them.
+  constexpr std::size_t count = 70'000;
+  for (const BlockEnd end : {BlockEnd::ceil, BlockEnd::carry}) {
+    for (const bool pauses : {false, true}) {
+      CAPTURE(pauses);
+      std::vector<double> lengths{0.25};
+      for (std::size_t i = 0; i < count; ++i) lengths.push_back(end == BlockEnd::ceil ? 0.0 : 1e-6);
+      lengths.push_back(0.25);
+      const auto blocks = row_of_lines(lengths, std::vector<double>(lengths.size(), 100.0));
+      BlockPlayer player(blocks, 1e-3, end);
+      constexpr std::size_t paused = 40'000;
+      if (pauses) player.pause_after(paused, 0.01);
+      double time_s = 0.0;  // as the documentation says: each block for its time, one after the other
+      std::size_t block = 0;
+      Vector3 position;
+      for (int i = 0; player.step(position); ++i) {
+        const auto lasts = [&](std::size_t k) {
+          return player.block_duration_s(blocks[k]) + (pauses && k == paused ? 0.01 : 0.0);
+        };
+        while (block + 1 < blocks.size() && i * 1e-3 - time_s >= lasts(block) - 1e-9) time_s += lasts(block++);
+        CHECK(player.block() == block);
+        const double expected = std::min(blocks[block].length_mm, 100.0 * (i * 1e-3 - time_s));
+        const bool ended = block + 1 == blocks.size() && i * 1e-3 - time_s >= lasts(block) - 1e-9;
+        CHECK(position.x() ==
+              doctest::Approx(ended ? blocks.back().end_mm.x() : blocks[block].start_mm.x() + expected).epsilon(1e-9));
+      }
+    }
+  }
+}

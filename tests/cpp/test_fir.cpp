@@ -45,7 +45,7 @@ std::vector<double> streamed(const Fir& fir, const std::vector<double>& in) {
   std::vector<double> out;
   for (std::size_t i = 0; i < in.size() + static_cast<std::size_t>(fir.duration_samples()); ++i) {
     double value = i < in.size() ? in[i] : in.back();
-    stream.step({&value, 1});
+    stream.step({&value, 1}, {&value, 1});
     out.push_back(value);
   }
   return out;
@@ -159,7 +159,7 @@ TEST_CASE("fir: every form gives the same, all axes at once") {
     int differing = 0;
     for (Eigen::Index i = 0; i < out.positions_mm.rows(); ++i) {
       position = in.positions_mm.row(std::min<Eigen::Index>(i, 3999));
-      stream.step({position.data(), 3});
+      stream.step({position.data(), 3}, {position.data(), 3});
       if (position.transpose() != out.positions_mm.row(i)) ++differing;
     }
     CHECK(differing == 0);
@@ -214,7 +214,7 @@ TEST_CASE("fir: a moving average does not drift in 1e8 real-time steps") {
   for (long i = 0; i < steps; ++i) {
     const double in = next();
     double out = in;
-    stream.step({&out, 1});
+    stream.step({&out, 1}, {&out, 1});
     if (i % 1'000'000 > 1'000'000 - 1 - length) last[static_cast<std::size_t>(i % length)] = in;
     if ((i + 1) % 1'000'000 == 0) {
       long double sum = 0.0L;
@@ -224,4 +224,14 @@ TEST_CASE("fir: a moving average does not drift in 1e8 real-time steps") {
   }
   MESSAGE("largest error " << worst << " mm");
   CHECK(worst < 4e-12);
+}
+
+TEST_CASE("fir: delays that no int holds on a finer grid or in a row of axes") {
+  CHECK_THROWS_WITH_AS(Fir({0, 2147483647}, {0.5, 0.5}), "filter delay 2147483647, at most 100000000 is possible",
+                       Error);
+  CHECK_THROWS_WITH_AS(Fir({0, 5}, {0.5, 0.5}).on_finer_grid(2'000'000'000),
+                       "filter delay 5 on a grid 2000000000 times as fine, at most 100000000 is possible", Error);
+  CHECK(Fir({0, 5}, {0.5, 0.5}).on_finer_grid(20'000'000).duration_samples() == 100'000'000);
+  CHECK_THROWS_WITH_AS(Fir::moving_average(2147483647),
+                       "moving average over 2147483647 samples, at most 100000000 are possible", Error);
 }

@@ -180,6 +180,19 @@ TEST_CASE("interpolator: refuses a period that is not positive; nothing to do is
   CHECK(samples.positions_mm.row(0) == Vector3(1, 2, 3).transpose());
 }
 
+TEST_CASE("interpolator: refuses more set-points than can be counted") {
+  // A feed of 1e-18 mm/s: 1e22 set-points fit into no whole number.
+  const PathPointer path = straight(10.0);
+  const auto slow = std::make_shared<const SpeedProfile>(std::vector<SpeedPhase>{{0.0, 1e19, 0.0, 1e-18, 0.0}},
+                                                         path->length_mm(), 0.0);
+  CHECK_THROWS_WITH_AS(Interpolator(path, slow, 1e-3), "a path takes 1e+22 set-points, at most 4000000000 are possible",
+                       Error);
+  const auto smooth =
+      std::make_shared<const SpeedProfile>(std::vector<SpeedPhase>{{0.0, 1.0, 0.0, 10.0, 0.0}}, path->length_mm(), 1e9);
+  CHECK_THROWS_WITH_AS(Interpolator(path, smooth, 1e-3),
+                       "the jerk time takes 1e+12 periods, at most 10000000 are possible", Error);
+}
+
 TEST_CASE("interpolator: a delay is rest at the start, also of part of a period") {
   const double length = 30.0;
   const double speed = 100.0;

@@ -51,6 +51,13 @@ double command(int sample) {
   return sample < 10 ? 0.0 : std::sin(angle) + 0.3 * std::sin(7.3 * angle) - std::sin(0.5) - 0.3 * std::sin(3.65);
 }
 
+/// One step of a plant with one input.
+VectorXd stepped(LinearPlant& plant, double input) {
+  VectorXd output(plant.outputs());
+  plant.step({&input, 1}, {output.data(), static_cast<std::size_t>(output.size())});
+  return output;
+}
+
 /// Largest difference of the outputs over the largest output, against CVODE restarted at every sample.
 double apart_from_cvode(const StateSpace& system, int samples) {
   double from = 0.0;
@@ -73,7 +80,7 @@ double apart_from_cvode(const StateSpace& system, int samples) {
     slope = (command(i) - from) / (i * period_s - since);
     solver.restart(solver.state());
     const VectorXd expected = system.c * solver.advance(i * period_s) + system.d * command(i);
-    const VectorXd& got = plant.step(VectorXd::Constant(1, command(i)));
+    const VectorXd got = stepped(plant, command(i));
     worst = std::max(worst, (got - expected).cwiseAbs().maxCoeff());
     largest = std::max(largest, expected.cwiseAbs().maxCoeff());
   }
@@ -95,8 +102,7 @@ TEST_CASE("linear plant: a base-excited mode is ModalPlant's") {
     shapegcode::ModalPlant mode({std::vector<shapegcode::Mode>{{46.0, damping, 1.0}}, {}, {}}, period_s);
     double worst = 0.0;
     for (int i = 0; i < 2000; ++i) {
-      worst = std::max(
-          worst, std::abs(plant.step(VectorXd::Constant(1, command(i)))[0] - mode.step({command(i), 0.0, 0.0})[0]));
+      worst = std::max(worst, std::abs(stepped(plant, command(i))[0] - mode.step({command(i), 0.0, 0.0})[0]));
     }
     CHECK(worst < 1e-11);
   }
@@ -108,7 +114,7 @@ TEST_CASE("linear plant: integrators keep a polynomial exactly") {
   chain.a(1, 0) = 1.0;
   chain.b(0, 0) = 1.0;
   LinearPlant plant(chain, period_s);
-  for (int i = 1; i <= 100'000; ++i) plant.step(VectorXd::Constant(1, i * period_s));
+  for (int i = 1; i <= 100'000; ++i) stepped(plant, i * period_s);
   CHECK(plant.output()[0] == doctest::Approx(5e3).epsilon(1e-12));
   CHECK(plant.output()[1] == doctest::Approx(1e6 / 6.0).epsilon(1e-12));
 }

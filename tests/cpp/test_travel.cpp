@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <numeric>
+#include <span>
 #include <vector>
 
 #include "shapegcode/error.hpp"
@@ -79,4 +80,18 @@ TEST_CASE("stations that do not fit are refused") {
   CHECK_THROWS_AS(run({15.0, 10.0, 20.0}, {}), Error);
   CHECK_THROWS_AS(run({20.0}, {0.0, {}, 0.0}), Error);
   CHECK_THROWS_AS(run({20.0}, {0.001, {}, -1.0}), Error);
+}
+
+TEST_CASE("a travel without a way is refused, not read past its end") {
+  const auto path = two_lines();
+  const auto profile = std::make_shared<const SpeedProfile>();
+  const auto nothing = std::make_shared<const Path>();
+  const auto of_blocks = [&](std::span<const Segment> blocks, double window_s) {
+    static_cast<void>(travel_blocks(blocks, *path, BlockEnd::ceil, stations(), {0.001, {}, window_s}));
+  };
+  const auto of_path = [&] { static_cast<void>(travel_path(nothing, profile, *path, stations(), {0.001, {}, 0.0})); };
+  CHECK_THROWS_WITH_AS(of_blocks({}, 0.0), "a travel needs a path with at least one segment", Error);
+  CHECK_THROWS_WITH_AS(of_path(), "a travel needs a path with at least one segment", Error);
+  CHECK_THROWS_WITH_AS(of_blocks(path->segments(), 1e9),
+                       "window of a travel takes 1e+12 periods, at most 10000000 are possible", Error);
 }

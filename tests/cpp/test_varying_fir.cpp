@@ -111,7 +111,7 @@ TEST_CASE("varying fir: stream and batch agree to the last bit, no drift over a 
   bool same = true;
   for (Index row = 0; row < rows; ++row) {
     position = in.positions_mm.row(row);
-    stream.step({position.data(), 3}, place[static_cast<std::size_t>(row)]);
+    stream.step({position.data(), 3}, {position.data(), 3}, place[static_cast<std::size_t>(row)]);
     same = same && position.transpose() == out.positions_mm.row(row);
   }
   CHECK(same);
@@ -126,7 +126,7 @@ TEST_CASE("varying fir: a step that is no place, a place beyond the set") {
     double position = 0.0;
     stream.reset({&position, 1});
     position = 2.0;
-    stream.step({&position, 1}, place);
+    stream.step({&position, 1}, {&position, 1}, place);
     CHECK(position == doctest::Approx(1.0));
   }
   for (const double place : {1e300, std::numeric_limits<double>::infinity()}) {
@@ -134,7 +134,7 @@ TEST_CASE("varying fir: a step that is no place, a place beyond the set") {
     stream.reset({&position, 1});
     for (int i = 0; i < 2; ++i) {
       position = 2.0;
-      stream.step({&position, 1}, place);
+      stream.step({&position, 1}, {&position, 1}, place);
     }
     CHECK(position == doctest::Approx(0.8));
   }

@@ -59,11 +59,11 @@ double follow(const std::shared_ptr<const Path>& path, const std::shared_ptr<con
   FirStream stream(shaper, axis_count);
   FeedDriveRealTime drive(drive_x(), period_s, substeps);
   Vector3 setpoint = (*path)[0].start_mm;
-  stream.reset({setpoint.data(), axis_count});
+  stream.reset(values_of(setpoint));
   drive.reset(setpoint[0]);
   double largest = 0.0;
   while (interpolator.step(setpoint)) {
-    stream.step({setpoint.data(), axis_count});
+    stream.step(values_of(setpoint), values_of(setpoint));
     largest = std::max(largest, std::abs(drive.step(setpoint[0]) - setpoint[0]));
   }
   return largest * 1e3;
@@ -76,12 +76,12 @@ Vector3 run(const std::shared_ptr<const Path>& path, const std::shared_ptr<const
   FirStream stream(shaper, axis_count);
   ModalPlant plant({std::vector<Mode>{mode_x}, std::vector<Mode>{mode_y}, {}}, period_s);
   Vector3 setpoint = (*path)[0].start_mm;
-  stream.reset({setpoint.data(), axis_count});
+  stream.reset(values_of(setpoint));
   plant.reset(setpoint);
   const std::size_t periods = interpolator.sample_count() + static_cast<std::size_t>(shaper.duration_samples());
   for (std::size_t i = 0; i < periods; ++i) {
     interpolator.step(setpoint);
-    stream.step({setpoint.data(), axis_count});
+    stream.step(values_of(setpoint), values_of(setpoint));
     plant.step(setpoint);
   }
   return plant.residual_peak() * 1e3;

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -28,7 +30,8 @@ enum class BlockEnd : std::uint8_t {
 [[nodiscard]] double whole_periods(double periods) noexcept;
 
 /// A controller without look-ahead: every block runs at its feed for its whole length, the next one follows at once.
-/// The acceleration filter comes after it (a moving average: block overlap). Real-time form.
+/// The acceleration filter comes after it (a moving average: block overlap). Real-time form: the work of a step grows
+/// with the logarithm of the number of blocks that end within a period.
 class BlockPlayer {
  public:
   /// `override_ratio` scales every feed. Throws Error(argument) on period or ratio <= 0, or a segment without feed.
@@ -39,7 +42,13 @@ class BlockPlayer {
   /// periods, rounded up. Throws Error(argument) on a time that is negative or not finite, or a block that is
   /// over already or does not exist.
   void pause_after(std::size_t block, double seconds);
-  /// Next set-point, the start first; false once the end was given.
+  /// Next set-point, X, Y and Z, the start first; false once the end was given.
+  bool step(std::span<double> out) noexcept {
+    Vector3 position;
+    const bool moving = step(position);
+    std::copy_n(position.data(), axis_count, out.begin());
+    return moving;
+  }
   bool step(Vector3& position) noexcept;
   /// Block on which the set-point last given lies.
   [[nodiscard]] std::size_t block() const noexcept { return block_; }
@@ -50,6 +59,10 @@ class BlockPlayer {
 
  private:
   void open_block() noexcept;
+  /// Sums of durations where many blocks may end within a period.
+  void find_crowds();
+  /// Passes over a group of blocks that ends within the time elapsed; false if none begins here that does.
+  bool leap(double slack) noexcept;
 
   std::span<const Segment> blocks_;
   double period_s_;
@@ -62,6 +75,9 @@ class BlockPlayer {
   double pause_s_ = 0.0;
   bool started_ = false;
   bool finished_ = false;
+  // Durations of groups of 16 blocks, of 16 such groups, and so on; null where no 16 blocks end within a period. Never
+  // changes: copies share it.
+  std::shared_ptr<const std::vector<std::vector<double>>> crowds_;
 };
 
 /// Sum of block durations in s.
@@ -177,7 +193,13 @@ class RapidPlayer {
  public:
   /// Throws Error(argument) on a model that `check` refuses.
   RapidPlayer(const Vector3& start_mm, const Vector3& end_mm, const ControllerModel& model);
-  /// Next set-point; false once the end was given.
+  /// Next set-point, X, Y and Z; false once the end was given.
+  bool step(std::span<double> out) noexcept {
+    Vector3 position;
+    const bool moving = step(position);
+    std::copy_n(position.data(), axis_count, out.begin());
+    return moving;
+  }
   bool step(Vector3& position) noexcept;
   /// Periods from rest to rest.
   [[nodiscard]] int period_count() const noexcept { return count_; }

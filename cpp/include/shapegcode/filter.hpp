@@ -13,9 +13,11 @@ namespace shapegcode {
 class Fir {
  public:
   /// Taps at whole-sample delays, ascending, first >= 0. Throws Error(argument) on an empty list, unequal lengths, a
-  /// negative or unsorted delay, a value that is not finite, or a sum that differs from 1 by more than 1e-9.
+  /// negative or unsorted delay, one beyond 1e8 samples, a value that is not finite, or a sum that differs from 1 by
+  /// more than 1e-9.
   Fir(std::vector<int> delays, std::vector<double> taps);
-  /// Equal weights over `length` >= 1 samples; costs the same for any length. Throws Error(argument) on length < 1.
+  /// Equal weights over `length` >= 1 samples; costs the same for any length. Throws Error(argument) on length < 1 or >
+  /// 1e8.
   [[nodiscard]] static Fir moving_average(int length);
   /// Geometric weights exp(-k / time_constant), cut off where less than the share `rest` of them is left and scaled to
   /// a sum of one; costs the same for any length. Its variance tends to time_constant^2. Throws Error(argument) on a
@@ -34,7 +36,8 @@ class Fir {
   /// Second central moment of the taps in samples^2: the contour cost (dR/R = variance*(v/R)^2/2 on a circle).
   [[nodiscard]] double variance_samples2() const noexcept;
 
-  /// The same taps on a grid that is `factor` times as fine. Throws Error(argument) on factor < 1.
+  /// The same taps on a grid that is `factor` times as fine. Throws Error(argument) on factor < 1 or a delay beyond 1e8
+  /// samples.
   [[nodiscard]] Fir on_finer_grid(int factor) const;
 
   /// Batch form of one axis: input held at its first value before and at its last value after.
@@ -70,8 +73,8 @@ class FirStream {
   FirStream(Fir fir, int n_axes);
   /// Rest at `position` (n_axes values).
   void reset(std::span<const double> position) noexcept;
-  /// Filters in place: n_axes values.
-  void step(std::span<double> position) noexcept;
+  /// n_axes values in, as many out; both may be the same memory.
+  void step(std::span<const double> in, std::span<double> out) noexcept;
   [[nodiscard]] const Fir& fir() const noexcept { return fir_; }
 
  private:
@@ -129,9 +132,9 @@ class VaryingFirStream {
   VaryingFirStream(VaryingFir fir, int n_axes);
   /// Rest at `position` (n_axes values).
   void reset(std::span<const double> position) noexcept;
-  /// Filters in place: n_axes values, whose increment since the last step goes to the filter at `place`; a place that
-  /// is not a number counts as 0.
-  void step(std::span<double> position, double place) noexcept;
+  /// n_axes values in, as many out; both may be the same memory. Their increment since the last step goes to the filter
+  /// at `place`; a place that is not a number counts as 0.
+  void step(std::span<const double> in, std::span<double> out, double place) noexcept;
   [[nodiscard]] const VaryingFir& fir() const noexcept { return fir_; }
 
  private:

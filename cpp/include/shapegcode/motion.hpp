@@ -1,9 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "shapegcode/filter.hpp"
@@ -121,11 +123,17 @@ struct SpeedCaps {
 class Interpolator {
  public:
   /// `delay_s` >= 0: rest at the start before the motion begins; need not be a multiple of the period. Throws
-  /// Error(argument) on a period <= 0.
+  /// Error(argument) on a period <= 0, or more than 4e9 set-points.
   Interpolator(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile, double period_s,
                double delay_s = 0.0);
 
-  /// Next set-point. False once the last set-point was given; `position` then stays at the end.
+  /// Next set-point, X, Y and Z. False once the last set-point was given; it then stays at the end.
+  bool step(std::span<double> out) noexcept {
+    Vector3 position;
+    const bool moving = step(position);
+    std::copy_n(position.data(), axis_count, out.begin());
+    return moving;
+  }
   bool step(Vector3& position) noexcept;
   /// Distance along the path at the set-point last given.
   [[nodiscard]] double distance_mm() const noexcept { return distance_mm_; }

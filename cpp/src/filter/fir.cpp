@@ -4,9 +4,13 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <string>
+#include <limits>
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "base/checks.hpp"
+#include "base/rest.hpp"
 #include "shapegcode/error.hpp"
 
 #ifdef __FAST_MATH__
@@ -19,7 +23,8 @@ namespace {
 using Eigen::Index;
 
 constexpr int taps_per_pass = 8;
-constexpr Index block_rows = 1024;  // 8 kB of output: stays in the first-level cache between passes
+constexpr int most_delay = 100'000'000;  // a day of milliseconds; sums of a few filters stay countable
+constexpr Index block_rows = 1024;       // 8 kB of output: stays in the first-level cache between passes
 
 /// Sum of the last `length` samples, free of drift: every rounding of `sum` is caught exactly (two-sum) in `error`.
 struct RunningSum {
@@ -186,6 +191,7 @@ void decay_column(const double* in, Index rows, Index length, double decay, doub
     lag = lag_behind(lag, newest, previous, in[std::clamp<Index>(i - length, 0, rows - 1)], decay, leaving_weight,
                      weight_sum);
     out[i] = newest + lag / weight_sum;
+    if ((i + 1) % rows_between_looks == 0) lag = state_or_none(lag);
     previous = newest;
   }
 }
@@ -194,10 +200,11 @@ void decay_column(const double* in, Index rows, Index length, double decay, doub
 
 void Fir::apply_rows(const double* in, Index rows, int n_axes, double* out) const {
   if (rows < 1 || n_axes < 1) {
-    throw Error(ErrorKind::argument, "filter input of " + std::to_string(rows) + " samples and " +
-                                         std::to_string(n_axes) + " axes, at least 1 of each needed");
+    throw Error(ErrorKind::argument,
+                fmt::format("filter input of {} samples and {} axes, at least 1 of each needed", rows, n_axes));
   }
-  if (!moving_average_ && decay_ == 0.0) {
+  const bool flat_delays_fit = duration_samples() <= std::numeric_limits<int>::max() / n_axes;
+  if (!moving_average_ && decay_ == 0.0 && flat_delays_fit) {
     weigh_rows(in, rows, n_axes, delays_, taps_, out);
     return;
   }
@@ -213,32 +220,37 @@ void Fir::apply_rows(const double* in, Index rows, int n_axes, double* out) cons
 Fir::Fir(std::vector<int> delays, std::vector<double> taps) : delays_(std::move(delays)), taps_(std::move(taps)) {
   if (taps_.empty()) throw Error(ErrorKind::argument, "filter without taps");
   if (delays_.size() != taps_.size()) {
-    throw Error(ErrorKind::argument, "filter with " + std::to_string(delays_.size()) + " delays but " +
-                                         std::to_string(taps_.size()) + " taps");
+    throw Error(ErrorKind::argument, fmt::format("filter with {} delays but {} taps", delays_.size(), taps_.size()));
   }
   if (delays_.front() < 0) {
-    throw Error(ErrorKind::argument, "filter delay " + std::to_string(delays_.front()) + " is negative");
+    throw Error(ErrorKind::argument, fmt::format("filter delay {} is negative", delays_.front()));
   }
   double sum = 0.0;
   for (std::size_t k = 0; k < taps_.size(); ++k) {
+    if (delays_[k] > most_delay) {
+      throw Error(ErrorKind::argument, fmt::format("filter delay {}, at most {} is possible", delays_[k], most_delay));
+    }
     if (k > 0 && delays_[k] <= delays_[k - 1]) {
-      throw Error(ErrorKind::argument, "filter delays must ascend: " + std::to_string(delays_[k]) + " follows " +
-                                           std::to_string(delays_[k - 1]));
+      throw Error(ErrorKind::argument,
+                  fmt::format("filter delays must ascend: {} follows {}", delays_[k], delays_[k - 1]));
     }
     if (!std::isfinite(taps_[k])) {
-      throw Error(ErrorKind::argument, "filter tap " + std::to_string(k) + " is not finite");
+      throw Error(ErrorKind::argument, fmt::format("filter tap {} is not finite", k));
     }
     sum += taps_[k];
   }
   if (!(std::abs(sum - 1.0) <= 1e-9)) {
-    throw Error(ErrorKind::argument,
-                "filter taps add up to 1 + " + std::to_string((sum - 1.0) * 1e9) + "e-9, limit 1 +- 1e-9");
+    throw Error(ErrorKind::argument, fmt::format("filter taps add up to 1 + {:.6g}, limit 1 +- 1e-9", sum - 1.0));
   }
 }
 
 Fir Fir::on_finer_grid(int factor) const {
   if (factor < 1) {
-    throw Error(ErrorKind::argument, "grid " + std::to_string(factor) + " times as fine, at least 1 needed");
+    throw Error(ErrorKind::argument, fmt::format("grid {} times as fine, at least 1 needed", factor));
+  }
+  if (duration_samples() > most_delay / factor) {
+    throw Error(ErrorKind::argument, fmt::format("filter delay {} on a grid {} times as fine, at most {} is possible",
+                                                 duration_samples(), factor, most_delay));
   }
   std::vector<int> delays = delays_;
   for (int& delay : delays) delay *= factor;
@@ -247,7 +259,11 @@ Fir Fir::on_finer_grid(int factor) const {
 
 Fir Fir::moving_average(int length) {
   if (length < 1) {
-    throw Error(ErrorKind::argument, "moving average over " + std::to_string(length) + " samples, at least 1 needed");
+    throw Error(ErrorKind::argument, fmt::format("moving average over {} samples, at least 1 needed", length));
+  }
+  if (length > most_delay) {
+    throw Error(ErrorKind::argument,
+                fmt::format("moving average over {} samples, at most {} are possible", length, most_delay));
   }
   std::vector<int> delays(static_cast<std::size_t>(length));
   for (std::size_t k = 0; k < delays.size(); ++k) delays[k] = static_cast<int>(k);
@@ -258,18 +274,17 @@ Fir Fir::moving_average(int length) {
 
 Fir Fir::exponential(double time_constant_samples, double rest) {
   if (!(time_constant_samples > 0.0) || !std::isfinite(time_constant_samples)) {
-    throw Error(ErrorKind::argument, "exponential time constant is " + std::to_string(time_constant_samples) +
-                                         " samples, must be > 0 and finite");
+    throw Error(ErrorKind::argument,
+                fmt::format("exponential time constant is {} samples, must be > 0 and finite", time_constant_samples));
   }
   if (!(rest > 0.0 && rest < 1.0)) {
     throw Error(ErrorKind::argument,
-                "share of the exponential that is cut off is " + std::to_string(rest) + ", must be between 0 and 1");
+                fmt::format("share of the exponential that is cut off is {}, must be between 0 and 1", rest));
   }
-  constexpr double most_taps = 1e7;
   const double length = std::max(1.0, std::ceil(-std::log(rest) * time_constant_samples));
-  if (!(length <= most_taps)) {
-    throw Error(ErrorKind::argument,
-                "exponential filter of " + std::to_string(length) + " taps, at most 10000000 are possible");
+  if (!(length <= most_filter_samples)) {
+    throw Error(ErrorKind::argument, fmt::format("exponential filter of {:.10g} taps, at most {:.10g} are possible",
+                                                 length, most_filter_samples));
   }
   const double decay = std::exp(-1.0 / time_constant_samples);
   const double leaving = std::exp(-length / time_constant_samples);
@@ -310,8 +325,7 @@ double Fir::variance_samples2() const noexcept {
 void Fir::apply(std::span<const double> in, std::span<double> out) const {
   const auto expected = in.size() + static_cast<std::size_t>(duration_samples());
   if (out.size() != expected) {
-    throw Error(ErrorKind::argument, "filter output has " + std::to_string(out.size()) + " samples, " +
-                                         std::to_string(expected) + " needed");
+    throw Error(ErrorKind::argument, fmt::format("filter output has {} samples, {} needed", out.size(), expected));
   }
   apply(in.data(), static_cast<Index>(in.size()), 1, out.data());
 }
@@ -327,7 +341,7 @@ Samples Fir::apply(const Samples& in) const {
 
 void Fir::apply(const double* in, Index in_rows, int n_axes, double* out) const {
   if (in_rows < 1) throw Error(ErrorKind::argument, "filter input has no samples: there is no value to hold");
-  if (n_axes < 0) throw Error(ErrorKind::argument, "filter input has " + std::to_string(n_axes) + " axes");
+  if (n_axes < 0) throw Error(ErrorKind::argument, fmt::format("filter input has {} axes", n_axes));
   const Index out_rows = in_rows + duration_samples();
   for (int axis = 0; axis < n_axes; ++axis) {
     const double* column_in = in + axis * in_rows;
@@ -344,7 +358,7 @@ void Fir::apply(const double* in, Index in_rows, int n_axes, double* out) const 
 
 FirStream::FirStream(Fir fir, int n_axes) : fir_(std::move(fir)), n_axes_(n_axes) {
   if (n_axes < 1) {
-    throw Error(ErrorKind::argument, "filter stream of " + std::to_string(n_axes) + " axes, at least 1 needed");
+    throw Error(ErrorKind::argument, fmt::format("filter stream of {} axes, at least 1 needed", n_axes));
   }
   // A moving average also needs the sample that leaves it: one more than the largest delay, beside the newest.
   const auto rows = std::bit_ceil(static_cast<std::size_t>(fir_.duration_samples()) + 2);
@@ -371,10 +385,10 @@ void FirStream::reset(std::span<const double> position) noexcept {
   }
 }
 
-void FirStream::step(std::span<double> position) noexcept {
+void FirStream::step(std::span<const double> in, std::span<double> out) noexcept {
   const auto axes = static_cast<std::size_t>(n_axes_);
   double* const newest = &ring_[(row_ & row_mask_) * axes];
-  for (std::size_t axis = 0; axis < axes; ++axis) newest[axis] = position[axis];
+  for (std::size_t axis = 0; axis < axes; ++axis) newest[axis] = in[axis];
   if (fir_.is_moving_average()) {
     const auto length = static_cast<std::size_t>(fir_.duration_samples()) + 1;
     const double* const oldest = &ring_[((row_ - length) & row_mask_) * axes];
@@ -382,7 +396,7 @@ void FirStream::step(std::span<double> position) noexcept {
     for (std::size_t axis = 0; axis < axes; ++axis) {
       RunningSum running{sum_[axis], sum_error_[axis]};
       running.replace(newest[axis], oldest[axis]);
-      position[axis] = running.mean(static_cast<double>(length));
+      out[axis] = running.mean(static_cast<double>(length));
       if (block_ends) running.normalise();
       sum_[axis] = running.sum;
       sum_error_[axis] = running.error;
@@ -394,7 +408,8 @@ void FirStream::step(std::span<double> position) noexcept {
     for (std::size_t axis = 0; axis < axes; ++axis) {
       sum_[axis] = lag_behind(sum_[axis], newest[axis], previous[axis], leaving[axis], fir_.decay_, fir_.leaving_,
                               fir_.weight_sum_);
-      position[axis] = newest[axis] + sum_[axis] / fir_.weight_sum_;
+      out[axis] = newest[axis] + sum_[axis] / fir_.weight_sum_;
+      if ((row_ + 1) % static_cast<std::size_t>(rows_between_looks) == 0) sum_[axis] = state_or_none(sum_[axis]);
     }
   } else {
     const std::vector<int>& delays = fir_.delays();
@@ -403,7 +418,7 @@ void FirStream::step(std::span<double> position) noexcept {
       const double* const delayed = &ring_[((row_ - static_cast<std::size_t>(delays[k])) & row_mask_) * axes];
       for (std::size_t axis = 0; axis < axes; ++axis) {
         const double share = taps[k] * delayed[axis];
-        position[axis] = k == 0 ? share : position[axis] + share;
+        out[axis] = k == 0 ? share : out[axis] + share;
       }
     }
   }

@@ -4,8 +4,9 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
-#include <string>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "shapegcode/error.hpp"
 
@@ -91,11 +92,11 @@ Samples VaryingFir::apply(const Samples& in, std::span<const double> place) cons
   const Index axes = in.positions_mm.cols();
   if (rows < 1) throw Error(ErrorKind::argument, "filter input has no samples: there is no value to hold");
   if (place.size() != static_cast<std::size_t>(rows)) {
-    throw Error(ErrorKind::argument, std::to_string(place.size()) + " places for " + std::to_string(rows) + " samples");
+    throw Error(ErrorKind::argument, fmt::format("{} places for {} samples", place.size(), rows));
   }
   for (std::size_t i = 0; i < place.size(); ++i) {
     if (!std::isfinite(place[i])) {
-      throw Error(ErrorKind::argument, "place of sample " + std::to_string(i) + " is not finite");
+      throw Error(ErrorKind::argument, fmt::format("place of sample {} is not finite", i));
     }
   }
   Samples out;
@@ -112,7 +113,7 @@ Samples VaryingFir::apply(const Samples& in, std::span<const double> place) cons
   for (Index row = 0; row < out.positions_mm.rows(); ++row) {
     const Index from = std::min(row, rows - 1);
     take_row(from);
-    stream.step(position, place[static_cast<std::size_t>(from)]);
+    stream.step(position, position, place[static_cast<std::size_t>(from)]);
     for (Index axis = 0; axis < axes; ++axis) out.positions_mm(row, axis) = position[static_cast<std::size_t>(axis)];
   }
   return out;
@@ -127,7 +128,7 @@ void VaryingFirStream::Lag::add(double value) noexcept {
 
 VaryingFirStream::VaryingFirStream(VaryingFir fir, int n_axes) : fir_(std::move(fir)) {
   if (n_axes < 1) {
-    throw Error(ErrorKind::argument, "filter stream of " + std::to_string(n_axes) + " axes, at least 1 needed");
+    throw Error(ErrorKind::argument, fmt::format("filter stream of {} axes, at least 1 needed", n_axes));
   }
   const auto rows = std::bit_ceil(static_cast<std::size_t>(fir_.duration_samples()) + 1);
   const auto axes = static_cast<std::size_t>(n_axes);
@@ -162,12 +163,12 @@ void VaryingFirStream::begin_train(const Fir& fir, double share) noexcept {
   }
 }
 
-void VaryingFirStream::step(std::span<double> position, double place) noexcept {
+void VaryingFirStream::step(std::span<const double> in, std::span<double> out, double place) noexcept {
   const std::size_t axes = last_.size();
   bool moves = false;
   for (std::size_t axis = 0; axis < axes; ++axis) {
-    increment_[axis] = position[axis] - last_[axis];
-    last_[axis] = position[axis];
+    increment_[axis] = in[axis] - last_[axis];
+    last_[axis] = in[axis];
     moves = moves || increment_[axis] != 0.0;
   }
   at_rest_ = moves ? 0 : at_rest_ + 1;
@@ -188,7 +189,7 @@ void VaryingFirStream::step(std::span<double> position, double place) noexcept {
       lag.add(-arriving[axis]);
     }
     arriving[axis] = 0.0;
-    position[axis] -= lag.sum + lag.error;
+    out[axis] = last_[axis] - (lag.sum + lag.error);
   }
   ++row_;
 }
@@ -196,16 +197,17 @@ void VaryingFirStream::step(std::span<double> position, double place) noexcept {
 FollowingFir::FollowingFir(VaryingFir fir, int axis, std::vector<double> position_mm)
     : fir_(std::move(fir)), axis_(axis), position_mm_(std::move(position_mm)) {
   if (axis < 0 || axis >= axis_count) {
-    throw Error(ErrorKind::argument, "axis " + std::to_string(axis) + ", 0 to 2 are X, Y and Z");
+    throw Error(ErrorKind::argument, fmt::format("axis {}, 0 to 2 are X, Y and Z", axis));
   }
   if (position_mm_.size() != fir_.set().size()) {
-    throw Error(ErrorKind::argument, std::to_string(position_mm_.size()) + " positions for " +
-                                         std::to_string(fir_.set().size()) + " filters");
+    throw Error(ErrorKind::argument,
+                fmt::format("{} positions for {} filters", position_mm_.size(), fir_.set().size()));
   }
   for (std::size_t k = 0; k < position_mm_.size(); ++k) {
     if (!std::isfinite(position_mm_[k]) || (k > 0 && !(position_mm_[k] > position_mm_[k - 1]))) {
-      throw Error(ErrorKind::argument, "positions of filters must be finite and ascend: position " + std::to_string(k) +
-                                           " is " + std::to_string(position_mm_[k]) + " mm");
+      throw Error(
+          ErrorKind::argument,
+          fmt::format("positions of filters must be finite and ascend: position {} is {} mm", k, position_mm_[k]));
     }
   }
 }
@@ -223,8 +225,8 @@ FollowingFir FollowingFir::on_finer_grid(int factor) const { return {fir_.on_fin
 
 Samples FollowingFir::apply(const Samples& in) const {
   if (in.positions_mm.cols() <= axis_) {
-    throw Error(ErrorKind::argument, "samples of " + std::to_string(in.positions_mm.cols()) +
-                                         " axes, the filters follow axis " + std::to_string(axis_));
+    throw Error(ErrorKind::argument,
+                fmt::format("samples of {} axes, the filters follow axis {}", in.positions_mm.cols(), axis_));
   }
   std::vector<double> places(static_cast<std::size_t>(in.positions_mm.rows()));
   for (std::size_t row = 0; row < places.size(); ++row) {

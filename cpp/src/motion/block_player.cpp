@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
+#include <numeric>
+#include <utility>
 
+#include <fmt/format.h>
+
+#include "base/checks.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -11,6 +15,8 @@ namespace {
 
 // A block that ends on a tick to within rounding ends there.
 constexpr double tick_tolerance = 1e-6;
+// Blocks that one step takes one by one; where more of them end within a period, whole groups are passed at once.
+constexpr std::size_t group_size = 16;
 
 }  // namespace
 
@@ -26,18 +32,68 @@ double block_periods(double length_mm, double feed_mm_per_s, double period_s, Bl
 
 BlockPlayer::BlockPlayer(std::span<const Segment> blocks, double period_s, BlockEnd block_end, double override_ratio)
     : blocks_(blocks), period_s_(period_s), ratio_(override_ratio), block_end_(block_end) {
-  if (!(period_s > 0.0) || !(override_ratio > 0.0)) {
-    throw Error(ErrorKind::argument, "interpolation period " + std::to_string(period_s) + " s and override " +
-                                         std::to_string(override_ratio) + " must be > 0");
-  }
+  require_period(period_s);
+  require_above_zero(override_ratio, "override", "");
   for (const Segment& block : blocks_) {
     if (block.length_mm > 0.0 && !(block.feed_mm_per_s > 0.0)) {
       throw Error(ErrorKind::argument, "block without a feed greater than zero", block.line);
     }
   }
   if (!blocks_.empty()) {
+    find_crowds();
     open_block();
   }
+}
+
+void BlockPlayer::find_crowds() {
+  const auto duration_of = [this](std::size_t first) {
+    double sum = 0.0;
+    for (const Segment& block : blocks_.subspan(first, group_size)) {
+      sum += block_duration_s(block);
+    }
+    return sum;
+  };
+  bool crowded = false;
+  for (std::size_t first = 0; first + group_size <= blocks_.size() && !crowded; first += group_size) {
+    crowded = duration_of(first) <= period_s_;
+  }
+  if (!crowded) {
+    return;
+  }
+  // The last block is in no group: it ends the run.
+  std::vector<std::vector<double>> sums(1);
+  for (std::size_t group = 0; group < (blocks_.size() - 1) / group_size; ++group) {
+    sums[0].push_back(duration_of(group * group_size));
+  }
+  while (sums.back().size() >= group_size) {
+    const std::vector<double>& parts = sums.back();
+    std::vector<double> wholes;
+    for (std::size_t group = 0; group < parts.size() / group_size; ++group) {
+      const auto first = parts.begin() + static_cast<std::ptrdiff_t>(group * group_size);
+      wholes.push_back(std::accumulate(first, first + group_size, 0.0));
+    }
+    sums.push_back(std::move(wholes));
+  }
+  crowds_ = std::make_shared<const std::vector<std::vector<double>>>(std::move(sums));
+}
+
+bool BlockPlayer::leap(double slack) noexcept {
+  const std::vector<std::vector<double>>& sums = *crowds_;
+  std::size_t size = group_size;
+  std::size_t largest = 0;  // group that ends within the time elapsed
+  double duration_s = 0.0;
+  for (std::size_t level = 0; level < sums.size() && block_ % size == 0; ++level, size *= group_size) {
+    const std::size_t group = block_ / size;
+    const bool pauses = pause_s_ > 0.0 && paused_block_ >= block_ && paused_block_ < block_ + size;
+    if (group >= sums[level].size() || pauses || sums[level][group] > elapsed_s_ + slack) {
+      break;
+    }
+    largest = size;
+    duration_s = sums[level][group];
+  }
+  block_ += largest;
+  elapsed_s_ = block_end_ == BlockEnd::ceil ? 0.0 : elapsed_s_ - duration_s;
+  return largest > 0;
 }
 
 double BlockPlayer::block_duration_s(const Segment& segment) const noexcept {
@@ -53,11 +109,11 @@ void BlockPlayer::open_block() noexcept {
 
 void BlockPlayer::pause_after(std::size_t block, double seconds) {
   if (!(seconds >= 0.0) || !std::isfinite(seconds)) {
-    throw Error(ErrorKind::argument, "pause of " + std::to_string(seconds) + " s: must be finite and >= 0");
+    throw Error(ErrorKind::argument, fmt::format("pause of {} s: must be finite and >= 0", seconds));
   }
   if (block < block_ || block >= blocks_.size()) {
-    throw Error(ErrorKind::argument, "pause behind block " + std::to_string(block) + ": block " +
-                                         std::to_string(block_) + " of " + std::to_string(blocks_.size()) + " is open");
+    throw Error(ErrorKind::argument,
+                fmt::format("pause behind block {}: block {} of {} is open", block, block_, blocks_.size()));
   }
   paused_block_ = block;
   pause_s_ = block_end_ == BlockEnd::ceil ? whole_periods(seconds / period_s_) * period_s_ : seconds;
@@ -91,6 +147,8 @@ bool BlockPlayer::step(Vector3& position) noexcept {
       return true;
     }
     ++block_;
+    while (crowds_ && leap(slack)) {
+    }
     open_block();
   }
   const Segment& segment = blocks_[block_];

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
+#include <fmt/format.h>
+
+#include "base/checks.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/motion.hpp"
 
@@ -13,26 +15,16 @@ namespace {
 constexpr double longest_ramp_s = 100.0;
 constexpr double longest_wait_s = 3600.0;
 
-void require(bool holds, const char* name, double value, const char* range) {
-  if (!holds) {
-    throw Error(ErrorKind::argument, std::string(name) + " is " + std::to_string(value) + ", must be " + range);
-  }
-}
-
 void require_ramp(const char* name, double value) {
-  require(value >= 0.0 && value <= longest_ramp_s, name, value, "0 to 100 s");
+  require(value >= 0.0 && value <= longest_ramp_s, name, value, "s", "0 to 100 s");
 }
 
 void require_wait(const char* name, double value) {
-  require(value >= 0.0 && value <= longest_wait_s, name, value, "0 to 3600 s");
-}
-
-void require_positive(const char* name, double value) {
-  require(value > 0.0 && std::isfinite(value), name, value, "> 0 and finite");
+  require(value >= 0.0 && value <= longest_wait_s, name, value, "s", "0 to 3600 s");
 }
 
 void add_average(std::vector<Fir>& filters, double time_s, double period_s) {
-  const long length = std::lround(time_s / period_s);
+  const auto length = require_count(std::round(time_s / period_s), most_filter_samples, "a filter", "periods");
   if (length > 1) {
     filters.push_back(Fir::moving_average(static_cast<int>(length)));
   }
@@ -41,27 +33,27 @@ void add_average(std::vector<Fir>& filters, double time_s, double period_s) {
 }  // namespace
 
 void check(const ControllerModel& model) {
-  require(model.period_s >= 1e-5 && model.period_s <= 1.0, "interpolation period (s)", model.period_s, "1e-5 to 1");
-  require_ramp("acceleration time constant (s)", model.time_constant_s);
-  require_ramp("bell time (s)", model.bell_time_s);
-  require_ramp("look-ahead filter time constant (s)", model.look_ahead_filter_time_constant_s);
-  require_ramp("rapid bell time (s)", model.rapid_bell_time_s);
-  require_wait("tool change (s)", model.tool_change_s);
-  require_wait("M function (s)", model.m_function_s);
+  require(model.period_s >= 1e-5 && model.period_s <= 1.0, "interpolation period", model.period_s, "s", "1e-5 to 1 s");
+  require_ramp("acceleration time constant", model.time_constant_s);
+  require_ramp("bell time", model.bell_time_s);
+  require_ramp("look-ahead filter time constant", model.look_ahead_filter_time_constant_s);
+  require_ramp("rapid bell time", model.rapid_bell_time_s);
+  require_wait("tool change", model.tool_change_s);
+  require_wait("M function", model.m_function_s);
   require(model.exponential_rest > 0.0 && model.exponential_rest < 1.0, "share left of the exponential",
-          model.exponential_rest, "between 0 and 1");
-  require_positive("feed override", model.feed_override);
-  require_positive("rapid override", model.rapid_override);
+          model.exponential_rest, "", "between 0 and 1");
+  require_above_zero(model.feed_override, "feed override", "");
+  require_above_zero(model.rapid_override, "rapid override", "");
   for (int i = 0; i < axis_count; ++i) {
-    require(model.limits.max_feed_mm_per_s[i] > 0.0, "axis feed limit (mm/s)", model.limits.max_feed_mm_per_s[i],
+    require(model.limits.max_feed_mm_per_s[i] > 0.0, "axis feed limit", model.limits.max_feed_mm_per_s[i], "mm/s",
             "> 0");
-    require_positive("rapid rate (mm/s)", model.rapid_rate_mm_per_s[i]);
-    require_ramp("rapid time constant (s)", model.rapid_time_constant_s[i]);
-    require_wait("in-position wait (s)", model.in_position_s[i]);
-    require_positive("position gain (1/s)", model.position_gain_per_s[i]);
-    require_positive("in-position width (mm)", model.in_position_width_mm[i]);
+    require_above_zero(model.rapid_rate_mm_per_s[i], "rapid rate", "mm/s");
+    require_ramp("rapid time constant", model.rapid_time_constant_s[i]);
+    require_wait("in-position wait", model.in_position_s[i]);
+    require_above_zero(model.position_gain_per_s[i], "position gain", "1/s");
+    require_above_zero(model.in_position_width_mm[i], "in-position width", "mm");
     require(model.feed_forward_ratio[i] >= 0.0 && model.feed_forward_ratio[i] <= 1.0, "feed-forward ratio",
-            model.feed_forward_ratio[i], "0 to 1");
+            model.feed_forward_ratio[i], "", "0 to 1");
   }
 }
 
@@ -94,15 +86,13 @@ double block_overlap_time_s(std::span<const double> lengths_mm, std::span<const 
                             const ControllerModel& model) {
   check(model);
   if (lengths_mm.size() != feeds_mm_per_s.size()) {
-    throw Error(ErrorKind::argument,
-                std::to_string(lengths_mm.size()) + " lengths but " + std::to_string(feeds_mm_per_s.size()) + " feeds");
+    throw Error(ErrorKind::argument, fmt::format("{} lengths but {} feeds", lengths_mm.size(), feeds_mm_per_s.size()));
   }
   double periods = 0.0;
   for (std::size_t i = 0; i < lengths_mm.size(); ++i) {
     if (!(lengths_mm[i] >= 0.0) || !(feeds_mm_per_s[i] > 0.0)) {
-      throw Error(ErrorKind::argument, "block " + std::to_string(i) + " has length " + std::to_string(lengths_mm[i]) +
-                                           " mm and feed " + std::to_string(feeds_mm_per_s[i]) +
-                                           " mm/s, must be >= 0 and > 0");
+      throw Error(ErrorKind::argument, fmt::format("block {} has length {} mm and feed {} mm/s, must be >= 0 and > 0",
+                                                   i, lengths_mm[i], feeds_mm_per_s[i]));
     }
     periods += block_periods(lengths_mm[i], feeds_mm_per_s[i], model.period_s, model.block_end);
   }

@@ -2,19 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 #include <utility>
 
-#include "shapegcode/error.hpp"
+#include "base/checks.hpp"
 
 namespace shapegcode {
 namespace {
 
 int smoothing_length(const SpeedProfile& profile, double period_s) {
-  if (!(period_s > 0.0)) {
-    throw Error(ErrorKind::argument, "interpolation period is " + std::to_string(period_s) + " s, must be > 0");
-  }
-  return std::max(1, static_cast<int>(std::lround(profile.jerk_time_s() / period_s)));
+  require_period(period_s);
+  const double length = std::round(profile.jerk_time_s() / period_s);
+  return std::max(1, static_cast<int>(require_count(length, most_filter_samples, "the jerk time", "periods")));
 }
 
 }  // namespace
@@ -29,8 +27,9 @@ Interpolator::Interpolator(std::shared_ptr<const Path> path, std::shared_ptr<con
   const double rest = 0.0;
   smoothing_.reset({&rest, 1});
   // A ramp that ends on a tick to within rounding ends there.
-  const auto ramps = static_cast<std::size_t>(std::ceil((profile_->ramp_duration_s() + delay_s) / period_s - 1e-9));
-  sample_count_ = ramps + 1 + static_cast<std::size_t>(smoothing_.fir().duration_samples());
+  const double ramps = std::ceil((profile_->ramp_duration_s() + delay_s) / period_s - 1e-9);
+  sample_count_ = static_cast<std::size_t>(require_count(ramps, most_set_points, "a path", "set-points")) + 1 +
+                  static_cast<std::size_t>(smoothing_.fir().duration_samples());
 }
 
 bool Interpolator::step(Vector3& position) noexcept {
@@ -39,7 +38,7 @@ bool Interpolator::step(Vector3& position) noexcept {
     double distance = profile_->distance_mm(static_cast<double>(index_) * period_s_ - delay_s_, phase_cursor_);
     ++index_;
     // The last set-point is the end itself, whatever the running sum rounds to.
-    smoothing_.step({&distance, 1});
+    smoothing_.step({&distance, 1}, {&distance, 1});
     distance_mm_ = index_ == sample_count_ ? path_->length_mm() : distance;
   }
   position = path_->point(distance_mm_, path_cursor_);

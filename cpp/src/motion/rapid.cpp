@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
-#include "shapegcode/error.hpp"
+#include "base/checks.hpp"
 
 namespace shapegcode {
 namespace {
@@ -45,10 +44,7 @@ struct Counts {
 
 int countable(double periods) {
   constexpr double most_periods = 1e8;
-  if (!(periods <= most_periods)) {
-    throw Error(ErrorKind::argument, "rapid takes " + std::to_string(periods) + " periods, at most 1e8 are possible");
-  }
-  return static_cast<int>(periods);
+  return static_cast<int>(require_count(periods, most_periods, "rapid", "periods"));
 }
 
 int full_ramp(const Way& way, double period_s) {
@@ -84,8 +80,8 @@ Counts counts_by_trial(const Way& way, double period_s) {
   return counts;
 }
 
-int bell_periods(const ControllerModel& model) noexcept {
-  return static_cast<int>(std::lround(model.rapid_bell_time_s / model.period_s));
+int bell_periods(const ControllerModel& model) {
+  return countable(std::round(model.rapid_bell_time_s / model.period_s));
 }
 
 int periods_of(const RapidShape& shape, std::size_t axis) noexcept {
@@ -206,7 +202,7 @@ bool RapidPlayer::step(Vector3& position) noexcept {
     Axis& axis = axes_[i];
     double share = axis.travel > 0 ? std::min(1.0, static_cast<double>(index_) / axis.travel) : 1.0;
     for (FirStream& filter : axis.filters) {
-      filter.step({&share, 1});
+      filter.step({&share, 1}, {&share, 1});
     }
     const auto k = static_cast<Eigen::Index>(i);
     position[k] = start_mm_[k] + share * travel_mm_[k];

@@ -3,23 +3,23 @@
 #include <cmath>
 #include <string>
 
-#include "plant/feed_drive/drive_checks.hpp"
+#include "base/checks.hpp"
 
 namespace shapegcode {
 
 void FrictionParameters::check(const char* place) const {
   const std::string of = std::string(" of the ") + place;
-  check_not_below_zero(viscous_n_s_per_m, "viscous friction" + of, "N s/m");
+  require_not_below_zero(viscous_n_s_per_m, "viscous friction" + of, "N s/m");
   if (model == FrictionModel::viscous) return;
-  check_above_zero(coulomb_n, "Coulomb friction" + of, "N");
-  check_above_zero(stribeck_velocity_m_per_s, "Stribeck speed" + of, "m/s");
-  check_within(static_n, coulomb_n, unbounded, "static friction" + of, "N");
+  require_above_zero(coulomb_n, "Coulomb friction" + of, "N");
+  require_above_zero(stribeck_velocity_m_per_s, "Stribeck speed" + of, "m/s");
+  require_within(static_n, coulomb_n, unbounded, "static friction" + of, "N");
   if (model == FrictionModel::stribeck) {
-    check_above_zero(smoothing_velocity_m_per_s, "smoothing speed of the friction" + of, "m/s");
+    require_above_zero(smoothing_velocity_m_per_s, "smoothing speed of the friction" + of, "m/s");
     return;
   }
-  check_above_zero(bristle_stiffness_n_per_m, "stiffness of the bristles" + of, "N/m");
-  check_not_below_zero(bristle_damping_n_s_per_m, "damping of the bristles" + of, "N s/m");
+  require_above_zero(bristle_stiffness_n_per_m, "stiffness of the bristles" + of, "N/m");
+  require_not_below_zero(bristle_damping_n_s_per_m, "damping of the bristles" + of, "N s/m");
 }
 
 FrictionForce friction_force(const FrictionParameters& friction, double velocity_m_per_s, double bristle_m) noexcept {

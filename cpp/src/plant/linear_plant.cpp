@@ -1,5 +1,6 @@
 #include "shapegcode/plant/linear_plant.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -9,7 +10,9 @@
 
 #include <Eigen/LU>
 
+#include "base/checks.hpp"
 #include "base/linear_algebra.hpp"
+#include "base/rest.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -44,14 +47,6 @@ void check_vector(const char* name, const VectorXd& vector, Index size) {
   }
   if (!vector.allFinite()) {
     throw Error(ErrorKind::argument, std::string(name) + " of a linear plant has a value that is not finite");
-  }
-}
-
-void check_period(double period_s) {
-  if (!std::isfinite(period_s) || !(period_s > 0.0)) {
-    std::ostringstream message;
-    message << "period of a linear plant is " << period_s << " s, must be finite and above 0";
-    throw Error(ErrorKind::argument, message.str());
   }
 }
 
@@ -137,7 +132,7 @@ HeldPeriod first_order_hold(const MatrixXd& a, const MatrixXd& b, double period_
   const Index inputs = b.cols();
   check_matrix("A", a, states, states);
   check_matrix("B", b, states, inputs);
-  check_period(period_s);
+  require_period(period_s, "period of a linear plant");
   MatrixXd joint = MatrixXd::Zero(states + 2 * inputs, states + 2 * inputs);
   joint.topLeftCorner(states, states) = a * period_s;
   joint.block(0, states, states, inputs) = b * period_s;
@@ -201,15 +196,17 @@ void LinearPlant::reset_at_rest(const VectorXd& input, const VectorXd& near) {
   reset(state, input);
 }
 
-const VectorXd& LinearPlant::step(const Eigen::Ref<const VectorXd>& input) noexcept {
+void LinearPlant::step(std::span<const double> in, std::span<double> out) noexcept {
   const Index states = order();
+  const Eigen::Map<const VectorXd> input(in.data(), inputs());
   joint_.tail(inputs()) = input;
   next_.noalias() = over_period_ * joint_;
+  for (double& value : next_) value = state_or_none(value);
   joint_.head(states) = next_;
   joint_.segment(states, inputs()) = input;
   output_.noalias() = plant_.c * next_;
   output_.noalias() += plant_.d * input;
-  return output_;
+  std::copy_n(output_.data(), outputs(), out.begin());
 }
 
 void LinearPlant::check_inputs(const MatrixXd& inputs_of_run) const {
@@ -227,7 +224,12 @@ MatrixXd LinearPlant::run(const MatrixXd& inputs_of_run) {
   MatrixXd result(inputs_of_run.rows(), outputs());
   result.row(0) = output_;
   const MatrixXd by_sample = inputs_of_run.transpose();
-  for (Index k = 1; k < by_sample.cols(); ++k) result.row(k) = step(by_sample.col(k));
+  const auto values = static_cast<std::size_t>(inputs());
+  VectorXd output(outputs());
+  for (Index k = 1; k < by_sample.cols(); ++k) {
+    step({by_sample.col(k).data(), values}, {output.data(), static_cast<std::size_t>(output.size())});
+    result.row(k) = output;
+  }
   return result;
 }
 

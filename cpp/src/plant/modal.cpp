@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <sstream>
 #include <utility>
 
+#include "base/checks.hpp"
+#include "base/rest.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -68,11 +69,7 @@ ModalPlant::Node ModalPlant::node_of(const Mode& mode, double period_s) {
 
 ModalPlant::ModalPlant(AxisModes modes, double period_s, AxisModeTables tables)
     : modes_(std::move(modes)), period_s_(period_s), rate_hz_(1.0 / period_s) {
-  if (!std::isfinite(period_s) || !(period_s > 0.0)) {
-    std::ostringstream message;
-    message << "interpolation period " << period_s << " s, must be finite and above 0";
-    throw Error(ErrorKind::argument, message.str());
-  }
+  require_period(period_s);
   std::vector<Varying> varying;
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     const std::vector<Mode>& axis_modes = modes_[axis];
@@ -192,6 +189,7 @@ void ModalPlant::reset(const Vector3& position) noexcept {
     state.deflection = 0.0;
     state.velocity = 0.0;
   }
+  row_ = 0;
   command_ = position;
   move_to(position);
   command_velocity_.setZero();
@@ -225,6 +223,13 @@ void ModalPlant::look_between(std::size_t axis) noexcept {
   peak_[a] = peak;
 }
 
+void ModalPlant::forget_nothing() noexcept {
+  for (State& state : states_) {
+    state.deflection = state_or_none(state.deflection);
+    state.velocity = state_or_none(state.velocity);
+  }
+}
+
 Vector3 ModalPlant::step(const Vector3& command) noexcept {
   if (!place_.empty()) move_to(0.5 * (command_ + command));
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
@@ -251,6 +256,7 @@ Vector3 ModalPlant::step(const Vector3& command) noexcept {
     }
     deflection_[a] = deflection;
   }
+  if (++row_ % rows_between_looks == rows_between_looks - 1) forget_nothing();
   return command_ + deflection_;
 }
 

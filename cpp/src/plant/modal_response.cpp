@@ -4,9 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <sstream>
 #include <string>
 
+#include "base/checks.hpp"
+#include "base/rest.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -17,7 +18,6 @@ using Eigen::Index;
 constexpr std::size_t lane_count = 2;     // doubles that every 64-bit processor takes at once
 constexpr std::size_t modes_at_once = 4;  // more would not stay in registers
 constexpr Index piece_rows = 512;         // what is at work stays in the first cache
-constexpr double nothing = 1e-290;  // below it a deflection, mm, or its velocity, mm/s, is none: such numbers are slow
 
 /// The axes of a group side by side.
 using Lanes = Eigen::Array<double, static_cast<int>(lane_count), 1>;
@@ -35,10 +35,6 @@ struct GroupMode {
     vd[lane] = over_period.vd;
     vv[lane] = over_period.vv;
     participation[lane] = mode.participation;
-  }
-  void forget_nothing() noexcept {
-    deflection = (deflection.abs() < nothing).select(0.0, deflection);
-    velocity = (velocity.abs() < nothing).select(0.0, velocity);
   }
 };
 
@@ -84,26 +80,26 @@ struct Group {
     }
     position[0] = position[static_cast<std::size_t>(rows)];
     velocity[0] = velocity[static_cast<std::size_t>(rows)];
-    for (GroupMode& mode : modes) mode.forget_nothing();
   }
 
-  void propagate(Index rows) noexcept {
+  /// `row`: of the whole record, at which the piece begins.
+  void propagate(Index row, Index rows) noexcept {
     std::size_t first = 0;
-    for (; first + modes_at_once <= modes.size(); first += modes_at_once) propagate<modes_at_once>(first, rows);
+    for (; first + modes_at_once <= modes.size(); first += modes_at_once) propagate<modes_at_once>(first, row, rows);
     switch (modes.size() - first) {
       case 3:
-        return propagate<3>(first, rows);
+        return propagate<3>(first, row, rows);
       case 2:
-        return propagate<2>(first, rows);
+        return propagate<2>(first, row, rows);
       case 1:
-        return propagate<1>(first, rows);
+        return propagate<1>(first, row, rows);
       default:
         return;
     }
   }
   /// Some modes over a piece; the operations and their order are those of ModalPlant::step().
   template <std::size_t count>
-  void propagate(std::size_t first, Index rows) noexcept {
+  void propagate(std::size_t first, Index row, Index rows) noexcept {
     GroupMode* const mode = &modes[first];
     std::array<Lanes, count> d;
     std::array<Lanes, count> v;
@@ -111,17 +107,28 @@ struct Group {
       d[m] = mode[m].deflection;
       v[m] = mode[m].velocity;
     }
-    for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k) {
-      const Lanes jump = velocity[k + 1] - velocity[k];
-      Lanes sum = deflection[k];
-      for (std::size_t m = 0; m < count; ++m) {
-        v[m] -= jump;
-        const Lanes next = mode[m].dd * d[m] + mode[m].dv * v[m];
-        v[m] = mode[m].vd * d[m] + mode[m].vv * v[m];
-        d[m] = next;
-        sum += mode[m].participation * next;
+    for (Index done = 0; done < rows;) {
+      const Index until_look = rows_between_looks - (row + done) % rows_between_looks;
+      const Index until = std::min(rows, done + until_look);
+      for (auto k = static_cast<std::size_t>(done); k < static_cast<std::size_t>(until); ++k) {
+        const Lanes jump = velocity[k + 1] - velocity[k];
+        Lanes sum = deflection[k];
+        for (std::size_t m = 0; m < count; ++m) {
+          v[m] -= jump;
+          const Lanes next = mode[m].dd * d[m] + mode[m].dv * v[m];
+          v[m] = mode[m].vd * d[m] + mode[m].vv * v[m];
+          d[m] = next;
+          sum += mode[m].participation * next;
+        }
+        deflection[k] = sum;
       }
-      deflection[k] = sum;
+      if (until == done + until_look) {
+        for (std::size_t m = 0; m < count; ++m) {
+          d[m] = (d[m].abs() < least_state).select(0.0, d[m]);
+          v[m] = (v[m].abs() < least_state).select(0.0, v[m]);
+        }
+      }
+      done = until;
     }
     for (std::size_t m = 0; m < count; ++m) {
       mode[m].deflection = d[m];
@@ -135,17 +142,14 @@ struct Group {
 struct ModalResponse::Impl {
   double rate_hz = 0.0;
   Index axes = 0;
+  Index row = 0;  // of the whole record that comes next
   bool begun = false;
   std::vector<Group> groups;
 };
 
 ModalResponse::ModalResponse(const std::vector<std::vector<Mode>>& modes, double period_s)
     : impl_(std::make_unique<Impl>()) {
-  if (!std::isfinite(period_s) || !(period_s > 0.0)) {
-    std::ostringstream message;
-    message << "period of a response is " << period_s << " s, must be finite and above 0";
-    throw Error(ErrorKind::argument, message.str());
-  }
+  require_period(period_s, "period of a response");
   if (modes.empty()) throw Error(ErrorKind::argument, "response of 0 axes, at least one needed");
   impl_->rate_hz = 1.0 / period_s;
   impl_->axes = static_cast<Index>(modes.size());
@@ -191,9 +195,10 @@ void ModalResponse::apply(const Record& command, Result response) {
         throw Error(ErrorKind::argument, "command of a response has a value that is not finite, in rows " +
                                              std::to_string(first) + " to " + std::to_string(first + rows - 1));
       }
-      group.propagate(rows);
+      group.propagate(self.row, rows);
       group.give(response, first, rows);
     }
+    self.row += rows;
   }
 }
 

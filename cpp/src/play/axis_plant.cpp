@@ -2,8 +2,10 @@
 
 #include <cmath>
 #include <limits>
-#include <string>
 
+#include <fmt/format.h>
+
+#include "base/checks.hpp"
 #include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
 
@@ -22,8 +24,10 @@ ModalPlant modal_plant(const PlaybackOptions& options) {
 AxisPlant::AxisPlant(const PlaybackOptions& options) : period_s_(options.period_s), modal_(modal_plant(options)) {
   if (!options.drives.empty() && options.drives.size() != axis_count) {
     throw Error(ErrorKind::argument,
-                std::to_string(options.drives.size()) + " feed drives: must be none or one each for X, Y and Z");
+                fmt::format("{} feed drives: must be none or one each for X, Y and Z", options.drives.size()));
   }
+  // It is looked for at every set-point.
+  static_cast<void>(require_count(options.settling_limit_s / period_s_, most_set_points, "settling limit", "periods"));
   drives_.reserve(options.drives.size());
   for (const FeedDriveParameters& drive : options.drives) {
     drives_.emplace_back(drive, options.period_s);

@@ -2,25 +2,20 @@
 
 #include <cmath>
 #include <numbers>
-#include <string>
 
-#include "shapegcode/error.hpp"
+#include "base/checks.hpp"
 #include "shapegcode/plant/servo_lag.hpp"
 
 namespace shapegcode {
 
 CircleFigures simulate_circle(double radius_mm, double feed_mm_per_s, const ControllerModel& model) {
   check(model);
-  const bool usable =
-      radius_mm > 0.0 && std::isfinite(radius_mm) && feed_mm_per_s > 0.0 && std::isfinite(feed_mm_per_s);
+  require_above_zero(radius_mm, "radius of a circle", "mm");
+  require_above_zero(feed_mm_per_s, "feed on a circle", "mm/s");
   constexpr double most_samples = 1e9;
   constexpr double memory = 40.0;  // time constants of the servo loop after which a transient is rounding error
-  const double turn = usable ? 2.0 * std::numbers::pi * radius_mm / feed_mm_per_s / model.period_s : 0.0;
-  if (!usable || turn > most_samples) {
-    throw Error(ErrorKind::argument, "circle of radius " + std::to_string(radius_mm) + " mm at " +
-                                         std::to_string(feed_mm_per_s) +
-                                         " mm/s: both must be > 0 and a turn take at most 1e9 periods");
-  }
+  const double turn = 2.0 * std::numbers::pi * radius_mm / feed_mm_per_s / model.period_s;
+  const std::int64_t count = require_count(std::ceil(turn), most_samples, "a turn", "periods");
   const std::vector<Fir> designs = acceleration_filters(model);
   std::vector<FirStream> filters;
   filters.reserve(designs.size());
@@ -30,12 +25,11 @@ CircleFigures simulate_circle(double radius_mm, double feed_mm_per_s, const Cont
   ServoLag servo(model.position_gain_per_s, model.feed_forward_ratio, model.period_s);
   Vector3 position(radius_mm, 0.0, 0.0);
   for (FirStream& filter : filters) {
-    filter.reset({position.data(), axis_count});
+    filter.reset(values_of(position));
   }
   servo.reset(position);
   const double settling = filter_periods(designs) + memory / (model.position_gain_per_s.minCoeff() * model.period_s);
-  const auto begin = static_cast<std::int64_t>(std::ceil(settling));
-  const auto count = static_cast<std::int64_t>(std::ceil(turn));
+  const std::int64_t begin = require_count(std::ceil(settling), most_samples, "the servo loop's settling", "periods");
   const double step_rad = feed_mm_per_s * model.period_s / radius_mm;
   double command_sum = 0.0;
   double response_sum = 0.0;
@@ -43,7 +37,7 @@ CircleFigures simulate_circle(double radius_mm, double feed_mm_per_s, const Cont
     const double angle = step_rad * static_cast<double>(i);
     position = Vector3(radius_mm * std::cos(angle), radius_mm * std::sin(angle), 0.0);
     for (FirStream& filter : filters) {
-      filter.step({position.data(), axis_count});
+      filter.step(values_of(position), values_of(position));
     }
     const Vector3 response = servo.step(position);
     if (i >= begin) {

@@ -4,6 +4,8 @@
 #include <array>
 #include <charconv>
 
+#include <fmt/format.h>
+
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -11,12 +13,11 @@ namespace shapegcode {
 std::string csv_rows(std::span<const std::uint8_t> word, const std::vector<std::string>& words,
                      const Eigen::Ref<const Eigen::MatrixXd>& table) {
   if (static_cast<Eigen::Index>(word.size()) != table.rows()) {
-    throw Error(ErrorKind::argument,
-                std::to_string(word.size()) + " words for " + std::to_string(table.rows()) + " rows: must be as many");
+    throw Error(ErrorKind::argument, fmt::format("{} words for {} rows: must be as many", word.size(), table.rows()));
   }
   if (!word.empty() && *std::max_element(word.begin(), word.end()) >= words.size()) {
-    throw Error(ErrorKind::argument, "word " + std::to_string(*std::max_element(word.begin(), word.end())) + " of " +
-                                         std::to_string(words.size()) + " does not exist");
+    throw Error(ErrorKind::argument,
+                fmt::format("word {} of {} does not exist", *std::max_element(word.begin(), word.end()), words.size()));
   }
   constexpr std::size_t typical_number = 14;
   std::string text;

@@ -19,12 +19,12 @@ class FilterChain {
 
   void reset(const Vector3& position) noexcept {
     for (FirStream& filter : filters_) {
-      filter.reset({position.data(), axis_count});
+      filter.reset(values_of(position));
     }
   }
   void step(Vector3& position) noexcept {
     for (FirStream& filter : filters_) {
-      filter.step({position.data(), axis_count});
+      filter.step(values_of(position), values_of(position));
     }
   }
   [[nodiscard]] bool empty() const noexcept { return filters_.empty(); }

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "base/checks.hpp"
 #include "play/axis_plant.hpp"
 #include "play/filter_chain.hpp"
 #include "shapegcode/error.hpp"
@@ -119,8 +121,8 @@ class Recorder {
       }
     }
     // A picture of the decay needs what comes after the stop.
-    const auto decay = static_cast<std::size_t>(recorded_decay_s / options_.period_s);
-    for (std::size_t i = 0; options_.record_samples > 0 && i < decay; ++i) {
+    const double decay = std::floor(recorded_decay_s / options_.period_s);
+    for (double i = 0.0; commands_.size() < options_.record_samples && i < decay; ++i) {
       record(last_, plant_.step(last_));
     }
     figures_.recorded_command = pack(commands_);
@@ -237,7 +239,8 @@ PlaybackFigures play(const Path& path, const PlaybackOptions& options, bool comm
 StarvedFigures starve(Recorder recorder, BlockPlayer player, const PlaybackOptions& options) {
   const std::size_t block = player.block();
   player.pause_after(block, options.starved_s);
-  const auto memory = static_cast<std::size_t>(whole_periods(options.starved_memory_s / options.period_s));
+  const auto memory = static_cast<std::size_t>(require_count(whole_periods(options.starved_memory_s / options.period_s),
+                                                             most_set_points, "memory of a wait", "set-points"));
   std::size_t behind = 0;  // samples since the wait was over
   Vector3 position = Vector3::Zero();
   while ((memory == 0 || behind < memory) && player.step(position)) {
@@ -261,12 +264,12 @@ void check_starved(std::span<const Segment> blocks, const PlaybackOptions& optio
   const bool usable = options.starved_s >= 0.0 && options.starved_memory_s >= 0.0 && std::isfinite(options.starved_s) &&
                       std::isfinite(options.starved_memory_s);
   if (!usable) {
-    throw Error(ErrorKind::argument, "wait of " + std::to_string(options.starved_s) + " s and memory of " +
-                                         std::to_string(options.starved_memory_s) + " s must be finite and >= 0");
+    throw Error(ErrorKind::argument, fmt::format("wait of {} s and memory of {} s must be finite and >= 0",
+                                                 options.starved_s, options.starved_memory_s));
   }
   if (starved.back() >= blocks.size() || !std::is_sorted(starved.begin(), starved.end())) {
     throw Error(ErrorKind::argument,
-                "starved blocks must ascend and lie below the " + std::to_string(blocks.size()) + " blocks given");
+                fmt::format("starved blocks must ascend and lie below the {} blocks given", blocks.size()));
   }
 }
 

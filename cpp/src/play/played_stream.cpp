@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "base/checks.hpp"
 #include "play/axis_plant.hpp"
 #include "play/filter_chain.hpp"
 #include "play/program_set_points.hpp"
@@ -63,10 +65,9 @@ struct PlayedStream::Impl {
         rate_hz(1.0 / options.period_s),
         plant(options),
         region_offsets_mm(std::move(offsets)) {
-    if (!(rest_s >= 0.0) || !std::isfinite(rest_s)) {
-      throw Error(ErrorKind::argument, "rest of " + std::to_string(rest_s) + " s must be finite and >= 0");
-    }
-    rest_samples = static_cast<std::uint64_t>(whole_periods(rest_s / options.period_s));
+    require_not_below_zero(rest_s, "rest", "s");
+    const double rest = whole_periods(rest_s / options.period_s);
+    rest_samples = static_cast<std::uint64_t>(require_count(rest, most_set_points, "rest", "set-points"));
   }
 
   [[nodiscard]] Vector3 offset(std::size_t of) const {
@@ -119,7 +120,9 @@ PlayedStream::PlayedStream(std::shared_ptr<const Path> path, std::shared_ptr<con
   auto run = std::make_shared<Run<Interpolator>>(Interpolator(path, std::move(profile), options.period_s), options);
   impl_ = std::make_unique<Impl>(
       [run, path](SetPoint& next) {
-        return run->step(next, [&path](const Interpolator& player) { return (*path)[player.segment()].line; });
+        return run->step(next, [&path](const Interpolator& player) {
+          return path->size() > 0 ? (*path)[player.segment()].line : 0U;
+        });
       },
       options, rest_s);
 }
@@ -138,13 +141,12 @@ PlayedStream::PlayedStream(std::shared_ptr<const Path> blocks, BlockEnd block_en
 PlayedStream::PlayedStream(std::shared_ptr<const Program> program, const ControllerModel& model,
                            const PlaybackOptions& options, std::vector<Vector3> region_offsets_mm, double rest_s) {
   if (!region_offsets_mm.empty() && region_offsets_mm.size() != program->regions.size()) {
-    throw Error(ErrorKind::argument, std::to_string(region_offsets_mm.size()) + " offsets for " +
-                                         std::to_string(program->regions.size()) + " regions: must be one for each");
+    throw Error(ErrorKind::argument, fmt::format("{} offsets for {} regions: must be one for each",
+                                                 region_offsets_mm.size(), program->regions.size()));
   }
   if (options.period_s != model.period_s) {
-    throw Error(ErrorKind::argument, "plant with a period of " + std::to_string(options.period_s) +
-                                         " s on a controller of " + std::to_string(model.period_s) +
-                                         " s: must be equal");
+    throw Error(ErrorKind::argument, fmt::format("plant with a period of {} s on a controller of {} s: must be equal",
+                                                 options.period_s, model.period_s));
   }
   // What the set-points refer to lives with them.
   struct Played {

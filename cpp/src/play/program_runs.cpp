@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/checks.hpp"
 #include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
 
@@ -111,7 +112,8 @@ MotionLimits overridden_limits(const ControllerModel& model) {
 
 PlannedEnd planned_end(const SpeedProfile& profile, const std::vector<Fir>& filters, const ControllerModel& model) {
   PlannedEnd end;
-  const auto jerk_periods = static_cast<int>(std::lround(profile.jerk_time_s() / model.period_s));
+  const double jerk = std::round(profile.jerk_time_s() / model.period_s);
+  const auto jerk_periods = static_cast<int>(require_count(jerk, most_filter_samples, "the jerk time", "periods"));
   if (jerk_periods > 1) {
     end.smoothing.push_back(Fir::moving_average(jerk_periods));
   }

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 #include <utility>
 
+#include "base/checks.hpp"
 #include "play/program_runs.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/motion.hpp"
@@ -12,7 +12,6 @@
 namespace shapegcode::detail {
 namespace {
 
-constexpr std::uint64_t most_set_points = 4'000'000'000;
 constexpr double settled_time_constants = 40.0;  // time constants of the servo loop that a wait needs to be played for
 constexpr double tick_slack = 1e-9;
 constexpr double rounding_mm = 1e-9;  // between the end of a motion and the start of the next
@@ -266,11 +265,7 @@ void ProgramSetPoints::open_wait(double seconds) {
   owed_periods_ -= whole;
   const double settled = std::ceil(settled_time_constants / (model_.position_gain_per_s.minCoeff() * model_.period_s));
   const double played = waits_ == Waits::cut ? std::min(whole, settled) : whole;
-  if (!(played <= static_cast<double>(most_set_points))) {
-    throw Error(ErrorKind::argument, "wait of " + std::to_string(seconds) + " s takes more than " +
-                                         std::to_string(most_set_points) + " set-points");
-  }
-  active_ = Wait{static_cast<std::uint64_t>(played)};
+  active_ = Wait{static_cast<std::uint64_t>(require_count(played, most_set_points, "a wait", "set-points"))};
 }
 
 void ProgramSetPoints::start_at(const Vector3& position) {
@@ -287,9 +282,8 @@ void ProgramSetPoints::start_at(const Vector3& position) {
 }
 
 void ProgramSetPoints::give(const Vector3& position) {
-  if (++time_.set_points > most_set_points) {
-    throw Error(ErrorKind::argument,
-                "program takes more than " + std::to_string(most_set_points) + " set-points to interpolate");
+  if (const auto count = static_cast<double>(++time_.set_points); count > most_set_points) {
+    static_cast<void>(require_count(count, most_set_points, "a program", "set-points"));
   }
   set_point_ = position;
   servo_.step(position);

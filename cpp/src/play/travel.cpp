@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <string>
 
+#include <fmt/format.h>
+
+#include "base/checks.hpp"
 #include "play/filter_chain.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/measure/contour.hpp"
@@ -21,22 +23,22 @@ class Follower {
  public:
   Follower(const Path& path, std::span<const double> stations, const TravelOptions& options)
       : stations_(stations), options_(options), filters_(options.axis_filters), tracker_(path), path_(path) {
-    if (!(options.period_s > 0.0) || !(options.window_s >= 0.0)) {
-      throw Error(ErrorKind::argument, "a travel needs a period above 0 and a window of at least 0");
-    }
+    require_period(options.period_s);
+    require_not_below_zero(options.window_s, "window of a travel", "s");
     double before = 0.0;
     for (const double s : stations) {
       if (!(s >= before)) {
-        throw Error(ErrorKind::argument, "station at " + std::to_string(s) + " mm: stations must ascend");
+        throw Error(ErrorKind::argument, fmt::format("station at {} mm: stations must ascend", s));
       }
       before = s;
     }
     if (stations.empty() || std::abs(before - path.length_mm()) > 1e-6) {
-      throw Error(ErrorKind::argument, "the stations end at " + std::to_string(before) + " mm, the path at " +
-                                           std::to_string(path.length_mm()) + " mm");
+      throw Error(ErrorKind::argument,
+                  fmt::format("the stations end at {} mm, the path at {} mm", before, path.length_mm()));
     }
-    const auto window = static_cast<std::size_t>(std::lround(options.window_s / options.period_s));
-    steps_.assign(std::max<std::size_t>(window, 1), Vector3::Zero());
+    const double window = std::round(options.window_s / options.period_s);
+    const auto periods = require_count(window, most_filter_samples, "window of a travel", "periods");
+    steps_.assign(std::max<std::size_t>(static_cast<std::size_t>(periods), 1), Vector3::Zero());
     result_.highest_mm_per_s.assign(stations.size(), 0.0);
     result_.time_s.assign(stations.size(), 0.0);
   }
@@ -138,6 +140,13 @@ class Follower {
   Vector3 last_ = Vector3::Zero();
 };
 
+const Segment& last_of(std::span<const Segment> segments) {
+  if (segments.empty()) {
+    throw Error(ErrorKind::argument, "a travel needs a path with at least one segment");
+  }
+  return segments.back();
+}
+
 template <typename Player>
 Travel follow(Player& player, const Path& path, const Vector3& end, std::span<const double> stations,
               const TravelOptions& options) {
@@ -154,13 +163,13 @@ Travel follow(Player& player, const Path& path, const Vector3& end, std::span<co
 Travel travel_path(const std::shared_ptr<const Path>& path, const std::shared_ptr<const SpeedProfile>& profile,
                    const Path& along, std::span<const double> stations_mm, const TravelOptions& options) {
   Interpolator interpolator(path, profile, options.period_s);
-  return follow(interpolator, along, path->segments().back().end_mm, stations_mm, options);
+  return follow(interpolator, along, last_of(path->segments()).end_mm, stations_mm, options);
 }
 
 Travel travel_blocks(std::span<const Segment> blocks, const Path& along, BlockEnd block_end,
                      std::span<const double> stations_mm, const TravelOptions& options) {
   BlockPlayer player(blocks, options.period_s, block_end);
-  return follow(player, along, blocks.back().end_mm, stations_mm, options);
+  return follow(player, along, last_of(blocks).end_mm, stations_mm, options);
 }
 
 }  // namespace shapegcode

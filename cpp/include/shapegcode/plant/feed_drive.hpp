@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -160,8 +161,9 @@ class FeedDriveRealTime {
 
   /// At rest at `position_mm`, without force in spring and bristles.
   void reset(double position_mm) noexcept;
-  /// Next set-point; returns the response (table and modes, mm) at that instant. A set-point that is not finite gives
-  /// a response that is not finite from then on, until reset().
+  /// Next set-point in, the response (table and modes, mm) at that instant out: one value each. A set-point that is not
+  /// finite gives a response that is not finite from then on, until reset().
+  void step(std::span<const double> in, std::span<double> out) noexcept { out[0] = step(in[0]); }
   double step(double setpoint_mm) noexcept;
 
   // As of the last set-point.

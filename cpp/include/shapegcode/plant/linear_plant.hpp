@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include <Eigen/Core>
 
 namespace shapegcode {
@@ -50,8 +52,8 @@ class LinearPlant {
   void reset_at_rest(const Eigen::VectorXd& input);
   void reset_at_rest(const Eigen::VectorXd& input, const Eigen::VectorXd& near);
 
-  /// One period later, at which the input is `input`, of inputs() contiguous values; returns output().
-  const Eigen::VectorXd& step(const Eigen::Ref<const Eigen::VectorXd>& input) noexcept;
+  /// One period later, at which the input is `in`: inputs() values in, outputs() out.
+  void step(std::span<const double> in, std::span<double> out) noexcept;
   /// The same for a whole record, (n_samples, inputs()): the plant is put to rest for the first row, or to `state` with
   /// that input, and row k of the result, (n_samples, outputs()), is the output at row k. What step() gives, to the
   /// last bit; the plant stays at the last row. Throws Error(argument) on a wrong shape or a value that is not finite.

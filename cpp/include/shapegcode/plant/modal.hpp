@@ -1,8 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -61,7 +64,11 @@ class ModalPlant {
   void reset(const Vector3& position) noexcept;
   /// Moves set-point and table alike: a change of coordinates.
   void shift(const Vector3& by_mm) noexcept { command_ += by_mm; }
-  /// Next set-point; returns the response at that instant.
+  /// Next set-point in, the response at that instant out: X, Y and Z.
+  void step(std::span<const double> in, std::span<double> out) noexcept {
+    const Vector3 response = step(Vector3(in[0], in[1], in[2]));
+    std::copy_n(response.data(), axis_count, out.begin());
+  }
   Vector3 step(const Vector3& command) noexcept;
   /// Deflection u - x at the last set-point.
   [[nodiscard]] Vector3 deflection() const noexcept { return deflection_; }
@@ -130,6 +137,8 @@ class ModalPlant {
   void move_sub_steps(std::size_t axis) noexcept;
   /// A mode of an axis at the last set-point.
   [[nodiscard]] Mode mode_now(std::size_t axis, std::size_t mode) const noexcept;
+  /// States too small to be any become zero.
+  void forget_nothing() noexcept;
   /// `peak_` over the period that now begins, looked at between its ends; called only where it may grow.
   void look_between(std::size_t axis) noexcept;
   /// Largest |deflection| between two instants `time_s` apart, with the turning point found by the secant of the rate.
@@ -145,15 +154,15 @@ class ModalPlant {
   std::vector<Transition> sub_;                          // times participation; axis, end of sub-step, mode
   std::shared_ptr<const std::vector<Varying>> varying_;  // never changes: copies of the plant share it
   std::vector<Place> place_;                             // one per varying mode
+  std::int64_t row_ = 0;                                 // set-points since reset()
   Vector3 command_ = Vector3::Zero();
   Vector3 command_velocity_ = Vector3::Zero();
   Vector3 deflection_ = Vector3::Zero();
   Vector3 peak_ = Vector3::Zero();
 };
 
-/// ModalPlant with constant modes for whole records: the same motion to the last bit (but for deflections below 1e-290,
-/// which count as none), without peaks between samples, any number of axes, and about as fast as memory can be read.
-/// Records may be handed over in pieces.
+/// ModalPlant with constant modes for whole records: the same motion to the last bit, without peaks between samples,
+/// any number of axes, and about as fast as memory can be read. Records may be handed over in pieces.
 class ModalResponse {
  public:
   /// (n_samples, n_axes) in any memory order, mm.

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <algorithm>
+#include <span>
+
 #include "shapegcode/samples.hpp"
 
 namespace shapegcode {
@@ -15,7 +18,11 @@ class ServoLag {
   void reset(const Vector3& position) noexcept;
   /// Moves set-point and position alike: a change of coordinates.
   void shift(const Vector3& by_mm) noexcept { setpoint_ += by_mm; }
-  /// Position of the axes at the set-point's instant.
+  /// Next set-point in, position of the axes at that instant out: X, Y and Z.
+  void step(std::span<const double> in, std::span<double> out) noexcept {
+    const Vector3 position = step(Vector3(in[0], in[1], in[2]));
+    std::copy_n(position.data(), axis_count, out.begin());
+  }
   Vector3 step(const Vector3& setpoint) noexcept;
   /// Set-point minus position, as of the last step.
   [[nodiscard]] const Vector3& error_mm() const noexcept { return error_mm_; }

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "plant/feed_drive/drive_checks.hpp"
+#include "base/checks.hpp"
 #include "plant/feed_drive/feed_drive_equations.hpp"
 #include "plant/feed_drive/ode.hpp"
 #include "shapegcode/error.hpp"
@@ -23,22 +23,22 @@ constexpr double longest_step_periods = 0.5;      // two even steps fit between 
 }  // namespace
 
 void FeedDriveParameters::check() const {
-  check_above_zero(motor_mass_kg, "mass of the motor", "kg");
-  check_above_zero(table_mass_kg, "mass of the table", "kg");
-  check_above_zero(stiffness_n_per_m, "stiffness between motor and table", "N/m");
-  check_not_below_zero(damping_n_s_per_m, "damping between motor and table", "N s/m");
-  check_not_below_zero(backlash_m, "backlash", "m");
-  check_above_zero(position_gain_per_s, "position gain", "1/s");
-  check_above_zero(velocity_gain_n_s_per_m, "velocity gain", "N s/m");
-  check_not_below_zero(velocity_integral_time_s, "integral time of the velocity loop", "s");
-  check_within(velocity_feed_forward_ratio, 0.0, 1.0, "velocity feed-forward", "(ratio)");
-  check_within(acceleration_feed_forward_ratio, 0.0, 1.0, "acceleration feed-forward", "(ratio)");
-  check_not_below_zero(force_limit_n, "force limit", "N");
+  require_above_zero(motor_mass_kg, "mass of the motor", "kg");
+  require_above_zero(table_mass_kg, "mass of the table", "kg");
+  require_above_zero(stiffness_n_per_m, "stiffness between motor and table", "N/m");
+  require_not_below_zero(damping_n_s_per_m, "damping between motor and table", "N s/m");
+  require_not_below_zero(backlash_m, "backlash", "m");
+  require_above_zero(position_gain_per_s, "position gain", "1/s");
+  require_above_zero(velocity_gain_n_s_per_m, "velocity gain", "N s/m");
+  require_not_below_zero(velocity_integral_time_s, "integral time of the velocity loop", "s");
+  require_within(velocity_feed_forward_ratio, 0.0, 1.0, "velocity feed-forward", "(ratio)");
+  require_within(acceleration_feed_forward_ratio, 0.0, 1.0, "acceleration feed-forward", "(ratio)");
+  require_not_below_zero(force_limit_n, "force limit", "N");
   table_friction.check("table");
   motor_friction.check("motor");
   for (const Mode& mode : modes) {
     static_cast<void>(pole(mode));
-    check_within(mode.participation, -unbounded, unbounded, "participation of a mode", "(ratio)");
+    require_within(mode.participation, -unbounded, unbounded, "participation of a mode", "(ratio)");
   }
 }
 
@@ -129,9 +129,9 @@ struct FeedDrive::Impl final : OdeSystem {
 };
 
 FeedDrive::FeedDrive(FeedDriveParameters parameters, double period_s, double rtol, double atol_mm) {
-  check_above_zero(period_s, "interpolation period", "s");
-  check_above_zero(rtol, "relative tolerance", "(ratio)");
-  check_above_zero(atol_mm, "absolute tolerance", "mm");
+  require_period(period_s);
+  require_above_zero(rtol, "relative tolerance", "(ratio)");
+  require_above_zero(atol_mm, "absolute tolerance", "mm");
   impl_ = std::make_unique<Impl>(
       Impl::Plant{FeedDriveEquations(std::move(parameters), period_s), period_s, rtol, atol_mm * m_per_mm});
 }
@@ -148,7 +148,7 @@ FeedDrive& FeedDrive::operator=(const FeedDrive& other) {
 }
 
 void FeedDrive::reset(double position_mm) {
-  check_within(position_mm, -unbounded, unbounded, "position", "mm");
+  require_within(position_mm, -unbounded, unbounded, "position", "mm");
   Impl::Plant& plant = impl_->plant;
   plant.origin_m = position_mm * m_per_mm;
   plant.input = {};
@@ -161,7 +161,7 @@ void FeedDrive::reset(double position_mm) {
 void FeedDrive::shift(double by_mm) noexcept { impl_->plant.origin_m += by_mm * m_per_mm; }
 
 double FeedDrive::step(double setpoint_mm) {
-  check_within(setpoint_mm, -unbounded, unbounded, "set-point", "mm");
+  require_within(setpoint_mm, -unbounded, unbounded, "set-point", "mm");
   Impl::Plant& plant = impl_->plant;
   const FeedDriveInput input_before = plant.input;
   const double begin_before_s = plant.period_begin_s;

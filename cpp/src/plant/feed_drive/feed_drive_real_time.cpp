@@ -9,7 +9,8 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
-#include "plant/feed_drive/drive_checks.hpp"
+#include "base/checks.hpp"
+#include "base/rest.hpp"
 #include "plant/feed_drive/feed_drive_equations.hpp"
 #include "shapegcode/error.hpp"
 
@@ -155,7 +156,7 @@ struct FeedDriveRealTime::Impl {
 };
 
 FeedDriveRealTime::FeedDriveRealTime(FeedDriveParameters parameters, double period_s, int substeps) {
-  check_above_zero(period_s, "interpolation period", "s");
+  require_period(period_s);
   if (substeps < 1 || substeps > most_substeps) {
     throw Error(ErrorKind::argument,
                 std::to_string(substeps) + " substeps in a period, must be 1 ... " + std::to_string(most_substeps));
@@ -191,6 +192,7 @@ double FeedDriveRealTime::step(double setpoint_mm) noexcept {
     self.since_s = i * step_s;
     self.advance(step_s, 0);
   }
+  for (double& value : self.y) value = state_or_none(value);
   self.since_s = self.period_s;
   return response_mm();
 }
