@@ -81,7 +81,7 @@ struct ModeColumns {
 /// Response of a mode of unit mass. Written in real numbers: complex products of the standard look for NaN at each
 /// sample.
 void fill_mode(const Driven& driven, double omega, double zeta, ModeColumns columns) {
-  const auto& [held, force, period_s, options] = driven;
+  const auto [held, force, period_s, options] = driven;
   auto& [column, to_omega, to_zeta] = columns;
   const ModeTerms terms = mode_terms(omega, zeta, static_cast<int>(options.quantity));
   const OnePole pole = one_pole(terms.pole, period_s);

@@ -42,7 +42,7 @@ void FluteSet::add(const EngagedPiece& piece, const ChipTable& table, double azi
 
 void FluteSet::add_stretch(const EngagedPiece& piece, const ChipTable& table, double azimuth,
                            const FluteStretch& stretch, ChipTable::Values& sum) const noexcept {
-  const auto& [low, high, lower, upper] = stretch;
+  const auto [low, high, lower, upper] = stretch;
   const double share = 1.0 / lag_rad_per_mm;
   if (piece.slope_per_mm == 0.0) {
     const double weight = piece.weight * share;

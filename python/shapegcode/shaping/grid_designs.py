@@ -1,8 +1,9 @@
 """Exact shaper designs on a sample grid that need an optimiser.
 
 A shaper survives being written as blocks only if its taps lie on the block grid and its zeros are exact there
-(sum a_k z_i^-k = 0, z_i = e^(s_i T)). The shortest exact design is a polynomial (:func:`shapegcode._core.grid_polynomial`), but its
-taps may be wild; :func:`shortest_non_negative` spends a few more taps on a design that never reverses.
+(sum a_k z_i^-k = 0, z_i = e^(s_i T)). The shortest exact design is a polynomial
+(:func:`shapegcode._core.grid_polynomial`), but its taps may be wild; :func:`shortest_non_negative` spends a few more
+taps on a design that never reverses.
 """
 
 from __future__ import annotations
