@@ -232,6 +232,17 @@ def test_no_test_skips_silently() -> None:
     assert skipping == set()
 
 
+def test_no_test_has_a_limit_in_wall_clock_time() -> None:
+    """It would fail on a busy machine: effort.cpu_s compares CPU times instead."""
+    words = re.compile(r"perf_counter|monotonic|time\.time\(|\btimeout\b")
+    looking = {
+        file.name
+        for file in (ROOT / "tests" / "python").rglob("*.py")
+        if file != Path(__file__) and words.search(file.read_text(encoding="utf-8"))
+    }
+    assert looking == set()
+
+
 def says_something(name: str, doc: str | None) -> bool:
     """Whether a docstring holds more than the signatures that pybind11 puts there."""
     signature = re.compile(rf"(\d+\. )?{re.escape(name)}\(.*\)( -> .*)?|Overloaded function\.")
