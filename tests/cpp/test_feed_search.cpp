@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "command/feed_search.hpp"
 #include "shapegcode/command.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/motion.hpp"

@@ -6,8 +6,11 @@
 #include <cstdint>
 #include <memory>
 #include <numbers>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
+#include "command/run_shaper.hpp"
 #include "shapegcode/command.hpp"
 #include "shapegcode/motion.hpp"
 #include "shapegcode/shaper.hpp"
@@ -246,6 +249,27 @@ TEST_CASE("run shaper: a region cut into pieces is the region, bit for bit") {
     CHECK(ends == whole.run_ends);
     CHECK(reached == whole.segment_periods);
   }
+}
+
+TEST_CASE("run shaper: what refers into itself cannot be moved, and a region is moved in the midst of a run") {
+  static_assert(!std::is_copy_constructible_v<RunShaper> && !std::is_move_constructible_v<RunShaper>);
+  static_assert(!std::is_copy_constructible_v<RegionShaper> && std::is_nothrow_move_constructible_v<RegionShaper> &&
+                std::is_nothrow_move_assignable_v<RegionShaper>);
+  const PathPointer path = paper_path(180.0);
+  const ShapingOptions options = region_options(ContourTarget::command, 0.02);
+  const ShapedCommand whole = shape_path(path, grid_shaper(), {}, options);
+  auto first = std::make_unique<RegionShaper>(path, grid_shaper(), std::vector<std::uint32_t>{}, options);
+  ShapedCommand piece;
+  REQUIRE(first->next(piece, 9));
+  RegionShaper second(std::move(*first));
+  first.reset();
+  std::uint32_t periods = 9;
+  while (second.next(piece, 9)) {
+    const auto n = static_cast<std::uint32_t>(piece.middle_mm.rows());
+    CHECK(piece.grid_mm == whole.grid_mm.middleRows(periods, n + 1));
+    periods += n;
+  }
+  CHECK(periods == static_cast<std::uint32_t>(whole.middle_mm.rows()));
 }
 
 TEST_CASE("run shaper: limits of the axes are kept, and what plain shaping asks for is no reason to ask for more") {

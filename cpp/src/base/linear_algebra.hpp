@@ -13,6 +13,17 @@ namespace shapegcode::linear_algebra {
 /// The solution of a least-squares problem (column-pivoting QR).
 [[nodiscard]] Eigen::VectorXd least_squares(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
 
+/// The solution of matrix*x = right for a square matrix (LU, partial pivoting); not finite where it is singular.
+[[nodiscard]] Eigen::VectorXd solve(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
+[[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
+
+/// Replaces a matrix by the triangular factor of its QR decomposition, zeros below.
+void triangulate(Eigen::MatrixXd& matrix);
+
+/// Replaces columns, not more of them than rows, by an orthonormal basis of them; returns the triangular factor that
+/// makes the columns from it.
+[[nodiscard]] Eigen::MatrixXd orthonormalise(Eigen::MatrixXd& columns);
+
 /// The eigenvalues of a real square matrix, in no order.
 [[nodiscard]] Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& matrix);
 

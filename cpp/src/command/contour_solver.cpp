@@ -1,5 +1,7 @@
 #include "shapegcode/command.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -73,7 +75,7 @@ ContourSolver::ContourSolver(std::vector<double> kernel, double smoothness)
   }
   if (!(smoothness > 0.0) || !std::isfinite(smoothness)) {
     throw Error(ErrorKind::argument,
-                "smoothness of a contour correction is " + std::to_string(smoothness) + ", must be finite and above 0");
+                fmt::format("smoothness of a contour correction is {:g}, must be finite and above 0", smoothness));
   }
   band_ = std::max<std::size_t>(kernel_.size() - 1, 2);
   column_.assign(band_ + 1, 0.0);
@@ -131,10 +133,10 @@ void ContourSolver::solve(std::span<const double> error, std::span<double> corre
   const std::size_t past = reach() + 2;
   const std::size_t m = correction.size() - std::min(past, correction.size());
   if (correction.size() < past || error.size() != m + reach() || (!stiffness.empty() && stiffness.size() != m + 2)) {
-    throw Error(ErrorKind::argument, "a contour correction of " + std::to_string(m) + " samples needs " +
-                                         std::to_string(m + reach()) + " errors and " + std::to_string(m + 2) +
-                                         " or no stiffnesses: " + std::to_string(error.size()) + " and " +
-                                         std::to_string(stiffness.size()) + " given");
+    throw Error(ErrorKind::argument,
+                fmt::format("a contour correction of {} samples needs {} errors and {} or no stiffnesses: {} and {} "
+                            "given",
+                            m, m + reach(), m + 2, error.size(), stiffness.size()));
   }
   if (m == 0) {
     return;

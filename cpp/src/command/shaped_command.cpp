@@ -1,11 +1,15 @@
 #include "shapegcode/command.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
+#include <memory>
 #include <utility>
 
+#include "command/feed_search.hpp"
+#include "command/run_shaper.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/motion.hpp"
 
@@ -21,17 +25,54 @@ std::shared_ptr<const Path> sub_path(const std::shared_ptr<const Path>& path, st
                                                            segments.begin() + static_cast<std::ptrdiff_t>(last)));
 }
 
-// What the search for the highest feed takes over is taken out.
-MotionLimits without_tolerance(MotionLimits limits) {
-  limits.contour_tolerance_mm = MotionLimits::none;
-  limits.filter_variance_s2 = 0.0;
-  limits.filter_mean_deviation_s = 0.0;
-  return limits;
+// The rows of a piece; a piece without periods has the one row on which it rests.
+void put(const std::vector<Vector3>& grid, const std::vector<Vector3>& middle, const Vector3& at,
+         ShapedCommand& piece) {
+  piece.grid_mm.resize(static_cast<Eigen::Index>(std::max<std::size_t>(grid.size(), 1)), axis_count);
+  piece.middle_mm.resize(static_cast<Eigen::Index>(middle.size()), axis_count);
+  piece.grid_mm.row(0) = at;
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    piece.grid_mm.row(static_cast<Eigen::Index>(i)) = grid[i];
+  }
+  for (std::size_t i = 0; i < middle.size(); ++i) {
+    piece.middle_mm.row(static_cast<Eigen::Index>(i)) = middle[i];
+  }
 }
 
 }  // namespace
 
-RegionShaper::RegionShaper(std::shared_ptr<const Path> path, const Fir& shaper,
+struct RegionShaper::State {
+  State(std::shared_ptr<const Path> path, const Fir& shaper, std::span<const std::uint32_t> marked_segments,
+        ShapingOptions options);
+
+  [[nodiscard]] bool next(ShapedCommand& piece, std::uint32_t periods);
+  [[nodiscard]] bool begin_run();
+  void note_marks(const PlannedRun& run);
+
+  struct Piece {
+    std::size_t first, last;  // segments
+  };
+
+  std::shared_ptr<const Path> path_;
+  ShapingOptions options_;
+  RunFilter filter_;
+  std::vector<std::uint32_t> marks_;
+  std::vector<Piece> pieces_;  // still to be run, the next one last
+  std::size_t steps_per_half_ = 1;
+  std::uint32_t rest_periods_ = 0;
+
+  Piece now_{0, 0};
+  std::unique_ptr<RunShaper> run_;  // refers to the filter above
+  std::uint32_t given_ = 0;         // periods of the run given out
+  std::uint32_t resting_ = 0;       // periods of rest still to come
+  std::uint32_t period_ = 0;        // of the region
+  Vector3 at_ = Vector3::Zero();    // last grid row
+  std::vector<std::uint32_t> segment_periods_;
+  double largest_deviation_mm_ = 0.0;
+  std::uint32_t stops_ = 0;
+};
+
+RegionShaper::State::State(std::shared_ptr<const Path> path, const Fir& shaper,
                            std::span<const std::uint32_t> marked_segments, ShapingOptions options)
     : path_(std::move(path)),
       options_(std::move(options)),
@@ -41,9 +82,9 @@ RegionShaper::RegionShaper(std::shared_ptr<const Path> path, const Fir& shaper,
       marks_(marked_segments.begin(), marked_segments.end()) {
   const double ticks = options_.block_period_s / options_.interpolation_period_s;
   if (!(ticks >= 1.0 - 1e-9) || !(std::abs(ticks - std::round(ticks)) <= 1e-6)) {
-    throw Error(ErrorKind::argument, "block period " + std::to_string(options_.block_period_s) +
-                                         " s is not a whole multiple of the interpolation period " +
-                                         std::to_string(options_.interpolation_period_s) + " s");
+    throw Error(ErrorKind::argument,
+                fmt::format("block period {} s is not a whole multiple of the interpolation period {} s",
+                            options_.block_period_s, options_.interpolation_period_s));
   }
   // The middle of an odd number of ticks lies between two of them.
   const auto whole = static_cast<std::size_t>(std::lround(ticks));
@@ -63,7 +104,7 @@ RegionShaper::RegionShaper(std::shared_ptr<const Path> path, const Fir& shaper,
 }
 
 // Plans the next run and starts it; false if there is none.
-bool RegionShaper::begin_run() {
+bool RegionShaper::State::begin_run() {
   if (pieces_.empty()) {
     return false;
   }
@@ -76,8 +117,8 @@ bool RegionShaper::begin_run() {
       plan = {part, std::make_shared<const SpeedProfile>(plan_speed(*part, options_.limits)), 0.0, {}};
       break;
     }
-    plan = plan_within_tolerance(part, without_tolerance(options_.limits), filter_, steps_per_half_,
-                                 options_.limits.contour_tolerance_mm, options_.least_feed_mm_per_s);
+    plan = plan_within_tolerance(part, options_.limits, filter_, steps_per_half_, options_.limits.contour_tolerance_mm,
+                                 options_.least_feed_mm_per_s);
     if (plan.stops.empty()) {
       break;
     }
@@ -97,7 +138,7 @@ bool RegionShaper::begin_run() {
   return true;
 }
 
-void RegionShaper::note_marks(const PlannedRun& run) {
+void RegionShaper::State::note_marks(const PlannedRun& run) {
   const double delay_s = 0.5 * run.profile->jerk_time_s() + filter_.mean_delay_s;
   std::size_t cursor = 0;
   while (segment_periods_.size() < marks_.size() && marks_[segment_periods_.size()] < now_.last) {
@@ -108,7 +149,7 @@ void RegionShaper::note_marks(const PlannedRun& run) {
   }
 }
 
-bool RegionShaper::next(ShapedCommand& piece, std::uint32_t periods) {
+bool RegionShaper::State::next(ShapedCommand& piece, std::uint32_t periods) {
   const std::uint32_t first = period_;
   std::vector<Vector3> grid;
   std::vector<Vector3> middle;
@@ -159,21 +200,27 @@ bool RegionShaper::next(ShapedCommand& piece, std::uint32_t periods) {
   if (grid.empty() && (first > 0 || !over)) {
     return false;
   }
+  put(grid, middle, at_, piece);
   piece.first_period = first;
-  piece.grid_mm.resize(static_cast<Eigen::Index>(std::max<std::size_t>(grid.size(), 1)), axis_count);
-  piece.middle_mm.resize(static_cast<Eigen::Index>(middle.size()), axis_count);
-  piece.grid_mm.row(0) = at_;
-  for (std::size_t i = 0; i < grid.size(); ++i) {
-    piece.grid_mm.row(static_cast<Eigen::Index>(i)) = grid[i];
-  }
-  for (std::size_t i = 0; i < middle.size(); ++i) {
-    piece.middle_mm.row(static_cast<Eigen::Index>(i)) = middle[i];
-  }
   piece.arc_normal = std::move(normals);
   piece.run_ends = std::move(run_ends);
   piece.segment_periods = segment_periods_;
   return true;
 }
+
+RegionShaper::RegionShaper(std::shared_ptr<const Path> path, const Fir& shaper,
+                           std::span<const std::uint32_t> marked_segments, ShapingOptions options)
+    : state_(std::make_unique<State>(std::move(path), shaper, marked_segments, std::move(options))) {}
+
+RegionShaper::RegionShaper(RegionShaper&&) noexcept = default;
+RegionShaper& RegionShaper::operator=(RegionShaper&&) noexcept = default;
+RegionShaper::~RegionShaper() = default;
+
+bool RegionShaper::next(ShapedCommand& piece, std::uint32_t periods) { return state_->next(piece, periods); }
+
+double RegionShaper::largest_deviation_mm() const noexcept { return state_->largest_deviation_mm_; }
+
+std::uint32_t RegionShaper::stops() const noexcept { return state_->stops_; }
 
 ShapedCommand shape_path(const std::shared_ptr<const Path>& path, const Fir& shaper,
                          std::span<const std::uint32_t> marked_segments, const ShapingOptions& options) {

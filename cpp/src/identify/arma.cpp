@@ -147,7 +147,7 @@ class IteratedLeastSquares {
       fill_delayed(input, 0, columns.leftCols(terms_));
       fill_delayed(output, 1, columns.middleCols(terms_, order_));
       columns.rightCols(1) = output;
-      identification::triangulate(columns);
+      linear_algebra::triangulate(columns);
       stack.middleRows(static_cast<Index>(r) * kept, kept) = columns.block(eliminated, eliminated, kept, kept);
     }
     // A model with more modes than the data have does not determine all coefficients: take the smallest ones.
@@ -170,7 +170,7 @@ class IteratedLeastSquares {
       for (std::size_t r = 0; r < records_.size(); ++r) {
         MatrixXd columns(inputs[r].rows(), terms_ + 1);
         columns << inputs[r], records_[r].output;
-        identification::triangulate(columns);
+        linear_algebra::triangulate(columns);
         stack.middleRows(static_cast<Index>(r) * (terms_ + 1), terms_ + 1) = columns.topRows(terms_ + 1);
       }
       arma.numerator.row(0) =

@@ -7,12 +7,17 @@
 #include <limits>
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "base/linear_algebra.hpp"
+
 namespace shapegcode::identification {
 namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using linear_algebra::triangulate;
 
 // A column whose part of its own is smaller than this share of it is a combination of the others.
 constexpr double dependent = 1e-11;
@@ -110,9 +115,8 @@ class Linearisation {
     }
     if (bases_.size() <= r) {
       MatrixXd own = columns.leftCols(local);
-      const Eigen::HouseholderQR<MatrixXd> qr(own);
-      bases_.emplace_back(qr.householderQ() * MatrixXd::Identity(own.rows(), local));
-      factors_.emplace_back(qr.matrixQR().topRows(local).triangularView<Eigen::Upper>());
+      factors_.push_back(linear_algebra::orthonormalise(own));
+      bases_.push_back(std::move(own));
     }
     const Index others = columns.cols() - local;
     MatrixXd rest = columns.rightCols(others);
@@ -164,9 +168,8 @@ void complete(const SeparableModel& model, const Linearised& at, SeparableFit& f
     jacobian.rightCols(model.nonlinear()) =
         columns.middleCols(local + common, model.derivatives()) * model.combine(fit.theta, at.local[r], at.common);
     if (local > 0) {
-      const MatrixXd own = columns.leftCols(local);
-      const Eigen::HouseholderQR<MatrixXd> qr(own);
-      const MatrixXd basis = qr.householderQ() * MatrixXd::Identity(own.rows(), local);
+      MatrixXd basis = columns.leftCols(local);
+      static_cast<void>(linear_algebra::orthonormalise(basis));
       jacobian -= basis * (basis.transpose() * jacobian).eval();
     }
     fit.jacobian.push_back(std::move(jacobian));
@@ -190,14 +193,6 @@ void conclude(bool at_bound, bool has_dependent_columns, SeparableFit& fit) {
 }
 
 }  // namespace
-
-void triangulate(MatrixXd& matrix) {
-  const Eigen::HouseholderQR<Eigen::Ref<MatrixXd>> qr(matrix);
-  for (Index j = 0; j < matrix.cols(); ++j) {
-    const Index below = matrix.rows() - j - 1;
-    if (below > 0) matrix.col(j).tail(below).setZero();
-  }
-}
 
 SeparableFit fit_separable(const SeparableModel& model, VectorXd theta, int most_iterations) {
   Linearisation linearisation(model);

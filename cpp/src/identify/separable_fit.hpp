@@ -12,9 +12,6 @@
 
 namespace shapegcode::identification {
 
-/// Replaces a matrix by the triangular factor of its QR decomposition, zeros below.
-void triangulate(Eigen::MatrixXd& matrix);
-
 class SeparableModel {
  public:
   virtual ~SeparableModel() = default;

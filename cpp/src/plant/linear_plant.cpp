@@ -8,9 +8,8 @@
 #include <string>
 #include <utility>
 
-#include <Eigen/LU>
-
 #include "base/checks.hpp"
+#include <Eigen/LU>
 #include "base/linear_algebra.hpp"
 #include "base/rest.hpp"
 #include "shapegcode/error.hpp"
@@ -105,7 +104,7 @@ MatrixXd exponential_less_one(const MatrixXd& matrix) {
            pade[k - 10] * a2 + pade[k - 12] * one;
   };
   const MatrixXd odd = a1 * upper(13);
-  MatrixXd result = (upper(12) - odd).partialPivLu().solve(2.0 * odd);
+  MatrixXd result = linear_algebra::solve(upper(12) - odd, MatrixXd(2.0 * odd));
   for (int k = 0; k < halvings; ++k) result = (2.0 * result + result * result).eval();
   return result;
 }

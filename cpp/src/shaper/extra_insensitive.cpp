@@ -10,6 +10,7 @@
 #include <sstream>
 #include <utility>
 
+#include "base/linear_algebra.hpp"
 #include "shapegcode/error.hpp"
 
 // With the nominal frequency as unit the residual at frequency w is |S(w)|,
@@ -128,7 +129,7 @@ double newton_step(Unknowns& x, double zeta, double limit) {
       fill(2 * taps - 1 + (i < middle ? i : i - 1), r.slope, r.curvature);
     }
   }
-  const Eigen::VectorXd change = jacobian.partialPivLu().solve(error);
+  const Eigen::VectorXd change = linear_algebra::solve(jacobian, error);
   if (!change.allFinite()) {
     return std::numeric_limits<double>::infinity();
   }

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "command/run_reader.hpp"
+#include "shapegcode/plant/modal.hpp"
+
+namespace shapegcode {
+
+/// Largest deviation of what follows the path, near each junction and segment of a run, in mm.
+struct RunDeviation {
+  std::vector<float> at_junction;  ///< [i]: while segment i is entered, within half the shaper
+  std::vector<float> on_segment;   ///< further than that from every corner; negative: nowhere
+  std::vector<float> near_corner;  ///< [i]: on segment i, within half the shaper of a corner
+};
+
+/// Finds them row by row, behind the corrections.
+class DeviationMeter {
+ public:
+  /// `rows` must keep places.
+  DeviationMeter(RunReader& rows, RunDeviation& measured);
+
+  /// To be called for each row in turn, once its correction and that of the next row are final.
+  void measure(std::size_t row);
+
+ private:
+  [[nodiscard]] Vector3 deviation(std::size_t row);
+  [[nodiscard]] Vector3 as_block(std::size_t row) const noexcept;
+  /// Distance by which the last rows up to `row` miss a corner.
+  [[nodiscard]] double missed_by(const Vector3& corner, std::size_t row) const noexcept;
+  [[nodiscard]] Vector3& left(std::size_t row) noexcept { return left_[row % left_.size()]; }
+  [[nodiscard]] const Vector3& left(std::size_t row) const noexcept { return left_[row % left_.size()]; }
+
+  RunReader& rows_;
+  RunDeviation& measured_;
+  std::size_t half_;                   // of the shaper, rows
+  std::unique_ptr<ModalPlant> plant_;  // of the response; null where modes move
+  std::array<Vector3, 16> left_{};     // deviations of the last rows
+};
+
+}  // namespace shapegcode

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "shapegcode/command.hpp"
+#include "shapegcode/filter.hpp"
+#include "shapegcode/mode.hpp"
+
+namespace shapegcode {
+
+/// What follows the look-ahead of a run, on half the block grid, and how the contour is kept.
+struct RunFilter {
+  /// `shapers`: taps in whole block periods, one common to all axes or one for each, of one mean delay. `followed`: a
+  /// set of shapers along an axis, which is used instead of it; the contour is then kept with the modes at each of its
+  /// positions, by `tables`. Throws as `contour_kernel` and ContourSolver do.
+  RunFilter(std::span<const Fir> shapers, ContourTarget target, const AxisModes& modes, double block_period_s,
+            double smoothness, const std::optional<FollowingFir>& followed = {}, const AxisModeTables& tables = {});
+
+  /// Half block periods by which the shaped command moves longer.
+  [[nodiscard]] int shaper_rows() const noexcept { return following ? following->fir().duration_samples() : longest_; }
+
+  std::vector<Fir> half_shapers;          ///< one per axis, taps in half block periods
+  std::optional<FollowingFir> following;  ///< likewise, instead of it
+  ContourTarget target;
+  AxisModes modes;
+  double half_period_s;
+  double mean_delay_s;                                               ///< of the shaper
+  std::vector<std::array<std::vector<double>, axis_count>> kernels;  ///< one per shaper that is followed
+  double smoothness;
+
+ private:
+  int longest_ = 0;
+};
+
+}  // namespace shapegcode

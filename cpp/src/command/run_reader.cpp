@@ -1,0 +1,211 @@
+#include "command/run_reader.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "command/junctions.hpp"
+
+namespace shapegcode {
+namespace {
+
+constexpr double active_mm = 1e-4;  // deviations below it are left alone: a tenth of what a word can say
+constexpr std::size_t forget_after = 32768;
+
+double smooth_step(double x) noexcept { return x * x * (3.0 - 2.0 * x); }
+
+}  // namespace
+
+RunReader::RunReader(std::shared_ptr<const Path> path, std::shared_ptr<const SpeedProfile> profile,
+                     const RunFilter& filter, std::size_t steps_per_half, bool keeps_places)
+    : path_(std::move(path)),
+      filter_(filter),
+      steps_per_half_(steps_per_half),
+      keeps_places_(keeps_places),
+      ahead_(path_, profile, filter.half_period_s / static_cast<double>(steps_per_half)) {
+  const std::size_t steps_per_period = 2 * steps_per_half_;
+  const std::size_t periods_in = (ahead_.sample_count() - 1 + steps_per_period - 1) / steps_per_period;
+  rows_in_ = 2 * periods_in + 1;
+  const auto shaper_rows = static_cast<std::size_t>(filter_.shaper_rows());
+  periods_ = static_cast<std::uint32_t>(periods_in + shaper_rows / 2);
+  reach_ = shaper_rows;
+  if (filter_.target != ContourTarget::none) {
+    target_ = std::make_unique<Interpolator>(path_, std::move(profile), ahead_.period_s(), filter_.mean_delay_s);
+    for (const auto& kernel : filter_.kernels) {
+      for (const std::vector<double>& of_axis : kernel) reach_ = std::max(reach_, of_axis.size() - 1);
+    }
+  }
+  history_ = static_cast<std::ptrdiff_t>(2 * reach_ + 8);
+  base_ = -history_;
+}
+
+void RunReader::read_row() {
+  read_command();
+  if (target_) {
+    read_error();
+  }
+}
+
+void RunReader::read_command() {
+  Vector3 position;
+  for (std::size_t skip = 0; skip < (read_ == 0 ? 1 : steps_per_half_); ++skip) {
+    ahead_.step(position);
+  }
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    if (read_ == 0) {
+      command_[axis].assign(static_cast<std::size_t>(history_), position[static_cast<Eigen::Index>(axis)]);
+      error_[axis].assign(static_cast<std::size_t>(history_), 0.0);
+      correction_[axis].assign(static_cast<std::size_t>(history_), 0.0);
+    }
+    command_[axis].push_back(position[static_cast<Eigen::Index>(axis)]);
+    correction_[axis].push_back(0.0);
+  }
+  if (filter_.following) {
+    const double here = position[filter_.following->axis()];
+    if (read_ == 0) place_.assign(static_cast<std::size_t>(history_), filter_.following->place(here));
+    const Column& along = command_[static_cast<std::size_t>(filter_.following->axis())];
+    place_.push_back(filter_.following->place(0.5 * (here + along[along.size() - 2])));
+  }
+  const Segment& on = (*path_)[ahead_.segment()];
+  if (on.kind == SegmentKind::arc && read_ < rows_in_) {
+    arcs_.push_back({read_, static_cast<std::int8_t>(on.normal)});
+  }
+  ++read_;
+}
+
+void RunReader::read_error() {
+  const std::size_t segment = ahead_.segment();
+  // Near a corner the place along the path matters too: it is where both legs meet.
+  const double delay_rows = std::max(1.0, filter_.mean_delay_s / filter_.half_period_s);
+  if (passes_corner(*path_, segment_before_, segment)) {
+    since_corner_ = 0.0;
+  }
+  segment_before_ = segment;
+  const bool near = since_corner_ <= 1.5 * delay_rows;
+  along_ = std::clamp(along_ + (near ? 1.25 / delay_rows : -0.6 / delay_rows), 0.0, 1.0);
+  since_corner_ += 1.0;
+
+  Vector3 wanted;
+  for (std::size_t skip = 0; skip < (read_ == 1 ? 1 : steps_per_half_); ++skip) {
+    target_->step(wanted);
+  }
+  const std::size_t at = target_->segment();
+  const Vector3 tangent = tangent_at((*path_)[at], target_->distance_mm() - path_->distance_mm(at));
+  Vector3 error;
+  const std::size_t row = index(read_ - 1);
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    error[a] = behind_kernel(axis, command_[axis], row) - wanted[a];
+  }
+  error -= (1.0 - smooth_step(along_)) * tangent.dot(error) * tangent;
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    error_[axis].push_back(error[static_cast<Eigen::Index>(axis)]);
+  }
+  if (keeps_places_) {
+    if (read_ == 1) {
+      tangent_.assign(static_cast<std::size_t>(history_), tangent);
+      wanted_.assign(static_cast<std::size_t>(history_), wanted);
+      segment_.assign(static_cast<std::size_t>(history_), 0);
+    }
+    tangent_.push_back(tangent);
+    wanted_.push_back(wanted);
+    segment_.push_back(static_cast<std::uint32_t>(at));
+  }
+}
+
+void RunReader::read_to(std::size_t row) {
+  while (read_ < row) {
+    read_row();
+  }
+}
+
+bool RunReader::leaves_path(std::size_t row) const noexcept {
+  const std::size_t i = index(row);
+  return std::abs(error_[0][i]) > active_mm || std::abs(error_[1][i]) > active_mm || std::abs(error_[2][i]) > active_mm;
+}
+
+Vector3 RunReader::left_of_error(std::size_t row) const noexcept {
+  const std::size_t i = index(row);
+  Vector3 result;
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    result[static_cast<Eigen::Index>(axis)] = error_[axis][i] + behind_kernel(axis, correction_[axis], i);
+  }
+  return result;
+}
+
+double RunReader::behind_kernel(std::size_t axis, const Column& column, std::size_t i) const noexcept {
+  const auto at = [&](std::size_t node) {
+    const std::vector<double>& kernel = filter_.kernels[node][axis];
+    double sum = 0.0;
+    for (std::size_t j = 0; j < kernel.size(); ++j) {
+      sum += kernel[j] * column[i - j];
+    }
+    return sum;
+  };
+  if (place_.empty()) {
+    return at(0);
+  }
+  const auto lower = static_cast<std::size_t>(place_[i]);
+  const double upper_share = place_[i] - static_cast<double>(lower);
+  const double below = at(lower);
+  return upper_share > 0.0 ? below + upper_share * (at(lower + 1) - below) : below;
+}
+
+double RunReader::shaped(std::size_t axis, std::ptrdiff_t row, bool corrected) const noexcept {
+  if (filter_.following) {
+    const auto i = row - base_;
+    const VaryingFir& fir = filter_.following->fir();
+    const double plain = fir.value(command_[axis].data() + i, place_.data() + i);
+    return corrected ? plain + fir.value(correction_[axis].data() + i, place_.data() + i) : plain;
+  }
+  const std::vector<int>& delays = filter_.half_shapers[axis].delays();
+  const std::vector<double>& taps = filter_.half_shapers[axis].taps();
+  const double* command = command_[axis].data() + (row - base_);
+  double sum = 0.0;
+  for (std::size_t k = 0; k < taps.size(); ++k) {
+    sum += taps[k] * *(command - delays[k]);
+  }
+  if (corrected) {
+    const double* correction = correction_[axis].data() + (row - base_);
+    for (std::size_t k = 0; k < taps.size(); ++k) {
+      sum += taps[k] * *(correction - delays[k]);
+    }
+  }
+  return sum;
+}
+
+void RunReader::forget(std::size_t out) {
+  const auto keep = static_cast<std::ptrdiff_t>(out) - history_;
+  if (keep - base_ < static_cast<std::ptrdiff_t>(forget_after)) {
+    return;
+  }
+  const auto drop = [&](auto& column) { column.erase(column.begin(), column.begin() + (keep - base_)); };
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    drop(command_[axis]);
+    drop(correction_[axis]);
+    if (target_) {
+      drop(error_[axis]);
+    }
+  }
+  if (filter_.following) {
+    drop(place_);
+  }
+  if (keeps_places_) {
+    drop(tangent_);
+    drop(wanted_);
+    drop(segment_);
+  }
+  base_ = keep;
+}
+
+std::int8_t RunReader::arc_normal(std::size_t row, std::size_t lead) {
+  read_to(std::min(row + 3 + lead, rows_in_));
+  const auto behind = static_cast<std::size_t>(filter_.shaper_rows()) + lead;
+  while (!arcs_.empty() && arcs_.front().row <= row + 2 + lead) {
+    seen_ = arcs_.front();
+    arcs_.pop_front();
+  }
+  return seen_.normal >= 0 && row <= seen_.row + behind ? seen_.normal : std::int8_t{-1};
+}
+
+}  // namespace shapegcode
