@@ -42,11 +42,11 @@ void Interpreter::optional_skip_block(const ModalState& before) {
 void Interpreter::read_codes(LineFlow& flow) {
   explicit_exact_stop_ = false;
   one_shot_axes_ = false;
-  for (int k = 0; k < words_.g_count; ++k) {
-    const int g = words_.g_tenths[static_cast<std::size_t>(k)];
-    const std::uint32_t column = words_.g_column[static_cast<std::size_t>(k)];
+  for (int k = 0; k < words().g_count; ++k) {
+    const int g = words().g_tenths[static_cast<std::size_t>(k)];
+    const std::uint32_t column = words().g_column[static_cast<std::size_t>(k)];
     const int whole = g / 10;
-    const Group group = words_.g_group[static_cast<std::size_t>(k)];
+    const Group group = words().g_group[static_cast<std::size_t>(k)];
     // A no-op (G40 where nothing is compensated) leaves a block inside its region; a change ends it.
     const auto set = [&](int& field, bool keeps_region) {
       if (field != whole && !keeps_region) {
@@ -90,7 +90,7 @@ void Interpreter::read_codes(LineFlow& flow) {
         set(state_.compensation, false);
         break;
       case Group::length_offset:
-        if (whole != state_.length_offset || words_.has('H')) {
+        if (whole != state_.length_offset || words().has('H')) {
           flow.stop = true;
         }
         length_offset(whole);
@@ -115,12 +115,12 @@ void Interpreter::read_codes(LineFlow& flow) {
         break;
       case Group::coordinates: {
         // G54 P7 is G54.1 P7; in a block with a dwell or a cycle P belongs to that.
-        const bool extended = g == 541 || (g == 540 && words_.has('P') && state_.cycle == 80 &&
-                                           (words_.groups & (group_bit(Group::none) | group_bit(Group::cycle))) == 0);
+        const bool extended = g == 541 || (g == 540 && words().has('P') && state_.cycle == 80 &&
+                                           (words().groups & (group_bit(Group::none) | group_bit(Group::cycle))) == 0);
         const int system = extended ? 541 : whole;
-        const int extra = !extended ? 0 : words_.has('P') ? static_cast<int>(words_['P'].value) : 1;
+        const int extra = !extended ? 0 : words().has('P') ? static_cast<int>(words()['P'].value) : 1;
         if (extended && (extra < 1 || extra > 300)) {
-          alarm(30, "G54.1 P" + std::to_string(extra) + ": P is 1 ... 300", words_['P'].column);
+          alarm(30, "G54.1 P" + std::to_string(extra) + ": P is 1 ... 300", words()['P'].column);
         }
         if (system != state_.coordinate_system || extra != state_.coordinate_number) {
           change_coordinates(system, extra);
@@ -152,8 +152,8 @@ void Interpreter::read_codes(LineFlow& flow) {
         }
         flow.stop = true;
         one_shot_axes_ = true;
-        if (words_.has_any(axis_letters)) {
-          forget_axes(words_.present);
+        if (words().has_any(axis_letters)) {
+          forget_axes(words().present);
         } else {
           forget_all();
         }
@@ -170,8 +170,8 @@ void Interpreter::read_codes(LineFlow& flow) {
               column);
     }
   }
-  if (words_.has('H') && (words_.groups & group_bit(Group::length_offset)) == 0 && state_.length_offset != 49 &&
-      (words_.groups & group_bit(Group::none)) == 0) {
+  if (words().has('H') && (words().groups & group_bit(Group::length_offset)) == 0 && state_.length_offset != 49 &&
+      (words().groups & group_bit(Group::none)) == 0) {
     length_offset(state_.length_offset);  // H alone changes the offset in force
   }
 }
@@ -179,15 +179,15 @@ void Interpreter::read_codes(LineFlow& flow) {
 void Interpreter::dwell() {
   double seconds = 0.0;
   const Word* time = nullptr;
-  if (words_.has('P')) {
-    const Word& p = words_['P'];
+  if (words().has('P')) {
+    const Word& p = words()['P'];
     if (p.has_point) {
       alarm(7, "G04 P takes whole milliseconds: no decimal point", p.column);
     }
     seconds = p.value * 1e-3;
     time = &p;
-  } else if (words_.has('X') || words_.has('U')) {
-    const Word& x = words_[words_.has('X') ? 'X' : 'U'];
+  } else if (words().has('X') || words().has('U')) {
+    const Word& x = words()[words().has('X') ? 'X' : 'U'];
     seconds = x.has_point || options_.calculator_decimal_point ? x.value : x.value * 1e-3;
     time = &x;
   } else {
@@ -203,7 +203,7 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
   switch (g_tenths) {
     case 90:
       explicit_exact_stop_ = true;
-      flow.stop = flow.stop || !words_.has_any(axis_letters | centre_letters);
+      flow.stop = flow.stop || !words().has_any(axis_letters | centre_letters);
       return;
     case 40:
       flow.stop = true;
@@ -220,8 +220,8 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
       one_shot_axes_ = true;
       for (int axis = 0; axis < axis_count; ++axis) {
         const char letter = static_cast<char>('X' + axis);
-        if (words_.has(letter)) {
-          state_.position_mm[axis] = length_mm(words_[letter]);
+        if (words().has(letter)) {
+          state_.position_mm[axis] = length_mm(words()[letter]);
           state_.known[static_cast<std::size_t>(axis)] = true;
         }
       }
@@ -231,14 +231,14 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
       one_shot_axes_ = true;
       for (int axis = 0; axis < axis_count; ++axis) {
         const char letter = static_cast<char>('X' + axis);
-        if (words_.has(letter)) {
-          const double offset = length_mm(words_[letter]);
+        if (words().has(letter)) {
+          const double offset = length_mm(words()[letter]);
           state_.position_mm[axis] -= offset - local_offset_[axis];
           local_offset_[axis] = offset;
           // Behind a G52 that may not have run the step from the old offset is not known.
           const auto i = static_cast<std::size_t>(axis);
           state_.known[i] = state_.known[i] && !local_offset_uncertain_[i];
-          local_offset_uncertain_[i] = block_.optional_skip;
+          local_offset_uncertain_[i] = block_->optional_skip;
         }
       }
       return;
@@ -246,13 +246,13 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
       if (g_tenths != 530) {
         refuse_in_cycle(g_tenths);
       }
-      if (g_tenths == 300 && words_.has('P') && (words_['P'].value < 2.0 || words_['P'].value > 4.0)) {
-        alarm(46, format_message("G30 P%g: the reference points are P2, P3 and P4", words_['P'].value),
-              words_['P'].column);
+      if (g_tenths == 300 && words().has('P') && (words()['P'].value < 2.0 || words()['P'].value > 4.0)) {
+        alarm(46, format_message("G30 P%g: the reference points are P2, P3 and P4", words()['P'].value),
+              words()['P'].column);
       }
       flow.stop = true;
       one_shot_axes_ = true;
-      forget_axes(words_.present);
+      forget_axes(words().present);
       return;
   }
 }
@@ -286,10 +286,10 @@ void Interpreter::foreign_switch(int g_tenths) {
 
 // G05.1 Q1, G08 P1 and G05 P10000 switch modes on that plan short blocks anew.
 void Interpreter::look_ahead_switch(int g_tenths) {
-  if (g_tenths == 51 && words_.has('Q')) {
-    look_ahead_ = words_['Q'].value != 0.0;
-  } else if ((g_tenths == 80 || g_tenths == 50) && words_.has('P')) {
-    look_ahead_ = words_['P'].value != 0.0;
+  if (g_tenths == 51 && words().has('Q')) {
+    look_ahead_ = words()['Q'].value != 0.0;
+  } else if ((g_tenths == 80 || g_tenths == 50) && words().has('P')) {
+    look_ahead_ = words()['P'].value != 0.0;
   }
 }
 
@@ -306,27 +306,27 @@ void Interpreter::change_coordinates(int number, int extra) {
 }
 
 void Interpreter::m_codes(LineFlow& flow) {
-  if (words_.has_any(letter_mask("MST"))) {
+  if (words().has_any(letter_mask("MST"))) {
     close_region();
     MachineFunction function;
-    function.m_codes = words_.m_codes;
-    function.m_count = words_.m_count;
-    if (words_.has('T')) {
-      function.tool = static_cast<std::int64_t>(words_['T'].value);
+    function.m_codes = words().m_codes;
+    function.m_count = words().m_count;
+    if (words().has('T')) {
+      function.tool = static_cast<std::int64_t>(words()['T'].value);
     }
-    if (words_.has('S')) {
-      function.spindle_rev_per_min = words_['S'].value;
+    if (words().has('S')) {
+      function.spindle_rev_per_min = words()['S'].value;
     }
     add_step(StepKind::function, program_.functions.size());
     program_.functions.push_back(function);
   }
-  for (int k = 0; k < words_.m_count; ++k) {
+  for (int k = 0; k < words().m_count; ++k) {
     flow.stop = true;
-    switch (words_.m_codes[static_cast<std::size_t>(k)]) {
+    switch (words().m_codes[static_cast<std::size_t>(k)]) {
       case 2:
       case 30:
         close_region();
-        ended_ = ended_ || !block_.optional_skip;
+        ended_ = ended_ || !block_->optional_skip;
         break;
       case 6:
         for (std::size_t axis = 0; axis < axis_count; ++axis) {

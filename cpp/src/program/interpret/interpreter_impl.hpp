@@ -17,8 +17,7 @@
 #include "program/interpret/canned_cycle.hpp"
 #include "program/interpret/input_rules.hpp"
 #include "program/interpret/offsets.hpp"
-#include "program/text/block_words.hpp"
-#include "program/text/lexer.hpp"
+#include "program/text/parsed_block.hpp"
 #include "shapegcode/program.hpp"
 
 namespace shapegcode::detail {
@@ -41,12 +40,11 @@ class Interpreter {
   Interpreter(Program& program, const ReaderOptions& options)
       : options_(options), program_(program), state_(options.power_on), offsets_(options) {}
 
-  /// Splits a line into words: `block()` and `words()`.
-  void scan(std::string_view text, std::uint32_t line);
-  /// Throws where the words that were scanned could only be arguments of a macro call.
-  void require_plain_words(std::uint32_t line) const;
-  /// Executes the words that were scanned. The text of the line stands at [begin, end) of the program's text.
-  void execute(std::uint32_t line, const LineOrigin& origin, std::size_t begin, std::size_t end);
+  /// Throws where words could only be arguments of a macro call.
+  void require_plain_words(const BlockWords& words, std::uint32_t line) const;
+  /// Executes a block, whose text stands at [begin, end) of the program's text.
+  void execute(const ParsedBlock& block, std::uint32_t line, const LineOrigin& origin, std::size_t begin,
+               std::size_t end);
   /// Ends an open region: the next line is not part of it.
   void close_region();
   void warn(const std::string& message);
@@ -58,8 +56,6 @@ class Interpreter {
   /// A work offset set by the program: one that is in force shifts the position.
   void set_work_offset(int coordinate_system, int number, int axis, double value_mm, bool incremental = false);
 
-  [[nodiscard]] const Block& block() const noexcept { return block_; }
-  [[nodiscard]] const BlockWords& words() const noexcept { return words_; }
   [[nodiscard]] const ModalState& state() const noexcept { return state_; }
   [[nodiscard]] bool ended() const noexcept { return ended_; }
   void end() noexcept { ended_ = true; }
@@ -72,6 +68,7 @@ class Interpreter {
     bool motion = false;  ///< the block moves axes
   };
 
+  [[nodiscard]] const BlockWords& words() const noexcept { return block_->sorted(); }
   void optional_skip_block(const ModalState& before);
   void read_codes(LineFlow& flow);
   void refuse_in_cycle(int g_tenths) const;
@@ -111,8 +108,8 @@ class Interpreter {
   Program& program_;
   ModalState state_;
   Offsets offsets_;
-  Block block_;
-  BlockWords words_;
+  const ParsedBlock* block_ = nullptr;  ///< the one that is executed
+  std::size_t begin_ = 0;               ///< where it stands in the program's text
   std::uint32_t line_number_ = 0;
   LineOrigin origin_;
   std::shared_ptr<Region> region_;

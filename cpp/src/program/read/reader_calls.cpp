@@ -15,6 +15,8 @@ bool has_m(const BlockWords& words, int code) noexcept {
   return std::find(words.m_codes.data(), end, code) != end;
 }
 
+bool is_m(const Word& word, int code) noexcept { return word.letter == 'M' && static_cast<int>(word.value) == code; }
+
 }  // namespace
 
 std::string program_name(std::int64_t number) {
@@ -45,10 +47,9 @@ bool Reader::is_call(const BlockWords& words) const noexcept {
   return false;
 }
 
-// `text` holds plain numbers, `raw` the block as written: arguments keep their full precision.
-void Reader::call_block(std::string_view text, std::string_view raw) {
-  const BlockWords& words = interpreter_.words();
-  const Block& block = interpreter_.block();
+// `block` holds plain numbers, `raw` is the line as written: arguments keep their full precision.
+void Reader::call_block(const ParsedBlock& block, std::string_view raw) {
+  const BlockWords& words = block.sorted();
   if (block.optional_skip && !block_skip(options_, block.skip_switch).has_value()) {
     fail(
         "'/' before a call: whether the block runs decides where the program goes; say it in the machine file "
@@ -57,7 +58,7 @@ void Reader::call_block(std::string_view text, std::string_view raw) {
   for (int k = 0; k < words.g_count; ++k) {
     const int g = words.g_tenths[static_cast<std::size_t>(k)];
     if (g == 650 || g == 660 || g == 661 || g == 670) {
-      macro_call(text, raw, g);
+      macro_call(block, raw, g);
       return;
     }
   }
@@ -65,28 +66,25 @@ void Reader::call_block(std::string_view text, std::string_view raw) {
     fail("M99 in one block with M98 or M198: a block either calls or returns", words['M'].column);
   }
   if (has_m(words, 99)) {
-    subprogram_return(text);
+    subprogram_return(block);
   } else if (has_m(words, 98) || has_m(words, 198)) {
-    subprogram_call(text);
+    subprogram_call(block);
   } else {
-    bound_call(text, raw);
+    bound_call(block, raw);
   }
 }
 
 // Executes what stands in the block beside the call.
-void Reader::put_without(std::string_view text, std::string_view letters, std::initializer_list<int> m_codes) {
-  const Block block = interpreter_.block();
+void Reader::put_without(const ParsedBlock& block, const std::function<bool(const Word&)>& left_out) {
   std::string rest;
   bool words = false;
   for (const Word& word : block) {
-    const bool called =
-        word.letter == 'M' && std::find(m_codes.begin(), m_codes.end(), static_cast<int>(word.value)) != m_codes.end();
-    if (called || letters.find(word.letter) != std::string_view::npos) {
+    if (left_out(word)) {
       continue;
     }
     words = words || word.letter != 'N';
     rest += (rest.empty() ? "" : " ");
-    rest += text.substr(word.column - 1, word.end - (word.column - 1));
+    rest += block.text_of(word);
   }
   for (std::size_t i = 0; i < block.comment_count; ++i) {
     rest += (rest.empty() ? "" : " ");
@@ -95,12 +93,12 @@ void Reader::put_without(std::string_view text, std::string_view letters, std::i
   if (!words && block.comment_count == 0) {
     return;
   }
-  interpreter_.scan(rest, here_.line);
-  put_block(rest);
+  rest_.read_and_keep(std::move(rest), here_.line, options_.max_line_length);
+  put_block(rest_);
 }
 
-void Reader::subprogram_call(std::string_view text) {
-  const BlockWords words = interpreter_.words();
+void Reader::subprogram_call(const ParsedBlock& block) {
+  const BlockWords& words = block.sorted();
   if (!words.has('P')) {
     alarm(76, "M98 without a program number P", words['M'].column);
   }
@@ -123,17 +121,19 @@ void Reader::subprogram_call(std::string_view text) {
     alarm(76, "M98 P" + std::to_string(p) + " names no program", words['P'].column);
   }
   const std::uint32_t column = words['P'].column;
-  put_without(text, "PL", {98, 198});
+  put_without(block, [](const Word& word) {
+    return word.letter == 'P' || word.letter == 'L' || is_m(word, 98) || is_m(word, 198);
+  });
   if (repeats > 0) {
-    enter(number, {}, false, static_cast<int>(repeats), column, text);
+    enter(number, {}, false, static_cast<int>(repeats), column, block.text());
   }
 }
 
-void Reader::subprogram_return(std::string_view text) {
-  const BlockWords words = interpreter_.words();
+void Reader::subprogram_return(const ParsedBlock& block) {
+  const BlockWords& words = block.sorted();
   const std::int64_t target = words.has('P') ? static_cast<std::int64_t>(words['P'].value) : -1;
   const std::uint32_t column = words.has('P') ? words['P'].column : words['M'].column;
-  put_without(text, target >= 0 ? "P" : "", {99});
+  put_without(block, [&](const Word& word) { return is_m(word, 99) || (target >= 0 && word.letter == 'P'); });
   if (frames_.size() == 1) {
     if (target >= 0) {
       jump(target, column);
@@ -152,25 +152,15 @@ void Reader::subprogram_return(std::string_view text) {
   }
 }
 
-void Reader::macro_call(std::string_view text, std::string_view raw, int g_tenths) {
+void Reader::macro_call(const ParsedBlock& block, std::string_view raw, int g_tenths) {
   if (g_tenths == 670) {
     if (!modal_calls_.empty()) {
       modal_calls_.pop_back();
     }
     control_.modal_call = modal_calls_.empty() ? 67 : 66;
     // Other codes may share the block with G67.
-    std::string rest(text);
-    const Block& block = interpreter_.block();
-    for (const Word& word : block) {
-      if (word.letter == 'G' && word.value == 67.0) {
-        for (std::size_t i = word.column - 1; i < word.end; ++i) {
-          rest[i] = ' ';
-        }
-      }
-    }
     if (block.word_count > 1) {
-      interpreter_.scan(rest, here_.line);
-      put_without(rest, "", {});
+      put_without(block, [](const Word& word) { return word.letter == 'G' && word.value == 67.0; });
     }
     return;
   }
@@ -183,7 +173,7 @@ void Reader::macro_call(std::string_view text, std::string_view raw, int g_tenth
   }
   if (g_tenths == 650) {
     if (arguments.repeats > 0) {
-      enter(arguments.program, arguments, true, arguments.repeats, 1, text);
+      enter(arguments.program, arguments, true, arguments.repeats, 1, block.text());
     }
     return;
   }
@@ -198,23 +188,23 @@ void Reader::macro_call(std::string_view text, std::string_view raw, int g_tenth
 }
 
 // A G, M or T code that the machine builder bound to a program; inside of such a program codes are ordinary.
-void Reader::bound_call(std::string_view text, std::string_view raw) {
-  const BlockWords words = interpreter_.words();
+void Reader::bound_call(const ParsedBlock& block, std::string_view raw) {
+  const BlockWords& words = block.sorted();
   const CodeBindings& bound = options_.bindings;
   const bool inside = std::any_of(frames_.begin(), frames_.end(), [](const Frame& frame) { return frame.by_code; });
   if (inside) {
-    put_block(text);
+    put_block(block);
     return;
   }
   const auto call = [&](std::int64_t number, const MacroArguments& arguments, bool macro, std::uint32_t column) {
-    if (enter(number, arguments, macro, arguments.repeats, column, text)) {
+    if (enter(number, arguments, macro, arguments.repeats, column, block.text())) {
       frames_.back().by_code = true;
     }
   };
   const auto call_macro = [&](std::int64_t number, std::uint32_t column) {
     call(number, parse_arguments(raw, here_.line, variables_, argument_scale()), true, column);
   };
-  for (const Word& word : interpreter_.block()) {
+  for (const Word& word : block) {
     if (word.letter == 'G') {
       const auto found = bound.g_macros.find(static_cast<int>(std::lround(word.value * 10.0)));
       if (found != bound.g_macros.end()) {
@@ -233,14 +223,14 @@ void Reader::bound_call(std::string_view text, std::string_view raw) {
     const int m = words.m_codes[static_cast<std::size_t>(k)];
     const auto found = bound.m_subprograms.find(m);
     if (found != bound.m_subprograms.end()) {
-      put_without(text, "", {m});
+      put_without(block, [m](const Word& word) { return is_m(word, m); });
       call(found->second, {}, false, 1);
       return;
     }
   }
   // is_call() left nothing else.
   variables_.write(149, words['T'].value, here_.line, words['T'].column);
-  put_without(text, "T", {});
+  put_without(block, [](const Word& word) { return word.letter == 'T'; });
   call(bound.tool_program, {}, false, 1);
 }
 

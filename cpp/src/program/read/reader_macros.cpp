@@ -73,8 +73,8 @@ std::array<double, 26> Reader::argument_scale() const {
   return scale;
 }
 
-void Reader::macro_line(std::string_view view, std::size_t begin) {
-  const std::string text(view);
+void Reader::macro_line(std::size_t begin) {
+  const std::string_view text = line_.text();
   expand_from(begin);
   const MacroStatement statement = parse_statement(text, here_.line);
   if (statement.n_number >= 0) {
@@ -134,15 +134,15 @@ void Reader::macro_line(std::string_view view, std::size_t begin) {
 }
 
 void Reader::nc_block(std::string_view text) {
-  const std::string plain = substitute(text, here_.line, variables_, word_format());
-  interpreter_.scan(plain, here_.line);
-  if (interpreter_.block().macro) {
+  computed_.read_and_keep(substitute(text, here_.line, variables_, word_format()), here_.line,
+                          options_.max_line_length);
+  if (computed_.macro) {
     alarm(114, "macro expression is not understood");
   }
-  if (interpreter_.block().word_count == 0 && interpreter_.block().comment_count == 0) {
+  if (computed_.word_count == 0 && computed_.comment_count == 0) {
     return;  // every word was vacant
   }
-  run_block(plain, text);
+  run_block(computed_, text);
 }
 
 // The text with the values of local and common variables in place of their names; those that the control keeps stay.

@@ -74,12 +74,12 @@ void MoveRewriter::synchronise() {
   programmed_point_ = modes_.active() ? modes_.undo(programmed_.position_mm) : programmed_.position_mm;
 }
 
-void MoveRewriter::block(const Block& block, const BlockWords& words, std::string_view text, const LineOrigin& origin) {
+void MoveRewriter::block(const ParsedBlock& block, const LineOrigin& origin) {
+  const BlockWords& words = block.sorted();
   block_ = &block;
   words_ = &words;
-  text_ = text;
   origin_ = origin;
-  interpreter_.require_plain_words(origin.line);
+  interpreter_.require_plain_words(words, origin.line);
   if (idle()) {
     synchronise();
   }
@@ -99,8 +99,6 @@ void MoveRewriter::block(const Block& block, const BlockWords& words, std::strin
   }
   if (ends_span && !idle()) {
     flush();
-    // The interpreter read what was written: its words are those of another block now.
-    interpreter_.scan(text, origin.line);
     synchronise();
   }
   refuse_machine_coordinates();
@@ -131,7 +129,6 @@ void MoveRewriter::block(const Block& block, const BlockWords& words, std::strin
       item.head.clear();
       item.tail.clear();
       enqueue(std::move(hole));
-      interpreter_.scan(text, origin.line);  // it read what was written
       synchronise();
     }
     return;
@@ -206,7 +203,7 @@ void MoveRewriter::keep_words(Item& item) const {
   int g = 0;
   bool moves = false;
   for (const Word& word : *block_) {
-    const std::string_view text = text_.substr(word.column - 1, word.end - (word.column - 1));
+    const std::string_view text = block_->text_of(word);
     if (word.letter == 'N') {
       add(item.head, text);
     } else if (word.letter == 'G') {
