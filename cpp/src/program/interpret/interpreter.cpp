@@ -1,6 +1,7 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 
-#include "base/message.hpp"
 #include "program/interpret/interpreter_impl.hpp"
 #include "shapegcode/error.hpp"
 
@@ -110,10 +111,9 @@ void Interpreter::require_plain_words(const BlockWords& words, std::uint32_t lin
   }
   for (const char letter : {'H', 'D'}) {
     if (words.has(letter) && words[letter].value > 999.0) {
-      throw alarm_error(30,
-                        std::string("offset number ") + letter + std::to_string(static_cast<int>(words[letter].value)) +
-                            " outside 0 ... 999",
-                        line, words[letter].column);
+      throw alarm_error(
+          30, fmt::format("offset number {}{} outside 0 ... 999", letter, static_cast<int>(words[letter].value)), line,
+          words[letter].column);
     }
   }
   int motion = state_.motion;
@@ -149,7 +149,7 @@ void Interpreter::execute(const ParsedBlock& block, std::uint32_t line, const Li
   if (words().has('F')) {
     const double feed = words()['F'].value;
     if (feed < 0.0) {
-      fail(format_message("feed F%g is negative", feed), words()['F'].column);
+      fail(fmt::format("feed F{} is negative", feed), words()['F'].column);
     }
     const bool hundredths = state_.units == 20 && !words()['F'].has_point && !options_.calculator_decimal_point;
     state_.feed = hundredths ? feed * 0.01 : feed;

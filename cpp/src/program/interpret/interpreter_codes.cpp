@@ -1,5 +1,6 @@
 // Codes that change the modal state or what is known of the position.
-#include "base/message.hpp"
+#include <fmt/format.h>
+
 #include "path/arc_frame.hpp"
 #include "program/interpret/interpreter_impl.hpp"
 
@@ -120,7 +121,7 @@ void Interpreter::read_codes(LineFlow& flow) {
         const int system = extended ? 541 : whole;
         const int extra = !extended ? 0 : words().has('P') ? static_cast<int>(words()['P'].value) : 1;
         if (extended && (extra < 1 || extra > 300)) {
-          alarm(30, "G54.1 P" + std::to_string(extra) + ": P is 1 ... 300", words()['P'].column);
+          alarm(30, fmt::format("G54.1 P{}: P is 1 ... 300", extra), words()['P'].column);
         }
         if (system != state_.coordinate_system || extra != state_.coordinate_number) {
           change_coordinates(system, extra);
@@ -157,17 +158,13 @@ void Interpreter::read_codes(LineFlow& flow) {
         } else {
           forget_all();
         }
-        warn("G" + std::to_string(whole) + (g % 10 != 0 ? "." + std::to_string(g % 10) : "") +
-             " is passed through untouched: position not known afterwards");
+        warn(g_code_name(g) + " is passed through untouched: position not known afterwards");
         break;
       case Group::refused:
-        fail("G" + std::to_string(whole) + (g % 10 != 0 ? "." + std::to_string(g % 10) : "") +
-                 ": cylindrical interpolation is not supported",
-             column);
+        fail(g_code_name(g) + ": cylindrical interpolation is not supported", column);
       case Group::invalid:
       default:
-        alarm(10, "unknown G code G" + std::to_string(whole) + (g % 10 != 0 ? "." + std::to_string(g % 10) : ""),
-              column);
+        alarm(10, "unknown G code " + g_code_name(g), column);
     }
   }
   if (words().has('H') && (words().groups & group_bit(Group::length_offset)) == 0 && state_.length_offset != 49 &&
@@ -194,7 +191,7 @@ void Interpreter::dwell() {
     fail("G04 needs P (milliseconds) or X (seconds)");
   }
   if (seconds < 0.0) {
-    alarm(6, format_message("dwell G04 %c%g is negative", time->letter, time->value), time->column);
+    alarm(6, fmt::format("dwell G04 {}{} is negative", time->letter, time->value), time->column);
   }
   add_move({make_line(state_.position_mm, state_.position_mm, 0.0, line_number_), seconds});
 }
@@ -247,7 +244,7 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
         refuse_in_cycle(g_tenths);
       }
       if (g_tenths == 300 && words().has('P') && (words()['P'].value < 2.0 || words()['P'].value > 4.0)) {
-        alarm(46, format_message("G30 P%g: the reference points are P2, P3 and P4", words()['P'].value),
+        alarm(46, fmt::format("G30 P{}: the reference points are P2, P3 and P4", words()['P'].value),
               words()['P'].column);
       }
       flow.stop = true;

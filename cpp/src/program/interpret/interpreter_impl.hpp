@@ -3,8 +3,6 @@
 // moves (interpreter_moves.cpp).
 #pragma once
 
-#include <fmt/format.h>
-
 #include <array>
 #include <cstddef>
 #include <cstdint>

@@ -1,8 +1,9 @@
 // Axis moves: cutting regions, rapids, drilling cycles.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
-#include "base/message.hpp"
 #include "program/interpret/arc_geometry.hpp"
 #include "program/interpret/interpreter_impl.hpp"
 
@@ -13,7 +14,7 @@ void Interpreter::check_range() const {
   const double limit = (state_.units == 20 ? 9999.9999 : 99999.999) * (1.0 + 1e-12);
   for (char letter : {'X', 'Y', 'Z', 'I', 'J', 'K', 'R'}) {
     if (words().has(letter) && std::abs(length_mm(words()[letter])) > limit * unit) {
-      alarm(3, format_message("%c%.4f lies outside +-%.4f", letter, length_mm(words()[letter]) / unit, limit),
+      alarm(3, fmt::format("{}{:.4f} lies outside +-{:.4f}", letter, length_mm(words()[letter]) / unit, limit),
             words()[letter].column);
     }
   }
@@ -93,7 +94,7 @@ Segment Interpreter::cutting_segment(const Vector3& end) const {
       }
     }
     if (!given) {
-      alarm(22, "arc without R or I J K in its plane G" + std::to_string(state_.plane),
+      alarm(22, fmt::format("arc without R or I J K in its plane G{}", state_.plane),
             words().g_count > 0 ? words().g_column[0] : 1);
     }
   }
@@ -106,8 +107,8 @@ Segment Interpreter::cutting_segment(const Vector3& end) const {
 void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t begin, std::size_t end) {
   check_range();
   if (!distance_given_) {
-    warn_once(seen_distance_, "neither G90 nor G91 before the first move: G" + std::to_string(state_.distance) +
-                                  " assumed (power_on.distance)");
+    warn_once(seen_distance_, fmt::format("neither G90 nor G91 before the first move: G{} assumed (power_on.distance)",
+                                          state_.distance));
   }
   for (char letter : {'X', 'Y', 'Z', 'I', 'J', 'K', 'R'}) {
     if (words().has(letter) && !words()[letter].has_point && words()[letter].value != 0.0) {

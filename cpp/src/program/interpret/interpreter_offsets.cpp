@@ -1,4 +1,6 @@
 // Offsets: tool length, and data setting by G10.
+#include <fmt/format.h>
+
 #include "program/interpret/interpreter_impl.hpp"
 
 namespace shapegcode::detail {
@@ -35,7 +37,7 @@ void Interpreter::data_setting() {
   switch (kind) {
     case 2:
       if (number < 0 || number > 6) {
-        alarm(31, "G10 L2 P" + std::to_string(number) + ": P is 1 ... 6 for G54 ... G59, or 0", words()['P'].column);
+        alarm(31, fmt::format("G10 L2 P{}: P is 1 ... 6 for G54 ... G59, or 0", number), words()['P'].column);
       }
       if (number == 0) {
         forget_all();  // the external offset moves every system
@@ -46,7 +48,7 @@ void Interpreter::data_setting() {
       return;
     case 20:
       if (number < 1 || number > 300) {
-        alarm(31, "G10 L20 P" + std::to_string(number) + ": P is 1 ... 300 for G54.1 P1 ... P300",
+        alarm(31, fmt::format("G10 L20 P{}: P is 1 ... 300 for G54.1 P1 ... P300", number),
               words().has('P') ? words()['P'].column : 0);
       }
       data_work_offset(541, number);
@@ -65,14 +67,14 @@ void Interpreter::data_setting() {
       if (kind >= 10) {
         const bool value = words().has('P');
         alarm(value ? 32 : 31,
-              "G10 L" + std::to_string(kind) + (value ? " without a value R" : " without an offset number P"));
+              fmt::format("G10 L{}{}", kind, value ? " without a value R" : " without an offset number P"));
       }
       break;
     case 50:
     case 52:
       break;
     default:
-      alarm(31, "G10 L" + std::to_string(kind) + " is not known", words()['L'].column);
+      alarm(31, fmt::format("G10 L{} is not known", kind), words()['L'].column);
   }
   if (kind == -1 || kind == 50 || kind == 52 || kind == 3) {
     return;  // parameters, tool life: nothing that moves an axis
@@ -112,7 +114,7 @@ void Interpreter::set_work_offset(int coordinate_system, int number, int axis, d
 void Interpreter::set_tool_offset(int kind) {
   const int number = static_cast<int>(words()['P'].value);
   if (number < 1 || number > 999) {
-    alarm(30, "G10: offset number P" + std::to_string(number) + " outside 1 ... 999", words()['P'].column);
+    alarm(30, fmt::format("G10: offset number P{} outside 1 ... 999", number), words()['P'].column);
   }
   ToolOffset offset = offsets_.tool(number);
   const double value = length_mm(words()['R']);
@@ -153,9 +155,7 @@ void Interpreter::refuse_in_cycle(int g_tenths) const {
     const auto i = static_cast<std::size_t>(k);
     column = words().g_tenths[i] == g_tenths ? words().g_column[i] : column;
   }
-  alarm(44,
-        "G" + std::to_string(g_tenths / 10) + " while the drilling cycle G" + std::to_string(state_.cycle) +
-            " is on: cancel it with G80",
+  alarm(44, fmt::format("G{} while the drilling cycle G{} is on: cancel it with G80", g_tenths / 10, state_.cycle),
         column);
 }
 

@@ -1,4 +1,6 @@
 // Texts, lines, and where they end.
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "program/read/reader_impl.hpp"
@@ -56,11 +58,11 @@ void Reader::load_main() {
   if (main == nullptr) {
     std::string known;
     for (const std::int64_t number : program_.program_numbers) {
-      known += (known.empty() ? "" : ", ") + std::string("O") + std::to_string(number);
+      known += fmt::format("{}O{}", known.empty() ? "" : ", ", number);
     }
     throw alarm_error(78,
-                      "program O" + std::to_string(options_.program) + " is not in the file (it holds " +
-                          (known.empty() ? "no O number" : known) + ")",
+                      fmt::format("program O{} is not in the file (it holds {})", options_.program,
+                                  known.empty() ? "no O number" : known),
                       1, 1);
   }
   program_.program_number = main->number;
@@ -138,13 +140,13 @@ std::string Reader::call_stack() const {
   std::string stack;
   for (std::size_t k = frames_.size(); k-- > 1;) {
     if (frames_.size() - k > most_callers) {
-      return stack + "; and " + std::to_string(k) + " more";
+      return fmt::format("{}; and {} more", stack, k);
     }
     const Frame& caller = frames_[k - 1];
     const std::string& file = program_.files[caller.unit->file];
-    stack += "; called by " +
-             (caller.unit->number >= 0 ? "O" + std::to_string(caller.unit->number) : std::string("the main program")) +
-             " line " + std::to_string(caller.place.line - 1) + (file.empty() ? "" : " of " + file);
+    stack += fmt::format("; called by {} line {}{}",
+                         caller.unit->number >= 0 ? fmt::format("O{}", caller.unit->number) : "the main program",
+                         caller.place.line - 1, file.empty() ? "" : " of " + file);
   }
   return stack;
 }
@@ -211,7 +213,7 @@ bool Reader::step() {
     if (frames_.size() == 1) {
       return false;
     }
-    warn("program O" + std::to_string(frame.unit->number) + " ends without M99");
+    warn(fmt::format("program O{} ends without M99", frame.unit->number));
     leave();
     return true;
   }
@@ -219,8 +221,8 @@ bool Reader::step() {
   if (program_.expanded && ++steps_ > options_.max_steps) {
     steps_ = 0;
     interpreter_.end();
-    fail("more than " + std::to_string(options_.max_steps) +
-         " blocks executed (controller.max_program_steps): the program does not seem to end");
+    fail(fmt::format("more than {} blocks executed (controller.max_program_steps): the program does not seem to end",
+                     options_.max_steps));
   }
   line(text, begin, frame.place.at);
   return true;
@@ -336,13 +338,13 @@ void Reader::finish() {
   std::string others;
   for (const std::int64_t number : program_.program_numbers) {
     if (number != program_.program_number && !called_.contains(number)) {
-      others += (others.empty() ? "" : ", ") + std::string("O") + std::to_string(number);
+      others += fmt::format("{}O{}", others.empty() ? "" : ", ", number);
     }
   }
   if (!others.empty()) {
     program_.warnings.push_back({1,
-                                 "O" + std::to_string(program_.program_number) + " is played; the file also holds " +
-                                     others + " (--program picks another)",
+                                 fmt::format("O{} is played; the file also holds {} (--program picks another)",
+                                             program_.program_number, others),
                                  0, 0, ""});
   }
   if (!interpreter_.ended() && !framed_) {

@@ -1,4 +1,6 @@
 // Subprograms M98/M99/M198, macro calls G65/G66/G67, codes that the builder bound to programs.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -19,11 +21,7 @@ bool is_m(const Word& word, int code) noexcept { return word.letter == 'M' && st
 
 }  // namespace
 
-std::string program_name(std::int64_t number) {
-  std::string digits = std::to_string(number);
-  digits.insert(0, digits.size() < 4 ? 4 - digits.size() : 0, '0');
-  return "O" + digits;
-}
+std::string program_name(std::int64_t number) { return fmt::format("O{:04}", number); }
 
 bool Reader::is_call(const BlockWords& words) const noexcept {
   if ((words.groups & group_bit(Group::call)) != 0) {
@@ -118,7 +116,7 @@ void Reader::subprogram_call(const ParsedBlock& block) {
     number = p % 10000;
   }
   if (number < 1 || repeats < 0 || repeats > 99'999'999) {
-    alarm(76, "M98 P" + std::to_string(p) + " names no program", words['P'].column);
+    alarm(76, fmt::format("M98 P{} names no program", p), words['P'].column);
   }
   const std::uint32_t column = words['P'].column;
   put_without(block, [](const Word& word) {
@@ -166,10 +164,10 @@ void Reader::macro_call(const ParsedBlock& block, std::string_view raw, int g_te
   }
   MacroArguments arguments = parse_arguments(raw, here_.line, variables_, argument_scale());
   if (arguments.program < 1) {
-    alarm(76, "G" + std::to_string(g_tenths / 10) + " without a program number P");
+    alarm(76, fmt::format("G{} without a program number P", g_tenths / 10));
   }
   if (arguments.repeats < 0 || arguments.repeats > 99'999'999) {
-    alarm(76, "repetitions L" + std::to_string(arguments.repeats) + " outside 0 ... 99999999");
+    alarm(76, fmt::format("repetitions L{} outside 0 ... 99999999", arguments.repeats));
   }
   if (g_tenths == 650) {
     if (arguments.repeats > 0) {
@@ -300,14 +298,13 @@ bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool ma
     macros += frame.macro ? 1U : 0U;
   }
   if (macro && macros >= macro_nesting) {
-    alarm(122,
-          "macro calls nested deeper than " + std::to_string(macro_nesting) + " at the call of " + program_name(number),
+    alarm(122, fmt::format("macro calls nested deeper than {} at the call of {}", macro_nesting, program_name(number)),
           column);
   }
   if (frames_.size() - macros > static_cast<std::size_t>(options_.subprogram_nesting) && !macro) {
     alarm(77,
-          "subprograms nested deeper than " + std::to_string(options_.subprogram_nesting) +
-              " (controller.nesting_limit_subprogram) at the call of " + program_name(number),
+          fmt::format("subprograms nested deeper than {} (controller.nesting_limit_subprogram) at the call of {}",
+                      options_.subprogram_nesting, program_name(number)),
           column);
   }
   called_.insert(number);
