@@ -44,132 +44,148 @@ void Interpreter::read_codes(LineFlow& flow) {
   explicit_exact_stop_ = false;
   one_shot_axes_ = false;
   for (int k = 0; k < words().g_count; ++k) {
-    const int g = words().g_tenths[static_cast<std::size_t>(k)];
-    const std::uint32_t column = words().g_column[static_cast<std::size_t>(k)];
-    const int whole = g / 10;
-    const Group group = words().g_group[static_cast<std::size_t>(k)];
-    // A no-op (G40 where nothing is compensated) leaves a block inside its region; a change ends it.
-    const auto set = [&](int& field, bool keeps_region) {
-      if (field != whole && !keeps_region) {
-        flow.stop = true;
-      }
-      field = whole;
-      state_.uncertain_groups &= ~bit(group);
-    };
-    switch (group) {
-      case Group::motion:
-        set(state_.motion, true);
-        if (state_.cycle != 80) {
-          state_.cycle = 80;
-          flow.stop = true;
-        }
-        break;
-      case Group::plane:
-        set(state_.plane, true);
-        break;
-      case Group::distance:
-        set(state_.distance, true);
-        distance_given_ = true;
-        break;
-      case Group::feed_mode:
-        if (whole != state_.feed_mode) {
-          state_.feed = 0.0;  // the old F has another unit
-        }
-        set(state_.feed_mode, true);
-        break;
-      case Group::units:
-        set(state_.units, false);
-        break;
-      case Group::compensation:
-        if (whole == 40 && state_.compensation != 40) {
-          // The tool leaves the offset with the next move of the plane; until then its position is not the programmed.
-          const ArcFrame plane(plane_normal(state_.plane));
-          for (int i : {plane.a, plane.b}) {
-            state_.known[static_cast<std::size_t>(i)] = false;
-          }
-        }
-        set(state_.compensation, false);
-        break;
-      case Group::length_offset:
-        if (whole != state_.length_offset || words().has('H')) {
-          flow.stop = true;
-        }
-        length_offset(whole);
-        state_.uncertain_groups &= ~bit(group);
-        break;
-      case Group::cycle:
-        flow.stop = true;
-        if (whole == 80) {
-          state_.cycle = 80;
-        } else {
-          if (state_.cycle == 80) {
-            cycle_ = CannedCycle{};
-            cycle_.clearance_mm = options_.peck_clearance_mm;
-            cycle_.initial_mm = state_.position_mm[plane_normal(state_.plane)];
-          }
-          state_.cycle = whole;
-        }
-        state_.uncertain_groups &= ~bit(Group::cycle);
-        break;
-      case Group::cycle_return:
-        set(state_.cycle_return, false);
-        break;
-      case Group::coordinates: {
-        // G54 P7 is G54.1 P7; in a block with a dwell or a cycle P belongs to that.
-        const bool extended = g == 541 || (g == 540 && words().has('P') && state_.cycle == 80 &&
-                                           (words().groups & (group_bit(Group::none) | group_bit(Group::cycle))) == 0);
-        const int system = extended ? 541 : whole;
-        const int extra = !extended ? 0 : words().has('P') ? static_cast<int>(words()['P'].value) : 1;
-        if (extended && (extra < 1 || extra > 300)) {
-          alarm(30, fmt::format("G54.1 P{}: P is 1 ... 300", extra), words()['P'].column);
-        }
-        if (system != state_.coordinate_system || extra != state_.coordinate_number) {
-          change_coordinates(system, extra);
-          flow.stop = true;
-        }
-        state_.coordinate_system = system;
-        state_.coordinate_number = extra;
-        state_.uncertain_groups &= ~bit(group);
-        break;
-      }
-      case Group::exact_stop:
-        set(state_.exact_stop, false);
-        break;
-      case Group::none:
-        one_shot(g, flow);
-        break;
-      case Group::foreign:
-        flow.stop = true;
-        foreign_switch(g);
-        break;
-      case Group::harmless:
-        look_ahead_switch(g);
-        flow.stop = true;
-        one_shot_axes_ = one_shot_axes_ || g == 220;  // the others may share their block with a move
-        break;
-      case Group::unknown_position:
-        if (g == 270 || g == 290) {
-          refuse_in_cycle(g);
-        }
-        flow.stop = true;
-        one_shot_axes_ = true;
-        if (words().has_any(axis_letters)) {
-          forget_axes(words().present);
-        } else {
-          forget_all();
-        }
-        warn(g_code_name(g) + " is passed through untouched: position not known afterwards");
-        break;
-      case Group::refused:
-        fail(g_code_name(g) + ": cylindrical interpolation is not supported", column);
-      case Group::invalid:
-      default:
-        alarm(10, "unknown G code " + g_code_name(g), column);
-    }
+    const auto i = static_cast<std::size_t>(k);
+    read_code(words().g_tenths[i], words().g_group[i], words().g_column[i], flow);
   }
   if (words().has('H') && (words().groups & group_bit(Group::length_offset)) == 0 && state_.length_offset != 49 &&
       (words().groups & group_bit(Group::none)) == 0) {
     length_offset(state_.length_offset);  // H alone changes the offset in force
+  }
+}
+
+// Where the state of a group is kept that one number describes.
+int* Interpreter::modal_field(Group group) noexcept {
+  switch (group) {
+    case Group::motion:
+      return &state_.motion;
+    case Group::plane:
+      return &state_.plane;
+    case Group::distance:
+      return &state_.distance;
+    case Group::feed_mode:
+      return &state_.feed_mode;
+    case Group::units:
+      return &state_.units;
+    case Group::compensation:
+      return &state_.compensation;
+    case Group::cycle_return:
+      return &state_.cycle_return;
+    case Group::exact_stop:
+      return &state_.exact_stop;
+    default:
+      return nullptr;
+  }
+}
+
+void Interpreter::compensation_code(int whole) noexcept {
+  if (whole == 40 && state_.compensation != 40) {
+    // The tool leaves the offset with the next move of the plane; until then its position is not the programmed.
+    const ArcFrame plane(plane_normal(state_.plane));
+    for (int i : {plane.a, plane.b}) {
+      state_.known[static_cast<std::size_t>(i)] = false;
+    }
+  }
+}
+
+void Interpreter::cycle_code(int whole) {
+  if (whole != 80 && state_.cycle == 80) {
+    cycle_ = CannedCycle{};
+    cycle_.clearance_mm = options_.peck_clearance_mm;
+    cycle_.initial_mm = state_.position_mm[plane_normal(state_.plane)];
+  }
+  state_.cycle = whole;
+}
+
+// G54 ... G59, G54.1.
+void Interpreter::coordinate_code(int g_tenths, LineFlow& flow) {
+  // G54 P7 is G54.1 P7; in a block with a dwell or a cycle P belongs to that.
+  const bool extended = g_tenths == 541 || (g_tenths == 540 && words().has('P') && state_.cycle == 80 &&
+                                            (words().groups & (group_bit(Group::none) | group_bit(Group::cycle))) == 0);
+  const int system = extended ? 541 : g_tenths / 10;
+  const int extra = !extended ? 0 : words().has('P') ? static_cast<int>(words()['P'].value) : 1;
+  if (extended && (extra < 1 || extra > 300)) {
+    alarm(30, fmt::format("G54.1 P{}: P is 1 ... 300", extra), words()['P'].column);
+  }
+  if (system != state_.coordinate_system || extra != state_.coordinate_number) {
+    change_coordinates(system, extra);
+    flow.stop = true;
+  }
+  state_.coordinate_system = system;
+  state_.coordinate_number = extra;
+}
+
+// G27 ... G31: where they end is the machine's business.
+void Interpreter::reference_code(int g_tenths) {
+  if (g_tenths == 270 || g_tenths == 290) {
+    refuse_in_cycle(g_tenths);
+  }
+  one_shot_axes_ = true;
+  if (words().has_any(axis_letters)) {
+    forget_axes(words().present);
+  } else {
+    forget_all();
+  }
+  warn(g_code_name(g_tenths) + " is passed through untouched: position not known afterwards");
+}
+
+void Interpreter::read_code(int g_tenths, Group group, std::uint32_t column, LineFlow& flow) {
+  const int whole = g_tenths / 10;
+  if (int* const field = modal_field(group)) {
+    const bool changes = *field != whole;
+    const bool keeps_region =
+        group == Group::motion || group == Group::plane || group == Group::distance || group == Group::feed_mode;
+    // A no-op (G40 where nothing is compensated) leaves a block inside its region; a change ends it.
+    flow.stop = flow.stop || (changes && !keeps_region);
+    if (group == Group::motion && state_.cycle != 80) {
+      state_.cycle = 80;
+      flow.stop = true;
+    }
+    distance_given_ = distance_given_ || group == Group::distance;
+    if (group == Group::feed_mode && changes) {
+      state_.feed = 0.0;  // the old F has another unit
+    }
+    if (group == Group::compensation) {
+      compensation_code(whole);
+    }
+    *field = whole;
+    state_.uncertain_groups &= ~bit(group);
+    return;
+  }
+  switch (group) {
+    case Group::length_offset:
+      flow.stop = flow.stop || whole != state_.length_offset || words().has('H');
+      length_offset(whole);
+      state_.uncertain_groups &= ~bit(group);
+      return;
+    case Group::cycle:
+      flow.stop = true;
+      cycle_code(whole);
+      state_.uncertain_groups &= ~bit(group);
+      return;
+    case Group::coordinates:
+      coordinate_code(g_tenths, flow);
+      state_.uncertain_groups &= ~bit(group);
+      return;
+    case Group::none:
+      one_shot(g_tenths, flow);
+      return;
+    case Group::foreign:
+      flow.stop = true;
+      foreign_switch(g_tenths);
+      return;
+    case Group::harmless:
+      look_ahead_switch(g_tenths);
+      flow.stop = true;
+      one_shot_axes_ = one_shot_axes_ || g_tenths == 220;  // the others may share their block with a move
+      return;
+    case Group::unknown_position:
+      flow.stop = true;
+      reference_code(g_tenths);
+      return;
+    case Group::refused:
+      fail(g_code_name(g_tenths) + ": cylindrical interpolation is not supported", column);
+    default:
+      alarm(10, "unknown G code " + g_code_name(g_tenths), column);
   }
 }
 

@@ -69,6 +69,12 @@ class Interpreter {
   [[nodiscard]] const BlockWords& words() const noexcept { return block_->sorted(); }
   void optional_skip_block(const ModalState& before);
   void read_codes(LineFlow& flow);
+  void read_code(int g_tenths, Group group, std::uint32_t column, LineFlow& flow);
+  [[nodiscard]] int* modal_field(Group group) noexcept;
+  void compensation_code(int whole) noexcept;
+  void cycle_code(int whole);
+  void coordinate_code(int g_tenths, LineFlow& flow);
+  void reference_code(int g_tenths);
   void refuse_in_cycle(int g_tenths) const;
   void one_shot(int g_tenths, LineFlow& flow);
   void dwell();
@@ -79,6 +85,7 @@ class Interpreter {
   void length_offset(int whole);
   void move(LineFlow& flow, const ModalState& before, std::size_t begin, std::size_t end);
   void cut(const char* why_kept, const ModalState& before, std::size_t begin, std::size_t end);
+  void keep_cut(const char* why, const Vector3& end, const std::array<bool, 3>& known_after);
   void forget_uncertain_end() noexcept;
   void check_range() const;
   void cycle_block();

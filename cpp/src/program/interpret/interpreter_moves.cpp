@@ -159,6 +159,34 @@ void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t beg
   cut(why_kept, before, begin, end);
 }
 
+// A cutting move that stays as it is written. Its length is known only where start and path are.
+void Interpreter::keep_cut(const char* why, const Vector3& end, const std::array<bool, 3>& known_after) {
+  if (options_.absolute_arc_centres && state_.motion > 1 && words().has_any(centre_letters)) {
+    fail(std::string("arc with an absolute centre cannot be kept as it is: ") + why);
+  }
+  close_region();
+  if (foreign_ == 0) {
+    Vector3 to;
+    std::array<bool, 3> known{};
+    bool relative = false;
+    const bool measurable = target(to, known, relative);
+    const bool plain = state_.motion == 1 || state_.compensation != 40 || state_.motion == 33;
+    const double rate = state_.feed_mode != 93 ? feed_mm_per_s(0.0) : 0.0;
+    const Segment segment =
+        !plain && measurable ? cutting_segment(end) : make_line(state_.position_mm, end, rate, line_number_);
+    if (measurable && segment.feed_mm_per_s > 0.0 && segment.length_mm > 0.0) {
+      add_move({segment, 0.0});
+    }
+    state_.position_mm = end;
+    state_.known = known_after;
+  }
+  // One warning for a run of such blocks.
+  if (kept_run_line_ + 1 != line_number_) {
+    warn(std::string("cutting move kept untouched: ") + why);
+  }
+  kept_run_line_ = line_number_;
+}
+
 void Interpreter::cut(const char* why_kept, const ModalState& before, std::size_t begin, std::size_t end) {
   if (!(state_.feed > 0.0)) {
     alarm(11, words().has('F') ? "cutting move with feed F0" : "cutting move, but no feed F was given",
@@ -171,29 +199,7 @@ void Interpreter::cut(const char* why_kept, const ModalState& before, std::size_
     why_kept = "the position before it is not known";
   }
   if (why_kept != nullptr) {
-    if (options_.absolute_arc_centres && state_.motion > 1 && words().has_any(centre_letters)) {
-      fail(std::string("arc with an absolute centre cannot be kept as it is: ") + why_kept);
-    }
-    close_region();
-    // Kept to the letter. Its length is known only where start and path are.
-    if (foreign_ == 0) {
-      const bool plain = state_.motion == 1 || state_.compensation != 40 || state_.motion == 33;
-      const double rate = state_.feed_mode != 93 ? feed_mm_per_s(0.0) : 0.0;
-      Segment segment = make_line(state_.position_mm, to, rate, line_number_);
-      if (!plain && target(to, known_after, relative)) {
-        segment = cutting_segment(to);
-      }
-      if (target(to, known_after, relative) && segment.feed_mm_per_s > 0.0 && segment.length_mm > 0.0) {
-        add_move({segment, 0.0});
-      }
-      state_.position_mm = to;
-      state_.known = known_after;
-    }
-    // One warning for a run of such blocks.
-    if (kept_run_line_ + 1 != line_number_) {
-      warn(std::string("cutting move kept untouched: ") + why_kept);
-    }
-    kept_run_line_ = line_number_;
+    keep_cut(why_kept, to, known_after);
     return;
   }
   Segment segment = cutting_segment(to);
