@@ -1,5 +1,7 @@
 #include "shapegcode/path.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -8,6 +10,11 @@
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
+namespace {
+
+constexpr double largest_gap_mm = 1e-6;
+
+}  // namespace
 
 Path::Path(std::vector<Segment> segments) : segments_(std::move(segments)) {
   distance_mm_.reserve(segments_.size() + 1);
@@ -16,15 +23,15 @@ Path::Path(std::vector<Segment> segments) : segments_(std::move(segments)) {
   for (std::size_t i = 0; i < segments_.size(); ++i) {
     const Segment& segment = segments_[i];
     if (!std::isfinite(segment.length_mm) || !segment.start_mm.allFinite() || !segment.end_mm.allFinite()) {
-      throw Error(ErrorKind::argument, "path segment " + std::to_string(i) + " has a coordinate that is not finite",
+      throw Error(ErrorKind::argument, fmt::format("path segment {} has a coordinate that is not finite", i),
                   segment.line);
     }
     if (i > 0) {
       const double gap = (segment.start_mm - segments_[i - 1].end_mm).norm();
-      if (gap > 1e-6) {
+      if (gap > largest_gap_mm) {
         throw Error(ErrorKind::argument,
-                    "path segment " + std::to_string(i) + " starts " + std::to_string(gap) +
-                        " mm from the end of its predecessor (limit 0.000001 mm)",
+                    fmt::format("path segment {} starts {:.3g} mm from the end of its predecessor (limit {} mm)", i,
+                                gap, largest_gap_mm),
                     segment.line);
       }
     }

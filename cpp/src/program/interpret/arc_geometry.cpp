@@ -1,10 +1,11 @@
 #include "program/interpret/arc_geometry.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <numbers>
 #include <string>
 
-#include "base/message.hpp"
 #include "path/arc_frame.hpp"
 #include "shapegcode/error.hpp"
 
@@ -37,8 +38,9 @@ Segment resolve_arc(const ArcWords& words, double feed_mm_per_s, std::uint32_t l
     if (radius == 0.0 || excess > 0.5 * words.tolerance_mm) {
       throw alarm_error(
           20,
-          format_message("arc radius R%.4f cannot span its chord of %.4f mm: half the chord is %.4f mm, tolerance %.4f",
-                         radius, chord, half, words.tolerance_mm),
+          fmt::format(
+              "arc radius R{:.4f} cannot span its chord of {:.4f} mm: half the chord is {:.4f} mm, tolerance {:.4f}",
+              radius, chord, half, words.tolerance_mm),
           line, column);
     }
     const double height = std::sqrt(std::max(0.0, radius * radius - half * half));
@@ -55,11 +57,11 @@ Segment resolve_arc(const ArcWords& words, double feed_mm_per_s, std::uint32_t l
     constexpr char names[] = "XYZ";
     throw alarm_error(
         20,
-        format_message("arc end is %.4f mm off its radius: start (%c%.4f %c%.4f), end (%c%.4f %c%.4f), centre (%c%.4f "
-                       "%c%.4f), start radius %.4f, end radius %.4f, tolerance %.4f mm",
-                       difference, names[a], words.start_mm[a], names[b], words.start_mm[b], names[a], words.end_mm[a],
-                       names[b], words.end_mm[b], names[a], centre[a], names[b], centre[b], start_radius, end_radius,
-                       words.tolerance_mm),
+        fmt::format(
+            "arc end is {:.4f} mm off its radius: start ({}{:.4f} {}{:.4f}), end ({}{:.4f} {}{:.4f}), centre ({}{:.4f} "
+            "{}{:.4f}), start radius {:.4f}, end radius {:.4f}, tolerance {:.4f} mm",
+            difference, names[a], words.start_mm[a], names[b], words.start_mm[b], names[a], words.end_mm[a], names[b],
+            words.end_mm[b], names[a], centre[a], names[b], centre[b], start_radius, end_radius, words.tolerance_mm),
         line, column);
   }
 

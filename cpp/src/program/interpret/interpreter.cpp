@@ -1,6 +1,7 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 
-#include "base/message.hpp"
 #include "program/interpret/interpreter_impl.hpp"
 #include "shapegcode/error.hpp"
 
@@ -32,7 +33,7 @@ double Interpreter::length_mm(const Word& word) const noexcept {
 
 double Interpreter::feed_mm_per_s(double move_length_mm) const {
   if (state_.feed_mode == 93) {
-    if (!words_.has('F')) {
+    if (!words().has('F')) {
       fail("G93 needs F in every cutting block");
     }
     return state_.feed * move_length_mm / 60.0;
@@ -52,15 +53,15 @@ void Interpreter::forget_axes(std::uint32_t letters) noexcept {
 void Interpreter::note(std::size_t segment) {
   RegionNote entry;
   entry.segment = static_cast<std::uint32_t>(segment);
-  for (std::size_t i = 0; i < block_.comment_count; ++i) {
-    const std::string_view comment = block_.comments[i];
-    entry.comment_offset = static_cast<std::uint32_t>(comment.data() - program_.text.data());
+  for (std::size_t i = 0; i < block_->comment_count; ++i) {
+    const std::string_view comment = block_->comments[i];
+    entry.comment_offset = static_cast<std::uint32_t>(begin_ + block_->offset_of(comment));
     entry.comment_length = static_cast<std::uint32_t>(comment.size());
     region_->notes.push_back(entry);
   }
-  if (words_.has('N')) {
+  if (words().has('N')) {
     entry.comment_length = 0;
-    entry.n_number = static_cast<std::int32_t>(words_['N'].value);
+    entry.n_number = static_cast<std::int32_t>(words()['N'].value);
     region_->notes.push_back(entry);
   }
 }
@@ -92,44 +93,36 @@ void Interpreter::add_move(const OtherMove& move) {
   }
 }
 
-void Interpreter::scan(std::string_view text, std::uint32_t line) {
-  scan_block(text, line, options_.max_line_length, block_);
-  if (!block_.macro) {
-    detail::sort_words(block_, line, words_);
-  }
-}
-
-void Interpreter::require_plain_words(std::uint32_t line) const {
+void Interpreter::require_plain_words(const BlockWords& words, std::uint32_t line) const {
   const auto refuse = [&](int number, const Word& word, const std::string& what) {
     throw alarm_error(number, what + " in address " + std::string(1, word.letter) + ", which takes whole numbers", line,
                       word.column);
   };
-  if (words_.fractional != nullptr) {
-    refuse(7, *words_.fractional, "decimal point");
+  if (words.fractional != nullptr) {
+    refuse(7, *words.fractional, "decimal point");
   }
-  if (words_.negative != nullptr && words_.negative->letter != 'S') {
-    refuse(6, *words_.negative, "minus sign");
+  if (words.negative != nullptr && words.negative->letter != 'S') {
+    refuse(6, *words.negative, "minus sign");
   }
-  if (words_.duplicate != nullptr) {
+  if (words.duplicate != nullptr) {
     throw Error(ErrorKind::program,
-                "address " + std::string(1, words_.duplicate->letter) + " is given twice in one block", line,
-                words_.duplicate->column);
+                "address " + std::string(1, words.duplicate->letter) + " is given twice in one block", line,
+                words.duplicate->column);
   }
   for (const char letter : {'H', 'D'}) {
-    if (words_.has(letter) && words_[letter].value > 999.0) {
-      throw alarm_error(30,
-                        std::string("offset number ") + letter +
-                            std::to_string(static_cast<int>(words_[letter].value)) + " outside 0 ... 999",
-                        line, words_[letter].column);
+    if (words.has(letter) && words[letter].value > 999.0) {
+      throw alarm_error(
+          30, fmt::format("offset number {}{} outside 0 ... 999", letter, static_cast<int>(words[letter].value)), line,
+          words[letter].column);
     }
   }
   int motion = state_.motion;
-  for (int k = 0; k < words_.g_count; ++k) {
+  for (int k = 0; k < words.g_count; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    motion = words_.g_group[i] == Group::motion ? words_.g_tenths[i] / 10 : motion;
+    motion = words.g_group[i] == Group::motion ? words.g_tenths[i] / 10 : motion;
   }
-  if (words_.has('E') && motion != 33) {
-    throw alarm_error(9, "address E is used with threading G33 only", line, words_['E'].column);
+  if (words.has('E') && motion != 33) {
+    throw alarm_error(9, "address E is used with threading G33 only", line, words['E'].column);
   }
 }
 
@@ -138,32 +131,35 @@ void Interpreter::finish() {
   program_.final_state = state_;
 }
 
-void Interpreter::execute(std::uint32_t line, const LineOrigin& origin, std::size_t begin, std::size_t end) {
+void Interpreter::execute(const ParsedBlock& block, std::uint32_t line, const LineOrigin& origin, std::size_t begin,
+                          std::size_t end) {
+  block_ = &block;
   line_number_ = line;
   origin_ = origin;
-  require_plain_words(line);
-  if (block_.word_count > 0) {
+  begin_ = begin;
+  require_plain_words(words(), line);
+  if (block_->word_count > 0) {
     ++program_.block_count;
   }
   const ModalState before = state_;
   const std::uint32_t foreign_before = foreign_;
   LineFlow flow;
-  flow.stop = block_.optional_skip || words_.has_any(~region_letters & ~letter_mask("G"));
+  flow.stop = block_->optional_skip || words().has_any(~region_letters & ~letter_mask("G"));
   read_codes(flow);
-  if (words_.has('F')) {
-    const double feed = words_['F'].value;
+  if (words().has('F')) {
+    const double feed = words()['F'].value;
     if (feed < 0.0) {
-      fail(format_message("feed F%g is negative", feed), words_['F'].column);
+      fail(fmt::format("feed F{} is negative", feed), words()['F'].column);
     }
-    const bool hundredths = state_.units == 20 && !words_['F'].has_point && !options_.calculator_decimal_point;
+    const bool hundredths = state_.units == 20 && !words()['F'].has_point && !options_.calculator_decimal_point;
     state_.feed = hundredths ? feed * 0.01 : feed;
     state_.uncertain_groups &= ~feed_bit;
   }
-  if (words_.has('S')) {
-    state_.spindle_rev_per_min = words_['S'].value;
+  if (words().has('S')) {
+    state_.spindle_rev_per_min = words()['S'].value;
   }
-  flow.motion = words_.has_any(axis_letters | centre_letters) && !one_shot_axes_;
-  if (words_.has_any(other_axis_letters)) {
+  flow.motion = words().has_any(axis_letters | centre_letters) && !one_shot_axes_;
+  if (words().has_any(other_axis_letters)) {
     if (state_.motion != 0 && state_.cycle == 80) {
       warn("move of a rotary or additional axis is passed through untouched");
     }
@@ -177,7 +173,7 @@ void Interpreter::execute(std::uint32_t line, const LineOrigin& origin, std::siz
     note(segments_.size());
   }
   m_codes(flow);
-  if (block_.optional_skip && !block_skip(options_, block_.skip_switch)) {
+  if (block_->optional_skip && !block_skip(options_, block_->skip_switch)) {
     optional_skip_block(before);
     foreign_ |= foreign_before;
   }

@@ -1,5 +1,6 @@
 // Codes that change the modal state or what is known of the position.
-#include "base/message.hpp"
+#include <fmt/format.h>
+
 #include "path/arc_frame.hpp"
 #include "program/interpret/interpreter_impl.hpp"
 
@@ -42,159 +43,171 @@ void Interpreter::optional_skip_block(const ModalState& before) {
 void Interpreter::read_codes(LineFlow& flow) {
   explicit_exact_stop_ = false;
   one_shot_axes_ = false;
-  for (int k = 0; k < words_.g_count; ++k) {
-    const int g = words_.g_tenths[static_cast<std::size_t>(k)];
-    const std::uint32_t column = words_.g_column[static_cast<std::size_t>(k)];
-    const int whole = g / 10;
-    const Group group = words_.g_group[static_cast<std::size_t>(k)];
-    // A no-op (G40 where nothing is compensated) leaves a block inside its region; a change ends it.
-    const auto set = [&](int& field, bool keeps_region) {
-      if (field != whole && !keeps_region) {
-        flow.stop = true;
-      }
-      field = whole;
-      state_.uncertain_groups &= ~bit(group);
-    };
-    switch (group) {
-      case Group::motion:
-        set(state_.motion, true);
-        if (state_.cycle != 80) {
-          state_.cycle = 80;
-          flow.stop = true;
-        }
-        break;
-      case Group::plane:
-        set(state_.plane, true);
-        break;
-      case Group::distance:
-        set(state_.distance, true);
-        distance_given_ = true;
-        break;
-      case Group::feed_mode:
-        if (whole != state_.feed_mode) {
-          state_.feed = 0.0;  // the old F has another unit
-        }
-        set(state_.feed_mode, true);
-        break;
-      case Group::units:
-        set(state_.units, false);
-        break;
-      case Group::compensation:
-        if (whole == 40 && state_.compensation != 40) {
-          // The tool leaves the offset with the next move of the plane; until then its position is not the programmed.
-          const ArcFrame plane(plane_normal(state_.plane));
-          for (int i : {plane.a, plane.b}) {
-            state_.known[static_cast<std::size_t>(i)] = false;
-          }
-        }
-        set(state_.compensation, false);
-        break;
-      case Group::length_offset:
-        if (whole != state_.length_offset || words_.has('H')) {
-          flow.stop = true;
-        }
-        length_offset(whole);
-        state_.uncertain_groups &= ~bit(group);
-        break;
-      case Group::cycle:
-        flow.stop = true;
-        if (whole == 80) {
-          state_.cycle = 80;
-        } else {
-          if (state_.cycle == 80) {
-            cycle_ = CannedCycle{};
-            cycle_.clearance_mm = options_.peck_clearance_mm;
-            cycle_.initial_mm = state_.position_mm[plane_normal(state_.plane)];
-          }
-          state_.cycle = whole;
-        }
-        state_.uncertain_groups &= ~bit(Group::cycle);
-        break;
-      case Group::cycle_return:
-        set(state_.cycle_return, false);
-        break;
-      case Group::coordinates: {
-        // G54 P7 is G54.1 P7; in a block with a dwell or a cycle P belongs to that.
-        const bool extended = g == 541 || (g == 540 && words_.has('P') && state_.cycle == 80 &&
-                                           (words_.groups & (group_bit(Group::none) | group_bit(Group::cycle))) == 0);
-        const int system = extended ? 541 : whole;
-        const int extra = !extended ? 0 : words_.has('P') ? static_cast<int>(words_['P'].value) : 1;
-        if (extended && (extra < 1 || extra > 300)) {
-          alarm(30, "G54.1 P" + std::to_string(extra) + ": P is 1 ... 300", words_['P'].column);
-        }
-        if (system != state_.coordinate_system || extra != state_.coordinate_number) {
-          change_coordinates(system, extra);
-          flow.stop = true;
-        }
-        state_.coordinate_system = system;
-        state_.coordinate_number = extra;
-        state_.uncertain_groups &= ~bit(group);
-        break;
-      }
-      case Group::exact_stop:
-        set(state_.exact_stop, false);
-        break;
-      case Group::none:
-        one_shot(g, flow);
-        break;
-      case Group::foreign:
-        flow.stop = true;
-        foreign_switch(g);
-        break;
-      case Group::harmless:
-        look_ahead_switch(g);
-        flow.stop = true;
-        one_shot_axes_ = one_shot_axes_ || g == 220;  // the others may share their block with a move
-        break;
-      case Group::unknown_position:
-        if (g == 270 || g == 290) {
-          refuse_in_cycle(g);
-        }
-        flow.stop = true;
-        one_shot_axes_ = true;
-        if (words_.has_any(axis_letters)) {
-          forget_axes(words_.present);
-        } else {
-          forget_all();
-        }
-        warn("G" + std::to_string(whole) + (g % 10 != 0 ? "." + std::to_string(g % 10) : "") +
-             " is passed through untouched: position not known afterwards");
-        break;
-      case Group::refused:
-        fail("G" + std::to_string(whole) + (g % 10 != 0 ? "." + std::to_string(g % 10) : "") +
-                 ": cylindrical interpolation is not supported",
-             column);
-      case Group::invalid:
-      default:
-        alarm(10, "unknown G code G" + std::to_string(whole) + (g % 10 != 0 ? "." + std::to_string(g % 10) : ""),
-              column);
+  for (int k = 0; k < words().g_count; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    read_code(words().g_tenths[i], words().g_group[i], words().g_column[i], flow);
+  }
+  if (words().has('H') && (words().groups & group_bit(Group::length_offset)) == 0 && state_.length_offset != 49 &&
+      (words().groups & group_bit(Group::none)) == 0) {
+    length_offset(state_.length_offset);  // H alone changes the offset in force
+  }
+}
+
+// Where the state of a group is kept that one number describes.
+int* Interpreter::modal_field(Group group) noexcept {
+  switch (group) {
+    case Group::motion:
+      return &state_.motion;
+    case Group::plane:
+      return &state_.plane;
+    case Group::distance:
+      return &state_.distance;
+    case Group::feed_mode:
+      return &state_.feed_mode;
+    case Group::units:
+      return &state_.units;
+    case Group::compensation:
+      return &state_.compensation;
+    case Group::cycle_return:
+      return &state_.cycle_return;
+    case Group::exact_stop:
+      return &state_.exact_stop;
+    default:
+      return nullptr;
+  }
+}
+
+void Interpreter::compensation_code(int whole) noexcept {
+  if (whole == 40 && state_.compensation != 40) {
+    // The tool leaves the offset with the next move of the plane; until then its position is not the programmed.
+    const ArcFrame plane(plane_normal(state_.plane));
+    for (int i : {plane.a, plane.b}) {
+      state_.known[static_cast<std::size_t>(i)] = false;
     }
   }
-  if (words_.has('H') && (words_.groups & group_bit(Group::length_offset)) == 0 && state_.length_offset != 49 &&
-      (words_.groups & group_bit(Group::none)) == 0) {
-    length_offset(state_.length_offset);  // H alone changes the offset in force
+}
+
+void Interpreter::cycle_code(int whole) {
+  if (whole != 80 && state_.cycle == 80) {
+    cycle_ = CannedCycle{};
+    cycle_.clearance_mm = options_.peck_clearance_mm;
+    cycle_.initial_mm = state_.position_mm[plane_normal(state_.plane)];
+  }
+  state_.cycle = whole;
+}
+
+// G54 ... G59, G54.1.
+void Interpreter::coordinate_code(int g_tenths, LineFlow& flow) {
+  // G54 P7 is G54.1 P7; in a block with a dwell or a cycle P belongs to that.
+  const bool extended = g_tenths == 541 || (g_tenths == 540 && words().has('P') && state_.cycle == 80 &&
+                                            (words().groups & (group_bit(Group::none) | group_bit(Group::cycle))) == 0);
+  const int system = extended ? 541 : g_tenths / 10;
+  const int extra = !extended ? 0 : words().has('P') ? static_cast<int>(words()['P'].value) : 1;
+  if (extended && (extra < 1 || extra > 300)) {
+    alarm(30, fmt::format("G54.1 P{}: P is 1 ... 300", extra), words()['P'].column);
+  }
+  if (system != state_.coordinate_system || extra != state_.coordinate_number) {
+    change_coordinates(system, extra);
+    flow.stop = true;
+  }
+  state_.coordinate_system = system;
+  state_.coordinate_number = extra;
+}
+
+// G27 ... G31: where they end is the machine's business.
+void Interpreter::reference_code(int g_tenths) {
+  if (g_tenths == 270 || g_tenths == 290) {
+    refuse_in_cycle(g_tenths);
+  }
+  one_shot_axes_ = true;
+  if (words().has_any(axis_letters)) {
+    forget_axes(words().present);
+  } else {
+    forget_all();
+  }
+  warn(g_code_name(g_tenths) + " is passed through untouched: position not known afterwards");
+}
+
+void Interpreter::read_code(int g_tenths, Group group, std::uint32_t column, LineFlow& flow) {
+  const int whole = g_tenths / 10;
+  if (int* const field = modal_field(group)) {
+    const bool changes = *field != whole;
+    const bool keeps_region =
+        group == Group::motion || group == Group::plane || group == Group::distance || group == Group::feed_mode;
+    // A no-op (G40 where nothing is compensated) leaves a block inside its region; a change ends it.
+    flow.stop = flow.stop || (changes && !keeps_region);
+    if (group == Group::motion && state_.cycle != 80) {
+      state_.cycle = 80;
+      flow.stop = true;
+    }
+    distance_given_ = distance_given_ || group == Group::distance;
+    if (group == Group::feed_mode && changes) {
+      state_.feed = 0.0;  // the old F has another unit
+    }
+    if (group == Group::compensation) {
+      compensation_code(whole);
+    }
+    *field = whole;
+    state_.uncertain_groups &= ~bit(group);
+    return;
+  }
+  switch (group) {
+    case Group::length_offset:
+      flow.stop = flow.stop || whole != state_.length_offset || words().has('H');
+      length_offset(whole);
+      state_.uncertain_groups &= ~bit(group);
+      return;
+    case Group::cycle:
+      flow.stop = true;
+      cycle_code(whole);
+      state_.uncertain_groups &= ~bit(group);
+      return;
+    case Group::coordinates:
+      coordinate_code(g_tenths, flow);
+      state_.uncertain_groups &= ~bit(group);
+      return;
+    case Group::none:
+      one_shot(g_tenths, flow);
+      return;
+    case Group::foreign:
+      flow.stop = true;
+      foreign_switch(g_tenths);
+      return;
+    case Group::harmless:
+      look_ahead_switch(g_tenths);
+      flow.stop = true;
+      one_shot_axes_ = one_shot_axes_ || g_tenths == 220;  // the others may share their block with a move
+      return;
+    case Group::unknown_position:
+      flow.stop = true;
+      reference_code(g_tenths);
+      return;
+    case Group::refused:
+      fail(g_code_name(g_tenths) + ": cylindrical interpolation is not supported", column);
+    default:
+      alarm(10, "unknown G code " + g_code_name(g_tenths), column);
   }
 }
 
 void Interpreter::dwell() {
   double seconds = 0.0;
   const Word* time = nullptr;
-  if (words_.has('P')) {
-    const Word& p = words_['P'];
+  if (words().has('P')) {
+    const Word& p = words()['P'];
     if (p.has_point) {
       alarm(7, "G04 P takes whole milliseconds: no decimal point", p.column);
     }
     seconds = p.value * 1e-3;
     time = &p;
-  } else if (words_.has('X') || words_.has('U')) {
-    const Word& x = words_[words_.has('X') ? 'X' : 'U'];
+  } else if (words().has('X') || words().has('U')) {
+    const Word& x = words()[words().has('X') ? 'X' : 'U'];
     seconds = x.has_point || options_.calculator_decimal_point ? x.value : x.value * 1e-3;
     time = &x;
   } else {
     fail("G04 needs P (milliseconds) or X (seconds)");
   }
   if (seconds < 0.0) {
-    alarm(6, format_message("dwell G04 %c%g is negative", time->letter, time->value), time->column);
+    alarm(6, fmt::format("dwell G04 {}{} is negative", time->letter, time->value), time->column);
   }
   add_move({make_line(state_.position_mm, state_.position_mm, 0.0, line_number_), seconds});
 }
@@ -203,7 +216,7 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
   switch (g_tenths) {
     case 90:
       explicit_exact_stop_ = true;
-      flow.stop = flow.stop || !words_.has_any(axis_letters | centre_letters);
+      flow.stop = flow.stop || !words().has_any(axis_letters | centre_letters);
       return;
     case 40:
       flow.stop = true;
@@ -220,8 +233,8 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
       one_shot_axes_ = true;
       for (int axis = 0; axis < axis_count; ++axis) {
         const char letter = static_cast<char>('X' + axis);
-        if (words_.has(letter)) {
-          state_.position_mm[axis] = length_mm(words_[letter]);
+        if (words().has(letter)) {
+          state_.position_mm[axis] = length_mm(words()[letter]);
           state_.known[static_cast<std::size_t>(axis)] = true;
         }
       }
@@ -231,14 +244,14 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
       one_shot_axes_ = true;
       for (int axis = 0; axis < axis_count; ++axis) {
         const char letter = static_cast<char>('X' + axis);
-        if (words_.has(letter)) {
-          const double offset = length_mm(words_[letter]);
+        if (words().has(letter)) {
+          const double offset = length_mm(words()[letter]);
           state_.position_mm[axis] -= offset - local_offset_[axis];
           local_offset_[axis] = offset;
           // Behind a G52 that may not have run the step from the old offset is not known.
           const auto i = static_cast<std::size_t>(axis);
           state_.known[i] = state_.known[i] && !local_offset_uncertain_[i];
-          local_offset_uncertain_[i] = block_.optional_skip;
+          local_offset_uncertain_[i] = block_->optional_skip;
         }
       }
       return;
@@ -246,13 +259,13 @@ void Interpreter::one_shot(int g_tenths, LineFlow& flow) {
       if (g_tenths != 530) {
         refuse_in_cycle(g_tenths);
       }
-      if (g_tenths == 300 && words_.has('P') && (words_['P'].value < 2.0 || words_['P'].value > 4.0)) {
-        alarm(46, format_message("G30 P%g: the reference points are P2, P3 and P4", words_['P'].value),
-              words_['P'].column);
+      if (g_tenths == 300 && words().has('P') && (words()['P'].value < 2.0 || words()['P'].value > 4.0)) {
+        alarm(46, fmt::format("G30 P{}: the reference points are P2, P3 and P4", words()['P'].value),
+              words()['P'].column);
       }
       flow.stop = true;
       one_shot_axes_ = true;
-      forget_axes(words_.present);
+      forget_axes(words().present);
       return;
   }
 }
@@ -286,10 +299,10 @@ void Interpreter::foreign_switch(int g_tenths) {
 
 // G05.1 Q1, G08 P1 and G05 P10000 switch modes on that plan short blocks anew.
 void Interpreter::look_ahead_switch(int g_tenths) {
-  if (g_tenths == 51 && words_.has('Q')) {
-    look_ahead_ = words_['Q'].value != 0.0;
-  } else if ((g_tenths == 80 || g_tenths == 50) && words_.has('P')) {
-    look_ahead_ = words_['P'].value != 0.0;
+  if (g_tenths == 51 && words().has('Q')) {
+    look_ahead_ = words()['Q'].value != 0.0;
+  } else if ((g_tenths == 80 || g_tenths == 50) && words().has('P')) {
+    look_ahead_ = words()['P'].value != 0.0;
   }
 }
 
@@ -306,27 +319,27 @@ void Interpreter::change_coordinates(int number, int extra) {
 }
 
 void Interpreter::m_codes(LineFlow& flow) {
-  if (words_.has_any(letter_mask("MST"))) {
+  if (words().has_any(letter_mask("MST"))) {
     close_region();
     MachineFunction function;
-    function.m_codes = words_.m_codes;
-    function.m_count = words_.m_count;
-    if (words_.has('T')) {
-      function.tool = static_cast<std::int64_t>(words_['T'].value);
+    function.m_codes = words().m_codes;
+    function.m_count = words().m_count;
+    if (words().has('T')) {
+      function.tool = static_cast<std::int64_t>(words()['T'].value);
     }
-    if (words_.has('S')) {
-      function.spindle_rev_per_min = words_['S'].value;
+    if (words().has('S')) {
+      function.spindle_rev_per_min = words()['S'].value;
     }
     add_step(StepKind::function, program_.functions.size());
     program_.functions.push_back(function);
   }
-  for (int k = 0; k < words_.m_count; ++k) {
+  for (int k = 0; k < words().m_count; ++k) {
     flow.stop = true;
-    switch (words_.m_codes[static_cast<std::size_t>(k)]) {
+    switch (words().m_codes[static_cast<std::size_t>(k)]) {
       case 2:
       case 30:
         close_region();
-        ended_ = ended_ || !block_.optional_skip;
+        ended_ = ended_ || !block_->optional_skip;
         break;
       case 6:
         for (std::size_t axis = 0; axis < axis_count; ++axis) {

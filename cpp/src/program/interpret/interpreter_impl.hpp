@@ -3,8 +3,6 @@
 // moves (interpreter_moves.cpp).
 #pragma once
 
-#include <fmt/format.h>
-
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -17,8 +15,7 @@
 #include "program/interpret/canned_cycle.hpp"
 #include "program/interpret/input_rules.hpp"
 #include "program/interpret/offsets.hpp"
-#include "program/text/block_words.hpp"
-#include "program/text/lexer.hpp"
+#include "program/text/parsed_block.hpp"
 #include "shapegcode/program.hpp"
 
 namespace shapegcode::detail {
@@ -41,12 +38,11 @@ class Interpreter {
   Interpreter(Program& program, const ReaderOptions& options)
       : options_(options), program_(program), state_(options.power_on), offsets_(options) {}
 
-  /// Splits a line into words: `block()` and `words()`.
-  void scan(std::string_view text, std::uint32_t line);
-  /// Throws where the words that were scanned could only be arguments of a macro call.
-  void require_plain_words(std::uint32_t line) const;
-  /// Executes the words that were scanned. The text of the line stands at [begin, end) of the program's text.
-  void execute(std::uint32_t line, const LineOrigin& origin, std::size_t begin, std::size_t end);
+  /// Throws where words could only be arguments of a macro call.
+  void require_plain_words(const BlockWords& words, std::uint32_t line) const;
+  /// Executes a block, whose text stands at [begin, end) of the program's text.
+  void execute(const ParsedBlock& block, std::uint32_t line, const LineOrigin& origin, std::size_t begin,
+               std::size_t end);
   /// Ends an open region: the next line is not part of it.
   void close_region();
   void warn(const std::string& message);
@@ -58,8 +54,6 @@ class Interpreter {
   /// A work offset set by the program: one that is in force shifts the position.
   void set_work_offset(int coordinate_system, int number, int axis, double value_mm, bool incremental = false);
 
-  [[nodiscard]] const Block& block() const noexcept { return block_; }
-  [[nodiscard]] const BlockWords& words() const noexcept { return words_; }
   [[nodiscard]] const ModalState& state() const noexcept { return state_; }
   [[nodiscard]] bool ended() const noexcept { return ended_; }
   void end() noexcept { ended_ = true; }
@@ -72,8 +66,15 @@ class Interpreter {
     bool motion = false;  ///< the block moves axes
   };
 
+  [[nodiscard]] const BlockWords& words() const noexcept { return block_->sorted(); }
   void optional_skip_block(const ModalState& before);
   void read_codes(LineFlow& flow);
+  void read_code(int g_tenths, Group group, std::uint32_t column, LineFlow& flow);
+  [[nodiscard]] int* modal_field(Group group) noexcept;
+  void compensation_code(int whole) noexcept;
+  void cycle_code(int whole);
+  void coordinate_code(int g_tenths, LineFlow& flow);
+  void reference_code(int g_tenths);
   void refuse_in_cycle(int g_tenths) const;
   void one_shot(int g_tenths, LineFlow& flow);
   void dwell();
@@ -84,6 +85,7 @@ class Interpreter {
   void length_offset(int whole);
   void move(LineFlow& flow, const ModalState& before, std::size_t begin, std::size_t end);
   void cut(const char* why_kept, const ModalState& before, std::size_t begin, std::size_t end);
+  void keep_cut(const char* why, const Vector3& end, const std::array<bool, 3>& known_after);
   void forget_uncertain_end() noexcept;
   void check_range() const;
   void cycle_block();
@@ -111,8 +113,8 @@ class Interpreter {
   Program& program_;
   ModalState state_;
   Offsets offsets_;
-  Block block_;
-  BlockWords words_;
+  const ParsedBlock* block_ = nullptr;  ///< the one that is executed
+  std::size_t begin_ = 0;               ///< where it stands in the program's text
   std::uint32_t line_number_ = 0;
   LineOrigin origin_;
   std::shared_ptr<Region> region_;

@@ -1,8 +1,9 @@
 // Axis moves: cutting regions, rapids, drilling cycles.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
-#include "base/message.hpp"
 #include "program/interpret/arc_geometry.hpp"
 #include "program/interpret/interpreter_impl.hpp"
 
@@ -12,9 +13,9 @@ void Interpreter::check_range() const {
   const double unit = unit_mm(state_.units);
   const double limit = (state_.units == 20 ? 9999.9999 : 99999.999) * (1.0 + 1e-12);
   for (char letter : {'X', 'Y', 'Z', 'I', 'J', 'K', 'R'}) {
-    if (words_.has(letter) && std::abs(length_mm(words_[letter])) > limit * unit) {
-      alarm(3, format_message("%c%.4f lies outside +-%.4f", letter, length_mm(words_[letter]) / unit, limit),
-            words_[letter].column);
+    if (words().has(letter) && std::abs(length_mm(words()[letter])) > limit * unit) {
+      alarm(3, fmt::format("{}{:.4f} lies outside +-{:.4f}", letter, length_mm(words()[letter]) / unit, limit),
+            words()[letter].column);
     }
   }
 }
@@ -27,7 +28,7 @@ void Interpreter::forget_uncertain_end() noexcept {
   if ((state_.uncertain_groups & of_cycles) != 0) {
     forget_all();
   } else if ((state_.uncertain_groups & of_ends) != 0) {
-    forget_axes(words_.present);
+    forget_axes(words().present);
   }
 }
 
@@ -39,11 +40,11 @@ bool Interpreter::target(Vector3& end, std::array<bool, 3>& known_after, bool& r
   known_after = state_.known;
   for (int axis = 0; axis < axis_count; ++axis) {
     const char letter = static_cast<char>('X' + axis);
-    if (!words_.has(letter)) {
+    if (!words().has(letter)) {
       continue;
     }
     const auto i = static_cast<std::size_t>(axis);
-    const double value = length_mm(words_[letter]);
+    const double value = length_mm(words()[letter]);
     if (state_.distance == 90) {
       from_known = from_known && state_.known[i];
       end[axis] = value;
@@ -76,25 +77,25 @@ Segment Interpreter::cutting_segment(const Vector3& end) const {
   arc.normal = plane_normal(state_.plane);
   arc.tolerance_mm = options_.arc_tolerance_mm;
   std::uint32_t column = 0;
-  if (words_.has('R')) {
-    arc.radius_mm = length_mm(words_['R']);
-    column = words_['R'].column;
+  if (words().has('R')) {
+    arc.radius_mm = length_mm(words()['R']);
+    column = words()['R'].column;
   } else {
     arc.centre_mm = options_.absolute_arc_centres ? Vector3(Vector3::Zero()) : arc.start_mm;
     bool given = false;
     for (int axis = 0; axis < axis_count; ++axis) {
       const char letter = static_cast<char>('I' + axis);
-      if (words_.has(letter) && axis != arc.normal) {
-        arc.centre_mm[axis] += length_mm(words_[letter]);
-        column = words_[letter].column;
+      if (words().has(letter) && axis != arc.normal) {
+        arc.centre_mm[axis] += length_mm(words()[letter]);
+        column = words()[letter].column;
         given = true;
       } else if (options_.absolute_arc_centres) {
         arc.centre_mm[axis] = arc.start_mm[axis];
       }
     }
     if (!given) {
-      alarm(22, "arc without R or I J K in its plane G" + std::to_string(state_.plane),
-            words_.g_count > 0 ? words_.g_column[0] : 1);
+      alarm(22, fmt::format("arc without R or I J K in its plane G{}", state_.plane),
+            words().g_count > 0 ? words().g_column[0] : 1);
     }
   }
   Segment segment = resolve_arc(arc, 0.0, line_number_, column);
@@ -106,11 +107,11 @@ Segment Interpreter::cutting_segment(const Vector3& end) const {
 void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t begin, std::size_t end) {
   check_range();
   if (!distance_given_) {
-    warn_once(seen_distance_, "neither G90 nor G91 before the first move: G" + std::to_string(state_.distance) +
-                                  " assumed (power_on.distance)");
+    warn_once(seen_distance_, fmt::format("neither G90 nor G91 before the first move: G{} assumed (power_on.distance)",
+                                          state_.distance));
   }
   for (char letter : {'X', 'Y', 'Z', 'I', 'J', 'K', 'R'}) {
-    if (words_.has(letter) && !words_[letter].has_point && words_[letter].value != 0.0) {
+    if (words().has(letter) && !words()[letter].has_point && words()[letter].value != 0.0) {
       warn_once(seen_no_point_, std::string("numbers without a decimal point are read as ") +
                                     (options_.calculator_decimal_point ? "mm or inch" : "least increments") +
                                     " (controller.calculator_decimal_point)");
@@ -158,10 +159,38 @@ void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t beg
   cut(why_kept, before, begin, end);
 }
 
+// A cutting move that stays as it is written. Its length is known only where start and path are.
+void Interpreter::keep_cut(const char* why, const Vector3& end, const std::array<bool, 3>& known_after) {
+  if (options_.absolute_arc_centres && state_.motion > 1 && words().has_any(centre_letters)) {
+    fail(std::string("arc with an absolute centre cannot be kept as it is: ") + why);
+  }
+  close_region();
+  if (foreign_ == 0) {
+    Vector3 to;
+    std::array<bool, 3> known{};
+    bool relative = false;
+    const bool measurable = target(to, known, relative);
+    const bool plain = state_.motion == 1 || state_.compensation != 40 || state_.motion == 33;
+    const double rate = state_.feed_mode != 93 ? feed_mm_per_s(0.0) : 0.0;
+    const Segment segment =
+        !plain && measurable ? cutting_segment(end) : make_line(state_.position_mm, end, rate, line_number_);
+    if (measurable && segment.feed_mm_per_s > 0.0 && segment.length_mm > 0.0) {
+      add_move({segment, 0.0});
+    }
+    state_.position_mm = end;
+    state_.known = known_after;
+  }
+  // One warning for a run of such blocks.
+  if (kept_run_line_ + 1 != line_number_) {
+    warn(std::string("cutting move kept untouched: ") + why);
+  }
+  kept_run_line_ = line_number_;
+}
+
 void Interpreter::cut(const char* why_kept, const ModalState& before, std::size_t begin, std::size_t end) {
   if (!(state_.feed > 0.0)) {
-    alarm(11, words_.has('F') ? "cutting move with feed F0" : "cutting move, but no feed F was given",
-          words_.has('F') ? words_['F'].column : 1);
+    alarm(11, words().has('F') ? "cutting move with feed F0" : "cutting move, but no feed F was given",
+          words().has('F') ? words()['F'].column : 1);
   }
   Vector3 to;
   std::array<bool, 3> known_after{};
@@ -170,29 +199,7 @@ void Interpreter::cut(const char* why_kept, const ModalState& before, std::size_
     why_kept = "the position before it is not known";
   }
   if (why_kept != nullptr) {
-    if (options_.absolute_arc_centres && state_.motion > 1 && words_.has_any(centre_letters)) {
-      fail(std::string("arc with an absolute centre cannot be kept as it is: ") + why_kept);
-    }
-    close_region();
-    // Kept to the letter. Its length is known only where start and path are.
-    if (foreign_ == 0) {
-      const bool plain = state_.motion == 1 || state_.compensation != 40 || state_.motion == 33;
-      const double rate = state_.feed_mode != 93 ? feed_mm_per_s(0.0) : 0.0;
-      Segment segment = make_line(state_.position_mm, to, rate, line_number_);
-      if (!plain && target(to, known_after, relative)) {
-        segment = cutting_segment(to);
-      }
-      if (target(to, known_after, relative) && segment.feed_mm_per_s > 0.0 && segment.length_mm > 0.0) {
-        add_move({segment, 0.0});
-      }
-      state_.position_mm = to;
-      state_.known = known_after;
-    }
-    // One warning for a run of such blocks.
-    if (kept_run_line_ + 1 != line_number_) {
-      warn(std::string("cutting move kept untouched: ") + why_kept);
-    }
-    kept_run_line_ = line_number_;
+    keep_cut(why_kept, to, known_after);
     return;
   }
   Segment segment = cutting_segment(to);
@@ -229,27 +236,27 @@ void Interpreter::read_cycle_words(int axis) {
   const char depth_letter = static_cast<char>('X' + axis);
   const bool incremental = state_.distance == 91;
   // Levels are kept as levels: a row of holes in G91 behind a cycle in G90 is drilled at the same ones.
-  if (words_.has('R')) {
-    const double value = length_mm(words_['R']);
+  if (words().has('R')) {
+    const double value = length_mm(words()['R']);
     cycle_.r_mm = incremental ? cycle_.initial_mm + value : value;
   }
-  if (words_.has(depth_letter)) {
-    const double value = length_mm(words_[depth_letter]);
+  if (words().has(depth_letter)) {
+    const double value = length_mm(words()[depth_letter]);
     cycle_.bottom_mm = incremental ? cycle_.r_mm + value : value;
   }
-  if (words_.has('Q')) {
-    cycle_.peck_mm = std::abs(length_mm(words_['Q']));
+  if (words().has('Q')) {
+    cycle_.peck_mm = std::abs(length_mm(words()['Q']));
   }
-  if (words_.has('P')) {
+  if (words().has('P')) {
     // Some post-processors write "P500.": whole milliseconds all the same.
-    if (words_['P'].value != std::floor(words_['P'].value)) {
-      alarm(7, fmt::format("P{} of a drilling cycle: it takes whole milliseconds", words_['P'].value),
-            words_['P'].column);
+    if (words()['P'].value != std::floor(words()['P'].value)) {
+      alarm(7, fmt::format("P{} of a drilling cycle: it takes whole milliseconds", words()['P'].value),
+            words()['P'].column);
     }
-    if (words_['P'].has_point) {
+    if (words()['P'].has_point) {
       warn_once(seen_cycle_point_, "P of a drilling cycle counts milliseconds; some controls refuse its decimal point");
     }
-    cycle_.dwell_s = words_['P'].value * 1e-3;
+    cycle_.dwell_s = words()['P'].value * 1e-3;
   }
   cycle_.code = state_.cycle;
   cycle_.return_to_r = state_.cycle_return == 99;
@@ -258,16 +265,16 @@ void Interpreter::read_cycle_words(int axis) {
 int Interpreter::cycle_repeats() const {
   int repeats = 1;
   for (char letter : {'K', 'L'}) {
-    if (words_.has(letter)) {
-      const double count = words_[letter].value;
+    if (words().has(letter)) {
+      const double count = words()[letter].value;
       if (count < 0.0) {
         alarm(6, fmt::format("minus sign in the repetitions {}{} of a drilling cycle", letter, count),
-              words_[letter].column);
+              words()[letter].column);
       }
       // A computed K carries a point ("K3."): only a fraction is wrong.
       if (count != std::floor(count)) {
         alarm(7, fmt::format("repetitions {}{} of a drilling cycle are no whole number", letter, count),
-              words_[letter].column);
+              words()[letter].column);
       }
       repeats = static_cast<int>(std::min(count, 9999.0));
     }
@@ -280,11 +287,11 @@ void Interpreter::require_cycle_data() const {
     alarm(11, fmt::format("drilling cycle G{} without a feed F", state_.cycle));
   }
   if ((state_.cycle == 73 || state_.cycle == 83) && !(cycle_.peck_mm > 0.0)) {
-    const bool given = words_.has('Q');
+    const bool given = words().has('Q');
     alarm(45,
           fmt::format("drilling cycle G{} {} a depth of cut Q{}", state_.cycle, given ? "with" : "without",
                       given ? " of 0" : ""),
-          given ? words_['Q'].column : 1);
+          given ? words()['Q'].column : 1);
   }
 }
 
@@ -297,7 +304,7 @@ void Interpreter::require_room_for_holes(int holes) const {
                      "program come to {:.0f} moves (limit {})",
                      cycle_.code, cuts, holes, std::abs(cycle_.r_mm - cycle_.bottom_mm), moves,
                      options_.max_cycle_moves),
-         words_.has('Q') ? words_['Q'].column : 1);
+         words().has('Q') ? words()['Q'].column : 1);
   }
 }
 
@@ -308,10 +315,10 @@ void Interpreter::drill_hole(int axis, double feed_mm_per_s) {
   Vector3 hole = state_.position_mm;
   for (int i = 0; i < axis_count; ++i) {
     const char letter = static_cast<char>('X' + i);
-    if (i == axis || !words_.has(letter)) {
+    if (i == axis || !words().has(letter)) {
       continue;
     }
-    const double value = length_mm(words_[letter]);
+    const double value = length_mm(words()[letter]);
     hole[i] = incremental ? hole[i] + value : value;
     if (!incremental) {
       state_.known[static_cast<std::size_t>(i)] = true;

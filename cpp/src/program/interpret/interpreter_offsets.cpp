@@ -1,4 +1,6 @@
 // Offsets: tool length, and data setting by G10.
+#include <fmt/format.h>
+
 #include "program/interpret/interpreter_impl.hpp"
 
 namespace shapegcode::detail {
@@ -6,7 +8,7 @@ namespace shapegcode::detail {
 // G43 adds the offset of H to Z, G44 takes it away; the tip's coordinate shifts by the difference, where both are
 // known.
 void Interpreter::length_offset(int whole) {
-  const int number = whole == 49 ? 0 : words_.has('H') ? static_cast<int>(words_['H'].value) : state_.length_number;
+  const int number = whole == 49 ? 0 : words().has('H') ? static_cast<int>(words()['H'].value) : state_.length_number;
   const auto shift = [&](int code, int h) -> std::optional<double> {
     const auto value = code == 49 ? std::optional<double>(0.0) : offsets_.length(h);
     return value && code == 44 ? std::optional<double>(-*value) : value;
@@ -30,12 +32,12 @@ void Interpreter::length_offset(int whole) {
 
 // G10: offsets by program. What it sets is known from then on.
 void Interpreter::data_setting() {
-  const int kind = words_.has('L') ? static_cast<int>(words_['L'].value) : -1;
-  const int number = words_.has('P') ? static_cast<int>(words_['P'].value) : 0;
+  const int kind = words().has('L') ? static_cast<int>(words()['L'].value) : -1;
+  const int number = words().has('P') ? static_cast<int>(words()['P'].value) : 0;
   switch (kind) {
     case 2:
       if (number < 0 || number > 6) {
-        alarm(31, "G10 L2 P" + std::to_string(number) + ": P is 1 ... 6 for G54 ... G59, or 0", words_['P'].column);
+        alarm(31, fmt::format("G10 L2 P{}: P is 1 ... 6 for G54 ... G59, or 0", number), words()['P'].column);
       }
       if (number == 0) {
         forget_all();  // the external offset moves every system
@@ -46,8 +48,8 @@ void Interpreter::data_setting() {
       return;
     case 20:
       if (number < 1 || number > 300) {
-        alarm(31, "G10 L20 P" + std::to_string(number) + ": P is 1 ... 300 for G54.1 P1 ... P300",
-              words_.has('P') ? words_['P'].column : 0);
+        alarm(31, fmt::format("G10 L20 P{}: P is 1 ... 300 for G54.1 P1 ... P300", number),
+              words().has('P') ? words()['P'].column : 0);
       }
       data_work_offset(541, number);
       return;
@@ -58,21 +60,21 @@ void Interpreter::data_setting() {
     case 11:
     case 12:
     case 13:
-      if (kind != 3 && words_.has('P') && words_.has('R')) {
+      if (kind != 3 && words().has('P') && words().has('R')) {
         set_tool_offset(kind);
         return;
       }
       if (kind >= 10) {
-        const bool value = words_.has('P');
+        const bool value = words().has('P');
         alarm(value ? 32 : 31,
-              "G10 L" + std::to_string(kind) + (value ? " without a value R" : " without an offset number P"));
+              fmt::format("G10 L{}{}", kind, value ? " without a value R" : " without an offset number P"));
       }
       break;
     case 50:
     case 52:
       break;
     default:
-      alarm(31, "G10 L" + std::to_string(kind) + " is not known", words_['L'].column);
+      alarm(31, fmt::format("G10 L{} is not known", kind), words()['L'].column);
   }
   if (kind == -1 || kind == 50 || kind == 52 || kind == 3) {
     return;  // parameters, tool life: nothing that moves an axis
@@ -84,8 +86,8 @@ void Interpreter::data_setting() {
 void Interpreter::data_work_offset(int coordinate_system, int number) {
   for (int axis = 0; axis < axis_count; ++axis) {
     const char letter = static_cast<char>('X' + axis);
-    if (words_.has(letter)) {
-      set_work_offset(coordinate_system, number, axis, length_mm(words_[letter]), state_.distance == 91);
+    if (words().has(letter)) {
+      set_work_offset(coordinate_system, number, axis, length_mm(words()[letter]), state_.distance == 91);
     }
   }
 }
@@ -110,12 +112,12 @@ void Interpreter::set_work_offset(int coordinate_system, int number, int axis, d
 }
 
 void Interpreter::set_tool_offset(int kind) {
-  const int number = static_cast<int>(words_['P'].value);
+  const int number = static_cast<int>(words()['P'].value);
   if (number < 1 || number > 999) {
-    alarm(30, "G10: offset number P" + std::to_string(number) + " outside 1 ... 999", words_['P'].column);
+    alarm(30, fmt::format("G10: offset number P{} outside 1 ... 999", number), words()['P'].column);
   }
   ToolOffset offset = offsets_.tool(number);
-  const double value = length_mm(words_['R']);
+  const double value = length_mm(words()['R']);
   const auto set = [&](std::optional<double>& field) {
     field = state_.distance == 91 ? (field ? std::optional<double>(*field + value) : std::nullopt) : value;
   };
@@ -149,13 +151,11 @@ void Interpreter::refuse_in_cycle(int g_tenths) const {
     return;
   }
   std::uint32_t column = 1;
-  for (int k = 0; k < words_.g_count; ++k) {
+  for (int k = 0; k < words().g_count; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    column = words_.g_tenths[i] == g_tenths ? words_.g_column[i] : column;
+    column = words().g_tenths[i] == g_tenths ? words().g_column[i] : column;
   }
-  alarm(44,
-        "G" + std::to_string(g_tenths / 10) + " while the drilling cycle G" + std::to_string(state_.cycle) +
-            " is on: cancel it with G80",
+  alarm(44, fmt::format("G{} while the drilling cycle G{} is on: cancel it with G80", g_tenths / 10, state_.cycle),
         column);
 }
 

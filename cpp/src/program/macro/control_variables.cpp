@@ -1,4 +1,6 @@
 // System variables of custom macro B, as far as a program can know them before it runs.
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "program/read/reader_impl.hpp"
@@ -9,7 +11,7 @@ namespace {
 
 // A value that only the control has.
 bool unknown(int number) {
-  throw UnknownValue(number, "system variable #" + std::to_string(number) + " is known to the control only");
+  throw UnknownValue(number, fmt::format("system variable #{} is known to the control only", number));
 }
 
 double code_number(int code) { return code > 100 ? code / 10.0 : code; }

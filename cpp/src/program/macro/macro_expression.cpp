@@ -1,5 +1,7 @@
 #include "program/macro/macro_expression.hpp"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
 #include <string>
@@ -155,7 +157,7 @@ class Parser {
 
   void enter(bool counts) {
     if (counts && ++depth_ > max_brackets) {
-      fail(118, "more than " + std::to_string(max_brackets) + " levels of brackets", line_, i_);
+      fail(118, fmt::format("more than {} levels of brackets", max_brackets), line_, i_);
     }
     ++i_;
   }

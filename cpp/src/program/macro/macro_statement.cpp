@@ -1,5 +1,7 @@
 #include "program/macro/macro_statement.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -128,7 +130,7 @@ void read_loop_number(std::string_view line, std::size_t i, std::uint32_t line_n
     fail(126, "number 1 ... 3 expected behind DO or END, " + name_at(line, i) + " found", line_number, start);
   }
   if (number < 1 || number > 3) {
-    fail(126, "loop number " + std::to_string(number) + " (limit 1 ... 3)", line_number, start);
+    fail(126, fmt::format("loop number {} (limit 1 ... 3)", number), line_number, start);
   }
   expect_end(line, i, line_number);
   statement.loop = static_cast<int>(number);
@@ -310,8 +312,8 @@ std::int64_t go_to_target(std::string_view line, std::size_t at, std::uint32_t l
   const double number = std::round(value.value_or(0.0));
   if (!(number >= 1.0 && number <= static_cast<double>(max_sequence_number))) {
     fail(128,
-         "GOTO " + (value.has_value() ? macro::shown(*value) : "<vacant>") + ": sequence numbers are 1 ... " +
-             std::to_string(max_sequence_number),
+         fmt::format("GOTO {}: sequence numbers are 1 ... {}", value.has_value() ? macro::shown(*value) : "<vacant>",
+                     max_sequence_number),
          line_number, at);
   }
   return static_cast<std::int64_t>(number);

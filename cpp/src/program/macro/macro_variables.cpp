@@ -1,5 +1,7 @@
 #include "program/macro/macro_variables.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <string>
 
@@ -19,7 +21,7 @@ bool is_retained(int number) noexcept { return number >= first_retained && numbe
 
 bool is_common(int number) noexcept { return number >= first_common && number <= last_common; }
 
-std::string name_of(int number) { return "#" + std::to_string(number); }
+std::string name_of(int number) { return fmt::format("#{}", number); }
 
 }  // namespace
 
@@ -118,8 +120,7 @@ void MacroVariables::forget(int number) noexcept {
 
 void MacroVariables::push_level(const std::array<MacroValue, 34>& arguments, std::uint32_t line, std::uint32_t column) {
   if (level_ + 1 == max_levels) {
-    throw alarm_error(122, "macro calls nested deeper than " + std::to_string(max_levels - 1) + " levels", line,
-                      column);
+    throw alarm_error(122, fmt::format("macro calls nested deeper than {} levels", max_levels - 1), line, column);
   }
   ++level_;
   locals_[level_] = arguments;

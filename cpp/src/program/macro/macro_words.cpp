@@ -1,5 +1,7 @@
 // The words of NC blocks and macro calls whose operands may be variables.
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -86,10 +88,7 @@ std::size_t whole_digits(double magnitude) noexcept {
 void append_word(std::string& text, char letter, double value, Notation notation, int decimals,
                  std::uint32_t line_number, std::size_t at) {
   if (!(std::abs(value) < 1e8)) {
-    fail(3,
-         std::string(1, letter) + " = " + macro::shown(value) + " has more than " + std::to_string(max_digits) +
-             " digits",
-         line_number, at);
+    fail(3, fmt::format("{} = {} has more than {} digits", letter, macro::shown(value), max_digits), line_number, at);
   }
   if (notation == Notation::feed) {
     decimals = std::min(decimals, max_digits - static_cast<int>(whole_digits(std::abs(value))));
@@ -101,8 +100,8 @@ void append_word(std::string& text, char letter, double value, Notation notation
   const double scaled = std::round(value * unit);
   if (!(std::abs(scaled) < 1e8) && notation != Notation::feed) {
     fail(3,
-         std::string(1, letter) + " = " + macro::shown(value) + " has more than " + std::to_string(max_digits) +
-             " digits at " + std::to_string(decimals) + " decimals",
+         fmt::format("{} = {} has more than {} digits at {} decimals", letter, macro::shown(value), max_digits,
+                     decimals),
          line_number, at);
   }
   const auto count = static_cast<std::int64_t>(scaled);
@@ -331,7 +330,7 @@ class ArgumentReader {
     if (last_of_set_ != 0 && letter <= last_of_set_) {
       ++set_;
       if (set_ == max_sets) {
-        fail(129, "more than " + std::to_string(max_sets) + " sets of I J K", line_number_, at);
+        fail(129, fmt::format("more than {} sets of I J K", max_sets), line_number_, at);
       }
     }
     last_of_set_ = letter;

@@ -1,5 +1,7 @@
 #include "program/read/program_store.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -60,7 +62,7 @@ TapeFrame find_frame(const std::string& text) {
     const auto at = static_cast<std::uint32_t>(
         1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(junk), '\n'));
     const std::size_t line_start = junk == 0 ? 0 : text.rfind('\n', junk - 1) + 1;
-    throw Error(ErrorKind::program, "byte 0x00 at offset " + std::to_string(junk) + ": this is no program text", at,
+    throw Error(ErrorKind::program, fmt::format("byte 0x00 at offset {}: this is no program text", junk), at,
                 static_cast<std::uint32_t>(junk - line_start + 1));
   }
   // Offsets of lines that start with '%'.
@@ -174,10 +176,9 @@ void ProgramStore::add(const std::string& text, const TapeFrame& frame, std::uin
   const auto close = [&](std::size_t at) {
     const ProgramUnit* twin = unit->number < 0 ? nullptr : find(unit->number);
     if (twin != nullptr && twin->file == file) {
-      throw alarm_error(73,
-                        "program O" + std::to_string(unit->number) + " stands twice in the file, first in line " +
-                            std::to_string(twin->first.line),
-                        unit->first.line, 1);
+      throw alarm_error(
+          73, fmt::format("program O{} stands twice in the file, first in line {}", unit->number, twin->first.line),
+          unit->first.line, 1);
     }
     unit->end = at;
     units_.push_back(std::move(unit));
@@ -211,7 +212,7 @@ void ProgramStore::add(const std::string& text, const TapeFrame& frame, std::uin
     counted.at = begin;
     const LinePlace here = counted;
     if (number == 0 || number > 99'999'999) {
-      throw alarm_error(74, "program number O" + std::to_string(number) + " outside 1 ... 99999999", here.line, 1);
+      throw alarm_error(74, fmt::format("program number O{} outside 1 ... 99999999", number), here.line, 1);
     }
     if (unit->number < 0) {
       unit->number = number;  // what stands before the first O line belongs to its program

@@ -1,4 +1,6 @@
 // Texts, lines, and where they end.
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "program/read/reader_impl.hpp"
@@ -19,7 +21,7 @@ Reader::Reader(std::string text, const ReaderOptions& options)
                 [this](std::string_view flat, const LineOrigin& origin) { put(flat, origin); }),
       control_(options, interpreter_, rewriter_),
       variables_(options.retained_variables, &control_) {
-  program_.text = std::move(text);
+  sources_.push_back({"", std::move(text)});
   program_.files.emplace_back();
 }
 
@@ -36,9 +38,9 @@ void Reader::alarm(int number, const std::string& message, std::uint32_t column)
 }
 
 void Reader::load_main() {
-  const TapeFrame frame = find_frame(program_.text);
+  const std::string& text = sources_.front().text;
+  const TapeFrame frame = find_frame(text);
   framed_ = frame.framed;
-  const std::string& text = program_.text;
   const auto end_of_line = text.find('\n');
   if (end_of_line != std::string::npos && end_of_line > 0 && text[end_of_line - 1] == '\r') {
     program_.line_end = "\r\n";
@@ -56,11 +58,11 @@ void Reader::load_main() {
   if (main == nullptr) {
     std::string known;
     for (const std::int64_t number : program_.program_numbers) {
-      known += (known.empty() ? "" : ", ") + std::string("O") + std::to_string(number);
+      known += fmt::format("{}O{}", known.empty() ? "" : ", ", number);
     }
     throw alarm_error(78,
-                      "program O" + std::to_string(options_.program) + " is not in the file (it holds " +
-                          (known.empty() ? "no O number" : known) + ")",
+                      fmt::format("program O{} is not in the file (it holds {})", options_.program,
+                                  known.empty() ? "no O number" : known),
                       1, 1);
   }
   program_.program_number = main->number;
@@ -83,12 +85,8 @@ void Reader::expand_from(std::size_t begin) {
     return;
   }
   program_.expanded = true;
-  sources_.push_back({"", std::move(program_.text)});
-  const std::string& original = sources_.back().text;
+  const std::string& original = sources_.front().text;
   program_.text = original.substr(0, begin);
-  for (const auto& unit : store_.units()) {
-    unit->text = &original;
-  }
   const auto lines = static_cast<std::size_t>(
       std::count(original.begin(), original.begin() + static_cast<std::ptrdiff_t>(begin), '\n'));
   program_.origins.reserve(lines + 1000);
@@ -106,11 +104,21 @@ void Reader::put_raw(std::string_view flat, const LineOrigin& origin) {
 void Reader::put(std::string_view flat, const LineOrigin& origin) {
   const std::size_t begin = program_.text.size();
   put_raw(flat, origin);
-  const auto number = static_cast<std::uint32_t>(program_.origins.size());
-  const std::size_t end = program_.text.size();
+  written_.read(std::string_view(program_.text).substr(begin, flat.size()), origin.line, options_.max_line_length);
+  run_written(written_, origin, begin);
+}
+
+void Reader::put(const ParsedBlock& block, const LineOrigin& origin) {
+  const std::size_t begin = program_.text.size();
+  put_raw(block.text(), origin);
+  run_written(block, origin, begin);
+}
+
+// The last line of the text, which begins at `begin`.
+void Reader::run_written(const ParsedBlock& block, const LineOrigin& origin, std::size_t begin) {
   try {
-    interpreter_.scan(std::string_view(program_.text).substr(begin, flat.size()), origin.line);
-    interpreter_.execute(number, origin, begin, end);
+    interpreter_.execute(block, static_cast<std::uint32_t>(program_.origins.size()), origin, begin,
+                         program_.text.size());
   } catch (const Error& error) {
     // The interpreter counts the lines of the expanded text.
     throw Error(error.kind(), error.what(), origin.line, error.column(), error.alarm());
@@ -132,13 +140,13 @@ std::string Reader::call_stack() const {
   std::string stack;
   for (std::size_t k = frames_.size(); k-- > 1;) {
     if (frames_.size() - k > most_callers) {
-      return stack + "; and " + std::to_string(k) + " more";
+      return fmt::format("{}; and {} more", stack, k);
     }
     const Frame& caller = frames_[k - 1];
     const std::string& file = program_.files[caller.unit->file];
-    stack += "; called by " +
-             (caller.unit->number >= 0 ? "O" + std::to_string(caller.unit->number) : std::string("the main program")) +
-             " line " + std::to_string(caller.place.line - 1) + (file.empty() ? "" : " of " + file);
+    stack += fmt::format("; called by {} line {}{}",
+                         caller.unit->number >= 0 ? fmt::format("O{}", caller.unit->number) : "the main program",
+                         caller.place.line - 1, file.empty() ? "" : " of " + file);
   }
   return stack;
 }
@@ -159,7 +167,7 @@ Program Reader::run() {
     if (!record(error)) {
       throw;
     }
-    return std::move(program_);
+    return result();
   }
   const auto& probes = options_.probe_lines;
   program_.probed.reserve(probes.size());
@@ -182,6 +190,13 @@ Program Reader::run() {
     probe(program_.expanded ? static_cast<std::uint32_t>(program_.origins.size()) : here_.line);
   }
   finish();
+  return result();
+}
+
+Program Reader::result() {
+  if (!program_.expanded) {
+    program_.text = std::move(sources_.front().text);
+  }
   return std::move(program_);
 }
 
@@ -198,7 +213,7 @@ bool Reader::step() {
     if (frames_.size() == 1) {
       return false;
     }
-    warn("program O" + std::to_string(frame.unit->number) + " ends without M99");
+    warn(fmt::format("program O{} ends without M99", frame.unit->number));
     leave();
     return true;
   }
@@ -206,37 +221,35 @@ bool Reader::step() {
   if (program_.expanded && ++steps_ > options_.max_steps) {
     steps_ = 0;
     interpreter_.end();
-    fail("more than " + std::to_string(options_.max_steps) +
-         " blocks executed (controller.max_program_steps): the program does not seem to end");
+    fail(fmt::format("more than {} blocks executed (controller.max_program_steps): the program does not seem to end",
+                     options_.max_steps));
   }
   line(text, begin, frame.place.at);
   return true;
 }
 
 void Reader::line(std::string_view text, std::size_t begin, std::size_t end) {
-  interpreter_.scan(text, here_.line);
-  const Block& block = interpreter_.block();
-  if (block.optional_skip && block_skip(options_, block.skip_switch).value_or(false)) {
+  line_.read(text, here_.line, options_.max_line_length);
+  if (line_.optional_skip && block_skip(options_, line_.skip_switch).value_or(false)) {
     interpreter_.close_region();  // the switch is on: the control does not run it
     return;                       // an expanded text leaves it out
   }
-  if (block.macro) {
-    macro_line(text, begin);
-  } else if (interpreter_.words().has('O') && !is_call(interpreter_.words())) {
-    program_line(begin, end);
+  if (line_.macro) {
+    macro_line(begin);
+  } else if (line_.sorted().has('O') && !is_call(line_.sorted())) {
+    program_line(end);
   } else {
-    plain_line(text, begin, end);
+    plain_line(begin, end);
   }
 }
 
 // The O line at a program's head: that of a called program becomes a comment.
-void Reader::program_line(std::size_t begin, std::size_t end) {
-  const Block& block = interpreter_.block();
-  interpreter_.require_plain_words(here_.line);
-  const auto number = static_cast<std::int64_t>(interpreter_.words()['O'].value);
+void Reader::program_line(std::size_t end) {
+  interpreter_.require_plain_words(line_.sorted(), here_.line);
+  const auto number = static_cast<std::int64_t>(line_.sorted()['O'].value);
   std::string comments;
-  for (std::size_t i = 0; i < block.comment_count; ++i) {
-    comments += block.comments[i];
+  for (std::size_t i = 0; i < line_.comment_count; ++i) {
+    comments += line_.comments[i];
   }
   if (frames_.size() > 1) {
     // A call does not stop the motion: its comment may stand inside of a region.
@@ -246,51 +259,47 @@ void Reader::program_line(std::size_t begin, std::size_t end) {
   interpreter_.close_region();
   ++program_.block_count;
   if (program_.expanded) {
-    const std::string line(frames_.back().unit->text->substr(begin, end - begin));
-    put_raw(std::string_view(line).substr(0, line.find_first_of("\r\n")), origin_);
+    put_raw(line_.text(), origin_);
   }
   if (program_.regions.empty()) {
     program_.header_offset = program_.expanded ? program_.text.size() : end;
   }
 }
 
-void Reader::plain_line(std::string_view text, std::size_t begin, std::size_t end) {
-  const BlockWords& words = interpreter_.words();
-  if (program_.expanded) {
-    run_block(text, text);
-  } else if (is_call(words) || rewriter_.wants(words)) {
-    // The text moves: read the words again from where they stay.
-    const std::string line(text);
+void Reader::plain_line(std::size_t begin, std::size_t end) {
+  const BlockWords& words = line_.sorted();
+  if (!program_.expanded && (is_call(words) || rewriter_.wants(words))) {
     expand_from(begin);
-    interpreter_.scan(line, here_.line);
-    run_block(line, line);
-  } else {
-    note_words(words);
-    rewriter_.pass(words);
-    interpreter_.execute(here_.line, origin_, begin, end);
   }
-}
-
-// Executes the block that was scanned from `text`; `raw` is the block as written.
-void Reader::run_block(std::string_view text, std::string_view raw) {
-  const BlockWords& words = interpreter_.words();
-  if (is_call(words)) {
-    note_number(words);
-    call_block(text, raw);
+  if (program_.expanded) {
+    run_block(line_, line_.text());
     return;
   }
   note_words(words);
-  put_block(text);
+  rewriter_.pass(words);
+  interpreter_.execute(line_, here_.line, origin_, begin, end);
+}
+
+// Executes a block; `raw` is its line as written.
+void Reader::run_block(const ParsedBlock& block, std::string_view raw) {
+  const BlockWords& words = block.sorted();
+  if (is_call(words)) {
+    note_number(words);
+    call_block(block, raw);
+    return;
+  }
+  note_words(words);
+  put_block(block);
   modal_calls();
 }
 
-// Executes the block that was scanned from `text` and calls nothing, under the coordinate modes that are on.
-void Reader::put_block(std::string_view text) {
-  if (rewriter_.wants(interpreter_.words())) {
-    rewriter_.block(interpreter_.block(), interpreter_.words(), text, origin_);
+// Executes a block that calls nothing, under the coordinate modes that are on.
+void Reader::put_block(const ParsedBlock& block) {
+  if (rewriter_.wants(block.sorted())) {
+    rewriter_.block(block, origin_);
   } else {
-    rewriter_.pass(interpreter_.words());
-    put(text, origin_);
+    rewriter_.pass(block.sorted());
+    put(block, origin_);
   }
 }
 
@@ -329,13 +338,13 @@ void Reader::finish() {
   std::string others;
   for (const std::int64_t number : program_.program_numbers) {
     if (number != program_.program_number && !called_.contains(number)) {
-      others += (others.empty() ? "" : ", ") + std::string("O") + std::to_string(number);
+      others += fmt::format("{}O{}", others.empty() ? "" : ", ", number);
     }
   }
   if (!others.empty()) {
     program_.warnings.push_back({1,
-                                 "O" + std::to_string(program_.program_number) + " is played; the file also holds " +
-                                     others + " (--program picks another)",
+                                 fmt::format("O{} is played; the file also holds {} (--program picks another)",
+                                             program_.program_number, others),
                                  0, 0, ""});
   }
   if (!interpreter_.ended() && !framed_) {

@@ -1,4 +1,6 @@
 // Subprograms M98/M99/M198, macro calls G65/G66/G67, codes that the builder bound to programs.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -15,13 +17,11 @@ bool has_m(const BlockWords& words, int code) noexcept {
   return std::find(words.m_codes.data(), end, code) != end;
 }
 
+bool is_m(const Word& word, int code) noexcept { return word.letter == 'M' && static_cast<int>(word.value) == code; }
+
 }  // namespace
 
-std::string program_name(std::int64_t number) {
-  std::string digits = std::to_string(number);
-  digits.insert(0, digits.size() < 4 ? 4 - digits.size() : 0, '0');
-  return "O" + digits;
-}
+std::string program_name(std::int64_t number) { return fmt::format("O{:04}", number); }
 
 bool Reader::is_call(const BlockWords& words) const noexcept {
   if ((words.groups & group_bit(Group::call)) != 0) {
@@ -45,10 +45,9 @@ bool Reader::is_call(const BlockWords& words) const noexcept {
   return false;
 }
 
-// `text` holds plain numbers, `raw` the block as written: arguments keep their full precision.
-void Reader::call_block(std::string_view text, std::string_view raw) {
-  const BlockWords& words = interpreter_.words();
-  const Block& block = interpreter_.block();
+// `block` holds plain numbers, `raw` is the line as written: arguments keep their full precision.
+void Reader::call_block(const ParsedBlock& block, std::string_view raw) {
+  const BlockWords& words = block.sorted();
   if (block.optional_skip && !block_skip(options_, block.skip_switch).has_value()) {
     fail(
         "'/' before a call: whether the block runs decides where the program goes; say it in the machine file "
@@ -57,7 +56,7 @@ void Reader::call_block(std::string_view text, std::string_view raw) {
   for (int k = 0; k < words.g_count; ++k) {
     const int g = words.g_tenths[static_cast<std::size_t>(k)];
     if (g == 650 || g == 660 || g == 661 || g == 670) {
-      macro_call(text, raw, g);
+      macro_call(block, raw, g);
       return;
     }
   }
@@ -65,28 +64,25 @@ void Reader::call_block(std::string_view text, std::string_view raw) {
     fail("M99 in one block with M98 or M198: a block either calls or returns", words['M'].column);
   }
   if (has_m(words, 99)) {
-    subprogram_return(text);
+    subprogram_return(block);
   } else if (has_m(words, 98) || has_m(words, 198)) {
-    subprogram_call(text);
+    subprogram_call(block);
   } else {
-    bound_call(text, raw);
+    bound_call(block, raw);
   }
 }
 
 // Executes what stands in the block beside the call.
-void Reader::put_without(std::string_view text, std::string_view letters, std::initializer_list<int> m_codes) {
-  const Block block = interpreter_.block();
+void Reader::put_without(const ParsedBlock& block, const std::function<bool(const Word&)>& left_out) {
   std::string rest;
   bool words = false;
   for (const Word& word : block) {
-    const bool called =
-        word.letter == 'M' && std::find(m_codes.begin(), m_codes.end(), static_cast<int>(word.value)) != m_codes.end();
-    if (called || letters.find(word.letter) != std::string_view::npos) {
+    if (left_out(word)) {
       continue;
     }
     words = words || word.letter != 'N';
     rest += (rest.empty() ? "" : " ");
-    rest += text.substr(word.column - 1, word.end - (word.column - 1));
+    rest += block.text_of(word);
   }
   for (std::size_t i = 0; i < block.comment_count; ++i) {
     rest += (rest.empty() ? "" : " ");
@@ -95,12 +91,12 @@ void Reader::put_without(std::string_view text, std::string_view letters, std::i
   if (!words && block.comment_count == 0) {
     return;
   }
-  interpreter_.scan(rest, here_.line);
-  put_block(rest);
+  rest_.read_and_keep(std::move(rest), here_.line, options_.max_line_length);
+  put_block(rest_);
 }
 
-void Reader::subprogram_call(std::string_view text) {
-  const BlockWords words = interpreter_.words();
+void Reader::subprogram_call(const ParsedBlock& block) {
+  const BlockWords& words = block.sorted();
   if (!words.has('P')) {
     alarm(76, "M98 without a program number P", words['M'].column);
   }
@@ -120,20 +116,22 @@ void Reader::subprogram_call(std::string_view text) {
     number = p % 10000;
   }
   if (number < 1 || repeats < 0 || repeats > 99'999'999) {
-    alarm(76, "M98 P" + std::to_string(p) + " names no program", words['P'].column);
+    alarm(76, fmt::format("M98 P{} names no program", p), words['P'].column);
   }
   const std::uint32_t column = words['P'].column;
-  put_without(text, "PL", {98, 198});
+  put_without(block, [](const Word& word) {
+    return word.letter == 'P' || word.letter == 'L' || is_m(word, 98) || is_m(word, 198);
+  });
   if (repeats > 0) {
-    enter(number, {}, false, static_cast<int>(repeats), column, text);
+    enter(number, {}, false, static_cast<int>(repeats), column, block.text());
   }
 }
 
-void Reader::subprogram_return(std::string_view text) {
-  const BlockWords words = interpreter_.words();
+void Reader::subprogram_return(const ParsedBlock& block) {
+  const BlockWords& words = block.sorted();
   const std::int64_t target = words.has('P') ? static_cast<std::int64_t>(words['P'].value) : -1;
   const std::uint32_t column = words.has('P') ? words['P'].column : words['M'].column;
-  put_without(text, target >= 0 ? "P" : "", {99});
+  put_without(block, [&](const Word& word) { return is_m(word, 99) || (target >= 0 && word.letter == 'P'); });
   if (frames_.size() == 1) {
     if (target >= 0) {
       jump(target, column);
@@ -152,38 +150,28 @@ void Reader::subprogram_return(std::string_view text) {
   }
 }
 
-void Reader::macro_call(std::string_view text, std::string_view raw, int g_tenths) {
+void Reader::macro_call(const ParsedBlock& block, std::string_view raw, int g_tenths) {
   if (g_tenths == 670) {
     if (!modal_calls_.empty()) {
       modal_calls_.pop_back();
     }
     control_.modal_call = modal_calls_.empty() ? 67 : 66;
     // Other codes may share the block with G67.
-    std::string rest(text);
-    const Block& block = interpreter_.block();
-    for (const Word& word : block) {
-      if (word.letter == 'G' && word.value == 67.0) {
-        for (std::size_t i = word.column - 1; i < word.end; ++i) {
-          rest[i] = ' ';
-        }
-      }
-    }
     if (block.word_count > 1) {
-      interpreter_.scan(rest, here_.line);
-      put_without(rest, "", {});
+      put_without(block, [](const Word& word) { return word.letter == 'G' && word.value == 67.0; });
     }
     return;
   }
   MacroArguments arguments = parse_arguments(raw, here_.line, variables_, argument_scale());
   if (arguments.program < 1) {
-    alarm(76, "G" + std::to_string(g_tenths / 10) + " without a program number P");
+    alarm(76, fmt::format("G{} without a program number P", g_tenths / 10));
   }
   if (arguments.repeats < 0 || arguments.repeats > 99'999'999) {
-    alarm(76, "repetitions L" + std::to_string(arguments.repeats) + " outside 0 ... 99999999");
+    alarm(76, fmt::format("repetitions L{} outside 0 ... 99999999", arguments.repeats));
   }
   if (g_tenths == 650) {
     if (arguments.repeats > 0) {
-      enter(arguments.program, arguments, true, arguments.repeats, 1, text);
+      enter(arguments.program, arguments, true, arguments.repeats, 1, block.text());
     }
     return;
   }
@@ -198,23 +186,23 @@ void Reader::macro_call(std::string_view text, std::string_view raw, int g_tenth
 }
 
 // A G, M or T code that the machine builder bound to a program; inside of such a program codes are ordinary.
-void Reader::bound_call(std::string_view text, std::string_view raw) {
-  const BlockWords words = interpreter_.words();
+void Reader::bound_call(const ParsedBlock& block, std::string_view raw) {
+  const BlockWords& words = block.sorted();
   const CodeBindings& bound = options_.bindings;
   const bool inside = std::any_of(frames_.begin(), frames_.end(), [](const Frame& frame) { return frame.by_code; });
   if (inside) {
-    put_block(text);
+    put_block(block);
     return;
   }
   const auto call = [&](std::int64_t number, const MacroArguments& arguments, bool macro, std::uint32_t column) {
-    if (enter(number, arguments, macro, arguments.repeats, column, text)) {
+    if (enter(number, arguments, macro, arguments.repeats, column, block.text())) {
       frames_.back().by_code = true;
     }
   };
   const auto call_macro = [&](std::int64_t number, std::uint32_t column) {
     call(number, parse_arguments(raw, here_.line, variables_, argument_scale()), true, column);
   };
-  for (const Word& word : interpreter_.block()) {
+  for (const Word& word : block) {
     if (word.letter == 'G') {
       const auto found = bound.g_macros.find(static_cast<int>(std::lround(word.value * 10.0)));
       if (found != bound.g_macros.end()) {
@@ -233,14 +221,14 @@ void Reader::bound_call(std::string_view text, std::string_view raw) {
     const int m = words.m_codes[static_cast<std::size_t>(k)];
     const auto found = bound.m_subprograms.find(m);
     if (found != bound.m_subprograms.end()) {
-      put_without(text, "", {m});
+      put_without(block, [m](const Word& word) { return is_m(word, m); });
       call(found->second, {}, false, 1);
       return;
     }
   }
   // is_call() left nothing else.
   variables_.write(149, words['T'].value, here_.line, words['T'].column);
-  put_without(text, "T", {});
+  put_without(block, [](const Word& word) { return word.letter == 'T'; });
   call(bound.tool_program, {}, false, 1);
 }
 
@@ -310,14 +298,13 @@ bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool ma
     macros += frame.macro ? 1U : 0U;
   }
   if (macro && macros >= macro_nesting) {
-    alarm(122,
-          "macro calls nested deeper than " + std::to_string(macro_nesting) + " at the call of " + program_name(number),
+    alarm(122, fmt::format("macro calls nested deeper than {} at the call of {}", macro_nesting, program_name(number)),
           column);
   }
   if (frames_.size() - macros > static_cast<std::size_t>(options_.subprogram_nesting) && !macro) {
     alarm(77,
-          "subprograms nested deeper than " + std::to_string(options_.subprogram_nesting) +
-              " (controller.nesting_limit_subprogram) at the call of " + program_name(number),
+          fmt::format("subprograms nested deeper than {} (controller.nesting_limit_subprogram) at the call of {}",
+                      options_.subprogram_nesting, program_name(number)),
           column);
   }
   called_.insert(number);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <memory>
 #include <set>
 #include <string>
@@ -78,15 +79,18 @@ class Reader {
   void expand_from(std::size_t begin);
   bool step();
   void line(std::string_view text, std::size_t begin, std::size_t end);
-  void plain_line(std::string_view text, std::size_t begin, std::size_t end);
-  void program_line(std::size_t begin, std::size_t end);
-  void run_block(std::string_view text, std::string_view raw);
-  void put_block(std::string_view text);
+  void plain_line(std::size_t begin, std::size_t end);
+  void program_line(std::size_t end);
+  void run_block(const ParsedBlock& block, std::string_view raw);
+  void put_block(const ParsedBlock& block);
   void note_number(const BlockWords& words);
   void note_words(const BlockWords& words);
   void put(std::string_view flat, const LineOrigin& origin);
+  void put(const ParsedBlock& block, const LineOrigin& origin);
+  void run_written(const ParsedBlock& block, const LineOrigin& origin, std::size_t begin);
   void put_raw(std::string_view flat, const LineOrigin& origin);
   void finish();
+  Program result();
   bool record(const Error& error);
   [[nodiscard]] Error located(const Error& error) const;
   [[nodiscard]] std::string call_stack() const;
@@ -96,20 +100,20 @@ class Reader {
 
   // Calls.
   [[nodiscard]] bool is_call(const BlockWords& words) const noexcept;
-  void call_block(std::string_view text, std::string_view raw);
-  void subprogram_call(std::string_view text);
-  void subprogram_return(std::string_view text);
-  void macro_call(std::string_view text, std::string_view raw, int g_tenths);
-  void bound_call(std::string_view text, std::string_view raw);
+  void call_block(const ParsedBlock& block, std::string_view raw);
+  void subprogram_call(const ParsedBlock& block);
+  void subprogram_return(const ParsedBlock& block);
+  void macro_call(const ParsedBlock& block, std::string_view raw, int g_tenths);
+  void bound_call(const ParsedBlock& block, std::string_view raw);
   void modal_calls();
   bool enter(std::int64_t number, const MacroArguments& arguments, bool macro, int repeats, std::uint32_t column,
              std::string_view text);  // false: the call was kept as it stands
   ProgramUnit* lookup(std::int64_t number);
   void leave();
-  void put_without(std::string_view text, std::string_view letters, std::initializer_list<int> m_codes);
+  void put_without(const ParsedBlock& block, const std::function<bool(const Word&)>& left_out);
 
   // Macro statements.
-  void macro_line(std::string_view text, std::size_t begin);
+  void macro_line(std::size_t begin);
   void assignment(std::string_view text, std::size_t at);
   void nc_block(std::string_view text);
   void keep_for_control(std::string_view statement, int target);
@@ -123,7 +127,7 @@ class Reader {
 
   const ReaderOptions& options_;
   Program program_;
-  std::deque<SourceText> sources_;  ///< of programs in other files, and the original of an expanded text
+  std::deque<SourceText> sources_;  ///< the text that was handed over, and those of programs in other files
   ProgramStore store_;
   std::set<std::int64_t> sought_;  ///< programs that no file holds
   std::set<std::int64_t> called_;
@@ -131,6 +135,11 @@ class Reader {
   MoveRewriter rewriter_;
   ControlVariables control_;
   MacroVariables variables_;
+  // Each is read in one place and keeps while the line is executed.
+  ParsedBlock line_;      ///< the line of the program
+  ParsedBlock computed_;  ///< the same with values in place of variables
+  ParsedBlock rest_;      ///< of a call: what stands beside it
+  ParsedBlock written_;   ///< a plain line that the rewriter made
   std::vector<Frame> frames_;
   std::vector<ModalCall> modal_calls_;
   LineOrigin origin_;

@@ -1,7 +1,8 @@
 // Macro statements: assignments, GOTO, IF, WHILE.
+#include <fmt/format.h>
+
 #include <algorithm>
 
-#include "base/message.hpp"
 #include "base/text.hpp"
 #include "program/macro/macro_expression.hpp"
 #include "program/read/reader_impl.hpp"
@@ -37,7 +38,7 @@ class Recorder : public VariableAccess {
 };
 
 std::string number_text(double value) {
-  std::string result = format_message("%.6f", value);
+  std::string result = fmt::format("{:.6f}", value);
   while (result.back() == '0') {
     result.pop_back();
   }
@@ -73,8 +74,8 @@ std::array<double, 26> Reader::argument_scale() const {
   return scale;
 }
 
-void Reader::macro_line(std::string_view view, std::size_t begin) {
-  const std::string text(view);
+void Reader::macro_line(std::size_t begin) {
+  const std::string_view text = line_.text();
   expand_from(begin);
   const MacroStatement statement = parse_statement(text, here_.line);
   if (statement.n_number >= 0) {
@@ -134,15 +135,15 @@ void Reader::macro_line(std::string_view view, std::size_t begin) {
 }
 
 void Reader::nc_block(std::string_view text) {
-  const std::string plain = substitute(text, here_.line, variables_, word_format());
-  interpreter_.scan(plain, here_.line);
-  if (interpreter_.block().macro) {
+  computed_.read_and_keep(substitute(text, here_.line, variables_, word_format()), here_.line,
+                          options_.max_line_length);
+  if (computed_.macro) {
     alarm(114, "macro expression is not understood");
   }
-  if (interpreter_.block().word_count == 0 && interpreter_.block().comment_count == 0) {
+  if (computed_.word_count == 0 && computed_.comment_count == 0) {
     return;  // every word was vacant
   }
-  run_block(plain, text);
+  run_block(computed_, text);
 }
 
 // The text with the values of local and common variables in place of their names; those that the control keeps stay.
@@ -224,7 +225,7 @@ void Reader::jump(std::int64_t n, std::uint32_t column) {
   Frame& frame = frames_.back();
   const auto place = frame.unit->find_n(n, frame.place.at);
   if (!place) {
-    alarm(78, "sequence number N" + std::to_string(n) + " is not in the program", column);
+    alarm(78, fmt::format("sequence number N{} is not in the program", n), column);
   }
   frame.place = *place;
   // A jump out of a loop ends it.
@@ -235,7 +236,7 @@ void Reader::loop_start(std::string_view text, const MacroStatement& statement, 
   Frame& frame = frames_.back();
   const auto behind = frame.unit->behind_end(statement.loop, frame.place);
   if (!behind) {
-    alarm(124, "DO" + std::to_string(statement.loop) + " has no END" + std::to_string(statement.loop));
+    alarm(124, fmt::format("DO{} has no END{}", statement.loop, statement.loop));
   }
   // A loop that is still open under this number was left by a jump to its own start, or crosses this one.
   std::erase_if(frame.loops, [&](const Loop& loop) {
@@ -259,7 +260,7 @@ void Reader::loop_end(const MacroStatement& statement) {
     frame.loops.pop_back();
   }
   if (frame.loops.empty()) {
-    alarm(124, "END" + std::to_string(statement.loop) + " without its DO" + std::to_string(statement.loop));
+    alarm(124, fmt::format("END{} without its DO{}", statement.loop, statement.loop));
   }
   frame.place = frame.loops.back().start;
   frame.loops.pop_back();

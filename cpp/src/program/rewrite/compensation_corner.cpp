@@ -1,11 +1,12 @@
 #include "program/rewrite/compensation_corner.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
 
-#include "base/message.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode::plane {
@@ -69,15 +70,15 @@ void add_outer_points(std::vector<Vector2>& points, const Vector2& corner, const
   points.push_back(ends.after.anchor - radius * ends.after.direction);
 }
 
-std::string turned_in_degrees(double turn) { return format_message("%.3f degrees", turn * 180.0 / pi); }
+std::string turned_in_degrees(double turn) { return fmt::format("{:.3f} degrees", turn * 180.0 / pi); }
 
 Corner inner_corner(const OffsetCurve& before, const OffsetCurve& after, const Ends& ends) {
   const auto crossing = inner_crossing(ends.before, ends.after);
   if (!crossing) {
     throw alarm_error(33,
-                      format_message("cutter radius %.4f mm: the centre paths of this block and the one on line %u do "
-                                     "not meet inside their corner of ",
-                                     std::abs(ends.left_mm), static_cast<unsigned>(after.line)) +
+                      fmt::format("cutter radius {:.4f} mm: the centre paths of this block and the one on line {} do "
+                                  "not meet inside their corner of ",
+                                  std::abs(ends.left_mm), static_cast<unsigned>(after.line)) +
                           turned_in_degrees(ends.turn),
                       before.line, 0);
   }
@@ -121,13 +122,14 @@ void require_offset_arc(const OffsetCurve& block, bool at_end) {
   }
   const double cutter = std::abs(block.left_mm);
   if (left > -touch_mm) {
-    throw alarm_error(38,
-                      format_message("arc radius %.4f mm equals the cutter radius %.4f mm: the tool centre would stand "
-                                     "still in the arc's centre",
-                                     radius, cutter),
-                      block.line, 0);
+    throw alarm_error(
+        38,
+        fmt::format("arc radius {:.4f} mm equals the cutter radius {:.4f} mm: the tool centre would stand "
+                    "still in the arc's centre",
+                    radius, cutter),
+        block.line, 0);
   }
-  throw alarm_error(41, format_message("arc radius %.4f mm is smaller than the cutter radius %.4f mm", radius, cutter),
+  throw alarm_error(41, fmt::format("arc radius {:.4f} mm is smaller than the cutter radius {:.4f} mm", radius, cutter),
                     block.line, 0);
 }
 

@@ -1,10 +1,11 @@
 #include "program/rewrite/corner_words.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <numbers>
 #include <string>
 
-#include "base/message.hpp"
 #include "program/rewrite/plane_geometry.hpp"
 #include "shapegcode/error.hpp"
 
@@ -28,7 +29,7 @@ struct CornerWord {
 
   [[nodiscard]] const char* name() const { return chamfer ? "chamfer ,C" : "corner rounding ,R"; }
   [[nodiscard]] Error refusal(int alarm, const std::string& why) const {
-    return alarm_error(alarm, format_message("%s%.4f: ", name(), size_mm) + why, line, column);
+    return alarm_error(alarm, fmt::format("{}{:.4f}: ", name(), size_mm) + why, line, column);
   }
 };
 
@@ -44,9 +45,10 @@ double in_mm(const Curve& curve, double taken) { return curve.arc ? taken * curv
 
 void require_room(const Curve& curve, double taken, const char* which, const CornerWord& word) {
   if (in_mm(curve, available(curve) - taken) < -used_up_by_corner_mm) {
-    throw word.refusal(55, format_message("the block %s the corner is %.4f mm long in the plane, the corner takes %.4f "
-                                          "mm of it",
-                                          which, in_mm(curve, available(curve)), in_mm(curve, taken)));
+    throw word.refusal(55,
+                       fmt::format("the block {} the corner is {:.4f} mm long in the plane, the corner takes {:.4f} "
+                                   "mm of it",
+                                   which, in_mm(curve, available(curve)), in_mm(curve, taken)));
   }
 }
 
@@ -62,9 +64,9 @@ Cut chamfer_cut(const Curve& curve, bool at_end, const CornerWord& word) {
   const double radius = at_end ? curve.end_radius_mm : curve.start_radius_mm;
   if (word.size_mm > 2.0 * radius) {
     throw word.refusal(55,
-                       format_message("the block %s the corner is an arc of radius %.4f mm, no point of it is so far "
-                                      "from the corner",
-                                      which, radius));
+                       fmt::format("the block {} the corner is an arc of radius {:.4f} mm, no point of it is so far "
+                                   "from the corner",
+                                   which, radius));
   }
   const double taken = 2.0 * std::asin(word.size_mm / (2.0 * radius));
   require_room(curve, taken, which, word);
@@ -85,8 +87,8 @@ Vector2 foot(const Curve& curve, bool at_end, const Vector2& centre) {
 void require_fillet_arc(const Curve& curve, bool at_end, double left_mm, const CornerWord& word) {
   const double radius = at_end ? curve.end_radius_mm : curve.start_radius_mm;
   if (curve.arc && radius - curve.sense() * left_mm <= plane::touch_mm) {
-    throw word.refusal(55, format_message("no arc of this radius fits inside the arc %s the corner, radius %.4f mm",
-                                          at_end ? "before" : "after", radius));
+    throw word.refusal(55, fmt::format("no arc of this radius fits inside the arc {} the corner, radius {:.4f} mm",
+                                       at_end ? "before" : "after", radius));
   }
 }
 
@@ -113,7 +115,7 @@ Inserted rounding_of(const Curve& a, const Curve& b, double turn, const CornerWo
   require_fillet_arc(b, false, left, word);
   const auto no_arc = [&] {
     return word.refusal(
-        55, format_message("no arc of this radius touches both blocks, which turn by %.3f degrees", turn * 180.0 / pi));
+        55, fmt::format("no arc of this radius touches both blocks, which turn by {:.3f} degrees", turn * 180.0 / pi));
   };
   const auto crossing = plane::inner_crossing(plane::offset_at_end(a, left), plane::offset_at_start(b, left));
   if (!crossing) {
@@ -159,7 +161,7 @@ void check(const Segment& segment, const char* which, int normal, int alarm_with
     throw Error(ErrorKind::argument, "a corner word needs finite values", word.line, word.column);
   }
   if (segment.kind == SegmentKind::rapid) {
-    throw word.refusal(52, format_message("the block %s the corner is a rapid, G01, G02 or G03 is expected", which));
+    throw word.refusal(52, fmt::format("the block {} the corner is a rapid, G01, G02 or G03 is expected", which));
   }
   const bool arc = segment.kind == SegmentKind::arc;
   const Curve curve = arc && segment.normal != normal ? Curve{} : plane::curve_of(segment, normal);
@@ -167,7 +169,7 @@ void check(const Segment& segment, const char* which, int normal, int alarm_with
       !arc || (curve.start_radius_mm > plane::coincident_mm && curve.end_radius_mm > plane::coincident_mm);
   if (!curve.moves() || !radius) {
     throw word.refusal(alarm_without_motion,
-                       format_message("the block %s the corner moves %.4f mm in the plane", which, curve.length_mm));
+                       fmt::format("the block {} the corner moves {:.4f} mm in the plane", which, curve.length_mm));
   }
 }
 
@@ -186,7 +188,7 @@ CornerResult insert_corner(const Segment& before, const Segment& after, bool cha
   check(after, "after", plane_normal, 51, word);
   const double gap = (after.start_mm - before.end_mm).norm();
   if (gap > join_mm) {
-    throw Error(ErrorKind::argument, format_message("block starts %.6f mm off the end of the one before", gap),
+    throw Error(ErrorKind::argument, fmt::format("block starts {:.6f} mm off the end of the one before", gap),
                 after.line);
   }
   const Curve a = plane::curve_of(before, plane_normal);

@@ -1,11 +1,12 @@
 #include "program/rewrite/cutter_compensation.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <numbers>
 #include <optional>
 #include <string>
 
-#include "base/message.hpp"
 #include "program/rewrite/compensation_corner.hpp"
 #include "shapegcode/error.hpp"
 
@@ -34,28 +35,28 @@ bool finite(const CompensationBlock& block) {
 
 void check(std::span<const CompensationBlock> blocks, int plane_normal, const CompensationOptions& options) {
   if (plane_normal < 0 || plane_normal > 2) {
-    refuse(format_message("plane normal %d: 0, 1 or 2 is expected", plane_normal));
+    refuse(fmt::format("plane normal {}: 0, 1 or 2 is expected", plane_normal));
   }
   if (options.start_up != 'A' && options.start_up != 'B') {
     refuse("start-up type: A or B is expected");
   }
   if (!(options.ignorable_corner_mm >= 0.0) || !std::isfinite(options.ignorable_corner_mm)) {
-    refuse(format_message("ignorable corner %g mm: zero or more is expected", options.ignorable_corner_mm));
+    refuse(fmt::format("ignorable corner {} mm: zero or more is expected", options.ignorable_corner_mm));
   }
   if (options.blocks_read < 3 || options.blocks_read > 8) {
-    refuse(format_message("blocks read in compensation: %d, 3 to 8 is expected", options.blocks_read));
+    refuse(fmt::format("blocks read in compensation: {}, 3 to 8 is expected", options.blocks_read));
   }
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const CompensationBlock& block = blocks[i];
     if (block.mode < 40 || block.mode > 42) {
-      refuse(format_message("compensation mode %d: 40, 41 or 42 is expected", block.mode), block.segment.line);
+      refuse(fmt::format("compensation mode {}: 40, 41 or 42 is expected", block.mode), block.segment.line);
     }
     if (!finite(block)) {
       refuse("cutter compensation needs finite values", block.segment.line);
     }
     const double gap = i == 0 ? 0.0 : (block.segment.start_mm - blocks[i - 1].segment.end_mm).norm();
     if (gap > join_mm) {
-      refuse(format_message("block starts %.6f mm off the end of the one before, limit %.6f mm", gap, join_mm),
+      refuse(fmt::format("block starts {:.6f} mm off the end of the one before, limit {:.6f} mm", gap, join_mm),
              block.segment.line);
     }
   }
@@ -99,18 +100,19 @@ class Compensator {
     if (segment.kind == SegmentKind::arc && segment.normal != normal_) {
       constexpr char names[] = "XYZ";
       throw alarm_error(37,
-                        format_message("arc about %c in cutter compensation of the plane across %c",
-                                       names[segment.normal % 3], names[normal_]),
+                        fmt::format("arc about {} in cutter compensation of the plane across {}",
+                                    names[segment.normal % 3], names[normal_]),
                         segment.line, 0);
     }
     Curve result = plane::curve_of(segment, normal_);
     if (result.arc && (!(result.start_radius_mm > plane::coincident_mm) ||
                        !(result.end_radius_mm > plane::coincident_mm) || !result.moves())) {
-      throw alarm_error(38,
-                        format_message("arc of start radius %.7f mm, end radius %.7f mm and sweep %.3g rad has no room "
-                                       "for a cutter",
-                                       result.start_radius_mm, result.end_radius_mm, result.sweep_rad),
-                        segment.line, 0);
+      throw alarm_error(
+          38,
+          fmt::format("arc of start radius {:.7f} mm, end radius {:.7f} mm and sweep {:.3g} rad has no room "
+                      "for a cutter",
+                      result.start_radius_mm, result.end_radius_mm, result.sweep_rad),
+          segment.line, 0);
     }
     return result;
   }
@@ -174,9 +176,9 @@ class Compensator {
     if (segment.kind == SegmentKind::arc && (start_up || cancel)) {
       throw alarm_error(
           34,
-          format_message("cutter compensation can be %s only in a straight block: this arc has radius "
-                         "%.4f mm, the cutter %.4f mm",
-                         cancel ? "cancelled" : "started", segment.start_radius_mm, std::abs(blocks_[i].radius_mm)),
+          fmt::format("cutter compensation can be {} only in a straight block: this arc has radius "
+                      "{:.4f} mm, the cutter {:.4f} mm",
+                      cancel ? "cancelled" : "started", segment.start_radius_mm, std::abs(blocks_[i].radius_mm)),
           segment.line, 0);
     }
     Corner corner;
@@ -235,9 +237,9 @@ class Compensator {
     const double along = programmed.start_direction.dot(end - plane::in_plane(at_, normal_));
     if (along < -used_up_mm) {
       throw alarm_error(41,
-                        format_message("block of %.4f mm is too short for its corners with cutter radius %.4f mm: the "
-                                       "tool centre would run %.4f mm against the programmed direction",
-                                       programmed.length_mm, std::abs(blocks_[i].radius_mm), -along),
+                        fmt::format("block of {:.4f} mm is too short for its corners with cutter radius {:.4f} mm: the "
+                                    "tool centre would run {:.4f} mm against the programmed direction",
+                                    programmed.length_mm, std::abs(blocks_[i].radius_mm), -along),
                         blocks_[i].segment.line, 0);
     }
   }
@@ -259,12 +261,13 @@ class Compensator {
     const Vector3 end = plane::in_space(to, segment.end_mm, normal_);
     const double radius = (from - programmed.centre).norm();
     if (sweep * radius < -used_up_mm) {
-      throw alarm_error(41,
-                        format_message("arc of radius %.4f mm and sweep %.3f degrees is too short for its corners with "
-                                       "cutter radius %.4f mm: they take %.3f degrees",
-                                       programmed.start_radius_mm, std::abs(programmed.sweep_rad) * 180.0 / pi,
-                                       std::abs(blocks_[i].radius_mm), (before + after) * 180.0 / pi),
-                        segment.line, 0);
+      throw alarm_error(
+          41,
+          fmt::format("arc of radius {:.4f} mm and sweep {:.3f} degrees is too short for its corners with "
+                      "cutter radius {:.4f} mm: they take {:.3f} degrees",
+                      programmed.start_radius_mm, std::abs(programmed.sweep_rad) * 180.0 / pi,
+                      std::abs(blocks_[i].radius_mm), (before + after) * 180.0 / pi),
+          segment.line, 0);
     }
     if (sweep * radius <= used_up_mm) {
       line_to(i, end);

@@ -1,6 +1,8 @@
 // Reading blocks under coordinate modes; rewriter_codes.cpp switches them, rewriter_output.cpp writes the blocks.
 #include "program/rewrite/move_rewriter.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -21,10 +23,6 @@ constexpr std::uint32_t coordinate_groups =
 constexpr std::array mode_data_codes = {510, 511, 501, 680};
 // G28, G30, G53, G92, G52 and G10: their axis words are no programmed point.
 constexpr std::array machine_coordinate_codes = {280, 300, 530, 920, 520, 100};
-
-std::string code_name(int g_tenths) {
-  return "G" + std::to_string(g_tenths / 10) + (g_tenths % 10 != 0 ? "." + std::to_string(g_tenths % 10) : "");
-}
 
 bool has_code(const BlockWords& words, int g_tenths) noexcept {
   for (int k = 0; k < words.g_count; ++k) {
@@ -74,12 +72,12 @@ void MoveRewriter::synchronise() {
   programmed_point_ = modes_.active() ? modes_.undo(programmed_.position_mm) : programmed_.position_mm;
 }
 
-void MoveRewriter::block(const Block& block, const BlockWords& words, std::string_view text, const LineOrigin& origin) {
+void MoveRewriter::block(const ParsedBlock& block, const LineOrigin& origin) {
+  const BlockWords& words = block.sorted();
   block_ = &block;
   words_ = &words;
-  text_ = text;
   origin_ = origin;
-  interpreter_.require_plain_words(origin.line);
+  interpreter_.require_plain_words(words, origin.line);
   if (idle()) {
     synchronise();
   }
@@ -99,8 +97,6 @@ void MoveRewriter::block(const Block& block, const BlockWords& words, std::strin
   }
   if (ends_span && !idle()) {
     flush();
-    // The interpreter read what was written: its words are those of another block now.
-    interpreter_.scan(text, origin.line);
     synchronise();
   }
   refuse_machine_coordinates();
@@ -131,7 +127,6 @@ void MoveRewriter::block(const Block& block, const BlockWords& words, std::strin
       item.head.clear();
       item.tail.clear();
       enqueue(std::move(hole));
-      interpreter_.scan(text, origin.line);  // it read what was written
       synchronise();
     }
     return;
@@ -167,7 +162,7 @@ void MoveRewriter::refuse_machine_coordinates() const {
       named = named || (words_->has(static_cast<char>('X' + axis)) && modes_.acts_on(axis));
     }
     if ((reference && named) || g == 920 || g == 520 || words_->g_group[i] == Group::coordinates) {
-      fail(code_name(g) + " while G51, G51.1, G68 or G16 is on: the control wants these cancelled first",
+      fail(g_code_name(g) + " while G51, G51.1, G68 or G16 is on: the control wants these cancelled first",
            words_->g_column[i]);
     }
   }
@@ -206,7 +201,7 @@ void MoveRewriter::keep_words(Item& item) const {
   int g = 0;
   bool moves = false;
   for (const Word& word : *block_) {
-    const std::string_view text = text_.substr(word.column - 1, word.end - (word.column - 1));
+    const std::string_view text = block_->text_of(word);
     if (word.letter == 'N') {
       add(item.head, text);
     } else if (word.letter == 'G') {
@@ -228,7 +223,7 @@ void MoveRewriter::keep_words(Item& item) const {
   }
   // A motion code without a move stays for its own sake.
   if (!moves && (words.groups & group_bit(Group::motion)) != 0) {
-    add(item.head, "G0" + std::to_string(programmed_.motion));
+    add(item.head, fmt::format("G0{}", programmed_.motion));
   }
   for (std::size_t i = 0; i < block_->comment_count; ++i) {
     add(item.tail, block_->comments[i]);
@@ -360,8 +355,7 @@ void MoveRewriter::read_cycle(Item& item, bool data_only) {
   const int normal = plane_normal(programmed_.plane);
   const bool incremental = programmed_.distance == 91;
   if (compensation_ != 40 || span_open_) {
-    fail("drilling cycle G" + std::to_string(programmed_.cycle) +
-         " under cutter compensation: cancel it with G40 first");
+    fail(fmt::format("drilling cycle G{} under cutter compensation: cancel it with G40 first", programmed_.cycle));
   }
   if (modes_.mixes(normal)) {
     fail("drilling along an axis that the rotation G68 turns is not supported");

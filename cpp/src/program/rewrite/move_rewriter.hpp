@@ -22,8 +22,8 @@ class MoveRewriter {
 
   /// Whether a block has to go through here: a mode is on, or the block switches one on.
   [[nodiscard]] bool wants(const BlockWords& words) const noexcept;
-  /// Writes the block, now or as soon as the blocks behind it allow. Words and text are the interpreter's.
-  void block(const Block& block, const BlockWords& words, std::string_view text, const LineOrigin& origin);
+  /// Writes the block, now or as soon as the blocks behind it allow.
+  void block(const ParsedBlock& block, const LineOrigin& origin);
   /// Takes note of a block that did not have to go through here: it may name the offset of a G41 to come.
   void pass(const BlockWords& words) noexcept {
     d_number_ = words.has('D') ? static_cast<int>(words['D'].value) : d_number_;
@@ -111,9 +111,8 @@ class MoveRewriter {
   LineOrigin corner_origin_;
 
   // Of the block at hand.
-  const Block* block_ = nullptr;
+  const ParsedBlock* block_ = nullptr;
   const BlockWords* words_ = nullptr;
-  std::string_view text_;
   LineOrigin origin_;
 };
 

@@ -1,7 +1,8 @@
 // Codes that switch coordinate modes and cutter compensation.
+#include <fmt/format.h>
+
 #include <cmath>
 
-#include "base/message.hpp"
 #include "program/rewrite/move_rewriter.hpp"
 #include "shapegcode/error.hpp"
 
@@ -19,12 +20,12 @@ void MoveRewriter::read_codes(const BlockWords& words) {
         break;
       case Group::plane:
         if (compensation_ != 40 && options_.expand_compensation && whole != programmed_.plane) {
-          throw alarm_error(37, "the plane changes to G" + std::to_string(whole) + " under cutter compensation",
-                            origin_.line, words.g_column[i]);
+          throw alarm_error(37, fmt::format("the plane changes to G{} under cutter compensation", whole), origin_.line,
+                            words.g_column[i]);
         }
         if ((modes_.rotation || polar_) && whole != programmed_.plane) {
-          throw alarm_error(144, "the plane changes to G" + std::to_string(whole) + " under rotation G68 or G16",
-                            origin_.line, words.g_column[i]);
+          throw alarm_error(144, fmt::format("the plane changes to G{} under rotation G68 or G16", whole), origin_.line,
+                            words.g_column[i]);
         }
         programmed_.plane = whole;
         break;
@@ -85,7 +86,7 @@ void MoveRewriter::set_compensation(int code) {
   const int number = words.has('D') ? static_cast<int>(words['D'].value) : d_number_;
   const std::uint32_t column = words.has('D') ? words['D'].column : 1;
   if (number < 0) {
-    fail("cutter compensation G" + std::to_string(code) + " without an offset number D", column);
+    fail(fmt::format("cutter compensation G{} without an offset number D", code), column);
   }
   d_number_ = number;
   const auto radius = interpreter_.offsets().radius(number);
@@ -94,9 +95,9 @@ void MoveRewriter::set_compensation(int code) {
     // The moves stay as they are, and their path is not known.
     if (programmed_.compensation == 40) {
       program_.warnings.push_back({origin_.line,
-                                   "the radius of offset D" + std::to_string(number) +
-                                       " is not known (input.tool_radius_mm, or G10 L12 in the program): G" +
-                                       std::to_string(code) + " is kept as it stands",
+                                   fmt::format("the radius of offset D{} is not known (input.tool_radius_mm, or G10 "
+                                               "L12 in the program): G{} is kept as it stands",
+                                               number, code),
                                    0, 0, program_.files[origin_.file]});
     }
     keeps_compensation_ = true;
@@ -157,8 +158,7 @@ void MoveRewriter::set_scaling(int g_tenths) {
     const Word& word = words[letter];
     const double value = word.has_point ? word.value : word.value * options_.scale_unit;
     if (!(std::abs(value) > 0.0) || std::abs(value) > 1000.0) {
-      throw alarm_error(142,
-                        format_message("scaling factor %c = %g, which must not be 0 nor above 1000", letter, value),
+      throw alarm_error(142, fmt::format("scaling factor {} = {}, which must not be 0 nor above 1000", letter, value),
                         origin_.line, word.column);
     }
     return value;

@@ -1,4 +1,6 @@
 // Plain blocks from what was read: corners, compensation, words rounded to the increment.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -163,7 +165,7 @@ void MoveRewriter::refuse_corner(std::uint32_t line) {
   corner_waits_ = false;
   throw alarm_error(51,
                     "a block with ,R or ,C must be followed by a move in the plane" +
-                        (line > 0 ? ", and line " + std::to_string(line) + " has none" : std::string()),
+                        (line > 0 ? fmt::format(", and line {} has none", line) : std::string()),
                     corner_origin_.line, corner_column_);
 }
 

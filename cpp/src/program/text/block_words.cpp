@@ -1,9 +1,10 @@
 #include "program/text/block_words.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <string>
 
-#include "base/message.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode::detail {
@@ -123,9 +124,34 @@ Group group_of(int g_tenths) noexcept {
   }
 }
 
+std::string g_code_name(int g_tenths) {
+  const int tenths = g_tenths % 10;
+  return tenths != 0 ? fmt::format("G{}.{}", g_tenths / 10, tenths) : fmt::format("G{}", g_tenths / 10);
+}
+
 namespace {
 
 constexpr std::uint32_t whole_number_letters = letter_mask("MSTNOHDL");
+
+void add_g_code(const Word& word, std::uint32_t line, BlockWords& words) {
+  const double tenths = word.value * 10.0;
+  const int code = static_cast<int>(std::lround(tenths));
+  if (word.value < 0.0) {
+    throw alarm_error(6, fmt::format("minus sign in G code G{}", word.value), line, word.column);
+  }
+  if (std::abs(tenths - code) > 1e-6) {
+    throw alarm_error(10, fmt::format("unknown G code G{}", word.value), line, word.column);
+  }
+  if (words.g_count == static_cast<int>(words.g_tenths.size())) {
+    throw Error(ErrorKind::program, fmt::format("more than {} G codes in a block", words.g_tenths.size()), line,
+                word.column);
+  }
+  const auto at = static_cast<std::size_t>(words.g_count++);
+  words.g_tenths[at] = code;
+  words.g_column[at] = word.column;
+  words.g_group[at] = group_of(code);
+  words.groups |= group_bit(words.g_group[at]);
+}
 
 }  // namespace
 
@@ -144,27 +170,9 @@ void sort_words(const Block& block, std::uint32_t line, BlockWords& words) {
       words.negative = word.value < 0.0 && words.negative == nullptr ? &word : words.negative;
     }
     switch (word.letter) {
-      case 'G': {
-        const double tenths = word.value * 10.0;
-        const int code = static_cast<int>(std::lround(tenths));
-        if (word.value < 0.0) {
-          throw alarm_error(6, format_message("minus sign in G code G%g", word.value), line, word.column);
-        }
-        if (std::abs(tenths - code) > 1e-6) {
-          throw alarm_error(10, format_message("unknown G code G%.8g", word.value), line, word.column);
-        }
-        if (words.g_count == static_cast<int>(words.g_tenths.size())) {
-          throw Error(ErrorKind::program, format_message("more than %zu G codes in a block", words.g_tenths.size()),
-                      line, word.column);
-        }
-        words.g_tenths[static_cast<std::size_t>(words.g_count)] = code;
-        words.g_column[static_cast<std::size_t>(words.g_count)] = word.column;
-        const Group group = group_of(code);
-        words.g_group[static_cast<std::size_t>(words.g_count)] = group;
-        words.groups |= group_bit(group);
-        ++words.g_count;
+      case 'G':
+        add_g_code(word, line, words);
         break;
-      }
       case 'M':
         if (words.m_count == static_cast<int>(words.m_codes.size())) {
           throw Error(ErrorKind::program, "more than 6 M codes in a block", line, word.column);

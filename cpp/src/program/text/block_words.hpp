@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 
 #include "program/text/lexer.hpp"
 
@@ -38,6 +39,9 @@ constexpr std::uint32_t group_bit(Group group) noexcept { return 1U << static_ca
 
 /// Group of a G code given in tenths (G54.1 = 541).
 [[nodiscard]] Group group_of(int g_tenths) noexcept;
+
+/// "G54.1" for 541.
+[[nodiscard]] std::string g_code_name(int g_tenths);
 
 struct BlockWords {
   std::uint32_t present = 0;  ///< bit (letter - 'A')

@@ -74,6 +74,72 @@ bool scan_operand(std::string_view text, std::uint32_t line, std::size_t& i, std
   return true;
 }
 
+// Reads the word whose letter stands before i under the name `name`. False at a macro expression or keyword.
+bool scan_word(std::string_view text, std::uint32_t line, std::size_t& i, char name, Block& block) {
+  if (block.word_count == Block::max_words) {
+    fail(fmt::format("more than {} words in a block", Block::max_words), line, i - 1);
+  }
+  Word& word = block.words[block.word_count];
+  word = Word{};
+  word.letter = name;
+  word.column = static_cast<std::uint32_t>(i);
+  if (!scan_operand(text, line, i, i - 1, word)) {
+    return false;
+  }
+  ++block.word_count;
+  return true;
+}
+
+void scan_comment(std::string_view text, std::uint32_t line, std::size_t& i, Block& block) {
+  const std::size_t close = text.find(')', i);
+  if (close == std::string_view::npos) {
+    fail("comment does not close: '(' without ')'", line, i);
+  }
+  if (block.comment_count == Block::max_comments) {
+    fail(fmt::format("more than {} comments in a block", Block::max_comments), line, i);
+  }
+  block.comments[block.comment_count++] = text.substr(i, close + 1 - i);
+  i = close + 1;
+}
+
+void scan_block_skip(std::string_view text, std::uint32_t line, std::size_t& i, Block& block) {
+  if (block.word_count > 1 || (block.word_count == 1 && block.words[0].letter != 'N')) {
+    fail("'/' inside a block: only a block skip at its start is supported", line, i);
+  }
+  block.optional_skip = true;
+  block.skip_switch = scan_skip_switch(text, i);
+}
+
+// ",R" ",C": read as words of their own so that they can be named. False at a macro expression.
+bool scan_corner_word(std::string_view text, std::uint32_t line, std::size_t& i, Block& block) {
+  const char kind = i + 1 < text.size() ? upper(text[i + 1]) : ' ';
+  if ((kind != 'R' && kind != 'C') || block.word_count == Block::max_words) {
+    alarm(9, "',' without R or C", line, i);
+  }
+  const auto column = static_cast<std::uint32_t>(i + 1);
+  i += 2;
+  Word& word = block.words[block.word_count];
+  if (!scan_word(text, line, i, kind == 'R' ? '<' : '>', block)) {
+    return false;
+  }
+  word.column = column;
+  return true;
+}
+
+[[noreturn]] void refuse_character(std::string_view text, std::uint32_t line, std::size_t i, const Block& block) {
+  const char c = text[i];
+  if ((c == '.' || c == '-') && block.word_count > 0 && block.words[block.word_count - 1].end == i) {
+    const char letter = block.words[block.word_count - 1].letter;
+    const std::string name = letter == '<' ? ",R" : letter == '>' ? ",C" : std::string(1, letter);
+    alarm(c == '.' ? 7 : 6,
+          (c == '.' ? "second decimal point in address " : "minus sign behind the number of address ") + name, line, i);
+  }
+  if (is_digit(c) || c == '.' || c == '-' || c == '+') {
+    alarm(4, quoted(c) + " stands where an address is expected", line, i);
+  }
+  alarm(9, quoted(c) + " is no program character", line, i);
+}
+
 }  // namespace
 
 void scan_block(std::string_view text, std::uint32_t line, std::size_t max_length, Block& block) {
@@ -86,72 +152,23 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
     fail(fmt::format("line of {} characters (limit {})", n, max_length), line, max_length);
   }
   std::size_t i = 0;
-  while (i < n) {
+  while (i < n && !block.macro) {
     const char c = text[i];
     if (is_letter(c)) {
-      if (block.word_count == Block::max_words) {
-        fail(fmt::format("more than {} words in a block", Block::max_words), line, i);
-      }
-      const std::size_t letter_at = i;
-      Word& word = block.words[block.word_count];
-      word = Word{};
-      word.letter = upper(c);
-      word.column = static_cast<std::uint32_t>(i + 1);
       ++i;
-      if (!scan_operand(text, line, i, letter_at, word)) {
-        block.macro = true;
-        return;
-      }
-      ++block.word_count;
-    } else if (c == ' ' || c == '\t' || c == '\r' || c == ';') {
+      block.macro = !scan_word(text, line, i, upper(c), block);
+    } else if (is_blank(c)) {
       ++i;
     } else if (c == '(') {
-      const std::size_t close = text.find(')', i);
-      if (close == std::string_view::npos) {
-        fail("comment does not close: '(' without ')'", line, i);
-      }
-      if (block.comment_count == Block::max_comments) {
-        fail(fmt::format("more than {} comments in a block", Block::max_comments), line, i);
-      }
-      block.comments[block.comment_count++] = text.substr(i, close + 1 - i);
-      i = close + 1;
+      scan_comment(text, line, i, block);
     } else if (c == '/') {
-      if (block.word_count > 1 || (block.word_count == 1 && block.words[0].letter != 'N')) {
-        fail("'/' inside a block: only a block skip at its start is supported", line, i);
-      }
-      block.optional_skip = true;
-      block.skip_switch = scan_skip_switch(text, i);
+      scan_block_skip(text, line, i, block);
     } else if (c == '#' || c == '[' || c == ']' || c == '=') {
       block.macro = true;
-      return;
     } else if (c == ',') {
-      // ",R" ",C" corner words: read as a word of their own so that they can be named.
-      const char kind = i + 1 < n ? upper(text[i + 1]) : ' ';
-      if ((kind == 'R' || kind == 'C') && block.word_count < Block::max_words) {
-        const std::size_t letter_at = i + 1;
-        Word& word = block.words[block.word_count];
-        word = Word{};
-        word.letter = kind == 'R' ? '<' : '>';
-        word.column = static_cast<std::uint32_t>(i + 1);
-        i += 2;
-        if (!scan_operand(text, line, i, letter_at, word)) {
-          block.macro = true;
-          return;
-        }
-        ++block.word_count;
-      } else {
-        alarm(9, "',' without R or C", line, i);
-      }
-    } else if ((c == '.' || c == '-') && block.word_count > 0 && block.words[block.word_count - 1].end == i) {
-      const char letter = block.words[block.word_count - 1].letter;
-      const std::string name = letter == '<' ? ",R" : letter == '>' ? ",C" : std::string(1, letter);
-      alarm(c == '.' ? 7 : 6,
-            (c == '.' ? "second decimal point in address " : "minus sign behind the number of address ") + name, line,
-            i);
-    } else if (is_digit(c) || c == '.' || c == '-' || c == '+') {
-      alarm(4, quoted(c) + " stands where an address is expected", line, i);
+      block.macro = !scan_corner_word(text, line, i, block);
     } else {
-      alarm(9, quoted(c) + " is no program character", line, i);
+      refuse_character(text, line, i, block);
     }
   }
 }

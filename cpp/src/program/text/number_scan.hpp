@@ -26,27 +26,32 @@ inline ScannedNumber scan_number(std::string_view text, std::size_t& i) noexcept
   constexpr std::array<double, 19> powers_of_ten = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8, 1e9,
                                                     1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18};
   constexpr unsigned most_significant = 17;
-  ScannedNumber number;
   std::uint64_t mantissa = 0;
-  for (; i < text.size(); ++i) {
-    const char c = text[i];
-    if (is_digit(c)) {
-      ++number.digits;
-      if (mantissa != 0 || c != '0') {
-        ++number.significant;
+  unsigned significant = 0;
+  std::size_t k = i;
+  const auto read_digits = [&] {
+    unsigned kept = 0;
+    for (; k < text.size() && is_digit(text[k]); ++k) {
+      if (significant < most_significant) {
+        mantissa = mantissa * 10 + static_cast<unsigned>(text[k] - '0');
+        significant += mantissa != 0 ? 1U : 0U;
+        ++kept;
+      } else {
+        ++significant;
       }
-      if (number.significant <= most_significant) {
-        mantissa = mantissa * 10 + static_cast<unsigned>(c - '0');
-        if (number.has_point) {
-          ++number.decimals;
-        }
-      }
-    } else if (c == '.' && !number.has_point) {
-      number.has_point = true;
-    } else {
-      break;
     }
+    return kept;
+  };
+  ScannedNumber number;
+  read_digits();
+  number.has_point = k < text.size() && text[k] == '.';
+  if (number.has_point) {
+    ++k;
+    number.decimals = read_digits();
   }
+  number.significant = significant;
+  number.digits = static_cast<unsigned>(k - i) - (number.has_point ? 1U : 0U);
+  i = k;
   // A mantissa below 2^53 over an exact power of ten is the correctly rounded decimal.
   const std::size_t power = std::min<std::size_t>(number.decimals, powers_of_ten.size() - 1);
   number.value = static_cast<double>(mantissa) / powers_of_ten[power];
