@@ -215,7 +215,7 @@ struct PlannedRun {
 
 /// The highest feed at which a run keeps the contour tolerance: planned at full speed, shaped, measured, and slowed
 /// only on the arcs and at the corners that leave the tolerance, until all keep it; what was slowed too far is raised
-/// again. `limits` without any contour tolerance of their own; `tolerance_mm` of what the filter's target says shall
+/// again. `tolerance_mm` of what the filter's target says shall
 /// follow the path. A corner that would have to be crept through is a stop; nothing else is slowed below
 /// `least_feed_mm_per_s`, which a controller may not run.
 [[nodiscard]] PlannedRun plan_within_tolerance(std::shared_ptr<const Path> path, const MotionLimits& limits,
@@ -228,13 +228,14 @@ struct PlannedRun {
 /// How a region is turned into a shaped command on the block grid.
 struct ShapingOptions {
   MotionLimits limits;
+  FilterTolerance tolerance;  ///< of the shaper with what follows it
   double block_period_s = 0.005;
   double interpolation_period_s = 0.001;
   double plunge_axis_angle_rad = 0.26;  ///< see forced_stops
   double plunge_corner_angle_rad = 0.78;
   double rest_at_stop_s = 0.0;  ///< pause at a forced stop, so that a filter behind the program runs out
-  /// What is brought back to the path behind the shaper (spec 5). With a target, `limits.contour_tolerance_mm` is its
-  /// tolerance, kept by the highest feed that does; without one, `limits` holds the bounds that plain shaping needs.
+  /// What is brought back to the path behind the shaper. With a target, `tolerance.contour_tolerance_mm` is kept by the
+  /// highest feed that does; without one, `tolerance` bounds the speed at corners and on arcs.
   ContourTarget target = ContourTarget::none;
   AxisModes modes;  ///< of the response; nothing else is done with them
   /// One shaper for each of X, Y and Z (taps in whole block periods, of one mean delay) in place of the common one;
