@@ -6,6 +6,7 @@
 #include <sstream>
 #include <string>
 
+#include "base/checks.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -49,12 +50,6 @@ void check_taps(std::span<const TapSignals> taps, std::size_t least_samples) {
   }
 }
 
-void check_period(double period_s) {
-  if (!(period_s > 0.0) || !std::isfinite(period_s)) {
-    std::ostringstream message;
-    message << "time between samples is " << period_s << " s, must be finite and above 0";
-    throw Error(ErrorKind::argument, message.str());
-  }
-}
+void check_period(double period_s) { require_period(period_s, "time between samples"); }
 
 }  // namespace shapegcode

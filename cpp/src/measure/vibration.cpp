@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "base/checks.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -24,10 +25,8 @@ double vertex(double before, double middle, double after) noexcept {
 }  // namespace
 
 VibrationWatch::VibrationWatch(double period_s, double band_mm) : period_(period_s), band_(band_mm) {
-  if (!(period_s > 0.0 && std::isfinite(period_s) && band_mm > 0.0 && std::isfinite(band_mm))) {
-    throw Error(ErrorKind::argument,
-                "period " + std::to_string(period_s) + " s and band " + std::to_string(band_mm) + " mm must be > 0");
-  }
+  require_period(period_s);
+  require_above_zero(band_mm, "band", "mm");
 }
 
 bool VibrationWatch::moves(const Vector3& command) const noexcept {
