@@ -236,7 +236,7 @@ void register_timing(py::module_& module) {
         const py::gil_scoped_release release;
         return std::make_shared<CycleTime>(time_program(*program, model, per_block));
       },
-      py::arg("program"), py::arg("model"), py::arg("per_block") = false,
+      py::arg("program").none(false), py::arg("model"), py::arg("per_block") = false,
       "Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in "
       "look-ahead. Raises ArgumentError on a model that no controller can have.");
   module.def(
@@ -245,7 +245,7 @@ void register_timing(py::module_& module) {
         const py::gil_scoped_release release;
         return std::make_shared<InterpolatedTime>(interpolate_program(*program, model));
       },
-      py::arg("program"), py::arg("model"),
+      py::arg("program").none(false), py::arg("model"),
       "The same by full interpolation, every set-point of every step. Raises ArgumentError on a model that no "
       "controller can have, or a program of more than 4e9 set-points.");
 }
