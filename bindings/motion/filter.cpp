@@ -177,7 +177,7 @@ Raises:
 void register_filter(py::module_& module) {
   py::class_<Fir>(module, "Fir",
                   "Weights on the sample grid that add up to one: an acceleration filter (moving average) or an input "
-                  "shaper. One filter type for both (spec section 0).")
+                  "shaper. One filter type for both.")
       .def(py::init<std::vector<int>, std::vector<double>>(), py::arg("delays"), py::arg("taps"),
            "Taps at whole-sample delays, ascending, adding up to 1. Raises ArgumentError otherwise.")
       .def_static("moving_average", &Fir::moving_average, py::arg("length"),

@@ -188,7 +188,7 @@ TEST_CASE("fir: an exponential is its taps, cut off where the share is left, and
     for (std::size_t i = 0; i < a.size(); ++i) CHECK(std::abs(a[i] - b[i]) < 1e-10);
     CHECK(a.back() == in.back());
   }
-  // Spec section 0: the variance of an exponential acceleration is A^2.
+  // The variance of an exponential acceleration is A^2.
   CHECK(Fir::exponential(200.0, 1e-9).variance_samples2() == doctest::Approx(200.0 * 200.0).epsilon(1e-5));
 }
 

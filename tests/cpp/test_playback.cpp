@@ -154,7 +154,7 @@ TEST_CASE("playback: vibration of the paper's path against an integration of its
   }
 }
 
-TEST_CASE("playback: the paper's path at 200 mm/s, 1 % reduction, unshaped (spec section 4)") {
+TEST_CASE("playback: the paper's path at 200 mm/s, 1 % reduction, unshaped") {
   const auto path = paper_path(200.0);
   for (const double period : {1e-3, 1e-4}) {
     const PlaybackFigures figures = play_path(path, plan(path, 0.99), vertical_machine(period));
@@ -165,12 +165,12 @@ TEST_CASE("playback: the paper's path at 200 mm/s, 1 % reduction, unshaped (spec
     CHECK(figures.residual_mm.y() < 0.0086);
     CHECK(figures.peak_acceleration_mm_per_s2.x() == doctest::Approx(4000.0).epsilon(0.01));
     CHECK(figures.peak_acceleration_mm_per_s2.y() == doctest::Approx(4000.0).epsilon(0.01));
-    // The response leaves the path by the 42 um of spec section 5.
+    // The response leaves the path by 42 um.
     CHECK(figures.response.max_abs_mm == doctest::Approx(0.042).epsilon(0.05));
   }
 }
 
-TEST_CASE("playback: the minimal shaper as axis filter: no vibration left, and the orbit errors of spec section 3") {
+TEST_CASE("playback: the minimal shaper as axis filter: no vibration left, and the orbit errors of its variance") {
   // Times 6.514 and 11.326 ms lie on a grid of 2 us.
   PlaybackOptions options = vertical_machine(2e-6);
   options.axis_filters = {Fir({0, 3257, 5663}, {0.49156, 0.06297, 0.44547})};
@@ -187,7 +187,7 @@ TEST_CASE("playback: the minimal shaper as axis filter: no vibration left, and t
     CHECK(figures.residual_mm.y() < 1e-5);
     CHECK(figures.duration_s == doctest::Approx(PaperMotion(row.feed, row.ratio).duration + 0.011326).epsilon(1e-4));
     if (row.feed == 200.0) {
-      CHECK(figures.command.max_abs_mm == doctest::Approx(0.0295).epsilon(0.02));  // spec section 5
+      CHECK(figures.command.max_abs_mm == doctest::Approx(0.0295).epsilon(0.02));
       CHECK(figures.response.max_abs_mm == doctest::Approx(0.0266).epsilon(0.02));
     }
   }
@@ -205,7 +205,7 @@ TEST_CASE("playback: a circle behind a moving average shrinks by its closed form
     const PlaybackFigures figures = play_path(path, plan(path, 1.0), options);
     const double angle = 100.0 * 1e-3 / 10.0;
     const double shrunk = 10.0 * (1.0 - std::sin(20.0 * angle) / (40.0 * std::sin(0.5 * angle)));
-    // Spec section 0: radius * variance * (v/R)^2 / 2.
+    // radius * variance * (v/R)^2 / 2.
     CHECK(shrunk == doctest::Approx(10.0 * (0.04 * 0.04 / 12.0) * 100.0 / 2.0).epsilon(0.01));
     // Inside is left of a counter-clockwise circle.
     const double inside = sense > 0.0 ? figures.command.most_positive_mm : -figures.command.most_negative_mm;

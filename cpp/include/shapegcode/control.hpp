@@ -21,7 +21,7 @@ enum class BlockEnd : std::uint8_t {
   carry,  ///< at once: the remainder of a period is carried over
 };
 
-/// Time after which a block's successor starts, in periods: l / (F T_I), a whole number under `ceil` (spec section 0).
+/// Time after which a block's successor starts, in periods: l / (F T_I), a whole number under `ceil` (paper 004).
 /// 0 for a block without length.
 [[nodiscard]] double block_periods(double length_mm, double feed_mm_per_s, double period_s,
                                    BlockEnd block_end) noexcept;
@@ -147,14 +147,14 @@ void check(const ControllerModel& model);
 /// Filters behind interpolation in order: none, one or two (acceleration after interpolation, or 1769 in look-ahead).
 [[nodiscard]] std::vector<Fir> acceleration_filters(const ControllerModel& model);
 
-/// Periods that filters add to a run of set-points: as many as their cascade has taps (spec section 0: A for one moving
+/// Periods that filters add to a run of set-points: as many as their cascade has taps (A for one moving
 /// average); 0 without filters.
 [[nodiscard]] int filter_periods(const std::vector<Fir>& filters) noexcept;
 
 /// Feed of a cutting block in mm/s: programmed feed times override, no axis above its largest feed.
 [[nodiscard]] double controlled_feed_mm_per_s(const Segment& segment, const ControllerModel& model) noexcept;
 
-/// Time of a run of overlapping cutting blocks (spec section 0, paper 004): sum of ceil(l / (F T_I)) T_I (or of l / F
+/// Time of a run of overlapping cutting blocks (paper 004): sum of ceil(l / (F T_I)) T_I (or of l / F
 /// under `carry`) plus the length of the acceleration filters. Blocks without length take no time. Lengths in mm, feeds
 /// in mm/s, taken as they are (no override). Throws Error(argument) on unequal sizes or a feed <= 0.
 [[nodiscard]] double block_overlap_time_s(std::span<const double> lengths_mm, std::span<const double> feeds_mm_per_s,

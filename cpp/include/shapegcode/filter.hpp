@@ -33,7 +33,7 @@ class Fir {
   [[nodiscard]] int duration_samples() const noexcept;
   /// First moment of the taps in samples: the mean delay.
   [[nodiscard]] double mean_samples() const noexcept;
-  /// Second central moment of the taps in samples^2: the contour cost (spec: dR/R = variance*(v/R)^2/2).
+  /// Second central moment of the taps in samples^2: the contour cost, dR/R = variance*(v/R)^2/2.
   [[nodiscard]] double variance_samples2() const noexcept;
 
   /// The same taps on a grid that is `factor` times as fine. Throws Error(argument) on factor < 1 or a delay beyond 1e8

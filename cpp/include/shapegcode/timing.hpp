@@ -68,7 +68,7 @@ struct CycleTime {
   std::vector<BlockTime> blocks;  ///< only if asked for
 };
 
-/// Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004, spec section 0), by the
+/// Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the
 /// planner in look-ahead. Regions and cutting moves outside of them are runs from rest to rest; cutting moves outside
 /// that follow each other without anything between are one run. Waits for in-position come behind rapids and behind
 /// runs that end with an exact stop (G09, G61). Moves of an axis whose position is not known count what is known of

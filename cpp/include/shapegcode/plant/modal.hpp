@@ -49,7 +49,7 @@ using AxisModes = std::array<std::vector<Mode>, axis_count>;
 
 /// Propagates the modes exactly (matrix exponential) for a command that is linear between set-points, as a servo's
 /// set-points are (first-order hold). Real-time safe after construction: no allocation, no exception, bounded work.
-/// Spec section 3 and 6: u'' + 2*zeta*omega*u' + omega^2*u = 2*zeta*omega*x' + omega^2*x.
+/// For the response: u'' + 2*zeta*omega*u' + omega^2*u = 2*zeta*omega*x' + omega^2*x.
 ///
 /// Modes may vary with the commanded position of an axis. Frequency and damping are then held over each period at their
 /// value in its middle (an error of second order in the period), and the matrices of the period are interpolated
