@@ -161,7 +161,8 @@ void define_simulation(py::module_& module) {
            py::arg("feed_forward_ratio"), py::arg("period_s"),
            "At rest at zero. Raises ArgumentError on a period or gain <= 0 or a ratio outside 0 ... 1.")
       .def("reset", &ServoLag::reset, py::arg("position"), "Rest at `position`, shape (3,).")
-      .def("step", &ServoLag::step, py::arg("setpoint"), "Position of the axes at the set-point's instant, shape (3,).")
+      .def("step", py::overload_cast<const Vector3&>(&ServoLag::step), py::arg("setpoint"),
+           "Position of the axes at the set-point's instant, shape (3,).")
       .def_property_readonly("error_mm", &ServoLag::error_mm, "Set-point minus position, shape (3,), mm.");
 
   py::class_<CircleFigures>(module, "CircleFigures", "What acceleration and servo lag make of a circle.")

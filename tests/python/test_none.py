@@ -14,6 +14,13 @@ import numpy as np
 from shapegcode import _core
 
 STUB = Path(_core.__file__).parent / "_core.pyi"
+# By a part of the annotation.
+EXAMPLES: dict[str, Any] = {
+    "[3, 1]": [0.0, 0.0, 0.0],
+    "[m, 1]": [0.0],
+    "NDArray": np.zeros((2, 3)),
+    "ArrayLike": np.zeros((2, 3)),
+}
 SQUARE = b"%\nO1\nG90G94G17G21G54\nG00X0Y0Z0\nG01X10.F600\nY10.\nM30\n%\n"
 
 
@@ -26,7 +33,9 @@ def core_class(annotation: ast.expr) -> str | None:
 
 def known(name: str) -> Any:
     """Objects whose constructor asks for what no rule gives."""
-    path = _core.Path([_core.Segment.line([0, 0, 0], [10, 0, 0], 10.0), _core.Segment.line([10, 0, 0], [10, 10, 0], 10)])
+    path = _core.Path(
+        [_core.Segment.line([0, 0, 0], [10, 0, 0], 10.0), _core.Segment.line([10, 0, 0], [10, 10, 0], 10)]
+    )
     if name == "Path":
         return path
     if name == "SpeedProfile":
@@ -41,6 +50,14 @@ def known(name: str) -> Any:
         return path[0]
     if name == "ProgramText":
         return _core.read_program(SQUARE)
+    if name == "ModeTable":
+        return _core.ModeTable(0, [0.0], [40.0])
+    if name == "EndMill":
+        return _core.EndMill(4.0, 2)
+    if name == "Material":
+        return _core.Material([np.array([[-5.0, -5.0], [15.0, -5.0], [15.0, 15.0], [-5.0, 15.0]])], [-1.0, 1.0], 0.5)
+    if name == "EngagementTrack":
+        return _core.sweep(known("Material"), path, 4.0)
     raise KeyError(name)
 
 
@@ -52,7 +69,7 @@ def example(annotation: ast.expr | None, depth: int = 0) -> Any:
         return instance(name, depth + 1)
     if text.endswith("| None"):
         return None
-    for part, value in (("[3, 1]", [0.0, 0.0, 0.0]), ("[m, 1]", [0.0]), ("NDArray", np.zeros((2, 3))), ("ArrayLike", np.zeros((2, 3)))):
+    for part, value in EXAMPLES.items():
         if part in text:
             return value
     if "Callable" in text:
@@ -121,9 +138,12 @@ def walk() -> int:
             arguments = arguments[1:]
             if function.name != "__init__":
                 bound = [instance(kind)]
-        for at, argument in enumerate(arguments):
+        defaults = [None] * (len(arguments) - len(function.args.defaults)) + list(function.args.defaults)
+        for at, (argument, default) in enumerate(zip(arguments, defaults, strict=True)):
             if argument.annotation is None or core_class(argument.annotation) is None:
                 continue
+            if isinstance(default, ast.Constant) and default.value is None:
+                continue  # None has a meaning there
             values = [None if i == at else example(a.annotation) for i, a in enumerate(arguments)]
             print(f"{kind}.{function.name}({argument.arg}=None)", flush=True)
             try:
@@ -143,5 +163,5 @@ def test_none_is_no_object_of_the_core() -> None:
     )
     assert done.returncode == 0, done.stdout[-300:] + done.stderr[-2000:]
     assert int(done.stdout.split()[-1]) > 60
-    for asked in (".play_path(path=None)", ".play_blocks(blocks=None)", ".play_samples(path=None)", ".time_program(program=None)"):
-        assert asked in done.stdout
+    for function in ("play_path(path", "play_blocks(blocks", "play_samples(path", "time_program(program"):
+        assert f".{function}=None)" in done.stdout
