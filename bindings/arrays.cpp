@@ -19,7 +19,7 @@ Samples samples_from(const MatrixArray& positions_mm, double period_s) {
     throw Error(ErrorKind::argument, "positions must have the shape (n_samples, 3)");
   }
   if (!(period_s > 0.0)) {
-    throw Error(ErrorKind::argument, "period is " + std::to_string(period_s) + " s, must be > 0");
+    throw Error(ErrorKind::argument, "period is " + std::to_string(period_s) + " s, must be finite and above 0");
   }
   Samples samples;
   samples.period_s = period_s;

@@ -58,7 +58,7 @@ void register_sections(py::module_& module) {
   module.def(
       "path_sections",
       [](const std::shared_ptr<Path>& path, double short_mm) { return path_sections(*path, short_mm); },
-      py::arg("path"), py::arg("short_mm") = 0.5,
+      py::arg("path").none(false), py::arg("short_mm") = 0.5,
       "The whole path as runs of lines of one direction and of arcs about one centre; neighbours shorter than "
       "`short_mm` become one curve.");
   module.def(
@@ -71,7 +71,7 @@ void register_sections(py::module_& module) {
         }
         return line_sections(*path, lines);
       },
-      py::arg("path"), py::arg("ranges"),
+      py::arg("path").none(false), py::arg("ranges"),
       "The parts of a path that come from source lines, pairs of first and last. Raises ArgumentError if a range runs "
       "backwards or two overlap.");
 }
@@ -199,7 +199,7 @@ void register_section_metrology(py::module_& module) {
                        const MetrologyOptions& options) {
              return std::make_unique<SectionMetrology>(*path, std::move(sections), options);
            }),
-           py::arg("path"), py::arg("sections"), py::arg("options"),
+           py::arg("path").none(false), py::arg("sections"), py::arg("options"),
            "Raises ArgumentError on a path without length, sections of another path, or an option outside its range.")
       .def(
           "feed",

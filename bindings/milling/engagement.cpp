@@ -184,7 +184,10 @@ void register_layer_borders(py::module_& module) {
       [](const std::vector<std::shared_ptr<Path>>& paths, double bottom, double top, double ramp_step) {
         std::vector<const Path*> pointers;
         pointers.reserve(paths.size());
-        for (const auto& path : paths) pointers.push_back(path.get());
+        for (const auto& path : paths) {
+          if (path == nullptr) throw py::type_error("layer_borders: paths hold None");
+          pointers.push_back(path.get());
+        }
         return layer_borders(pointers, bottom, top, ramp_step);
       },
       py::arg("paths"), py::arg("bottom_mm"), py::arg("top_mm"), py::arg("ramp_step_mm"),
@@ -210,8 +213,8 @@ void register_sweep(py::module_& module) {
         const py::gil_scoped_release release;
         return std::make_shared<EngagementTrack>(sweep(material, *path, diameter, options));
       },
-      py::arg("material"), py::arg("path"), py::arg("tool_diameter_mm"), py::kw_only(), py::arg("step_mm") = 0.0,
-      py::arg("touch_mm") = SweepOptions{}.touch_mm, py::arg("progress") = std::nullopt,
+      py::arg("material"), py::arg("path").none(false), py::arg("tool_diameter_mm"), py::kw_only(),
+      py::arg("step_mm") = 0.0, py::arg("touch_mm") = SweepOptions{}.touch_mm, py::arg("progress") = std::nullopt,
       "Moves a tool along a path through the material, takes away what it sweeps, and tells what it met. Samples stand "
       "at most `step_mm` apart (0: a fortieth of the diameter) and at the end of every segment; contacts less deep or "
       "wide than `touch_mm` are none. `progress` is called now and then with the distance travelled, mm. Whatever "

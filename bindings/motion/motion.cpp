@@ -45,14 +45,18 @@ void register_motion(py::module_& module) {
       .def_readwrite("contour_acceleration_mm_per_s2", &MotionLimits::contour_acceleration_mm_per_s2,
                      "Of a change of direction, per axis, on arcs and along polylines, shape (3,).")
       .def_readwrite("feed_override", &MotionLimits::feed_override, "Scales the programmed feeds.")
-      .def_readwrite("arc_feed_ratio", &MotionLimits::arc_feed_ratio, "Feed on arcs relative to the programmed one.")
-      .def_readwrite("contour_tolerance_mm", &MotionLimits::contour_tolerance_mm,
-                     "Deviation allowed to the filter that follows.")
-      .def_readwrite("corner_share", &MotionLimits::corner_share,
+      .def_readwrite("arc_feed_ratio", &MotionLimits::arc_feed_ratio, "Feed on arcs relative to the programmed one.");
+
+  py::class_<FilterTolerance>(
+      module, "FilterTolerance",
+      "Within what a filter behind the interpolation must stay at corners and on arcs; without spread no limit.")
+      .def(py::init<>())
+      .def_readwrite("contour_tolerance_mm", &FilterTolerance::contour_tolerance_mm,
+                     "Deviation allowed to the filter, mm; infinity: any.")
+      .def_readwrite("corner_share", &FilterTolerance::corner_share,
                      "Share of the tolerance for one corner: several may fall into one filter.")
-      .def_readwrite("filter_variance_s2", &MotionLimits::filter_variance_s2, "Its second central moment, s^2.")
-      .def_readwrite("filter_mean_deviation_s", &MotionLimits::filter_mean_deviation_s,
-                     "Its mean absolute deviation, s.");
+      .def_readwrite("variance_s2", &FilterTolerance::variance_s2, "Second central moment of the filter, s^2.")
+      .def_readwrite("mean_deviation_s", &FilterTolerance::mean_deviation_s, "Its mean absolute deviation, s.");
 
   py::class_<SpeedProfile, std::shared_ptr<SpeedProfile>>(module, "SpeedProfile",
                                                           "Distance along a path as a function of time.")
@@ -63,19 +67,21 @@ void register_motion(py::module_& module) {
 
   module.def(
       "plan_speed",
-      [](const std::shared_ptr<Path>& path, const MotionLimits& limits) {
+      [](const std::shared_ptr<Path>& path, const MotionLimits& limits, const FilterTolerance& tolerance) {
         const py::gil_scoped_release release;
-        return std::make_shared<SpeedProfile>(plan_speed(*path, limits));
+        return std::make_shared<SpeedProfile>(plan_speed(*path, limits, tolerance));
       },
-      py::arg("path"), py::arg("limits"),
-      "Tangential speed profile over a whole path from rest to rest. Raises ArgumentError on a limit that is not > 0.");
+      py::arg("path").none(false), py::arg("limits"), py::arg("tolerance") = FilterTolerance{},
+      "Tangential speed profile over a whole path from rest to rest, with a filter behind it that must stay within its "
+      "tolerance. Raises ArgumentError on a limit that is not > 0.");
 
   py::class_<Interpolator>(module, "Interpolator",
                            "Set-points of a path, one per interpolation period (real-time form).")
       .def(py::init([](std::shared_ptr<Path> path, std::shared_ptr<SpeedProfile> profile, double period_s) {
              return Interpolator(std::move(path), std::move(profile), period_s);
            }),
-           py::arg("path"), py::arg("profile"), py::arg("period_s"), "Raises ArgumentError on a period <= 0.")
+           py::arg("path").none(false), py::arg("profile").none(false), py::arg("period_s"),
+           "Raises ArgumentError on a period <= 0.")
       .def(
           "step",
           [](Interpolator& self) {
@@ -96,7 +102,7 @@ void register_motion(py::module_& module) {
         }
         return take(std::move(samples.positions_mm));
       },
-      py::arg("path"), py::arg("profile"), py::arg("period_s"),
+      py::arg("path").none(false), py::arg("profile").none(false), py::arg("period_s"),
       "All set-points of a path, (n_samples, 3), mm, read-only. Raises ArgumentError on a period <= 0.");
 }
 

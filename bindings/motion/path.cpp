@@ -21,14 +21,17 @@ py::array polyline(const Path& path, double step_rad) {
   if (!(step_rad > 0.0)) {
     throw Error(ErrorKind::argument, "step_rad is " + std::to_string(step_rad) + ", must be > 0");
   }
+  constexpr double most_pieces = 1e7;
   std::vector<Vector3> points;
   for (const Segment& segment : path.segments()) {
     if (points.empty()) {
       points.push_back(segment.start_mm);
     }
-    const int pieces = segment.kind == SegmentKind::arc
-                           ? std::max(1, static_cast<int>(std::ceil(std::abs(segment.sweep_rad) / step_rad)))
-                           : 1;
+    const double steps = segment.kind == SegmentKind::arc ? std::ceil(std::abs(segment.sweep_rad) / step_rad) : 1.0;
+    if (!(steps <= most_pieces)) {
+      throw Error(ErrorKind::argument, "an arc in steps of step_rad takes more than 10000000 points");
+    }
+    const int pieces = std::max(1, static_cast<int>(steps));
     for (int i = 1; i <= pieces; ++i) {
       points.push_back(point_at(segment, segment.length_mm * i / pieces));
     }

@@ -32,8 +32,8 @@ void register_simulation(py::module_& module) {
 
   py::class_<ContourTracker, std::shared_ptr<ContourTracker>>(
       module, "ContourTracker", "Geometry of a path for the distance of a moving point to it.")
-      .def(py::init([](const std::shared_ptr<Path>& path) { return ContourTracker(*path); }), py::arg("path"),
-           "Raises ArgumentError on a path without segments.");
+      .def(py::init([](const std::shared_ptr<Path>& path) { return ContourTracker(*path); }),
+           py::arg("path").none(false), "Raises ArgumentError on a path without segments.");
 
   py::class_<PlaybackOptions>(module, "PlaybackOptions", "What a run of set-points is measured with.")
       .def(py::init<>())
@@ -106,7 +106,8 @@ void register_simulation(py::module_& module) {
             programmed ? play_path(std::move(path), std::move(profile), *programmed, options)
                        : play_path(std::move(path), std::move(profile), options));
       },
-      py::arg("path"), py::arg("profile"), py::arg("options"), py::arg("programmed") = py::none(),
+      py::arg("path").none(false), py::arg("profile").none(false), py::arg("options"),
+      py::arg("programmed") = py::none(),
       "Play a path under a speed profile (a controller with look-ahead) through filters and plant, measured against "
       "the programmed path (None: the path itself).");
 
@@ -118,7 +119,8 @@ void register_simulation(py::module_& module) {
         return std::make_shared<PlaybackFigures>(
             play_blocks(blocks->segments(), *path, block_end, override_ratio, options));
       },
-      py::arg("blocks"), py::arg("path"), py::arg("block_end"), py::arg("override_ratio"), py::arg("options"),
+      py::arg("blocks").none(false), py::arg("path").none(false), py::arg("block_end"), py::arg("override_ratio"),
+      py::arg("options"),
       "Play blocks at their feed (a controller without look-ahead), measured against the programmed path.");
 
   module.def(
@@ -128,7 +130,7 @@ void register_simulation(py::module_& module) {
         const py::gil_scoped_release release;
         return std::make_shared<PlaybackFigures>(play_samples(samples, *path, options));
       },
-      py::arg("positions_mm"), py::arg("path"), py::arg("options"),
+      py::arg("positions_mm"), py::arg("path").none(false), py::arg("options"),
       "Play set-points (n, 3), measured against the programmed path. Raises ArgumentError on another shape.");
 
   module.def(
@@ -137,12 +139,13 @@ void register_simulation(py::module_& module) {
         const py::gil_scoped_release release;
         return play_duration_s(blocks->segments(), period_s, block_end, override_ratio);
       },
-      py::arg("blocks"), py::arg("period_s"), py::arg("block_end"), py::arg("override_ratio") = 1.0,
+      py::arg("blocks").none(false), py::arg("period_s"), py::arg("block_end"), py::arg("override_ratio") = 1.0,
       "Sum of block durations, s.");
 
   module.def(
       "fastest_block_ends", [](const std::shared_ptr<Path>& blocks) { return fastest_block_ends(blocks->segments()); },
-      py::arg("blocks"), "Per axis the block, but for the last, at whose end it is fastest; ascending, each once.");
+      py::arg("blocks").none(false),
+      "Per axis the block, but for the last, at whose end it is fastest; ascending, each once.");
 
   module.def(
       "count_slowed_blocks",
@@ -150,7 +153,7 @@ void register_simulation(py::module_& module) {
         const py::gil_scoped_release release;
         return count_slowed_blocks(blocks->segments(), {corner_speed_difference, max_feed});
       },
-      py::arg("blocks"), py::arg("corner_speed_difference_mm_per_s"), py::arg("max_feed_mm_per_s"),
+      py::arg("blocks").none(false), py::arg("corner_speed_difference_mm_per_s"), py::arg("max_feed_mm_per_s"),
       "Blocks that a controller with look-ahead would run slower than programmed.");
 }
 

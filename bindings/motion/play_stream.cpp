@@ -62,21 +62,21 @@ void register_played_stream(py::module_& module) {
           "of_path",
           [](const std::shared_ptr<Path>& path, const std::shared_ptr<SpeedProfile>& profile,
              const PlaybackOptions& options, double rest_s) { return PlayedStream(path, profile, options, rest_s); },
-          py::arg("path"), py::arg("profile"), py::arg("options"), py::arg("rest_s") = 0.0,
+          py::arg("path").none(false), py::arg("profile").none(false), py::arg("options"), py::arg("rest_s") = 0.0,
           "A path under a speed profile; behind its end the set-points rest for rest_s.")
       .def_static(
           "of_blocks",
           [](const std::shared_ptr<Path>& blocks, BlockEnd block_end, double override_ratio,
              const PlaybackOptions& options,
              double rest_s) { return PlayedStream(blocks, block_end, override_ratio, options, rest_s); },
-          py::arg("blocks"), py::arg("block_end"), py::arg("override_ratio"), py::arg("options"),
+          py::arg("blocks").none(false), py::arg("block_end"), py::arg("override_ratio"), py::arg("options"),
           py::arg("rest_s") = 0.0, "Blocks at their feed.")
       .def_static(
           "of_program",
           [](const std::shared_ptr<Program>& program, const ControllerModel& model, const PlaybackOptions& options,
              const std::vector<Vector3>& region_offsets_mm,
              double rest_s) { return PlayedStream(program, model, options, region_offsets_mm, rest_s); },
-          py::arg("program"), py::arg("model"), py::arg("options"),
+          py::arg("program").none(false), py::arg("model"), py::arg("options"),
           py::arg("region_offsets_mm") = std::vector<Vector3>{}, py::arg("rest_s") = 0.0,
           "A whole program on one time axis. region_offsets_mm: from the positions of each region to the machine's, "
           "for "

@@ -161,7 +161,8 @@ void define_simulation(py::module_& module) {
            py::arg("feed_forward_ratio"), py::arg("period_s"),
            "At rest at zero. Raises ArgumentError on a period or gain <= 0 or a ratio outside 0 ... 1.")
       .def("reset", &ServoLag::reset, py::arg("position"), "Rest at `position`, shape (3,).")
-      .def("step", &ServoLag::step, py::arg("setpoint"), "Position of the axes at the set-point's instant, shape (3,).")
+      .def("step", py::overload_cast<const Vector3&>(&ServoLag::step), py::arg("setpoint"),
+           "Position of the axes at the set-point's instant, shape (3,).")
       .def_property_readonly("error_mm", &ServoLag::error_mm, "Set-point minus position, shape (3,), mm.");
 
   py::class_<CircleFigures>(module, "CircleFigures", "What acceleration and servo lag make of a circle.")
@@ -236,7 +237,7 @@ void register_timing(py::module_& module) {
         const py::gil_scoped_release release;
         return std::make_shared<CycleTime>(time_program(*program, model, per_block));
       },
-      py::arg("program"), py::arg("model"), py::arg("per_block") = false,
+      py::arg("program").none(false), py::arg("model"), py::arg("per_block") = false,
       "Cycle time in closed form: O(1) per block for acceleration after interpolation (paper 004), by the planner in "
       "look-ahead. Raises ArgumentError on a model that no controller can have.");
   module.def(
@@ -245,7 +246,7 @@ void register_timing(py::module_& module) {
         const py::gil_scoped_release release;
         return std::make_shared<InterpolatedTime>(interpolate_program(*program, model));
       },
-      py::arg("program"), py::arg("model"),
+      py::arg("program").none(false), py::arg("model"),
       "The same by full interpolation, every set-point of every step. Raises ArgumentError on a model that no "
       "controller can have, or a program of more than 4e9 set-points.");
 }

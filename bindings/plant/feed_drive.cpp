@@ -246,7 +246,7 @@ Raises:
       .def(py::init<FeedDriveParameters, double, int>(), py::arg("parameters"), py::arg("period_s"),
            py::arg("substeps") = FeedDriveRealTime::default_substeps, "ArgumentError on a value outside its range.")
       .def("reset", &FeedDriveRealTime::reset, py::arg("position_mm"), "At rest at a position (mm).")
-      .def("step", &FeedDriveRealTime::step, py::arg("setpoint_mm"),
+      .def("step", py::overload_cast<double>(&FeedDriveRealTime::step), py::arg("setpoint_mm"),
            "Next set-point (mm); the response at that instant in mm.")
       .def("play", &play_in_real_time, py::arg("setpoints_mm"),
            "Responses (n,) in mm at many set-points (n,) in mm. ArgumentError on another shape.");

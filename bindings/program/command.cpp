@@ -31,6 +31,7 @@ void register_shaped_command(py::module_& module) {
                              "How a region is turned into a shaped command on the block grid.")
       .def(py::init<>())
       .def_readwrite("limits", &ShapingOptions::limits, "Limits of the look-ahead.")
+      .def_readwrite("tolerance", &ShapingOptions::tolerance, "Of the shaper with what follows it.")
       .def_readwrite("block_period_s", &ShapingOptions::block_period_s, "s.")
       .def_readwrite("interpolation_period_s", &ShapingOptions::interpolation_period_s, "s.")
       .def_readwrite("plunge_axis_angle_rad", &ShapingOptions::plunge_axis_angle_rad,
@@ -39,7 +40,7 @@ void register_shaped_command(py::module_& module) {
                      "Least change of direction of such a corner, rad.")
       .def_readwrite("rest_at_stop_s", &ShapingOptions::rest_at_stop_s, "Pause at a forced stop, s.")
       .def_readwrite("target", &ShapingOptions::target,
-                     "What is brought back to the path; with a target, the contour tolerance of `limits` is its own.")
+                     "What is brought back to the path; with a target, `tolerance` is its own.")
       .def_readwrite("modes", &ShapingOptions::modes, "Modes of X, Y and Z, for the response as target.")
       .def_readwrite("following", &ShapingOptions::following,
                      "Shapers along an axis in place of the one shaper, taps in whole block periods; None: none.")
@@ -75,7 +76,7 @@ void register_shaped_command(py::module_& module) {
         const py::gil_scoped_release release;
         return std::make_shared<ShapedCommand>(shape_path(path, shaper, marked, options));
       },
-      py::arg("path"), py::arg("shaper"), py::arg("marked_segments"), py::arg("options"),
+      py::arg("path").none(false), py::arg("shaper"), py::arg("marked_segments"), py::arg("options"),
       "Split at forced stops, plan, sample on half the block grid and shape. `shaper` has its taps in whole block "
       "periods. Raises ArgumentError if the block period is no multiple of the interpolation period.");
 
@@ -93,7 +94,8 @@ Raises:
       .def(py::init(
                [](std::shared_ptr<Path> path, const Fir& shaper, const std::vector<std::uint32_t>& marked,
                   const ShapingOptions& options) { return RegionShaper(std::move(path), shaper, marked, options); }),
-           py::arg("path"), py::arg("shaper"), py::arg("marked_segments"), py::arg("options"), "See the class.")
+           py::arg("path").none(false), py::arg("shaper"), py::arg("marked_segments"), py::arg("options"),
+           "See the class.")
       .def(
           "next",
           [](RegionShaper& self, std::uint32_t periods) -> std::optional<std::shared_ptr<ShapedCommand>> {

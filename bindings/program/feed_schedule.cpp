@@ -47,8 +47,8 @@ void register_travel(py::module_& module) {
         const py::gil_scoped_release release;
         return travel_path(path, profile, *along, s, {period_s, filters, window_s});
       },
-      py::arg("path"), py::arg("profile"), py::arg("along"), py::arg("stations_mm"), py::arg("period_s"),
-      py::arg("filters") = std::vector<Fir>{}, py::arg("window_s") = 0.0,
+      py::arg("path").none(false), py::arg("profile").none(false), py::arg("along").none(false), py::arg("stations_mm"),
+      py::arg("period_s"), py::arg("filters") = std::vector<Fir>{}, py::arg("window_s") = 0.0,
       "How a path under a speed profile is travelled, followed along another one of which it is made, or along itself; "
       "`stations_mm` (n,) ascend to the length of that, `filters` stand behind "
       "the set-points, speeds are taken over `window_s`. Raises ArgumentError on stations that do not ascend.");
@@ -60,8 +60,8 @@ void register_travel(py::module_& module) {
         const py::gil_scoped_release release;
         return travel_blocks(blocks->segments(), *along, block_end, s, {period_s, filters, window_s});
       },
-      py::arg("blocks"), py::arg("along"), py::arg("block_end"), py::arg("stations_mm"), py::arg("period_s"),
-      py::arg("filters") = std::vector<Fir>{}, py::arg("window_s") = 0.0,
+      py::arg("blocks").none(false), py::arg("along").none(false), py::arg("block_end"), py::arg("stations_mm"),
+      py::arg("period_s"), py::arg("filters") = std::vector<Fir>{}, py::arg("window_s") = 0.0,
       "How blocks at their feed are travelled, followed along `along`; else as travel_path.");
 }
 
@@ -107,7 +107,7 @@ void define_schedule(py::module_& module) {
       [](const std::shared_ptr<Path>& path, const std::vector<FeedStretch>& stretches) {
         return std::make_shared<Path>(with_feeds(*path, stretches));
       },
-      py::arg("path"), py::arg("stretches"),
+      py::arg("path").none(false), py::arg("stretches"),
       "The path with other feeds: segments are divided where a stretch ends within one. Raises ArgumentError if the "
       "stretches do not cover it.");
   module.def(
@@ -149,18 +149,18 @@ void define_feed_writer(py::module_& module) {
       [](const Program& program, const Region& region, const FeedWriterOptions& options) {
         return divisible_segments(program, region, options);
       },
-      py::arg("program"), py::arg("region"), py::arg("options"),
+      py::arg("program").none(false), py::arg("region"), py::arg("options"),
       "Which segments of a region's path may be divided into several blocks.");
   module.def(
       "feeds_per_minute",
       [](const Program& program, const Region& region) { return feeds_per_minute(program, region); },
-      py::arg("program"), py::arg("region"),
+      py::arg("program").none(false), py::arg("region"),
       "Whether F is a feed per minute in every block of a region, in one unit of length.");
   module.def(
       "write_feeds",
       [](const Program& program, const Region& region, const std::vector<FeedStretch>& stretches,
          const FeedWriterOptions& options) { return write_feeds(program, region, stretches, options); },
-      py::arg("program"), py::arg("region"), py::arg("stretches"), py::arg("options"),
+      py::arg("program").none(false), py::arg("region"), py::arg("stretches"), py::arg("options"),
       "The region's lines with the feeds of stretches that cover its path; what else stands in them stays. Raises "
       "ArgumentError if they do not cover it, or end within a block that cannot be divided.");
 }

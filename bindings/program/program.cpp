@@ -218,7 +218,7 @@ void register_gcode(py::module_& module) {
       .def_readonly("comment_length", &RegionNote::comment_length, "Bytes; 0: no comment.");
 
   py::class_<Region, std::shared_ptr<Region>>(module, "Region", "A run of cutting moves between two stops.")
-      .def(py::init(&one_line_region), py::kw_only(), py::arg("path"), py::arg("entry"), py::arg("exit"),
+      .def(py::init(&one_line_region), py::kw_only(), py::arg("path").none(false), py::arg("entry"), py::arg("exit"),
            py::arg("line"), py::arg("text_begin"), py::arg("text_end"),
            "One line of a text as a region that ends with an exact stop: what takes the place of a rapid. `path`: its "
            "move; `entry`, `exit`: modal state before and behind it; `text_begin`, `text_end`: its bytes.")

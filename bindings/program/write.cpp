@@ -124,7 +124,7 @@ void register_emission(py::module_& module) {
         }
         return std::make_tuple(py::bytes(written.text), written.motion, written.plane);
       },
-      py::arg("blocks"), py::arg("start"), py::arg("marks"), py::arg("options"),
+      py::arg("blocks").none(false), py::arg("start"), py::arg("marks"), py::arg("options"),
       "(text as bytes, motion code, plane) of fitted blocks; `start` in increments.");
 }
 

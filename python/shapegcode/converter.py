@@ -16,7 +16,7 @@ from shapegcode.advice import binding_warnings, controller_warnings, region_warn
 from shapegcode.block_grid import Grid, choose_grid
 from shapegcode.budget import Budget, Load, Spending, measure_load
 from shapegcode.compensation import guard_lines, header_lines, read_for_conversion, require_decision
-from shapegcode.emit import emit_region, motion_limits
+from shapegcode.emit import emit_region, filter_tolerance, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.moving_modes import (
     axis_modes,
@@ -293,8 +293,8 @@ def _write(
             put(core.slice(region.text_begin, region.text_end))
             continue
         try:
-            limits = motion_limits(machine, arc_feed_ratio=arc_feed_ratio, grid=grid, contour_tolerance_um=room)
-            shaped = emit_region(program, region, machine, grid, limits)
+            limits = motion_limits(machine, arc_feed_ratio=arc_feed_ratio)
+            shaped = emit_region(program, region, machine, grid, limits, filter_tolerance(machine, grid, room))
         except _core.ArgumentError as error:
             raise program.region_error(region, str(error)) from error
         first = line

@@ -49,16 +49,12 @@ class EmittedRegion:
     planned_um: float
 
 
-def motion_limits(
-    machine: Machine, *, arc_feed_ratio: float = 1.0, grid: Grid | None = None, contour_tolerance_um: float = math.inf
-) -> _core.MotionLimits:
-    """Look-ahead limits of a machine; with a grid also those that keep the shaped command within a tolerance.
+def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
+    """Look-ahead limits of a machine.
 
     Args:
         machine: whose limits.
         arc_feed_ratio: feed on arcs relative to the programmed one.
-        grid: what follows the look-ahead; its spread limits the speed at corners and on arcs.
-        contour_tolerance_um: deviation allowed to it, µm.
     """
     limits = _core.MotionLimits()
     controller = machine.controller
@@ -78,17 +74,32 @@ def motion_limits(
     if controller.contour_acceleration_mm_s2 is not None:
         limits.contour_acceleration_mm_per_s2 = controller.contour_acceleration_mm_s2.as_tuple()
     limits.arc_feed_ratio = arc_feed_ratio
-    if grid is not None:
-        own = controller.shaped_time_constant_s
-        limits.filter_variance_s2 = max(shaper.variance_s2 for shaper in grid.shapers) + own * own / 12.0
-        limits.filter_mean_deviation_s = max(_mean_deviation_s(shaper) for shaper in grid.shapers) + own / 4.0
-        limits.contour_tolerance_mm = contour_tolerance_um * 1e-3
-        limits.corner_share = _CORNER_SHARE
     return limits
 
 
+def filter_tolerance(machine: Machine, grid: Grid, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
+    """What keeps the shaped command within a tolerance at corners and on arcs.
+
+    Args:
+        machine: whose controller smooths the shaped program once more.
+        grid: what follows the look-ahead; its spread limits the speed.
+        contour_tolerance_um: deviation allowed to it, µm.
+    """
+    own = machine.controller.shaped_time_constant_s
+    tolerance = _core.FilterTolerance()
+    tolerance.variance_s2 = max(shaper.variance_s2 for shaper in grid.shapers) + own * own / 12.0
+    tolerance.mean_deviation_s = max(_mean_deviation_s(shaper) for shaper in grid.shapers) + own / 4.0
+    tolerance.contour_tolerance_mm = contour_tolerance_um * 1e-3
+    tolerance.corner_share = _CORNER_SHARE
+    return tolerance
+
+
 def shaping_options(
-    machine: Machine, grid: Grid, limits: _core.MotionLimits, offset: Offset = NO_OFFSET
+    machine: Machine,
+    grid: Grid,
+    limits: _core.MotionLimits,
+    tolerance: _core.FilterTolerance,
+    offset: Offset = NO_OFFSET,
 ) -> _core.ShapingOptions:
     """How a region is shaped on a grid: what the core needs of the machine file.
 
@@ -96,11 +107,13 @@ def shaping_options(
         machine: controller and modes.
         grid: block period and shapers.
         limits: see `motion_limits`.
+        tolerance: see `filter_tolerance`.
         offset: from the region's positions to the machine's; where it is not known of the axis that the grid's track
             follows, the grid's one shaper is used.
     """
     options = _core.ShapingOptions()
     options.limits = limits
+    options.tolerance = tolerance
     options.block_period_s = grid.block_period_s
     options.interpolation_period_s = machine.controller.interpolation_period_s
     options.plunge_axis_angle_rad = machine.shaping.plunge_angle_deg * _DEGREE
@@ -147,14 +160,19 @@ class _Marks:
 
 
 def emit_region(
-    program: Program, region: _core.Region, machine: Machine, grid: Grid, limits: _core.MotionLimits
+    program: Program,
+    region: _core.Region,
+    machine: Machine,
+    grid: Grid,
+    limits: _core.MotionLimits,
+    tolerance: _core.FilterTolerance,
 ) -> EmittedRegion:
     """Shape one region and write it.
 
     The text begins with `emission.prologue` and a full safe line and ends with the modal state of the original.
     """
     notes = region.notes
-    options = shaping_options(machine, grid, limits, region_offset(region, machine))
+    options = shaping_options(machine, grid, limits, tolerance, region_offset(region, machine))
     shaper = _core.RegionShaper(region.path, grid.fir, [note.segment for note in notes], options)
 
     inch = region.exit.units == 20

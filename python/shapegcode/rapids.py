@@ -21,7 +21,7 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.block_grid import Grid
 from shapegcode.budget import Budget, measure_load
-from shapegcode.emit import EmittedRegion, emit_region, motion_limits
+from shapegcode.emit import EmittedRegion, emit_region, filter_tolerance, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.rapid_candidates import NO_CUT, Gap, Rapid, find_gaps
@@ -231,12 +231,12 @@ class _OpenGap:
 def _write(choice: _Choice, emitted: Program, machine: Machine, grid: Grid) -> None:
     """The lines that replace a rapid."""
     region = choice.region
-    limits = motion_limits(machine, grid=grid)
+    limits = motion_limits(machine)
     # Ends of blocks are rounded, and F is rounded up: at the clamp itself a block would last a tick too long.
     margin_mm_per_s = 2.0 * least_increment_mm(machine, region.exit.units) / grid.block_period_s
     limits.max_feed_mm_per_s = np.maximum(limits.max_feed_mm_per_s - margin_mm_per_s, margin_mm_per_s)
     limits.feed_override = max(0.5, 1.0 - margin_mm_per_s / region.path[0].feed_mm_per_s)
-    choice.shaped = emit_region(emitted, region, machine, grid, limits)
+    choice.shaped = emit_region(emitted, region, machine, grid, limits, filter_tolerance(machine, grid))
     lines = [choice.rapid.head] if choice.rapid.head else []
     # In G95 a dwell may count revolutions.
     lines += ["G94", _STOP] if region.entry.feed_mode != 94 else [_STOP]

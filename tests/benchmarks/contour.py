@@ -28,7 +28,7 @@ import shapegcode as sg
 from acceptance import machine_with
 from shapegcode import _core
 from shapegcode.block_grid import Grid, choose_grid
-from shapegcode.emit import motion_limits, shaping_options
+from shapegcode.emit import filter_tolerance, motion_limits, shaping_options
 
 Vector = npt.NDArray[np.float64]
 
@@ -101,8 +101,8 @@ def _region_rows(repetitions: int) -> list[list[str]]:
             machine = machine_with({"controller.block_time_s": period_s, "shaping.contour": target})
             grid = choose_grid(machine, period_s)
             path = sg.Program.from_text(arcs_and_corners().encode(), machine, source="path").regions[0].path
-            limits = motion_limits(machine, grid=grid, contour_tolerance_um=machine.tolerance.contour_um)
-            options = shaping_options(machine, grid, limits)
+            tolerance = filter_tolerance(machine, grid, machine.tolerance.contour_um)
+            options = shaping_options(machine, grid, motion_limits(machine), tolerance)
 
             def shape(path: Any = path, grid: Grid = grid, options: Any = options) -> int:
                 piece = _core.RegionShaper(path, grid.fir, [], options).next(10**7)

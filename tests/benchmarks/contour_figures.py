@@ -25,7 +25,7 @@ from judge.plant import contour_error_um
 from shapegcode import _core
 from shapegcode.block_grid import choose_grid
 from shapegcode.demos import path_program
-from shapegcode.emit import motion_limits, shaping_options
+from shapegcode.emit import filter_tolerance, motion_limits, shaping_options
 
 Vector = npt.NDArray[np.float64]
 
@@ -205,8 +205,8 @@ def exact(target: str, smoothness: float, block_period_s: float) -> tuple[float,
     """
     machine = machine_with({"shaping.contour": target, "controller.block_time_s": block_period_s})
     grid = choose_grid(machine, block_period_s)
-    limits = motion_limits(machine, arc_feed_ratio=ARC_FEED_RATIO, grid=grid, contour_tolerance_um=1e6)
-    options = shaping_options(machine, grid, limits)
+    limits = motion_limits(machine, arc_feed_ratio=ARC_FEED_RATIO)
+    options = shaping_options(machine, grid, limits, filter_tolerance(machine, grid, 1e6))
     options.contour_smoothness = smoothness
     shaper = _core.RegionShaper(path_program(200.0, machine).regions[-1].path, grid.fir, [], options)
     piece = shaper.next(10**7)

@@ -27,7 +27,7 @@ import shapegcode as sg
 from shapegcode import _core
 from shapegcode.controller import controller_model
 from shapegcode.converter import choose_grid
-from shapegcode.emit import emit_region, motion_limits
+from shapegcode.emit import emit_region, filter_tolerance, motion_limits
 
 _MEGA = 1e6
 _FIR_SAMPLES = 1_000_000
@@ -90,7 +90,8 @@ def _program_rows(folder: Path, program: Path, lines: int, repetitions: int) -> 
 
     machine = sg.Machine.load("vx500")
     grid = choose_grid(machine)
-    limits = motion_limits(machine, grid=grid, contour_tolerance_um=machine.tolerance.contour_um)
+    limits = motion_limits(machine)
+    tolerance = filter_tolerance(machine, grid, machine.tolerance.contour_um)
     reading, look_ahead, shaping, emission = [], [], [], []
     peers, conversions = [], []
     for repetition in range(repetitions):
@@ -101,9 +102,11 @@ def _program_rows(folder: Path, program: Path, lines: int, repetitions: int) -> 
         reading.append(read_s)
         (region,) = read.regions
         path = region.path
-        look_ahead.append(_timed(lambda path=path: _core.plan_speed(path, limits))[0])
+        look_ahead.append(_timed(lambda path=path: _core.plan_speed(path, limits, tolerance))[0])
         with _time_inside(_core, "fit_blocks", "write_blocks") as inside:
-            shaping.append(_timed(lambda read=read, region=region: emit_region(read, region, machine, grid, limits))[0])
+            shaping.append(
+                _timed(lambda read=read, region=region: emit_region(read, region, machine, grid, limits, tolerance))[0]
+            )
         emission.append(sum(inside))
         del read, region, path
 

@@ -334,3 +334,20 @@ TEST_CASE("side of a deviation: vertical ones are neither left nor right") {
   plunge.step({0.0, 0.0, -0.03});
   CHECK(plunge.side() == PathSide::below);
 }
+
+TEST_CASE("contour tracker: many short pieces within a step are the one line that they make") {
+  // 40 000 pieces of 1 um and one line, the samples 0.3 mm apart and far beside; then back, and onto a copy far ahead.
+  std::vector<Segment> pieces;
+  for (int i = 0; i < 40'000; ++i) pieces.push_back(make_line({i * 1e-3, 0, 0}, {(i + 1) * 1e-3, 0, 0}, 10.0));
+  const Path fine(pieces);
+  const Path coarse({make_line({0, 0, 0}, {40, 0, 0}, 10.0)});
+  ContourTracker many(fine);
+  ContourTracker one(coarse);
+  for (int i = 0; i < 230; ++i) {
+    const double x = i < 120 ? 0.3 * i : 0.3 * (240 - i);
+    const Vector3 p(x, 0.05 * std::sin(0.7 * i) + (i % 50 == 7 ? 3.0 : 0.0), i % 60 == 11 ? -1.0 : 0.0);
+    const double deviation = many.step(p);
+    CHECK(deviation == doctest::Approx(one.step(p)).epsilon(1e-9));
+    CHECK(std::abs(many.s_mm() - one.s_mm()) < 1e-9);
+  }
+}

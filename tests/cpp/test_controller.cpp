@@ -54,9 +54,9 @@ TEST_CASE("controller: override and largest feeds of the axes") {
 TEST_CASE("controller: a filter or rapid of more periods than can be counted is refused, unchecked models too") {
   ControllerModel model;
   model.look_ahead_filter_time_constant_s = 1e20;
-  CHECK_THROWS_WITH_AS(static_cast<void>(acceleration_filters(model)), "a filter takes 1e+23 periods, at most 10000000 are possible",
-                       Error);
+  CHECK_THROWS_WITH_AS(static_cast<void>(acceleration_filters(model)),
+                       "a filter takes 1e+23 periods, at most 10000000 are possible", Error);
   model.rapid_bell_time_s = 1e20;
-  CHECK_THROWS_WITH_AS(static_cast<void>(rapid_shape({1.0, 0.0, 0.0}, model)), "rapid takes 1e+23 periods, at most 100000000 are possible",
-                       Error);
+  CHECK_THROWS_WITH_AS(static_cast<void>(rapid_shape({1.0, 0.0, 0.0}, model)),
+                       "rapid takes 1e+23 periods, at most 100000000 are possible", Error);
 }

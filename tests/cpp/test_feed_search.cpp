@@ -65,7 +65,7 @@ ShapingOptions options_for(ContourTarget target, double tolerance_mm) {
   options.target = target;
   options.modes[0] = {both[0]};
   options.modes[1] = {both[1]};
-  options.limits.contour_tolerance_mm = tolerance_mm;
+  options.tolerance.contour_tolerance_mm = tolerance_mm;
   options.limits.max_acceleration_mm_per_s2 = Vector3::Constant(4000.0);
   return options;
 }
@@ -104,13 +104,13 @@ TEST_CASE("speed caps: a plan keeps them, at junctions and on segments, and noth
   const float none = std::numeric_limits<float>::infinity();
   SpeedCaps caps{std::vector<float>(path->size(), none), std::vector<float>(path->size(), none)};
   const SpeedProfile plain = plan_speed(*path, limits);
-  CHECK(plan_speed(*path, limits, &caps).duration_s() == plain.duration_s());
+  CHECK(plan_speed(*path, limits, {}, &caps).duration_s() == plain.duration_s());
   caps.on_segment[6] = 40.0F;
   caps.at_junction[2] = 25.0F;
   caps.at_junction[5] = 0.75F;
   for (const auto law : {shapegcode::AccelerationLaw::constant_time, shapegcode::AccelerationLaw::jerk_limited}) {
     limits.law = law;
-    const SpeedProfile capped = plan_speed(*path, limits, &caps);
+    const SpeedProfile capped = plan_speed(*path, limits, {}, &caps);
     CHECK(capped.duration_s() > plan_speed(*path, limits).duration_s());
     double distance = 0.0;
     double fastest = 0.0;
@@ -136,7 +136,7 @@ TEST_CASE("speed caps: a plan keeps them, at junctions and on segments, and noth
     CHECK(fastest == doctest::Approx(100.0));
   }
   caps.at_junction.pop_back();
-  CHECK_THROWS_AS((void)plan_speed(*path, limits, &caps), Error);
+  CHECK_THROWS_AS((void)plan_speed(*path, limits, {}, &caps), Error);
 }
 
 TEST_CASE("feed search: the tolerance is kept, and a tighter one takes longer") {
@@ -177,9 +177,7 @@ TEST_CASE("feed search: only what leaves the tolerance is slowed") {
   const ShapingOptions options = options_for(ContourTarget::command, 0.003);
   const std::vector<Fir> shaper{grid_shaper()};
   const RunFilter filter(shaper, options.target, options.modes, block_s, 1.0);
-  MotionLimits limits = options.limits;
-  limits.contour_tolerance_mm = MotionLimits::none;
-  const PlannedRun plan = plan_within_tolerance(path, limits, filter, 5, 0.003);
+  const PlannedRun plan = plan_within_tolerance(path, options.limits, filter, 5, 0.003);
   REQUIRE(plan.stops.empty());
   CHECK(plan.largest_deviation_mm <= 0.003);
   CHECK(plan.largest_deviation_mm > 0.003 * 0.8);  // the highest speed, not just some

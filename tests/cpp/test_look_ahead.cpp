@@ -14,6 +14,7 @@
 using shapegcode::AccelerationLaw;
 using shapegcode::corner_speed_limit;
 using shapegcode::Error;
+using shapegcode::FilterTolerance;
 using shapegcode::forced_stops;
 using shapegcode::make_arc;
 using shapegcode::make_line;
@@ -178,10 +179,10 @@ TEST_CASE("look-ahead: an arc's feed ratio and centripetal limit") {
   CHECK(segment_speed_limit(make_line({0, 0, 0}, {1, 0, 0}, 200.0), limits) == doctest::Approx(200.0));
   limits.centripetal_acceleration_mm_per_s2 = 500.0;  // sqrt(500*20)
   CHECK(segment_speed_limit(arc, limits) == doctest::Approx(100.0));
-  MotionLimits contour;
+  FilterTolerance contour;
   contour.contour_tolerance_mm = 0.001;
-  contour.filter_variance_s2 = 1e-4;  // R*sigma^2*(v/R)^2/2 = tolerance: v = sqrt(2*.001*20/1e-4) = 20
-  CHECK(segment_speed_limit(arc, contour) == doctest::Approx(20.0));
+  contour.variance_s2 = 1e-4;  // R*sigma^2*(v/R)^2/2 = tolerance: v = sqrt(2*.001*20/1e-4) = 20
+  CHECK(segment_speed_limit(arc, MotionLimits{}, contour) == doctest::Approx(20.0));
 }
 
 TEST_CASE("look-ahead: speed difference at corners of 90, 180 and 0 degrees") {
@@ -222,10 +223,8 @@ TEST_CASE("look-ahead: the corner limit of the contour tolerance holds behind a 
   // no more than the tolerance, ramps on both sides included.
   constexpr double period = 1e-4;
   constexpr int d = 40;
-  MotionLimits limits = accelerating(1500.0);
-  limits.contour_tolerance_mm = 0.02;
-  limits.filter_mean_deviation_s = d * period;
-  limits.filter_variance_s2 = d * period * d * period;
+  const MotionLimits limits = accelerating(1500.0);
+  const FilterTolerance filter{0.02, 1.0, d * period * d * period, d * period};
   for (const double angle : {pi / 2, pi / 4, 2.0}) {
     const Vector3 turned(std::cos(angle), std::sin(angle), 0.0);
     const auto path = std::make_shared<const Path>(
@@ -233,9 +232,9 @@ TEST_CASE("look-ahead: the corner limit of the contour tolerance holds behind a 
     // The speed by hand: |change|*(v*d + a*d^2/2)/2 = tolerance.
     const double change = 2.0 * std::sin(angle / 2.0);
     const double acceleration = 1500.0 / std::max(std::abs(turned.x()), std::abs(turned.y()));  // the larger side's
-    const double by_hand = (2.0 * 0.02 / change - 0.5 * acceleration * limits.filter_variance_s2) / (d * period);
-    CHECK(corner_speed_limit((*path)[0], (*path)[1], limits) == doctest::Approx(by_hand).epsilon(1e-3));
-    const auto profile = std::make_shared<const SpeedProfile>(plan_speed(*path, limits));
+    const double by_hand = (2.0 * 0.02 / change - 0.5 * acceleration * filter.variance_s2) / (d * period);
+    CHECK(corner_speed_limit((*path)[0], (*path)[1], limits, filter) == doctest::Approx(by_hand).epsilon(1e-3));
+    const auto profile = std::make_shared<const SpeedProfile>(plan_speed(*path, limits, filter));
     const auto filtered =
         shapegcode::Fir({0, 2 * d}, {0.5, 0.5}).apply(shapegcode::interpolate(path, profile, period)).positions_mm;
     double worst = 0.0;
@@ -361,13 +360,11 @@ TEST_CASE("look-ahead: forced stops at plunges, retracts and exact stops") {
             .empty());
   CHECK(forced_stops({}, lean, corner, MotionLimits{}).empty());
   // A filter of 10 ms spread cuts a right angle by sqrt(2)*a*(10 ms)^2/4 = 0.035 mm even if the speed is zero there.
-  MotionLimits limits = accelerating(1000.0);
-  limits.filter_mean_deviation_s = 0.01;
-  limits.filter_variance_s2 = 1e-4;
+  const MotionLimits limits = accelerating(1000.0);
+  FilterTolerance filter{0.035, 1.0, 1e-4, 0.01};
   const std::vector<Segment> right_angle = {make_line({0, 0, 0}, {50, 0, 0}, 100.0),
                                             make_line({50, 0, 0}, {50, 50, 0}, 100.0)};
-  limits.contour_tolerance_mm = 0.035;
-  CHECK(forced_stops(right_angle, lean, corner, limits) == std::vector<std::size_t>{1});
-  limits.contour_tolerance_mm = 0.036;
-  CHECK(forced_stops(right_angle, lean, corner, limits).empty());
+  CHECK(forced_stops(right_angle, lean, corner, limits, filter) == std::vector<std::size_t>{1});
+  filter.contour_tolerance_mm = 0.036;
+  CHECK(forced_stops(right_angle, lean, corner, limits, filter).empty());
 }

@@ -140,7 +140,7 @@ ShapingOptions region_options(ContourTarget target, double tolerance_mm) {
   options.interpolation_period_s = 0.001;
   options.target = target;
   options.modes = modes();
-  options.limits.contour_tolerance_mm = tolerance_mm;
+  options.tolerance.contour_tolerance_mm = tolerance_mm;
   return options;
 }
 

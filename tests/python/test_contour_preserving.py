@@ -21,7 +21,7 @@ import shapegcode as sg
 from acceptance import BLOCK_ENDS, machine_with
 from shapegcode import _core
 from shapegcode.block_grid import choose_grid
-from shapegcode.emit import motion_limits, shaping_options
+from shapegcode.emit import filter_tolerance, motion_limits, shaping_options
 
 
 def target_um(target: str, found: Figures) -> float:
@@ -109,8 +109,9 @@ def test_the_feed_on_a_binding_arc_is_the_highest() -> None:
     program = sg.Program.from_text(text.encode(), machine, source="arc")
     deviations = []
     for tolerance_um in (3.0, 1e6):
-        limits = motion_limits(machine, grid=grid, contour_tolerance_um=tolerance_um)
-        shaper = _core.RegionShaper(program.regions[0].path, grid.fir, [], shaping_options(machine, grid, limits))
+        tolerance = filter_tolerance(machine, grid, tolerance_um)
+        options = shaping_options(machine, grid, motion_limits(machine), tolerance)
+        shaper = _core.RegionShaper(program.regions[0].path, grid.fir, [], options)
         assert shaper.next(10**6) is not None
         deviations.append(shaper.largest_deviation_mm * 1e3)
     assert 0.85 * 3.0 <= deviations[0] <= 3.0
@@ -131,10 +132,11 @@ def test_off_is_the_plain_shaper() -> None:
     machine = machine_with({"shaping.contour": "off"})
     grid = choose_grid(machine, 0.005)
     program = sg.Program.from_text(paper_text().encode(), machine, source="paper")
-    limits = motion_limits(machine, arc_feed_ratio=0.99, grid=grid, contour_tolerance_um=1e6)
+    limits = motion_limits(machine, arc_feed_ratio=0.99)
+    tolerance = filter_tolerance(machine, grid, 1e6)
     path = program.regions[-1].path
-    piece = _core.RegionShaper(path, grid.fir, [], shaping_options(machine, grid, limits)).next(10**6)
+    piece = _core.RegionShaper(path, grid.fir, [], shaping_options(machine, grid, limits, tolerance)).next(10**6)
     assert piece is not None
-    raw = np.asarray(_core.interpolate(path, _core.plan_speed(path, limits), 0.005))
+    raw = np.asarray(_core.interpolate(path, _core.plan_speed(path, limits, tolerance), 0.005))
     expected = np.asarray(grid.fir.apply(np.asfortranarray(raw)))
     assert np.abs(np.asarray(piece.grid_mm)[: len(expected)] - expected).max() < 1e-9

@@ -274,7 +274,7 @@ def test_refusals() -> None:
         ({"tool_diameter_mm": 2e3}, "tool diameter is 2000 mm, must be at most 1000 mm"),
         ({"station_spacing_mm": 1e-4}, "station spacing is 0.0001 mm, must be at least 0.001 mm"),
         ({"station_spacing_mm": math.nan}, "station spacing is nan mm"),
-        ({"band_um": 0.0}, "band 0 mm must be > 0"),
+        ({"band_um": 0.0}, "band is 0 mm, must be finite and above 0"),
         ({"cutoff_mm": -1.0}, "cut-off is -1 mm"),
         ({"against": other}, "no cut from X0.000 Y0.000 Z0.000 to X30.000"),
         ({"lines": [(9, 8)]}, "first must not be behind the last"),

@@ -8,7 +8,7 @@ import pytest
 import shapegcode as sg
 from shapegcode import _core
 from shapegcode.block_grid import choose_grid, make_grid
-from shapegcode.emit import motion_limits, shaping_options
+from shapegcode.emit import filter_tolerance, motion_limits, shaping_options
 from shapegcode.moving_modes import region_offset
 from shapegcode.program import Program
 from shapegcode.simulator import simulate
@@ -40,7 +40,8 @@ def fine_machine(contour: str = "off") -> sg.Machine:
 
 def command(path: _core.Path, grid: object, machine: sg.Machine, offset: tuple[float | None, ...]) -> np.ndarray:
     """The shaped command of a region, borders and middles in turn."""
-    options = shaping_options(machine, grid, motion_limits(machine, grid=grid, contour_tolerance_um=1e6), offset)  # type: ignore[arg-type]
+    tolerance = filter_tolerance(machine, grid, 1e6)  # type: ignore[arg-type]
+    options = shaping_options(machine, grid, motion_limits(machine), tolerance, offset)  # type: ignore[arg-type]
     piece = _core.RegionShaper(path, grid.fir, [], options).next(1 << 30)  # type: ignore[attr-defined]
     assert piece is not None
     rows = np.empty((len(piece.grid_mm) + len(piece.middle_mm), 3))
@@ -56,8 +57,7 @@ def test_the_shaped_command_is_the_followed_one() -> None:
     assert grid.track is not None
     alone = make_grid(grid.block_period_s, _core.Shaper([0.0], [1.0]))
     offset = region_offset(region, machine)
-    limits = motion_limits(machine, grid=grid, contour_tolerance_um=1e6)
-    options = shaping_options(machine, alone, limits, offset)
+    options = shaping_options(machine, alone, motion_limits(machine), filter_tolerance(machine, grid, 1e6), offset)
     bare = _core.RegionShaper(region.path, alone.fir, [], options).next(1 << 30)
     assert bare is not None
     before = np.empty((len(bare.grid_mm) + len(bare.middle_mm), 3))
@@ -92,7 +92,8 @@ def test_an_unknown_position_is_shaped_for_the_nominal_frequency() -> None:
     machine = fine_machine()
     program = Program.from_text(HEAD.encode() + b"G00 X0 Y0\nG01 X30. F6000\nX0\nX30.\nM30\n%\n", machine)
     grid = choose_grid(machine)
-    options = shaping_options(machine, grid, motion_limits(machine), region_offset(program.regions[0], machine))
+    offset = region_offset(program.regions[0], machine)
+    options = shaping_options(machine, grid, motion_limits(machine), _core.FilterTolerance(), offset)
     assert options.following is None
     report = sg.convert(program, machine).report
     assert any("position of Z is not known" in warning for warning in report["warnings"])

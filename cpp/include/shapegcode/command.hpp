@@ -76,13 +76,14 @@ class ContourSolver {
 /// How a region is turned into a shaped command on the block grid.
 struct ShapingOptions {
   MotionLimits limits;
+  FilterTolerance tolerance;  ///< of the shaper with what follows it
   double block_period_s = 0.005;
   double interpolation_period_s = 0.001;
   double plunge_axis_angle_rad = 0.26;  ///< see forced_stops
   double plunge_corner_angle_rad = 0.78;
   double rest_at_stop_s = 0.0;  ///< pause at a forced stop, so that a filter behind the program runs out
-  /// What is brought back to the path behind the shaper. With a target, `limits.contour_tolerance_mm` is its
-  /// tolerance, kept by the highest feed that does; without one, `limits` holds the bounds that plain shaping needs.
+  /// What is brought back to the path behind the shaper. With a target, `tolerance.contour_tolerance_mm` is kept by the
+  /// highest feed that does; without one, `tolerance` bounds the speed at corners and on arcs.
   ContourTarget target = ContourTarget::none;
   AxisModes modes;  ///< of the response; nothing else is done with them
   /// One shaper for each of X, Y and Z (taps in whole block periods, of one mean delay) in place of the common one;

@@ -35,11 +35,14 @@ struct MotionLimits {
   Vector3 contour_acceleration_mm_per_s2 = Vector3::Constant(none);    ///< per axis, of a change of direction (1737)
   double feed_override = 1.0;                                          ///< scales the programmed feeds
   double arc_feed_ratio = 1.0;                                         ///< feed on arcs relative to the programmed feed
-  /// Deviation that a filter with the spread below may cause at corners and on arcs.
-  double contour_tolerance_mm = none;
-  double corner_share = 1.0;        ///< of it for one corner: several may fall into one filter, and then they add up
-  double filter_variance_s2 = 0.0;  ///< second central moment of the filter that follows
-  double filter_mean_deviation_s = 0.0;  ///< its mean absolute deviation from the mean delay
+};
+
+/// Within what a filter behind the interpolation must stay at corners and on arcs. Without spread it limits nothing.
+struct FilterTolerance {
+  double contour_tolerance_mm = MotionLimits::none;  ///< deviation that the filter may cause
+  double corner_share = 1.0;      ///< of it for one corner: several may fall into one filter, and then they add up
+  double variance_s2 = 0.0;       ///< second central moment of the filter
+  double mean_deviation_s = 0.0;  ///< its mean absolute deviation from the mean delay
 };
 
 /// One stretch of constant tangential acceleration.
@@ -89,7 +92,7 @@ struct SpeedCaps {
 
 /// Tangential speed profile over a whole path from rest to rest: every segment at most at its feed, every limit kept,
 /// deceleration ended where a slower segment begins. O(n). Throws Error(argument) on a limit that is not positive
-/// or a segment without feed, or caps that are not one per segment.
+/// or a segment without feed, or caps that are not one per segment. `filter`: what follows, and its tolerance.
 ///
 /// Forward and backward passes over the segments' boundary speeds (the planner of grbl and of LinuxCNC, in v^2); then,
 /// under the constant-time law, ramps are stretched to the time constant where a neighbouring steady stretch leaves
@@ -98,24 +101,27 @@ struct SpeedCaps {
 ///
 /// Behind a jerk time the acceleration of an axis may exceed its limit where segments of different direction meet at
 /// speed (there the corner limits bound what happens), and jerk on arcs is not bounded.
-[[nodiscard]] SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const SpeedCaps* caps = nullptr);
+[[nodiscard]] SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const FilterTolerance& filter = {},
+                                      const SpeedCaps* caps = nullptr);
 
 /// Highest speed at which no axis of a segment is above its largest feed.
 [[nodiscard]] double axis_feed_limit(const Segment& segment, const MotionLimits& limits) noexcept;
 
-/// Highest speed at which segment `i` may be run under the limits.
-[[nodiscard]] double segment_speed_limit(const Segment& segment, const MotionLimits& limits) noexcept;
+/// Highest speed at which a segment may be run under the limits, with such a filter behind.
+[[nodiscard]] double segment_speed_limit(const Segment& segment, const MotionLimits& limits,
+                                         const FilterTolerance& filter = {}) noexcept;
 
 /// Highest speed at the junction of two segments.
-[[nodiscard]] double corner_speed_limit(const Segment& before, const Segment& after,
-                                        const MotionLimits& limits) noexcept;
+[[nodiscard]] double corner_speed_limit(const Segment& before, const Segment& after, const MotionLimits& limits,
+                                        const FilterTolerance& filter = {}) noexcept;
 
 /// Indices of segments before which the tool must come to rest: sharp corners between the tool axis and the plane
 /// across it (a plunge or retract), which a shaper must not mix; corners that the filter behind cannot pass within the
 /// contour tolerance at any speed; and exact stops. `axis_angle_rad`: how far a side may lean from the tool axis Z and
 /// still count as plunge; `corner_angle_rad`: least change of direction of such a corner.
 [[nodiscard]] std::vector<std::size_t> forced_stops(const std::vector<Segment>& segments, double axis_angle_rad,
-                                                    double corner_angle_rad, const MotionLimits& limits);
+                                                    double corner_angle_rad, const MotionLimits& limits,
+                                                    const FilterTolerance& filter = {});
 
 /// Set-points of a path under a speed profile, one per interpolation period, from the start (first step) to the end.
 /// `step` is the real-time form: no allocation, no exception, no lock, work bounded by the segments and phases that one

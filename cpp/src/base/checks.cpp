@@ -26,7 +26,7 @@ void require_not_below_zero(double value, std::string_view name, std::string_vie
 }
 
 void require_above_zero(double value, std::string_view name, std::string_view unit) {
-  require(std::isfinite(value) && value > 0.0, name, value, unit, "finite and > 0");
+  require(std::isfinite(value) && value > 0.0, name, value, unit, "finite and above 0");
 }
 
 void require_period(double period_s, std::string_view name) { require_above_zero(period_s, name, "s"); }

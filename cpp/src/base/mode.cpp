@@ -2,7 +2,8 @@
 
 #include <cmath>
 #include <numbers>
-#include <sstream>
+
+#include <fmt/format.h>
 
 #include "shapegcode/error.hpp"
 
@@ -10,15 +11,12 @@ namespace shapegcode {
 
 std::complex<double> pole(const Mode& mode) {
   if (!std::isfinite(mode.frequency_hz) || !(mode.frequency_hz > 0.0)) {
-    std::ostringstream message;
-    message << "mode frequency " << mode.frequency_hz << " Hz, must be finite and above 0";
-    throw Error(ErrorKind::argument, message.str());
+    throw Error(ErrorKind::argument,
+                fmt::format("mode frequency {} Hz, must be finite and above 0", mode.frequency_hz));
   }
   if (!(mode.damping_ratio >= 0.0 && mode.damping_ratio < 1.0)) {
-    std::ostringstream message;
-    message << "mode at " << mode.frequency_hz << " Hz has damping ratio " << mode.damping_ratio
-            << ", must be at least 0 and below 1";
-    throw Error(ErrorKind::argument, message.str());
+    throw Error(ErrorKind::argument, fmt::format("mode at {} Hz has damping ratio {}, must be at least 0 and below 1",
+                                                 mode.frequency_hz, mode.damping_ratio));
   }
   const double omega = 2.0 * std::numbers::pi * mode.frequency_hz;
   const double zeta = mode.damping_ratio;

@@ -79,7 +79,7 @@ class FeedSearch {
 
  private:
   PlannedRun measured() {
-    PlannedRun plan{path_, std::make_shared<const SpeedProfile>(plan_speed(*path_, limits_, &caps_)), 0.0, {}};
+    PlannedRun plan{path_, std::make_shared<const SpeedProfile>(plan_speed(*path_, limits_, {}, &caps_)), 0.0, {}};
     deviation_.at_junction.assign(path_->size(), 0.0F);
     deviation_.on_segment.assign(path_->size(), -1.0F);
     deviation_.near_corner.assign(path_->size(), 0.0F);

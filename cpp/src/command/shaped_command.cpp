@@ -90,10 +90,10 @@ RegionShaper::State::State(std::shared_ptr<const Path> path, const Fir& shaper,
   const auto whole = static_cast<std::size_t>(std::lround(ticks));
   steps_per_half_ = whole % 2 == 0 ? whole / 2 : whole;
   rest_periods_ = static_cast<std::uint32_t>(std::ceil(options_.rest_at_stop_s / options_.block_period_s - 1e-9));
-  const MotionLimits& limits =
-      options_.target == ContourTarget::none ? options_.limits : without_tolerance(options_.limits);
-  std::vector<std::size_t> borders =
-      forced_stops(path_->segments(), options_.plunge_axis_angle_rad, options_.plunge_corner_angle_rad, limits);
+  // With a target the search for the highest feed keeps the tolerance.
+  const FilterTolerance filter = options_.target == ContourTarget::none ? options_.tolerance : FilterTolerance{};
+  std::vector<std::size_t> borders = forced_stops(path_->segments(), options_.plunge_axis_angle_rad,
+                                                  options_.plunge_corner_angle_rad, options_.limits, filter);
   borders.push_back(path_->size());
   std::size_t first = 0;
   for (const std::size_t border : borders) {
@@ -114,11 +114,12 @@ bool RegionShaper::State::begin_run() {
     pieces_.pop_back();
     const auto part = sub_path(path_, now_.first, now_.last);
     if (options_.target == ContourTarget::none) {
-      plan = {part, std::make_shared<const SpeedProfile>(plan_speed(*part, options_.limits)), 0.0, {}};
+      plan = {
+          part, std::make_shared<const SpeedProfile>(plan_speed(*part, options_.limits, options_.tolerance)), 0.0, {}};
       break;
     }
-    plan = plan_within_tolerance(part, options_.limits, filter_, steps_per_half_, options_.limits.contour_tolerance_mm,
-                                 options_.least_feed_mm_per_s);
+    plan = plan_within_tolerance(part, options_.limits, filter_, steps_per_half_,
+                                 options_.tolerance.contour_tolerance_mm, options_.least_feed_mm_per_s);
     if (plan.stops.empty()) {
       break;
     }

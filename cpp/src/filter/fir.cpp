@@ -56,10 +56,15 @@ struct RunningSum {
 
 /// Geometric weights in O(1): `lag` is sum over the n taps q^j (x[i-j] - x[i]), the filtered value newest + lag / G
 /// with G = sum q^j. Held as a difference, it is exactly zero at rest, and its rounding dies out with q.
-inline double lag_behind(double lag, double newest, double previous, double leaving, double decay,
-                         double leaving_weight, double weight_sum) noexcept {
-  return decay * lag - (weight_sum - 1.0) * (newest - previous) + leaving_weight * (previous - leaving);
-}
+struct GeometricWeights {
+  double decay;    // q
+  double leaving;  // q^n
+  double sum;      // G
+
+  [[nodiscard]] double lag_behind(double lag, double newest, double previous, double oldest) const noexcept {
+    return decay * lag - (sum - 1.0) * (newest - previous) + leaving * (previous - oldest);
+  }
+};
 
 /// out[i] (+)= sum of taps[k] * in[i - delays[k]], left to right, for begin <= i < end. One store per output.
 template <int n_taps, bool accumulate>
@@ -110,10 +115,14 @@ void weigh_interior(const double* in, const std::vector<int>& delays, const std:
   }
 }
 
+struct Range {
+  Index begin, end;
+};
+
 /// Samples near the ends, where the input is held.
 void weigh_boundary(const double* in, Index rows, const std::vector<int>& delays, const std::vector<double>& taps,
-                    double* out, Index begin, Index end) {
-  for (Index i = begin; i < end; ++i) {
+                    double* out, Range range) {
+  for (Index i = range.begin; i < range.end; ++i) {
     const auto delayed = [&](std::size_t k) { return in[std::clamp<Index>(i - delays[k], 0, rows - 1)]; };
     double sum = taps[0] * delayed(0);
     for (std::size_t k = 1; k < taps.size(); ++k) sum += taps[k] * delayed(k);
@@ -125,9 +134,9 @@ void weigh_column(const double* in, Index rows, const std::vector<int>& delays, 
                   double* out) {
   const Index duration = delays.back();
   const Index interior_begin = std::min(duration, rows);
-  weigh_boundary(in, rows, delays, taps, out, 0, interior_begin);
+  weigh_boundary(in, rows, delays, taps, out, {0, interior_begin});
   weigh_interior(in, delays, taps, out, interior_begin, rows);
-  weigh_boundary(in, rows, delays, taps, out, rows, rows + duration);
+  weigh_boundary(in, rows, delays, taps, out, {rows, rows + duration});
 }
 
 /// Row-major samples: all axes together are one series whose delays are n_axes times as long.
@@ -182,15 +191,13 @@ void average_column(const double* in, Index rows, Index length, double* out) {
   }
 }
 
-void decay_column(const double* in, Index rows, Index length, double decay, double leaving_weight, double weight_sum,
-                  double* out) {
+void decay_column(const double* in, Index rows, Index length, const GeometricWeights& weights, double* out) {
   double lag = 0.0;
   double previous = in[0];
   for (Index i = 0; i < rows + length - 1; ++i) {
     const double newest = in[std::min(i, rows - 1)];
-    lag = lag_behind(lag, newest, previous, in[std::clamp<Index>(i - length, 0, rows - 1)], decay, leaving_weight,
-                     weight_sum);
-    out[i] = newest + lag / weight_sum;
+    lag = weights.lag_behind(lag, newest, previous, in[std::clamp<Index>(i - length, 0, rows - 1)]);
+    out[i] = newest + lag / weights.sum;
     if ((i + 1) % rows_between_looks == 0) lag = state_or_none(lag);
     previous = newest;
   }
@@ -349,7 +356,7 @@ void Fir::apply(const double* in, Index in_rows, int n_axes, double* out) const 
     if (moving_average_) {
       average_column(column_in, in_rows, duration_samples() + 1, column_out);
     } else if (decay_ > 0.0) {
-      decay_column(column_in, in_rows, duration_samples() + 1, decay_, leaving_, weight_sum_, column_out);
+      decay_column(column_in, in_rows, duration_samples() + 1, {decay_, leaving_, weight_sum_}, column_out);
     } else {
       weigh_column(column_in, in_rows, delays_, taps_, column_out);
     }
@@ -405,9 +412,9 @@ void FirStream::step(std::span<const double> in, std::span<double> out) noexcept
     const auto length = static_cast<std::size_t>(fir_.duration_samples()) + 1;
     const double* const previous = &ring_[((row_ - 1) & row_mask_) * axes];
     const double* const leaving = &ring_[((row_ - length) & row_mask_) * axes];
+    const GeometricWeights weights{fir_.decay_, fir_.leaving_, fir_.weight_sum_};
     for (std::size_t axis = 0; axis < axes; ++axis) {
-      sum_[axis] = lag_behind(sum_[axis], newest[axis], previous[axis], leaving[axis], fir_.decay_, fir_.leaving_,
-                              fir_.weight_sum_);
+      sum_[axis] = weights.lag_behind(sum_[axis], newest[axis], previous[axis], leaving[axis]);
       out[axis] = newest[axis] + sum_[axis] / fir_.weight_sum_;
       if ((row_ + 1) % static_cast<std::size_t>(rows_between_looks) == 0) sum_[axis] = state_or_none(sum_[axis]);
     }

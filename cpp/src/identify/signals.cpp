@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "base/checks.hpp"
 #include "base/refuse.hpp"
 
 namespace shapegcode {
@@ -47,10 +48,6 @@ void check_finite(std::span<const double> values, const char* what) {
   if (bad != values.end()) refuse("{} is not finite at entry {}", what, bad - values.begin());
 }
 
-void check_period(double period_s) {
-  if (!(period_s > 0.0) || !std::isfinite(period_s)) {
-    refuse("time between samples is {} s, must be finite and above 0", period_s);
-  }
-}
+void check_period(double period_s) { require_period(period_s, "time between samples"); }
 
 }  // namespace shapegcode

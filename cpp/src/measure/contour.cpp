@@ -27,6 +27,10 @@ constexpr double retreat_tie_absolute_mm2 = 1e-16;
 constexpr double negligible_share = 1e-6;
 constexpr std::uint32_t growing_until_lost = 8;
 constexpr double widest_local_window_rad = 1.0;
+// Pieces that lie further away than the best foot are passed in groups.
+constexpr std::size_t group_size = 16;
+constexpr double group_slack = 1e-6;
+constexpr double group_slack_mm = 1e-6;
 
 }  // namespace
 
@@ -203,6 +207,33 @@ ContourTracker::Foot ContourTracker::foot_on_arc(std::size_t piece, const Vector
   return foot;
 }
 
+bool ContourTracker::is_beyond(std::size_t first, std::size_t size, const Vector3& p, double limit2) const noexcept {
+  const std::vector<Piece>& pieces = geometry_->pieces;
+  const double length = pieces[first + size].s - pieces[first].s;
+  const double nearest = (p - pieces[first].start).norm() - length * (1.0 + group_slack) - group_slack_mm;
+  return nearest > 0.0 && nearest * nearest >= limit2;
+}
+
+std::size_t ContourTracker::group_from(std::size_t first, const Vector3& p, double limit2) const noexcept {
+  std::size_t passed = 0;
+  for (std::size_t size = group_size; first % size == 0 && first + size < geometry_->pieces.size();
+       size *= group_size) {
+    if (!is_beyond(first, size, p, limit2)) break;
+    passed = size;
+  }
+  return passed;
+}
+
+std::size_t ContourTracker::group_before(std::size_t end, const Vector3& p, double limit2) const noexcept {
+  std::size_t passed = 0;
+  for (std::size_t size = group_size; end % size == 0 && end >= size && end < geometry_->pieces.size();
+       size *= group_size) {
+    if (!is_beyond(end - size, size, p, limit2)) break;
+    passed = size;
+  }
+  return passed;
+}
+
 ContourTracker::Found ContourTracker::search(const Vector3& p, double move, const Window& window) const noexcept {
   Found best{foot_on(cursor_, p, window), cursor_, 0.0};
   const double advance = geometry_->pieces[cursor_].s + best.foot.along - s_;
@@ -217,17 +248,26 @@ ContourTracker::Found ContourTracker::search(const Vector3& p, double move, cons
     }
   }
   for (std::size_t i = cursor_ + 1; i < geometry_->pieces.size() && geometry_->pieces[i].s <= forward.end; ++i) {
-    const Foot foot = foot_on(i, p, forward);
     const double limit = retreats ? best.foot.distance2 * (1.0 + retreat_tie_relative) + retreat_tie_absolute_mm2
                                   : best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
+    if (const std::size_t passed = group_from(i, p, limit); passed > 0) {
+      i += passed - 1;
+      continue;
+    }
+    const Foot foot = foot_on(i, p, forward);
     if (foot.distance2 < limit) {
       best = {foot, i, 0.0};
       retreats = false;
     }
   }
   for (std::size_t i = cursor_; i-- > 0 && geometry_->pieces[i].s + geometry_->pieces[i].length >= window.begin;) {
+    const double limit = best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
+    if (const std::size_t passed = group_before(i + 1, p, limit); passed > 0) {
+      i -= passed - 1;
+      continue;
+    }
     const Foot foot = foot_on(i, p, window);
-    if (foot.distance2 < best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2) best = {foot, i, 0.0};
+    if (foot.distance2 < limit) best = {foot, i, 0.0};
   }
   best.s = geometry_->pieces[best.piece].s + best.foot.along;
   return best;

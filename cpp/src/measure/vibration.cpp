@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/checks.hpp"
 #include "base/refuse.hpp"
 
 namespace shapegcode {
@@ -25,9 +26,8 @@ double vertex(double before, double middle, double after) noexcept {
 }  // namespace
 
 VibrationWatch::VibrationWatch(double period_s, double band_mm) : period_(period_s), band_(band_mm) {
-  if (!(period_s > 0.0 && std::isfinite(period_s) && band_mm > 0.0 && std::isfinite(band_mm))) {
-    refuse("period {} s and band {} mm must be > 0", period_s, band_mm);
-  }
+  require_period(period_s);
+  require_above_zero(band_mm, "band", "mm");
 }
 
 bool VibrationWatch::moves(const Vector3& command) const noexcept {

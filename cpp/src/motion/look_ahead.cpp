@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "base/checks.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -18,9 +20,22 @@ struct Piece {
   double start_speed = 0.0;
 };
 
-void require_positive(double value, const char* name) {
-  if (!(value > 0.0)) {
-    throw Error(ErrorKind::argument, std::string(name) + " is " + std::to_string(value) + ", must be > 0");
+// Infinity switches a limit off.
+void require_limit(double value, const char* name, const char* unit) { require(value > 0.0, name, value, unit, "> 0"); }
+
+void check_limits(const MotionLimits& limits, const FilterTolerance& filter) {
+  require_limit(limits.time_constant_s, "acceleration time constant", "s");
+  require_limit(limits.feed_override, "feed override", "");
+  require_limit(limits.arc_feed_ratio, "arc feed ratio", "");
+  require_not_below_zero(limits.jerk_time_s, "jerk time", "s");
+  require_limit(filter.contour_tolerance_mm, "contour tolerance", "mm");
+  require_limit(limits.centripetal_acceleration_mm_per_s2, "centripetal acceleration", "mm/s2");
+  for (int i = 0; i < axis_count; ++i) {
+    require_limit(limits.max_feed_mm_per_s[i], "axis feed limit", "mm/s");
+    require_limit(limits.max_acceleration_mm_per_s2[i], "axis acceleration limit", "mm/s2");
+    require_limit(limits.max_jerk_mm_per_s3[i], "axis jerk limit", "mm/s3");
+    require_limit(limits.corner_speed_difference_mm_per_s[i], "corner speed difference", "mm/s");
+    require_limit(limits.contour_acceleration_mm_per_s2[i], "contour acceleration", "mm/s2");
   }
 }
 
@@ -85,15 +100,15 @@ double contour_speed(const Vector3& change, double reach, const MotionLimits& li
   return std::sqrt(tangential_limit(change.cwiseAbs(), limits.contour_acceleration_mm_per_s2) * reach);
 }
 
-double curvature_speed(double curvature_per_mm, const MotionLimits& limits, double centripetal,
+double curvature_speed(double curvature_per_mm, double centripetal, const FilterTolerance& filter,
                        double tolerance_mm) noexcept {
   if (curvature_per_mm <= 0.0) {
     return MotionLimits::none;
   }
   double speed = std::sqrt(centripetal / curvature_per_mm);
-  if (limits.filter_variance_s2 > 0.0) {
-    // Radial error on a circle: variance * v^2 * curvature / 2
-    speed = std::min(speed, std::sqrt(2.0 * tolerance_mm / (limits.filter_variance_s2 * curvature_per_mm)));
+  if (filter.variance_s2 > 0.0) {
+    // Radial error of a filter on an arc: variance * v^2 * curvature / 2.
+    speed = std::min(speed, std::sqrt(2.0 * tolerance_mm / (filter.variance_s2 * curvature_per_mm)));
   }
   return speed;
 }
@@ -171,6 +186,28 @@ std::vector<Piece> make_pieces(const Path& path, const MotionLimits& limits, con
     }
   }
   return pieces;
+}
+
+// Highest speeds where pieces meet. With a jerk time the corner limits are already limits of the pieces around the
+// corner.
+std::vector<double> piece_boundaries(const Path& path, const std::vector<Piece>& pieces,
+                                     const std::vector<double>& corner, double jerk_s) {
+  if (jerk_s <= 0.0) {
+    return corner;
+  }
+  std::vector<double> boundary(pieces.size() + 1, MotionLimits::none);
+  std::size_t k = 0;
+  double distance = 0.0;
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    while (k < pieces.size() && distance + 0.5 * pieces[k].length < path.distance_mm(i)) {
+      distance += pieces[k].length;
+      ++k;
+    }
+    if (k < pieces.size()) {
+      boundary[k] = std::min(boundary[k], corner[i]);
+    }
+  }
+  return boundary;
 }
 
 // Boundary speeds by a forward and a backward pass in v^2.
@@ -293,17 +330,18 @@ double axis_feed_limit(const Segment& segment, const MotionLimits& limits) noexc
   return tangential_limit(axis_share(segment), limits.max_feed_mm_per_s);
 }
 
-double segment_speed_limit(const Segment& segment, const MotionLimits& limits) noexcept {
+double segment_speed_limit(const Segment& segment, const MotionLimits& limits, const FilterTolerance& filter) noexcept {
   double speed = segment.feed_mm_per_s * limits.feed_override;
   if (segment.kind == SegmentKind::arc) {
     speed *= limits.arc_feed_ratio;
-    speed = std::min(speed, curvature_speed(curvature(segment), limits, arc_centripetal_limit(segment, limits),
-                                            limits.contour_tolerance_mm));
+    speed = std::min(speed, curvature_speed(curvature(segment), arc_centripetal_limit(segment, limits), filter,
+                                            filter.contour_tolerance_mm));
   }
   return std::min(speed, axis_feed_limit(segment, limits));
 }
 
-double corner_speed_limit(const Segment& before, const Segment& after, const MotionLimits& limits) noexcept {
+double corner_speed_limit(const Segment& before, const Segment& after, const MotionLimits& limits,
+                          const FilterTolerance& filter) noexcept {
   const Vector3 change = tangent_at(after, 0.0) - tangent_at(before, before.length_mm);
   const double size = change.norm();
   // A tangent junction to within what the least increment lets a program say (1 um over 1 mm).
@@ -312,42 +350,29 @@ double corner_speed_limit(const Segment& before, const Segment& after, const Mot
   }
   double speed = tangential_limit(change.cwiseAbs(), limits.corner_speed_difference_mm_per_s);
   const double angle = 2.0 * std::asin(std::min(1.0, 0.5 * size));
-  const double tolerance = limits.corner_share * limits.contour_tolerance_mm;
-  speed = std::min(speed, curvature_speed(polyline_curvature(before, after, angle), limits,
-                                          limits.centripetal_acceleration_mm_per_s2, tolerance));
+  const double tolerance = filter.corner_share * filter.contour_tolerance_mm;
+  speed = std::min(speed, curvature_speed(polyline_curvature(before, after, angle),
+                                          limits.centripetal_acceleration_mm_per_s2, filter, tolerance));
   speed = std::min(speed, contour_speed(change, polyline_reach(before, after), limits));
-  if (limits.filter_mean_deviation_s > 0.0) {
+  if (filter.mean_deviation_s > 0.0) {
     // A filter of symmetric spread passes the corner at |change| * (v*E|t| + a*E[t^2]/2) / 2: what the speed at the
     // corner and the ramps on both sides of it cost.
-    const double acceleration = std::max(segment_acceleration(before, segment_speed_limit(before, limits), limits),
-                                         segment_acceleration(after, segment_speed_limit(after, limits), limits));
-    const double ramps = std::isfinite(acceleration) ? 0.5 * acceleration * limits.filter_variance_s2 : 0.0;
+    const double acceleration =
+        std::max(segment_acceleration(before, segment_speed_limit(before, limits, filter), limits),
+                 segment_acceleration(after, segment_speed_limit(after, limits, filter), limits));
+    const double ramps = std::isfinite(acceleration) ? 0.5 * acceleration * filter.variance_s2 : 0.0;
     const double room = 2.0 * tolerance / size - ramps;
-    speed = std::min(speed, std::max(0.0, room / limits.filter_mean_deviation_s));
+    speed = std::min(speed, std::max(0.0, room / filter.mean_deviation_s));
   }
   return speed;
 }
 
-SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const SpeedCaps* caps) {
-  require_positive(limits.time_constant_s, "acceleration time constant (s)");
-  require_positive(limits.feed_override, "feed override");
-  require_positive(limits.arc_feed_ratio, "arc feed ratio");
-  if (!(limits.jerk_time_s >= 0.0) || !std::isfinite(limits.jerk_time_s)) {
-    throw Error(ErrorKind::argument,
-                "jerk time is " + std::to_string(limits.jerk_time_s) + " s, must be finite and >= 0");
-  }
-  require_positive(limits.contour_tolerance_mm, "contour tolerance (mm)");
-  require_positive(limits.centripetal_acceleration_mm_per_s2, "centripetal acceleration (mm/s2)");
-  for (int i = 0; i < axis_count; ++i) {
-    require_positive(limits.max_feed_mm_per_s[i], "axis feed limit (mm/s)");
-    require_positive(limits.max_acceleration_mm_per_s2[i], "axis acceleration limit (mm/s2)");
-    require_positive(limits.max_jerk_mm_per_s3[i], "axis jerk limit (mm/s3)");
-    require_positive(limits.corner_speed_difference_mm_per_s[i], "corner speed difference (mm/s)");
-    require_positive(limits.contour_acceleration_mm_per_s2[i], "contour acceleration (mm/s2)");
-  }
+SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const FilterTolerance& filter,
+                        const SpeedCaps* caps) {
+  check_limits(limits, filter);
   const std::size_t n = path.size();
   if (caps != nullptr && (caps->on_segment.size() != n || caps->at_junction.size() != n)) {
-    throw Error(ErrorKind::argument, "speed caps of a path of " + std::to_string(n) + " segments: one per segment");
+    throw Error(ErrorKind::argument, fmt::format("speed caps of a path of {} segments: one per segment", n));
   }
   if (n == 0 || path.length_mm() <= 0.0) {
     return SpeedProfile({}, path.length_mm(), 0.0);
@@ -356,12 +381,12 @@ SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const Spee
   std::vector<double> corner(n + 1, MotionLimits::none);
   double fastest_acceleration = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
-    speed[i] = segment_speed_limit(path[i], limits);
+    speed[i] = segment_speed_limit(path[i], limits, filter);
     if (!(speed[i] > 0.0) || !std::isfinite(speed[i])) {
       throw Error(ErrorKind::argument, "segment without a feed greater than zero", path[i].line);
     }
     if (i > 0) {
-      corner[i] = corner_speed_limit(path[i - 1], path[i], limits);
+      corner[i] = corner_speed_limit(path[i - 1], path[i], limits, filter);
     }
     if (caps != nullptr) {
       speed[i] = std::min(speed[i], static_cast<double>(caps->on_segment[i]));
@@ -371,21 +396,7 @@ SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const Spee
   }
   const double jerk_s = jerk_time(limits, fastest_acceleration);
   std::vector<Piece> pieces = make_pieces(path, limits, speed, corner, jerk_s);
-  // With a jerk time the corner limits are already limits of the pieces around the corner.
-  std::vector<double> boundary = jerk_s > 0.0 ? std::vector<double>(pieces.size() + 1, MotionLimits::none) : corner;
-  if (jerk_s > 0.0) {
-    std::size_t k = 0;
-    double distance = 0.0;
-    for (std::size_t i = 1; i < n; ++i) {
-      while (k < pieces.size() && distance + 0.5 * pieces[k].length < path.distance_mm(i)) {
-        distance += pieces[k].length;
-        ++k;
-      }
-      if (k < pieces.size()) {
-        boundary[k] = std::min(boundary[k], corner[i]);
-      }
-    }
-  }
+  const std::vector<double> boundary = piece_boundaries(path, pieces, corner, jerk_s);
   pass_speeds(pieces, boundary);
   PhaseList list;
   for (std::size_t i = 0; i < pieces.size(); ++i) {
@@ -398,7 +409,8 @@ SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const Spee
 }
 
 std::vector<std::size_t> forced_stops(const std::vector<Segment>& segments, double axis_angle_rad,
-                                      double corner_angle_rad, const MotionLimits& limits) {
+                                      double corner_angle_rad, const MotionLimits& limits,
+                                      const FilterTolerance& filter) {
   const double along = std::cos(axis_angle_rad);
   const double turned = std::cos(corner_angle_rad);
   std::vector<std::size_t> stops;
@@ -407,7 +419,7 @@ std::vector<std::size_t> forced_stops(const std::vector<Segment>& segments, doub
     const Vector3 after = tangent_at(segments[i], 0.0);
     const bool plunges = std::abs(before[2]) >= along || std::abs(after[2]) >= along;
     if (segments[i - 1].stop_at_end || (plunges && before.dot(after) <= turned) ||
-        corner_speed_limit(segments[i - 1], segments[i], limits) <= 0.0) {
+        corner_speed_limit(segments[i - 1], segments[i], limits, filter) <= 0.0) {
       stops.push_back(i);
     }
   }

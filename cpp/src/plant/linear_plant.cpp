@@ -4,12 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <sstream>
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
 #include "base/checks.hpp"
-#include <Eigen/LU>
 #include "base/linear_algebra.hpp"
 #include "base/rest.hpp"
 #include "shapegcode/error.hpp"
@@ -25,27 +24,25 @@ constexpr int most_balancing_sweeps = 100;
 constexpr double worthwhile = 0.95;  // a scale factor must bring row and column sum at least this far down
 constexpr double rest_tolerance = 1e-9;
 
-std::string shape(const MatrixXd& matrix) {
-  return std::to_string(matrix.rows()) + " x " + std::to_string(matrix.cols());
-}
+std::string shape(const MatrixXd& matrix) { return fmt::format("{} x {}", matrix.rows(), matrix.cols()); }
 
 void check_matrix(const char* name, const MatrixXd& matrix, Index rows, Index columns) {
   if (matrix.rows() != rows || matrix.cols() != columns) {
-    throw Error(ErrorKind::argument, std::string(name) + " of a linear plant is " + shape(matrix) + ", must be " +
-                                         std::to_string(rows) + " x " + std::to_string(columns));
+    throw Error(ErrorKind::argument,
+                fmt::format("{} of a linear plant is {}, must be {} x {}", name, shape(matrix), rows, columns));
   }
   if (!matrix.allFinite()) {
-    throw Error(ErrorKind::argument, std::string(name) + " of a linear plant has a value that is not finite");
+    throw Error(ErrorKind::argument, fmt::format("{} of a linear plant has a value that is not finite", name));
   }
 }
 
 void check_vector(const char* name, const VectorXd& vector, Index size) {
   if (vector.size() != size) {
-    throw Error(ErrorKind::argument, std::string(name) + " of a linear plant has " + std::to_string(vector.size()) +
-                                         " values, must have " + std::to_string(size));
+    throw Error(ErrorKind::argument,
+                fmt::format("{} of a linear plant has {} values, must have {}", name, vector.size(), size));
   }
   if (!vector.allFinite()) {
-    throw Error(ErrorKind::argument, std::string(name) + " of a linear plant has a value that is not finite");
+    throw Error(ErrorKind::argument, fmt::format("{} of a linear plant has a value that is not finite", name));
   }
 }
 
@@ -114,7 +111,7 @@ MatrixXd exponential_less_one(const MatrixXd& matrix) {
 MatrixXd matrix_exponential(const MatrixXd& matrix) {
   if (matrix.rows() != matrix.cols() || !matrix.allFinite()) {
     throw Error(ErrorKind::argument,
-                "exponential of a matrix of " + shape(matrix) + " values, it must be square and finite");
+                fmt::format("exponential of a matrix of {} values, it must be square and finite", shape(matrix)));
   }
   if (matrix.size() == 0) return matrix;
   const VectorXd factor = balance(matrix);
@@ -145,9 +142,9 @@ HeldPeriod first_order_hold(const MatrixXd& a, const MatrixXd& b, double period_
 LinearPlant::LinearPlant(StateSpace plant, double period_s) : plant_(std::move(plant)), period_s_(period_s) {
   const Index states = order();
   if (states == 0 || inputs() == 0 || outputs() == 0) {
-    throw Error(ErrorKind::argument, "a linear plant of " + std::to_string(states) + " states, " +
-                                         std::to_string(inputs()) + " inputs and " + std::to_string(outputs()) +
-                                         " outputs, at least one of each needed");
+    throw Error(ErrorKind::argument,
+                fmt::format("a linear plant of {} states, {} inputs and {} outputs, at least one of each needed",
+                            states, inputs(), outputs()));
   }
   const HeldPeriod held = first_order_hold(plant_.a, plant_.b, period_s);
   check_matrix("C", plant_.c, outputs(), states);
@@ -186,10 +183,9 @@ void LinearPlant::reset_at_rest(const VectorXd& input, const VectorXd& near) {
   Index worst = 0;
   const double left = (equations * away - missing).cwiseAbs().maxCoeff(&worst);
   if (!(left <= rest_tolerance * terms.maxCoeff())) {
-    std::ostringstream message;
-    message << "no state of the linear plant rests under this input: state " << worst << " drifts by "
-            << left * largest[worst] << " per second";
-    throw Error(ErrorKind::argument, message.str());
+    throw Error(ErrorKind::argument,
+                fmt::format("no state of the linear plant rests under this input: state {} drifts by {:.6g} per second",
+                            worst, left * largest[worst]));
   }
   const VectorXd state = factor.asDiagonal() * (from + away);
   reset(state, input);
@@ -210,9 +206,10 @@ void LinearPlant::step(std::span<const double> in, std::span<double> out) noexce
 
 void LinearPlant::check_inputs(const MatrixXd& inputs_of_run) const {
   if (inputs_of_run.rows() == 0 || inputs_of_run.cols() != inputs()) {
-    throw Error(ErrorKind::argument, "inputs of a linear plant are " + shape(inputs_of_run) +
-                                         " values, must be one row per sample, at least one, and " +
-                                         std::to_string(inputs()) + " columns");
+    throw Error(
+        ErrorKind::argument,
+        fmt::format("inputs of a linear plant are {} values, must be one row per sample, at least one, and {} columns",
+                    shape(inputs_of_run), inputs()));
   }
   if (!inputs_of_run.allFinite()) {
     throw Error(ErrorKind::argument, "inputs of a linear plant have a value that is not finite");

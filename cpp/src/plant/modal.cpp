@@ -5,6 +5,8 @@
 #include <complex>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "base/checks.hpp"
 #include "base/rest.hpp"
 #include "shapegcode/error.hpp"
@@ -74,15 +76,14 @@ ModalPlant::ModalPlant(AxisModes modes, double period_s, AxisModeTables tables)
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
     const std::vector<Mode>& axis_modes = modes_[axis];
     if (tables[axis].size() > axis_modes.size()) {
-      throw Error(ErrorKind::argument, std::to_string(tables[axis].size()) + " tables for " +
-                                           std::to_string(axis_modes.size()) + " modes of axis " +
-                                           std::to_string(axis));
+      throw Error(ErrorKind::argument,
+                  fmt::format("{} tables for {} modes of axis {}", tables[axis].size(), axis_modes.size(), axis));
     }
     tables[axis].resize(axis_modes.size());
     first_[axis] = states_.size();
     for (const Mode& mode : axis_modes) {
       if (!std::isfinite(mode.participation)) {
-        throw Error(ErrorKind::argument, "participation of a mode of axis " + std::to_string(axis) + " is not finite");
+        throw Error(ErrorKind::argument, fmt::format("participation of a mode of axis {} is not finite", axis));
       }
       State state;
       static_cast<Node&>(state) = node_of(mode, period_s);
@@ -262,7 +263,7 @@ Vector3 ModalPlant::step(const Vector3& command) noexcept {
 
 Vector3 ModalPlant::residual_peak(int n_periods) const {
   if (n_periods < 1) {
-    throw Error(ErrorKind::argument, "residual over " + std::to_string(n_periods) + " swings, at least 1 needed");
+    throw Error(ErrorKind::argument, fmt::format("residual over {} swings, at least 1 needed", n_periods));
   }
   Vector3 result = Vector3::Zero();
   for (std::size_t axis = 0; axis < axis_count; ++axis) {

@@ -4,7 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <string>
+
+#include <fmt/format.h>
 
 #include "base/checks.hpp"
 #include "base/rest.hpp"
@@ -162,8 +163,7 @@ ModalResponse::ModalResponse(const std::vector<std::vector<Mode>>& modes, double
       if (group.modes.size() < modes[axis].size()) group.modes.resize(modes[axis].size());
       for (std::size_t m = 0; m < modes[axis].size(); ++m) {
         if (!std::isfinite(modes[axis][m].participation)) {
-          throw Error(ErrorKind::argument,
-                      "participation of a mode of axis " + std::to_string(axis) + " is not finite");
+          throw Error(ErrorKind::argument, fmt::format("participation of a mode of axis {} is not finite", axis));
         }
         group.modes[m].set(static_cast<Index>(lane), modes[axis][m], period_s);
       }
@@ -178,10 +178,9 @@ ModalResponse& ModalResponse::operator=(ModalResponse&&) noexcept = default;
 void ModalResponse::apply(const Record& command, Result response) {
   Impl& self = *impl_;
   if (command.cols() != self.axes || response.rows() != command.rows() || response.cols() != command.cols()) {
-    throw Error(ErrorKind::argument, "command of " + std::to_string(command.rows()) + " x " +
-                                         std::to_string(command.cols()) + " values and response of " +
-                                         std::to_string(response.rows()) + " x " + std::to_string(response.cols()) +
-                                         " for " + std::to_string(self.axes) + " axes");
+    throw Error(ErrorKind::argument,
+                fmt::format("command of {} x {} values and response of {} x {} for {} axes", command.rows(),
+                            command.cols(), response.rows(), response.cols(), self.axes));
   }
   if (command.rows() == 0) return;
   if (!self.begun) {
@@ -192,8 +191,9 @@ void ModalResponse::apply(const Record& command, Result response) {
     const Index rows = std::min(piece_rows, command.rows() - first);
     for (Group& group : self.groups) {
       if (!group.take(command, first, rows, self.rate_hz)) {
-        throw Error(ErrorKind::argument, "command of a response has a value that is not finite, in rows " +
-                                             std::to_string(first) + " to " + std::to_string(first + rows - 1));
+        throw Error(ErrorKind::argument,
+                    fmt::format("command of a response has a value that is not finite, in rows {} to {}", first,
+                                first + rows - 1));
       }
       group.propagate(self.row, rows);
       group.give(response, first, rows);

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <string>
+
+#include <fmt/format.h>
 
 #include "shapegcode/error.hpp"
 
@@ -12,18 +13,18 @@ namespace shapegcode {
 void check_table(const ModeTable& table) {
   const std::size_t rows = table.position_mm.size();
   if (table.frequency_hz.size() != rows || (!table.damping_ratio.empty() && table.damping_ratio.size() != rows)) {
-    throw Error(ErrorKind::argument, "table of a mode with " + std::to_string(rows) + " positions, " +
-                                         std::to_string(table.frequency_hz.size()) + " frequencies and " +
-                                         std::to_string(table.damping_ratio.size()) + " damping ratios");
+    throw Error(ErrorKind::argument,
+                fmt::format("table of a mode with {} positions, {} frequencies and {} damping ratios", rows,
+                            table.frequency_hz.size(), table.damping_ratio.size()));
   }
   if (rows > 0 && (table.axis < 0 || table.axis >= axis_count)) {
-    throw Error(ErrorKind::argument,
-                "table of a mode over axis " + std::to_string(table.axis) + ", 0 to 2 are X, Y and Z");
+    throw Error(ErrorKind::argument, fmt::format("table of a mode over axis {}, 0 to 2 are X, Y and Z", table.axis));
   }
   for (std::size_t k = 0; k < rows; ++k) {
     if (!std::isfinite(table.position_mm[k]) || (k > 0 && !(table.position_mm[k] > table.position_mm[k - 1]))) {
-      throw Error(ErrorKind::argument, "positions in the table of a mode must be finite and ascend: position " +
-                                           std::to_string(k) + " is " + std::to_string(table.position_mm[k]) + " mm");
+      throw Error(ErrorKind::argument,
+                  fmt::format("positions in the table of a mode must be finite and ascend: position {} is {} mm", k,
+                              table.position_mm[k]));
     }
     const double damping = table.damping_ratio.empty() ? 0.0 : table.damping_ratio[k];
     static_cast<void>(pole({table.frequency_hz[k], damping, 1.0}));

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/checks.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -69,11 +70,7 @@ Shaper grid_polynomial(std::span<const Mode> modes, double period_s) {
   if (modes.empty()) {
     throw Error(ErrorKind::argument, "a grid shaper needs at least one mode: 0 given");
   }
-  if (!std::isfinite(period_s) || period_s <= 0.0) {
-    std::ostringstream message;
-    message << "the period of a shaper's grid is positive: it is " << period_s << " s";
-    throw Error(ErrorKind::argument, message.str());
-  }
+  require_period(period_s, "period of a shaper's grid");
   std::vector<double> amplitudes{1.0};
   std::vector<std::complex<double>> cancelled;
   for (const Mode& mode : modes) {

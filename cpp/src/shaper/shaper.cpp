@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "base/checks.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -97,10 +98,7 @@ double residual_ratio(const Shaper& shaper, const Mode& mode) {
 
 Fir to_fir(const Shaper& shaper, double period_s) {
   auto message = precise_message();
-  if (!std::isfinite(period_s) || period_s <= 0.0) {
-    message << "the period of a shaper's grid is positive: it is " << period_s << " s";
-    reject(message);
-  }
+  require_period(period_s, "period of a shaper's grid");
   std::vector<int> delays;
   delays.reserve(shaper.times_s.size());
   for (const double time : shaper.times_s) {

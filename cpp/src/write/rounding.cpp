@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "base/checks.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -26,9 +27,7 @@ constexpr std::size_t room = 2 * std::max(width_on_the_way, width_before_rest);
 }  // namespace
 
 ModalRounder::ModalRounder(std::span<const Mode> modes, double block_period_s, int ticks_per_period) {
-  if (!std::isfinite(block_period_s) || !(block_period_s > 0.0)) {
-    throw Error(ErrorKind::argument, "block period " + std::to_string(block_period_s) + " s, must be above 0");
-  }
+  require_period(block_period_s, "block period");
   if (ticks_per_period < 1) {
     throw Error(ErrorKind::argument, std::to_string(ticks_per_period) + " ticks in a block period, must be at least 1");
   }

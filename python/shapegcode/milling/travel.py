@@ -11,7 +11,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.block_grid import Grid
 from shapegcode.controller import controller_model
-from shapegcode.emit import motion_limits
+from shapegcode.emit import filter_tolerance, motion_limits
 from shapegcode.machine import Machine
 from shapegcode.verify import own_rule, playback_options
 
@@ -84,7 +84,8 @@ class ShapedMotion:
         period = machine.controller.interpolation_period_s
         ticks = round(grid.block_period_s / period)
         self._period_s = period
-        self._limits = motion_limits(machine, grid=grid, contour_tolerance_um=machine.tolerance.contour_um)
+        self._limits = motion_limits(machine)
+        self._tolerance = filter_tolerance(machine, grid, machine.tolerance.contour_um)
         shaper = _core.Fir([ticks * delay for delay in grid.fir.delays], list(grid.fir.taps))
         own = playback_options(machine, time_constant_s=machine.controller.shaped_time_constant_s).axis_filters
         # The emitted blocks join samples of the shaped command by straight lines.
@@ -97,7 +98,7 @@ class ShapedMotion:
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
         """See `Motion`."""
-        profile = _core.plan_speed(path, self._limits)
+        profile = _core.plan_speed(path, self._limits, self._tolerance)
         return Travelled.of(
             _core.travel_path(path, profile, along, stations_mm, self._period_s, self._filters, window_s)
         )

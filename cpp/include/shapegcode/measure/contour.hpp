@@ -37,7 +37,8 @@ enum class PathSide : std::uint8_t {
 /// True distance of a moving point to the programmed path (not the tracking error in time), following the path
 /// forward. Positive on the left of the direction of travel seen along the tool axis (+Z looking down), negative on
 /// the right; a deviation along Z only, or from a travel along Z only, is positive above. Amortised O(1) per sample, no
-/// allocation after construction. Copies what it needs of the path.
+/// allocation after construction; a step looks at the pieces of the path that may be nearest and passes others in
+/// groups, so that its work has no other bound than how many pieces lie equally near. Copies what it needs of the path.
 ///
 /// The foot point is searched within an arc length that the last step and the last deviation allow, so that another
 /// pass of the path nearby is not mistaken for the present one. On a path that turns back on itself the outward and the
@@ -99,6 +100,11 @@ class ContourTracker {
   [[nodiscard]] static double refined_foot(const Arc& arc, const Vector3& p, const Polar& polar, const Turns& turns,
                                            double u) noexcept;
   [[nodiscard]] static Foot arc_point_foot(const Arc& arc, double u, const Vector3& p) noexcept;
+  /// Whether no point of so many pieces lies within the root of `limit2` from `p`.
+  [[nodiscard]] bool is_beyond(std::size_t first, std::size_t size, const Vector3& p, double limit2) const noexcept;
+  /// How many pieces from `first` on, or before `end`, need not be looked at one by one; 0: none.
+  [[nodiscard]] std::size_t group_from(std::size_t first, const Vector3& p, double limit2) const noexcept;
+  [[nodiscard]] std::size_t group_before(std::size_t end, const Vector3& p, double limit2) const noexcept;
   [[nodiscard]] Found search(const Vector3& p, double move, const Window& window) const noexcept;
   [[nodiscard]] double lateral_side(const Found& found, double distance) const noexcept;
   [[nodiscard]] Vector3 start_tangent(std::size_t piece) const noexcept;

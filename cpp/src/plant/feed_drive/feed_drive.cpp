@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "base/checks.hpp"
 #include "plant/feed_drive/feed_drive_equations.hpp"
 #include "plant/feed_drive/ode.hpp"
@@ -48,9 +50,9 @@ FeedDriveLinearModel linear_model(const FeedDriveParameters& parameters) {
     throw Error(ErrorKind::argument, "a linear model needs viscous friction alone");
   }
   if (parameters.backlash_m != 0.0 || parameters.force_limit_n != 0.0) {
-    throw Error(ErrorKind::argument, "a linear model needs a drive without backlash and force limit, here " +
-                                         std::to_string(parameters.backlash_m) + " m and " +
-                                         std::to_string(parameters.force_limit_n) + " N");
+    throw Error(ErrorKind::argument,
+                fmt::format("a linear model needs a drive without backlash and force limit, here {} m and {} N",
+                            parameters.backlash_m, parameters.force_limit_n));
   }
   // Nothing depends on the period: it only turns set-points into the speed that is an input here.
   const FeedDriveEquations equations(parameters, 1.0);

@@ -3,9 +3,9 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <string>
 #include <utility>
 
+#include <fmt/format.h>
 #include <Eigen/Core>
 #include <Eigen/LU>
 
@@ -158,8 +158,7 @@ struct FeedDriveRealTime::Impl {
 FeedDriveRealTime::FeedDriveRealTime(FeedDriveParameters parameters, double period_s, int substeps) {
   require_period(period_s);
   if (substeps < 1 || substeps > most_substeps) {
-    throw Error(ErrorKind::argument,
-                std::to_string(substeps) + " substeps in a period, must be 1 ... " + std::to_string(most_substeps));
+    throw Error(ErrorKind::argument, fmt::format("{} substeps in a period, must be 1 ... {}", substeps, most_substeps));
   }
   impl_ = std::make_unique<Impl>(std::move(parameters), period_s, substeps);
 }

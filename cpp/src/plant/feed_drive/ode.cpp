@@ -5,17 +5,18 @@
 #include <exception>
 #include <limits>
 #include <new>
-#include <sstream>
 #include <string>
 #include <type_traits>
 #include <utility>
 
 #include <cvode/cvode.h>
+#include <fmt/format.h>
 #include <nvector/nvector_serial.h>
 #include <sundials/sundials_context.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
+#include "base/checks.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
@@ -121,10 +122,7 @@ struct OdeSolver::Impl {
     if (thrown) std::rethrow_exception(std::exchange(thrown, nullptr));
     double reached = time;
     if (cvode) CVodeGetCurrentTime(cvode.get(), &reached);
-    std::ostringstream message;
-    message.precision(17);
-    message << call << " failed with " << flag_name(flag) << " at t = " << reached << " s";
-    throw Error(ErrorKind::numeric, message.str());
+    throw Error(ErrorKind::numeric, fmt::format("{} failed with {} at t = {} s", call, flag_name(flag), reached));
   }
   [[nodiscard]] long steps_since_restart() const noexcept {
     long count = 0;
@@ -193,11 +191,10 @@ OdeSolver::OdeSolver(OdeSystem& system, const VectorXd& y0, double t0, double rt
 
 void OdeSolver::Impl::open(const VectorXd& y0, double t0, double relative, const VectorXd& absolute) {
   if (y0.size() == 0 || !y0.allFinite() || !std::isfinite(t0)) {
-    throw Error(ErrorKind::argument,
-                "initial state of " + std::to_string(y0.size()) + " values must be finite and not empty");
+    throw Error(ErrorKind::argument, fmt::format("initial state of {} values must be finite and not empty", y0.size()));
   }
   if (!std::isfinite(relative) || !(relative > 0.0)) {
-    throw Error(ErrorKind::argument, "relative tolerance " + std::to_string(relative) + " must be above 0");
+    throw Error(ErrorKind::argument, fmt::format("relative tolerance {} must be above 0", relative));
   }
   if (absolute.size() != y0.size() || !absolute.allFinite() || !(absolute.minCoeff() >= 0.0)) {
     throw Error(ErrorKind::argument, "absolute tolerances must be one per unknown, finite and not below 0");
@@ -236,13 +233,10 @@ OdeSolver& OdeSolver::operator=(OdeSolver&&) noexcept = default;
 const VectorXd& OdeSolver::advance(double t, bool stop_exactly) {
   Impl& self = *impl_;
   if (self.failed) {
-    throw Error(ErrorKind::numeric, "the solver failed at t = " + std::to_string(self.time) + " s; restart it first");
+    throw Error(ErrorKind::numeric, fmt::format("the solver failed at t = {} s; restart it first", self.time));
   }
   if (!(t >= self.time) || !std::isfinite(t)) {
-    std::ostringstream message;
-    message.precision(17);
-    message << "cannot advance to t = " << t << " s, the solver is at " << self.time << " s";
-    throw Error(ErrorKind::argument, message.str());
+    throw Error(ErrorKind::argument, fmt::format("cannot advance to t = {} s, the solver is at {} s", t, self.time));
   }
   if (t == self.time) return self.state;
   void* const cvode = self.cvode.get();
@@ -263,8 +257,8 @@ void OdeSolver::restart(const VectorXd& y) { restart(y, impl_->time); }
 void OdeSolver::restart(const VectorXd& y, double t) {
   Impl& self = *impl_;
   if (y.size() != self.state.size() || !y.allFinite() || !std::isfinite(t)) {
-    throw Error(ErrorKind::argument, "restart needs " + std::to_string(self.state.size()) + " finite values, got " +
-                                         std::to_string(y.size()));
+    throw Error(ErrorKind::argument,
+                fmt::format("restart needs {} finite values, got {}", self.state.size(), y.size()));
   }
   void* const cvode = self.cvode.get();
   self.steps_before_restart += self.steps_since_restart();
@@ -277,9 +271,7 @@ void OdeSolver::restart(const VectorXd& y, double t) {
 }
 
 void OdeSolver::limit_step(double longest) {
-  if (!std::isfinite(longest) || !(longest > 0.0)) {
-    throw Error(ErrorKind::argument, "longest step " + std::to_string(longest) + " must be above 0");
-  }
+  require_above_zero(longest, "longest step", "s");
   impl_->check(CVodeSetMaxStep(impl_->cvode.get(), longest), "CVodeSetMaxStep");
 }
 
