@@ -1,4 +1,4 @@
-// Private to gcode: the execution of programs. Lines go in the order in which the control runs them to the Interpreter,
+// Private: the execution of programs. Lines go in the order in which the control runs them to the Interpreter,
 // plain ones as they stand, all others as the plain blocks that they come to. Spread over three files: texts and lines
 // (reader.cpp), calls (reader_calls.cpp), macro statements (reader_macros.cpp).
 #pragma once

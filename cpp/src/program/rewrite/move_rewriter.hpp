@@ -1,4 +1,4 @@
-// Private to gcode: blocks under coordinate modes (G16, G51, G51.1, G68), corner words and cutter compensation, written
+// Private: blocks under coordinate modes (G16, G51, G51.1, G68), corner words and cutter compensation, written
 // as plain blocks.
 #pragma once
 
