@@ -82,7 +82,7 @@ Corner random_corner(Random& random) {
 /// Alarm number of the refusal, 0 if there is none.
 int refused(const Segment& before, const Segment& after, bool chamfer, double size, const std::string& words = "") {
   try {
-    (void)insert_corner(before, after, chamfer, size, 2, 7, 9);
+    (void)insert_corner(before, after, {chamfer, size, 7, 9}, 2);
   } catch (const Error& error) {
     CHECK_MESSAGE(std::string(error.what()).find(words) != std::string::npos, error.what());
     CHECK(error.kind() == ErrorKind::program);
@@ -99,7 +99,7 @@ TEST_CASE("corner words: a right angle, chamfer and rounding in closed form") {
   const Segment before = make_line({0, 0, 0}, {20, 0, 0}, 10.0, 4);
   Segment after = make_line({20, 0, 0}, {20, 30, 0}, 20.0, 5);
   after.stop_at_end = true;
-  const CornerResult chamfer = insert_corner(before, after, true, 3.0, 2, 4, 1);
+  const CornerResult chamfer = insert_corner(before, after, {true, 3.0, 4, 1}, 2);
   CHECK(chamfer.before.end_mm == Vector3(17, 0, 0));
   REQUIRE(chamfer.inserted);
   CHECK(chamfer.inserted->start_mm == Vector3(17, 0, 0));
@@ -112,7 +112,7 @@ TEST_CASE("corner words: a right angle, chamfer and rounding in closed form") {
   CHECK(chamfer.after.line == 5);
   CHECK(chamfer.after.stop_at_end);
 
-  const CornerResult rounding = insert_corner(before, after, false, 3.0, 2, 4, 1);
+  const CornerResult rounding = insert_corner(before, after, {false, 3.0, 4, 1}, 2);
   REQUIRE(rounding.inserted);
   CHECK(rounding.inserted->kind == SegmentKind::arc);
   CHECK((rounding.before.end_mm - Vector3(17, 0, 0)).norm() < 1e-12);
@@ -121,20 +121,20 @@ TEST_CASE("corner words: a right angle, chamfer and rounding in closed form") {
   CHECK(rounding.inserted->sweep_rad == doctest::Approx(pi / 2));
   CHECK(rounding.inserted->feed_mm_per_s == 10.0);
   // The whole of the shorter block may be used.
-  CHECK((insert_corner(before, after, false, 20.0, 2, 4, 1).before.end_mm - before.start_mm).norm() < 1e-9);
-  CHECK((insert_corner(before, after, true, 20.0, 2, 4, 1).before.end_mm - before.start_mm).norm() < 1e-9);
+  CHECK((insert_corner(before, after, {false, 20.0, 4, 1}, 2).before.end_mm - before.start_mm).norm() < 1e-9);
+  CHECK((insert_corner(before, after, {true, 20.0, 4, 1}, 2).before.end_mm - before.start_mm).norm() < 1e-9);
 }
 
 TEST_CASE("corner words: a chamfer between a line and an arc has its ends at the straight distance from the corner") {
   const Segment line = make_line({0, 0, 0}, {20, 0, 0}, 10.0);
   const Segment arc = make_arc({20, 0, 0}, {10, 10, 0}, {10, 0, 0}, pi / 2, 2, 20.0);
-  const CornerResult there = insert_corner(line, arc, true, 2.0, 2, 1, 1);
+  const CornerResult there = insert_corner(line, arc, {true, 2.0, 1, 1}, 2);
   CHECK((there.before.end_mm - Vector3(18, 0, 0)).norm() < 1e-12);
   CHECK((there.after.start_mm - Vector3(20, 0, 0)).norm() == doctest::Approx(2.0));
   CHECK((there.after.start_mm - Vector3(10, 0, 0)).norm() == doctest::Approx(10.0));
   CHECK(there.after.start_mm.y() > 0.0);
   CHECK(there.after.sweep_rad == doctest::Approx(pi / 2 - 2.0 * std::asin(0.1)));
-  const CornerResult back = insert_corner(reversed(arc), reversed(line), true, 2.0, 2, 1, 1);
+  const CornerResult back = insert_corner(reversed(arc), reversed(line), {true, 2.0, 1, 1}, 2);
   CHECK((back.before.end_mm - there.after.start_mm).norm() < 1e-12);
   CHECK((back.after.start_mm - there.before.end_mm).norm() < 1e-12);
   CHECK(back.before.sweep_rad == doctest::Approx(-there.after.sweep_rad));
@@ -151,7 +151,7 @@ TEST_CASE("corner words: a rounding is tangent to both blocks, its centre at the
     const Corner corner = random_corner(random);
     const double size = std::pow(10.0, uniform(random, -2.0, 1.3));
     try {
-      const CornerResult result = insert_corner(corner.before, corner.after, false, size, 2, 1, 1);
+      const CornerResult result = insert_corner(corner.before, corner.after, {false, size, 1, 1}, 2);
       REQUIRE(result.inserted);
       ++inserted;
       const Segment& arc = *result.inserted;
@@ -205,30 +205,30 @@ TEST_CASE("corner words: nothing is inserted at a tangent corner or with a size 
   for (const bool chamfer : {false, true}) {
     for (const double degrees : {0.0, 0.99, -0.99, 1.01}) {
       const Segment after = block_from({20, 0, 0}, degrees * pi / 180.0, 30.0, 0.0, 1.0, 20.0);
-      const CornerResult result = insert_corner(before, after, chamfer, 1.0, 2, 1, 1);
+      const CornerResult result = insert_corner(before, after, {chamfer, 1.0, 1, 1}, 2);
       CHECK(result.inserted.has_value() == (degrees > 1.0));
       if (!result.inserted) {
         CHECK(result.before.end_mm == before.end_mm);
         CHECK(result.after.start_mm == after.start_mm);
       }
     }
-    CHECK_FALSE(insert_corner(before, arc, chamfer, 1.0, 2, 1, 1).inserted);
+    CHECK_FALSE(insert_corner(before, arc, {chamfer, 1.0, 1, 1}, 2).inserted);
     CHECK_FALSE(
-        insert_corner(before, block_from({20, 0, 0}, 1.0, 30.0, 0.0, 1.0, 20.0), chamfer, 0.0, 2, 1, 1).inserted);
+        insert_corner(before, block_from({20, 0, 0}, 1.0, 30.0, 0.0, 1.0, 20.0), {chamfer, 0.0, 1, 1}, 2).inserted);
   }
 }
 
 TEST_CASE("corner words: motion along the normal axis stays in the blocks, other planes turn the axes") {
   const Segment before = make_line({0, 0, 0}, {20, 0, -1}, 10.0);
   const Segment after = make_line({20, 0, -1}, {20, 30, -3}, 20.0);
-  const CornerResult result = insert_corner(before, after, false, 4.0, 2, 1, 1);
+  const CornerResult result = insert_corner(before, after, {false, 4.0, 1, 1}, 2);
   REQUIRE(result.inserted);
   CHECK(result.inserted->start_mm.z() == -1.0);
   CHECK(result.inserted->end_mm.z() == -1.0);
   CHECK(result.after.end_mm.z() == -3.0);
   // G18: axes Z, X.
   const CornerResult g18 = insert_corner(make_line({0, 0, 0}, {0, 0, 20}, 10.0),
-                                         make_line({0, 0, 20}, {30, 0, 20}, 10.0), false, 4.0, 1, 1, 1);
+                                         make_line({0, 0, 20}, {30, 0, 20}, 10.0), {false, 4.0, 1, 1}, 1);
   REQUIRE(g18.inserted);
   CHECK((g18.inserted->centre_mm - Vector3(4, 0, 16)).norm() < 1e-12);
   CHECK(int{g18.inserted->normal} == 1);
@@ -253,9 +253,9 @@ TEST_CASE("corner words: what the control refuses, with the word's place and the
   const Segment arc = make_arc({20, 0, 0}, {16, 4, 0}, {16, 0, 0}, pi / 2, 2, 20.0);
   CHECK(refused(before, arc, false, 5.0, "arc after the corner, radius 4.0000 mm") == 55);
   CHECK(refused(before, arc, true, 9.0, "arc of radius 4.0000 mm") == 55);
-  CHECK_THROWS_AS((void)insert_corner(before, after, true, std::nan(""), 2, 1, 1), Error);
-  CHECK_THROWS_AS((void)insert_corner(before, after, true, 1.0, 3, 1, 1), Error);
-  CHECK_THROWS_AS((void)insert_corner(before, make_line({21, 0, 0}, {30, 9, 0}, 1.0), true, 1.0, 2, 1, 1), Error);
+  CHECK_THROWS_AS((void)insert_corner(before, after, {true, std::nan(""), 1, 1}, 2), Error);
+  CHECK_THROWS_AS((void)insert_corner(before, after, {true, 1.0, 1, 1}, 3), Error);
+  CHECK_THROWS_AS((void)insert_corner(before, make_line({21, 0, 0}, {30, 9, 0}, 1.0), {true, 1.0, 1, 1}, 2), Error);
 }
 
 TEST_CASE("corner words: arbitrary corners end in finite blocks or a refusal") {
@@ -274,7 +274,7 @@ TEST_CASE("corner words: arbitrary corners end in finite blocks or a refusal") {
     const Segment after = part(turn);
     try {
       const CornerResult result =
-          insert_corner(before, after, round % 2 == 0, scale * uniform(random, 0.0, 2.0), 2, 1, 1);
+          insert_corner(before, after, {round % 2 == 0, scale * uniform(random, 0.0, 2.0), 1, 1}, 2);
       ++done;
       const Segment middle = result.inserted.value_or(make_line(result.before.end_mm, result.after.start_mm, 1.0));
       for (const Segment& s : {result.before, middle, result.after}) {

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <random>
 #include <string>
+#include <tuple>
 
 using shapegcode::scan_number;
 using shapegcode::scan_skip_switch;

@@ -14,6 +14,129 @@ bool cuts_in_steps(const CannedCycle& cycle) noexcept {
 
 double depth_mm(const CannedCycle& cycle) noexcept { return std::abs(cycle.r_mm - cycle.bottom_mm); }
 
+// The tool over and in one hole.
+class Hole {
+ public:
+  Hole(const CannedCycle& cycle, const Vector3& position, int axis, double feed_mm_per_s, std::uint32_t line,
+       std::vector<OtherMove>& moves)
+      : cycle_(cycle),
+        centre_(position),
+        position_(position),
+        axis_(axis),
+        feed_mm_per_s_(feed_mm_per_s),
+        line_(line),
+        moves_(moves) {}
+
+  Vector3 drill() {
+    if (cycle_.code == 87) {
+      bore_back();
+      return position_;
+    }
+    rapid(cycle_.r_mm);
+    if (cuts_in_steps(cycle_)) {
+      peck();
+    } else {
+      feed(cycle_.bottom_mm);
+    }
+    // P has no meaning in G81, G85 and G86; tapping waits at both ends.
+    const bool taps = cycle_.code == 74 || cycle_.code == 84;
+    if (cycle_.code != 81 && cycle_.code != 85 && cycle_.code != 86) {
+      wait();
+    }
+    if (taps || cycle_.code == 85 || cycle_.code == 89) {
+      feed(cycle_.r_mm);
+    }
+    if (taps) {
+      wait();
+    }
+    if (cycle_.code == 88) {
+      rapid(cycle_.r_mm);  // the operator retracts to R by hand
+    }
+    if (cycle_.code == 76) {
+      shift(cycle_.peck_mm);
+    }
+    rapid(cycle_.return_to_r ? cycle_.r_mm : cycle_.initial_mm);
+    if (cycle_.code == 76) {
+      unshift();
+    }
+    return position_;
+  }
+
+ private:
+  // Goes down beside the bore and cuts upwards.
+  void bore_back() {
+    shift(cycle_.peck_mm);
+    rapid(cycle_.r_mm);
+    unshift();
+    feed(cycle_.bottom_mm);
+    wait();
+    shift(cycle_.peck_mm);
+    rapid(cycle_.initial_mm);
+    unshift();
+  }
+
+  void peck() {
+    const double depth = depth_mm(cycle_);
+    const double down = cycle_.bottom_mm < cycle_.r_mm ? -1.0 : 1.0;
+    const auto count = static_cast<std::int64_t>(cuts_per_hole(cycle_));
+    for (std::int64_t i = 1; i <= count; ++i) {
+      const double reached = std::min(depth, static_cast<double>(i) * cycle_.peck_mm);
+      feed(cycle_.r_mm + down * reached);
+      if (i < count) {
+        const double back = cycle_.code == 83 ? 0.0 : std::max(0.0, reached - cycle_.clearance_mm);
+        rapid(cycle_.r_mm + down * back);
+        rapid(cycle_.r_mm + down * std::max(0.0, reached - cycle_.clearance_mm));
+      }
+    }
+  }
+
+  void move_to(const Vector3& target, bool is_rapid) {
+    OtherMove move{make_line(position_, target, is_rapid ? 0.0 : feed_mm_per_s_, line_), 0.0};
+    if (is_rapid) {
+      move.segment.kind = SegmentKind::rapid;
+    }
+    if (move.segment.length_mm > 0.0) {
+      moves_.push_back(move);
+    }
+    position_ = target;
+  }
+
+  void go(double level, bool is_rapid) {
+    Vector3 target = position_;
+    target[axis_] = level;
+    move_to(target, is_rapid);
+  }
+  void rapid(double level) { go(level, true); }
+  void feed(double level) { go(level, false); }
+
+  void wait() {
+    if (cycle_.dwell_s > 0.0) {
+      moves_.push_back(OtherMove{make_line(position_, position_, 0.0, line_), cycle_.dwell_s});
+    }
+  }
+
+  // G76 and G87 lift the tip off the wall by Q; the direction is a parameter (5148), the way the same.
+  void shift(double by) {
+    Vector3 target = position_;
+    target[ArcFrame(axis_).a] += by;
+    move_to(target, true);
+  }
+
+  void unshift() {
+    const int side = ArcFrame(axis_).a;
+    shift(centre_[side] - position_[side]);
+    position_[side] = centre_[side];
+  }
+
+  const CannedCycle& cycle_;
+  Vector3 centre_;
+  Vector3 position_;
+  int axis_;
+  double feed_mm_per_s_;
+  std::uint32_t line_;
+  std::vector<OtherMove>& moves_;
+};
+
 }  // namespace
 
 double cuts_per_hole(const CannedCycle& cycle) noexcept {
@@ -27,90 +150,7 @@ double most_moves_per_cut(const CannedCycle& cycle) noexcept {
 
 Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, double feed_mm_per_s, std::uint32_t line,
                      std::vector<OtherMove>& moves) {
-  const auto go = [&](double level, bool rapid) {
-    Vector3 target = position;
-    target[axis] = level;
-    OtherMove move{make_line(position, target, rapid ? 0.0 : feed_mm_per_s, line), 0.0};
-    if (rapid) {
-      move.segment.kind = SegmentKind::rapid;
-    }
-    if (move.segment.length_mm > 0.0) {
-      moves.push_back(move);
-    }
-    position = target;
-  };
-  const auto wait = [&] {
-    if (cycle.dwell_s > 0.0) {
-      moves.push_back(OtherMove{make_line(position, position, 0.0, line), cycle.dwell_s});
-    }
-  };
-  // G76 and G87 lift the tip off the wall by Q; the direction is a parameter (5148), the way the same.
-  const int side = ArcFrame(axis).a;
-  const auto shift = [&](double by) {
-    Vector3 target = position;
-    target[side] += by;
-    OtherMove move{make_line(position, target, 0.0, line), 0.0};
-    move.segment.kind = SegmentKind::rapid;
-    if (move.segment.length_mm > 0.0) {
-      moves.push_back(move);
-    }
-    position = target;
-  };
-  const Vector3 centre = position;
-  const auto unshift = [&] {
-    shift(centre[side] - position[side]);
-    position[side] = centre[side];
-  };
-  if (cycle.code == 87) {  // back boring goes down beside the bore and cuts upwards
-    shift(cycle.peck_mm);
-    go(cycle.r_mm, true);
-    unshift();
-    go(cycle.bottom_mm, false);
-    wait();
-    shift(cycle.peck_mm);
-    go(cycle.initial_mm, true);
-    unshift();
-    return position;
-  }
-  go(cycle.r_mm, true);
-  const double depth = depth_mm(cycle);
-  const double down = cycle.bottom_mm < cycle.r_mm ? -1.0 : 1.0;
-  if (cuts_in_steps(cycle)) {
-    const auto count = static_cast<std::int64_t>(cuts_per_hole(cycle));
-    for (std::int64_t i = 1; i <= count; ++i) {
-      const double reached = std::min(depth, static_cast<double>(i) * cycle.peck_mm);
-      go(cycle.r_mm + down * reached, false);
-      if (i < count) {
-        const double back = cycle.code == 83 ? 0.0 : std::max(0.0, reached - cycle.clearance_mm);
-        go(cycle.r_mm + down * back, true);
-        go(cycle.r_mm + down * std::max(0.0, reached - cycle.clearance_mm), true);
-      }
-    }
-  } else {
-    go(cycle.bottom_mm, false);
-  }
-  // P has no meaning in G81, G85 and G86; tapping waits at both ends.
-  const bool taps = cycle.code == 74 || cycle.code == 84;
-  if (cycle.code != 81 && cycle.code != 85 && cycle.code != 86) {
-    wait();
-  }
-  if (taps || cycle.code == 85 || cycle.code == 89) {
-    go(cycle.r_mm, false);
-  }
-  if (taps) {
-    wait();
-  }
-  if (cycle.code == 88) {
-    go(cycle.r_mm, true);  // the operator retracts to R by hand
-  }
-  if (cycle.code == 76) {
-    shift(cycle.peck_mm);
-  }
-  go(cycle.return_to_r ? cycle.r_mm : cycle.initial_mm, true);
-  if (cycle.code == 76) {
-    unshift();
-  }
-  return position;
+  return Hole(cycle, position, axis, feed_mm_per_s, line, moves).drill();
 }
 
 }  // namespace shapegcode

@@ -1,4 +1,4 @@
-// Private to gcode: what the settings of a control make of words and marks, asked for in several places.
+// Private: what the settings of a control make of words and marks, asked for in several places.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Private to gcode: the reading of plain blocks. Its functions are spread over four files: lines and regions
+// Private: the reading of plain blocks. Its functions are spread over four files: lines and regions
 // (interpreter.cpp), codes that change the modal state (interpreter_codes.cpp), offsets (interpreter_offsets.cpp), and
 // moves (interpreter_moves.cpp).
 #pragma once

@@ -1,4 +1,4 @@
-// Private to gcode: the control's offset memory, as far as it is known.
+// Private: the control's offset memory, as far as it is known.
 #pragma once
 
 #include <array>

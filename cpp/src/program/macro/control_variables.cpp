@@ -124,11 +124,9 @@ std::optional<double>* ControlVariables::tool_field(int number, ToolOffset& offs
   }
 }
 
-bool ControlVariables::read(int number, MacroValue& value) {
+// What the program itself has said last.
+bool ControlVariables::last_said(int number, MacroValue& value) const {
   const ModalState& state = rewriter_.programmed();
-  if ((number >= 4001 && number <= 4030) || (number >= 4201 && number <= 4230) || (number >= 4301 && number <= 4330)) {
-    return modal(number, value);
-  }
   switch (number >= 4200 && number < 4400 ? 4100 + number % 100 : number) {
     case 4107:
       value = std::max(0, rewriter_.radius_number());
@@ -158,7 +156,41 @@ bool ControlVariables::read(int number, MacroValue& value) {
       value = state.coordinate_number;
       return true;
     default:
-      break;
+      return false;
+  }
+}
+
+// Work and tool offsets.
+bool ControlVariables::offset(int number, MacroValue& value) const {
+  int system = 0;
+  int extra = 0;
+  int axis = 0;
+  if (work_slot(number, system, extra, axis)) {
+    const auto work = interpreter_.offsets().work(system, extra)[static_cast<std::size_t>(axis)];
+    if (!work) {
+      return unknown(number);
+    }
+    value = to_program_units(*work);
+    return true;
+  }
+  ToolOffset tool_offset;
+  int tool = 0;
+  if (const std::optional<double>* field = tool_field(number, tool_offset, tool)) {
+    if (!*field) {
+      return unknown(number);
+    }
+    value = to_program_units(**field);
+    return true;
+  }
+  return false;
+}
+
+bool ControlVariables::read(int number, MacroValue& value) {
+  if ((number >= 4001 && number <= 4030) || (number >= 4201 && number <= 4230) || (number >= 4301 && number <= 4330)) {
+    return modal(number, value);
+  }
+  if (last_said(number, value)) {
+    return true;
   }
   const auto written = written_.find(number);
   if (written != written_.end()) {
@@ -171,6 +203,7 @@ bool ControlVariables::read(int number, MacroValue& value) {
   }
   // Position behind the block before, in work coordinates, and the position commanded now: the same for a reader.
   if ((number >= 5001 && number <= 5003) || (number >= 5041 && number <= 5043)) {
+    const ModalState& state = rewriter_.programmed();
     const int axis = (number - 1) % 10;
     if (!state.known[static_cast<std::size_t>(axis)]) {
       return unknown(number);
@@ -178,24 +211,7 @@ bool ControlVariables::read(int number, MacroValue& value) {
     value = to_program_units(state.position_mm[axis]);
     return true;
   }
-  int system = 0;
-  int extra = 0;
-  int axis = 0;
-  if (work_slot(number, system, extra, axis)) {
-    const auto offset = interpreter_.offsets().work(system, extra)[static_cast<std::size_t>(axis)];
-    if (!offset) {
-      return unknown(number);
-    }
-    value = to_program_units(*offset);
-    return true;
-  }
-  ToolOffset offset;
-  int tool = 0;
-  if (const std::optional<double>* field = tool_field(number, offset, tool)) {
-    if (!*field) {
-      return unknown(number);
-    }
-    value = to_program_units(**field);
+  if (offset(number, value)) {
     return true;
   }
   // Inputs, clocks, machine coordinates, measured positions: variables that exist, but not here.

@@ -85,10 +85,21 @@ std::size_t whole_digits(double magnitude) noexcept {
   return digits;
 }
 
-void append_word(std::string& text, char letter, double value, Notation notation, int decimals,
-                 std::uint32_t line_number, std::size_t at) {
+// An address as it is written, and how its value is.
+struct Address {
+  char letter;
+  Notation notation;
+  int decimals;
+  std::size_t at;  // in the line
+};
+
+void append_word(std::string& text, const Address& address, double value, std::uint32_t line_number) {
+  const char letter = address.letter;
+  const Notation notation = address.notation;
+  int decimals = address.decimals;
   if (!(std::abs(value) < 1e8)) {
-    fail(3, fmt::format("{} = {} has more than {} digits", letter, macro::shown(value), max_digits), line_number, at);
+    fail(3, fmt::format("{} = {} has more than {} digits", letter, macro::shown(value), max_digits), line_number,
+         address.at);
   }
   if (notation == Notation::feed) {
     decimals = std::min(decimals, max_digits - static_cast<int>(whole_digits(std::abs(value))));
@@ -102,7 +113,7 @@ void append_word(std::string& text, char letter, double value, Notation notation
     fail(3,
          fmt::format("{} = {} has more than {} digits at {} decimals", letter, macro::shown(value), max_digits,
                      decimals),
-         line_number, at);
+         line_number, address.at);
   }
   const auto count = static_cast<std::int64_t>(scaled);
   if (notation == Notation::feed && upper(letter) == 'F') {
@@ -111,7 +122,7 @@ void append_word(std::string& text, char letter, double value, Notation notation
   }
   text += letter;
   if (notation == Notation::whole || (notation == Notation::g_code && count % 10 == 0)) {
-    text += std::to_string(notation == Notation::whole ? count : count / 10);
+    text += fmt::format("{}", notation == Notation::whole ? count : count / 10);
     return;
   }
   append_decimal(text, count, decimals);
@@ -201,7 +212,7 @@ std::string substitute(std::string_view line, std::uint32_t line_number, Variabl
     expect_operand_end(line, operand, line_number);
     if (value.has_value()) {
       text.append(line.substr(i, at - i));
-      append_word(text, line[at], *value, notation, decimals, line_number, at);
+      append_word(text, {line[at], notation, decimals, at}, *value, line_number);
       dwell = dwell || (letter == 'G' && std::round(*value * 10.0) == 40.0);
     } else if (!text.empty() && is_letter(text.back())) {
       fail(5, std::string("address ") + text.back() + " has no number", line_number, i);  // must not join the next word

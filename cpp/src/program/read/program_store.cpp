@@ -50,6 +50,49 @@ int loop_number(std::string_view line, std::string_view keyword) {
   return own && digit >= '1' && digit <= '3' ? digit - '0' : 0;
 }
 
+// The lines that begin with O, in their order. Only the letters O are looked at: a plain program of a million lines has
+// hardly any.
+class ProgramHeads {
+ public:
+  struct Head {
+    std::size_t begin;  // of the line
+    std::int64_t number;
+  };
+
+  ProgramHeads(const std::string& text, const TapeFrame& frame)
+      : text_(std::string_view(text).substr(0, frame.end)),
+        from_(frame.begin),
+        next_{find('O', frame.begin), find('o', frame.begin)} {}
+
+  std::optional<Head> next() {
+    for (;;) {
+      const std::size_t at = std::min(next_[0], next_[1]);
+      if (at == text_.size()) {
+        return std::nullopt;
+      }
+      const std::size_t which = next_[0] == at ? 0 : 1;
+      next_[which] = find(which == 0 ? 'O' : 'o', at + 1);
+      const std::size_t newline = at == 0 ? std::string_view::npos : text_.rfind('\n', at - 1);
+      const std::size_t begin = std::max(newline == std::string_view::npos ? 0 : newline + 1, from_);
+      const std::int64_t number = leading_number(text_.substr(begin), 'O');
+      std::size_t first = begin;
+      skip_spaces(text_, first);
+      if (number >= 0 && first == at) {
+        return Head{begin, number};
+      }
+    }
+  }
+
+ private:
+  [[nodiscard]] std::size_t find(char letter, std::size_t from) const noexcept {
+    return std::min(text_.find(letter, from), text_.size());
+  }
+
+  std::string_view text_;
+  std::size_t from_;
+  std::array<std::size_t, 2> next_;
+};
+
 }  // namespace
 
 // Where the program text proper begins and ends: between the first '%' and the next one.
@@ -168,11 +211,16 @@ std::optional<LinePlace> ProgramUnit::behind_end(int loop, const LinePlace& from
 }
 
 void ProgramStore::add(const std::string& text, const TapeFrame& frame, std::uint32_t file) {
-  auto unit = std::make_unique<ProgramUnit>();
-  unit->file = file;
-  unit->text = &text;
-  unit->first = {frame.begin, frame.first_line};
-  unit->end = frame.end;
+  const auto unit_at = [&](const LinePlace& first, std::int64_t number) {
+    auto unit = std::make_unique<ProgramUnit>();
+    unit->number = number;
+    unit->file = file;
+    unit->text = &text;
+    unit->first = first;
+    unit->end = frame.end;
+    return unit;
+  };
+  auto unit = unit_at({frame.begin, frame.first_line}, -1);
   const auto close = [&](std::size_t at) {
     const ProgramUnit* twin = unit->number < 0 ? nullptr : find(unit->number);
     if (twin != nullptr && twin->file == file) {
@@ -183,48 +231,21 @@ void ProgramStore::add(const std::string& text, const TapeFrame& frame, std::uin
     unit->end = at;
     units_.push_back(std::move(unit));
   };
-  // Only the letters O are looked at: a plain program of a million lines has hardly any.
-  LinePlace counted = unit->first;
-  std::array<std::size_t, 2> next = {frame.begin, frame.begin};
-  const auto advance = [&](std::size_t k, char letter, std::size_t from) {
-    const std::size_t at = text.find(letter, from);
-    next[k] = at == std::string::npos ? frame.end : std::min(at, frame.end);
-  };
-  advance(0, 'O', frame.begin);
-  advance(1, 'o', frame.begin);
-  while (true) {
-    const std::size_t at = std::min(next[0], next[1]);
-    if (at >= frame.end) {
-      break;
-    }
-    advance(0, 'O', next[0] <= at ? at + 1 : next[0]);
-    advance(1, 'o', next[1] <= at ? at + 1 : next[1]);
-    const std::size_t newline = at == 0 ? std::string::npos : text.rfind('\n', at - 1);
-    const std::size_t begin = std::max(newline == std::string::npos ? 0 : newline + 1, frame.begin);
-    const std::int64_t number = leading_number(std::string_view(text).substr(begin, frame.end - begin), 'O');
-    std::size_t first = begin;
-    skip_spaces(text, first);
-    if (number < 0 || first != at) {
-      continue;
-    }
-    counted.line += static_cast<std::uint32_t>(std::count(text.begin() + static_cast<std::ptrdiff_t>(counted.at),
-                                                          text.begin() + static_cast<std::ptrdiff_t>(begin), '\n'));
-    counted.at = begin;
-    const LinePlace here = counted;
-    if (number == 0 || number > 99'999'999) {
-      throw alarm_error(74, fmt::format("program number O{} outside 1 ... 99999999", number), here.line, 1);
+  ProgramHeads heads(text, frame);
+  LinePlace here = unit->first;
+  while (const auto head = heads.next()) {
+    here.line += static_cast<std::uint32_t>(std::count(text.begin() + static_cast<std::ptrdiff_t>(here.at),
+                                                       text.begin() + static_cast<std::ptrdiff_t>(head->begin), '\n'));
+    here.at = head->begin;
+    if (head->number == 0 || head->number > 99'999'999) {
+      throw alarm_error(74, fmt::format("program number O{} outside 1 ... 99999999", head->number), here.line, 1);
     }
     if (unit->number < 0) {
-      unit->number = number;  // what stands before the first O line belongs to its program
+      unit->number = head->number;  // what stands before the first O line belongs to its program
       continue;
     }
-    close(begin);
-    unit = std::make_unique<ProgramUnit>();
-    unit->number = number;
-    unit->file = file;
-    unit->text = &text;
-    unit->first = here;
-    unit->end = frame.end;
+    close(head->begin);
+    unit = unit_at(here, head->number);
   }
   close(frame.end);
 }

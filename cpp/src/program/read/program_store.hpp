@@ -1,4 +1,4 @@
-// Private to gcode: the programs of one reading, in one or several files, and where their lines begin.
+// Private: the programs of one reading, in one or several files, and where their lines begin.
 #pragma once
 
 #include <cstdint>

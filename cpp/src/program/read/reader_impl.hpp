@@ -1,4 +1,4 @@
-// Private to gcode: the execution of programs. Lines go in the order in which the control runs them to the Interpreter,
+// Private: the execution of programs. Lines go in the order in which the control runs them to the Interpreter,
 // plain ones as they stand, all others as the plain blocks that they come to. Spread over three files: texts and lines
 // (reader.cpp), calls (reader_calls.cpp), macro statements (reader_macros.cpp).
 #pragma once
@@ -35,6 +35,8 @@ class ControlVariables : public SystemVariables {
 
  private:
   [[nodiscard]] bool modal(int number, MacroValue& value) const;
+  [[nodiscard]] bool last_said(int number, MacroValue& value) const;
+  [[nodiscard]] bool offset(int number, MacroValue& value) const;
   [[nodiscard]] std::optional<double>* tool_field(int number, ToolOffset& offset, int& tool) const;
   [[nodiscard]] bool work_slot(int number, int& system, int& extra, int& axis) const;
   [[nodiscard]] double to_program_units(double value_mm) const;

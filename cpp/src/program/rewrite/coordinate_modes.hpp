@@ -1,4 +1,4 @@
-// Private to gcode: scaling G51, mirror G51.1 and rotation G68 as one map from programmed to work coordinates.
+// Private: scaling G51, mirror G51.1 and rotation G68 as one map from programmed to work coordinates.
 #pragma once
 
 #include <array>

@@ -21,17 +21,11 @@ constexpr double tangent_rad = pi / 180.0;
 // Sizes in words are rounded: a block may be used up to its last digit.
 constexpr double used_up_by_corner_mm = 1e-6;
 
-struct CornerWord {
-  bool chamfer;
-  double size_mm;
-  std::uint32_t line;
-  std::uint32_t column;
-
-  [[nodiscard]] const char* name() const { return chamfer ? "chamfer ,C" : "corner rounding ,R"; }
-  [[nodiscard]] Error refusal(int alarm, const std::string& why) const {
-    return alarm_error(alarm, fmt::format("{}{:.4f}: ", name(), size_mm) + why, line, column);
-  }
-};
+Error refusal(const CornerWord& word, int alarm, const std::string& why) {
+  return alarm_error(alarm,
+                     fmt::format("{}{:.4f}: {}", word.chamfer ? "chamfer ,C" : "corner rounding ,R", word.size_mm, why),
+                     word.line, word.column);
+}
 
 // How much of a block the corner takes: mm on a line, rad on an arc.
 struct Cut {
@@ -45,10 +39,10 @@ double in_mm(const Curve& curve, double taken) { return curve.arc ? taken * curv
 
 void require_room(const Curve& curve, double taken, const char* which, const CornerWord& word) {
   if (in_mm(curve, available(curve) - taken) < -used_up_by_corner_mm) {
-    throw word.refusal(55,
-                       fmt::format("the block {} the corner is {:.4f} mm long in the plane, the corner takes {:.4f} "
-                                   "mm of it",
-                                   which, in_mm(curve, available(curve)), in_mm(curve, taken)));
+    throw refusal(word, 55,
+                  fmt::format("the block {} the corner is {:.4f} mm long in the plane, the corner takes {:.4f} "
+                              "mm of it",
+                              which, in_mm(curve, available(curve)), in_mm(curve, taken)));
   }
 }
 
@@ -63,10 +57,10 @@ Cut chamfer_cut(const Curve& curve, bool at_end, const CornerWord& word) {
   }
   const double radius = at_end ? curve.end_radius_mm : curve.start_radius_mm;
   if (word.size_mm > 2.0 * radius) {
-    throw word.refusal(55,
-                       fmt::format("the block {} the corner is an arc of radius {:.4f} mm, no point of it is so far "
-                                   "from the corner",
-                                   which, radius));
+    throw refusal(word, 55,
+                  fmt::format("the block {} the corner is an arc of radius {:.4f} mm, no point of it is so far "
+                              "from the corner",
+                              which, radius));
   }
   const double taken = 2.0 * std::asin(word.size_mm / (2.0 * radius));
   require_room(curve, taken, which, word);
@@ -87,8 +81,9 @@ Vector2 foot(const Curve& curve, bool at_end, const Vector2& centre) {
 void require_fillet_arc(const Curve& curve, bool at_end, double left_mm, const CornerWord& word) {
   const double radius = at_end ? curve.end_radius_mm : curve.start_radius_mm;
   if (curve.arc && radius - curve.sense() * left_mm <= plane::touch_mm) {
-    throw word.refusal(55, fmt::format("no arc of this radius fits inside the arc {} the corner, radius {:.4f} mm",
-                                       at_end ? "before" : "after", radius));
+    throw refusal(word, 55,
+                  fmt::format("no arc of this radius fits inside the arc {} the corner, radius {:.4f} mm",
+                              at_end ? "before" : "after", radius));
   }
 }
 
@@ -114,8 +109,9 @@ Inserted rounding_of(const Curve& a, const Curve& b, double turn, const CornerWo
   require_fillet_arc(a, true, left, word);
   require_fillet_arc(b, false, left, word);
   const auto no_arc = [&] {
-    return word.refusal(
-        55, fmt::format("no arc of this radius touches both blocks, which turn by {:.3f} degrees", turn * 180.0 / pi));
+    return refusal(
+        word, 55,
+        fmt::format("no arc of this radius touches both blocks, which turn by {:.3f} degrees", turn * 180.0 / pi));
   };
   const auto crossing = plane::inner_crossing(plane::offset_at_end(a, left), plane::offset_at_start(b, left));
   if (!crossing) {
@@ -161,28 +157,27 @@ void check(const Segment& segment, const char* which, int normal, int alarm_with
     throw Error(ErrorKind::argument, "a corner word needs finite values", word.line, word.column);
   }
   if (segment.kind == SegmentKind::rapid) {
-    throw word.refusal(52, fmt::format("the block {} the corner is a rapid, G01, G02 or G03 is expected", which));
+    throw refusal(word, 52, fmt::format("the block {} the corner is a rapid, G01, G02 or G03 is expected", which));
   }
   const bool arc = segment.kind == SegmentKind::arc;
   const Curve curve = arc && segment.normal != normal ? Curve{} : plane::curve_of(segment, normal);
   const bool radius =
       !arc || (curve.start_radius_mm > plane::coincident_mm && curve.end_radius_mm > plane::coincident_mm);
   if (!curve.moves() || !radius) {
-    throw word.refusal(alarm_without_motion,
-                       fmt::format("the block {} the corner moves {:.4f} mm in the plane", which, curve.length_mm));
+    throw refusal(word, alarm_without_motion,
+                  fmt::format("the block {} the corner moves {:.4f} mm in the plane", which, curve.length_mm));
   }
 }
 
 }  // namespace
 
-CornerResult insert_corner(const Segment& before, const Segment& after, bool chamfer, double size_mm, int plane_normal,
-                           std::uint32_t line, std::uint32_t column) {
-  const CornerWord word{chamfer, size_mm, line, column};
-  if (plane_normal < 0 || plane_normal > 2 || !std::isfinite(size_mm)) {
-    throw Error(ErrorKind::argument, "a corner word needs a plane normal of 0, 1 or 2 and a finite size", line, column);
+CornerResult insert_corner(const Segment& before, const Segment& after, const CornerWord& word, int plane_normal) {
+  if (plane_normal < 0 || plane_normal > 2 || !std::isfinite(word.size_mm)) {
+    throw Error(ErrorKind::argument, "a corner word needs a plane normal of 0, 1 or 2 and a finite size", word.line,
+                word.column);
   }
-  if (size_mm < 0.0) {
-    throw word.refusal(6, "a size below zero");
+  if (word.size_mm < 0.0) {
+    throw refusal(word, 6, "a size below zero");
   }
   check(before, "before", plane_normal, 55, word);
   check(after, "after", plane_normal, 51, word);
@@ -194,18 +189,18 @@ CornerResult insert_corner(const Segment& before, const Segment& after, bool cha
   const Curve a = plane::curve_of(before, plane_normal);
   const Curve b = plane::curve_of(after, plane_normal);
   const double turn = plane::turn_at(a, b);
-  if (size_mm == 0.0 || std::abs(turn) <= tangent_rad) {
+  if (word.size_mm == 0.0 || std::abs(turn) <= tangent_rad) {
     return {before, std::nullopt, after};
   }
 
-  const Inserted corner = chamfer ? chamfer_of(a, b, word) : rounding_of(a, b, turn, word);
+  const Inserted corner = word.chamfer ? chamfer_of(a, b, word) : rounding_of(a, b, turn, word);
   const Vector3 corner_start = plane::in_space(corner.from.point, before.end_mm, plane_normal);
   Vector3 corner_end = plane::in_space(corner.to.point, before.end_mm, plane_normal);
   Segment inserted;  // not in an optional yet: GCC 12 would warn of its unset part
   const bool has_length = corner.length_mm > plane::coincident_mm;
   if (!has_length) {
     corner_end = corner_start;  // both blocks are shortened to one point
-  } else if (chamfer) {
+  } else if (word.chamfer) {
     inserted = make_line(corner_start, corner_end, before.feed_mm_per_s, before.line);
   } else {
     inserted = make_arc(corner_start, corner_end, plane::in_space(corner.centre, before.end_mm, plane_normal),

@@ -116,19 +116,7 @@ void MoveRewriter::block(const ParsedBlock& block, const LineOrigin& origin) {
                         (words.groups & group_bit(Group::unknown_position)) != 0 || has_code(words, 40);
   const bool drills = programmed_.cycle != 80 && !own_axes;
   if (drills && words.has_any(axis_letters | letter_mask("RKL"))) {
-    // Each hole gets a block of its own: its place may be anything but a multiple of the first step.
-    const int repeats = words.has('K')   ? static_cast<int>(words['K'].value)
-                        : words.has('L') ? static_cast<int>(words['L'].value)
-                                         : 1;
-    const bool data_only = repeats == 0;
-    for (int k = 0; k < std::clamp(repeats, 1, 9999); ++k) {
-      Item hole = item;
-      read_cycle(hole, data_only);
-      item.head.clear();
-      item.tail.clear();
-      enqueue(std::move(hole));
-      synchronise();
-    }
+    drill_holes(std::move(item));
     return;
   }
   if (words.has_any(axis_letters | centre_letters) && !own_axes) {
@@ -138,6 +126,23 @@ void MoveRewriter::block(const ParsedBlock& block, const LineOrigin& origin) {
   }
   if (item.move || !item.head.empty() || !item.tail.empty()) {
     enqueue(std::move(item));
+  }
+}
+
+// Each hole gets a block of its own: its place may be anything but a multiple of the first step.
+void MoveRewriter::drill_holes(Item item) {
+  const BlockWords& words = *words_;
+  const int repeats = words.has('K')   ? static_cast<int>(words['K'].value)
+                      : words.has('L') ? static_cast<int>(words['L'].value)
+                                       : 1;
+  const bool data_only = repeats == 0;
+  for (int k = 0; k < std::clamp(repeats, 1, 9999); ++k) {
+    Item hole = item;
+    read_cycle(hole, data_only);
+    item.head.clear();
+    item.tail.clear();
+    enqueue(std::move(hole));
+    synchronise();
   }
 }
 

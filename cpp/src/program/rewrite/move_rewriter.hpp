@@ -1,4 +1,4 @@
-// Private to gcode: blocks under coordinate modes (G16, G51, G51.1, G68), corner words and cutter compensation, written
+// Private: blocks under coordinate modes (G16, G51, G51.1, G68), corner words and cutter compensation, written
 // as plain blocks.
 #pragma once
 
@@ -9,6 +9,7 @@
 
 #include "program/interpret/interpreter_impl.hpp"
 #include "program/rewrite/coordinate_modes.hpp"
+#include "program/rewrite/corner_words.hpp"
 
 namespace shapegcode::detail {
 
@@ -63,6 +64,7 @@ class MoveRewriter {
   [[nodiscard]] bool idle() const noexcept { return waiting_.empty(); }
   void synchronise();
   void read_codes(const BlockWords& words);
+  void set_plane(int plane, std::uint32_t column);
   void set_rotation(int g_tenths);
   void set_scaling(int g_tenths);
   void set_mirror(int g_tenths);
@@ -71,6 +73,7 @@ class MoveRewriter {
   void keep_words(Item& item) const;
   void read_move(Item& item);
   void read_cycle(Item& item, bool data_only);
+  void drill_holes(Item item);
   void read_target(Item& item, Vector3& end);
   void check_known(bool from_polar) const;
   [[nodiscard]] Segment programmed_segment(const Vector3& end) const;
@@ -105,9 +108,7 @@ class MoveRewriter {
   std::vector<Item> waiting_;
   bool span_open_ = false;     // blocks under compensation wait for their end
   bool corner_waits_ = false;  // the last move that waits carries ,R or ,C
-  bool corner_chamfers_ = false;
-  double corner_mm_ = 0.0;
-  std::uint32_t corner_column_ = 0;
+  CornerWord corner_;
   LineOrigin corner_origin_;
 
   // Of the block at hand.

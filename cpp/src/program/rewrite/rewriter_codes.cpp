@@ -19,15 +19,7 @@ void MoveRewriter::read_codes(const BlockWords& words) {
         programmed_.cycle = 80;
         break;
       case Group::plane:
-        if (compensation_ != 40 && options_.expand_compensation && whole != programmed_.plane) {
-          throw alarm_error(37, fmt::format("the plane changes to G{} under cutter compensation", whole), origin_.line,
-                            words.g_column[i]);
-        }
-        if ((modes_.rotation || polar_) && whole != programmed_.plane) {
-          throw alarm_error(144, fmt::format("the plane changes to G{} under rotation G68 or G16", whole), origin_.line,
-                            words.g_column[i]);
-        }
-        programmed_.plane = whole;
+        set_plane(whole, words.g_column[i]);
         break;
       case Group::distance:
         programmed_.distance = whole;
@@ -72,6 +64,19 @@ void MoveRewriter::read_codes(const BlockWords& words) {
       set_compensation(compensation_);
     }
   }
+}
+
+void MoveRewriter::set_plane(int plane, std::uint32_t column) {
+  const bool changes = plane != programmed_.plane;
+  if (changes && compensation_ != 40 && options_.expand_compensation) {
+    throw alarm_error(37, fmt::format("the plane changes to G{} under cutter compensation", plane), origin_.line,
+                      column);
+  }
+  if (changes && (modes_.rotation || polar_)) {
+    throw alarm_error(144, fmt::format("the plane changes to G{} under rotation G68 or G16", plane), origin_.line,
+                      column);
+  }
+  programmed_.plane = plane;
 }
 
 void MoveRewriter::set_compensation(int code) {

@@ -143,8 +143,7 @@ void MoveRewriter::meet_corner(Item& item) {
   }
   const auto previous =
       std::find_if(waiting_.rbegin(), waiting_.rend(), [](const Item& waiting) { return waiting.move; });
-  CornerResult corner = insert_corner(previous->segment, item.segment, corner_chamfers_, corner_mm_, normal,
-                                      corner_origin_.line, corner_column_);
+  CornerResult corner = insert_corner(previous->segment, item.segment, corner_, normal);
   previous->segment = corner.before;
   item.segment = corner.after;
   if (corner.inserted) {
@@ -166,7 +165,7 @@ void MoveRewriter::refuse_corner(std::uint32_t line) {
   throw alarm_error(51,
                     "a block with ,R or ,C must be followed by a move in the plane" +
                         (line > 0 ? fmt::format(", and line {} has none", line) : std::string()),
-                    corner_origin_.line, corner_column_);
+                    corner_.line, corner_.column);
 }
 
 void MoveRewriter::enqueue(Item item) {
@@ -187,9 +186,8 @@ void MoveRewriter::enqueue(Item item) {
                         item.origin.line, words_->corner->column);
     }
     corner_waits_ = true;
-    corner_chamfers_ = words_->corner->letter == '>';
-    corner_mm_ = interpreter_.length_mm(*words_->corner);
-    corner_column_ = words_->corner->column;
+    corner_ = {words_->corner->letter == '>', interpreter_.length_mm(*words_->corner), item.origin.line,
+               words_->corner->column};
     corner_origin_ = item.origin;
   }
   waiting_.push_back(std::move(item));

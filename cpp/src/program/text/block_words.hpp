@@ -1,4 +1,4 @@
-// Private to gcode: the words of one block sorted by address, and its G codes by modal group.
+// Private: the words of one block sorted by address, and its G codes by modal group.
 #pragma once
 
 #include <array>
