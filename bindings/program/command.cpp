@@ -122,7 +122,7 @@ Args:
 Raises:
     ArgumentError: An empty or not finite kernel, or a smoothness that is not above 0.
 
-Source: spec 5.)")
+Source: this project.)")
       .def(py::init<std::vector<double>, double>(), py::arg("kernel"), py::arg("smoothness"), "See the class.")
       .def(
           "solve",

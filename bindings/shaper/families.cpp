@@ -129,7 +129,7 @@ Returns:
 Raises:
     ArgumentError: A value is outside its range.
 
-Source: spec 2.)");
+Source: this project.)");
   m.def("worst_residual", &shapegcode::worst_residual, py::arg("shaper"), py::arg("mode"), py::arg("lowest_hz"),
         py::arg("highest_hz"), release_gil(),
         R"(Largest residual ratio over a band of natural frequencies, found and proven.

@@ -64,7 +64,7 @@ Raises:
       .def_readonly("participation", &Mode::participation,
                     "Share of this mode's relative deflection in the response, no unit.")
       .def_property_readonly("pole", &shapegcode::pole,
-                             "Pole -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s (spec 2; paper 002, eq. 7).")
+                             "Pole -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s (paper 002, eq. 7).")
       .def("__repr__",
            [](const Mode& self) {
              return "Mode(frequency_hz=" + repr(self.frequency_hz) + ", damping_ratio=" + repr(self.damping_ratio) +
@@ -113,7 +113,7 @@ Source: paper 002, eq. 4 and 9.)")
                              "Time of the last tap in s: how much longer the shaped command moves.")
       .def_property_readonly("mean_s", &shapegcode::mean_s, "First moment in s: the mean delay of the shaped command.")
       .def_property_readonly("variance_s2", &shapegcode::variance_s2,
-                             "Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2 (spec 0).")
+                             "Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2.")
       .def_property_readonly("has_negative", &shapegcode::has_negative, "True if any amplitude is below zero.")
       .def_property_readonly("abs_sum", &shapegcode::abs_sum,
                              "Sum of the amplitudes' magnitudes (no unit): 1 for a non-negative shaper.")
@@ -129,7 +129,7 @@ Args:
 Returns:
     The ratio V (no unit), 0 where the shaper cancels the mode.
 
-Source: spec 2; paper 002, eq. 8.)")
+Source: paper 002, eq. 8.)")
       .def("__repr__",
            [](const Shaper& self) {
              return "Shaper(times_s=" + repr(self.times_s) + ", amplitudes=" + repr(self.amplitudes) + ")";
@@ -221,7 +221,7 @@ Raises:
     ArgumentError: No mode, or a period that is not positive.
     DesignError: A z closer to +1 than 0.01, or so large an abs_sum that rounding leaves more than 1e-10.
 
-Source: this project (spec 2, grid-exact shapers).)");
+Source: this project (grid-exact shapers).)");
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ class Mode:
     @property
     def pole(self) -> complex:
         """
-        Pole -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s (spec 2; paper 002, eq. 7).
+        Pole -zeta*omega + j*omega*sqrt(1-zeta^2) in rad/s (paper 002, eq. 7).
         """
 class Shaper:
     """
@@ -117,7 +117,7 @@ class Shaper:
         Returns:
             The ratio V (no unit), 0 where the shaper cancels the mode.
         
-        Source: spec 2; paper 002, eq. 8.
+        Source: paper 002, eq. 8.
         """
     @property
     def abs_sum(self) -> float:
@@ -152,7 +152,7 @@ class Shaper:
     @property
     def variance_s2(self) -> float:
         """
-        Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2 (spec 0).
+        Second central moment in s^2: the contour cost, dR/R = variance*(v/R)^2/2.
         """
 class ExtraInsensitive:
     """
@@ -2526,7 +2526,7 @@ class ContourSolver:
     Raises:
         ArgumentError: An empty or not finite kernel, or a smoothness that is not above 0.
     
-    Source: spec 5.
+    Source: this project.
     """
     def __init__(self, kernel: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], smoothness: typing.SupportsFloat | typing.SupportsIndex) -> None:
         """
@@ -5384,7 +5384,7 @@ def grid_polynomial(modes: collections.abc.Sequence[Mode], period_s: typing.Supp
         ArgumentError: No mode, or a period that is not positive.
         DesignError: A z closer to +1 than 0.01, or so large an abs_sum that rounding leaves more than 1e-10.
     
-    Source: this project (spec 2, grid-exact shapers).
+    Source: this project (grid-exact shapers).
     """
 def in_position_wait_behind_s(error_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], moved: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(3)"], model: ControllerModel) -> float:
     """
@@ -5752,7 +5752,7 @@ def sensitivity_curve(shaper: Shaper, damping_ratio: typing.SupportsFloat | typi
     Raises:
         ArgumentError: A value is outside its range.
     
-    Source: spec 2.
+    Source: this project.
     """
 def shape_path(path: Path, shaper: Fir, marked_segments: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: ShapingOptions) -> ShapedCommand:
     """

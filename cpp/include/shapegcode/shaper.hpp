@@ -8,7 +8,7 @@
 
 namespace shapegcode {
 
-/// An input shaper: amplitudes A_k at times t_k, ascending from t_1 = 0, that add up to one (spec 2). The times are
+/// An input shaper: amplitudes A_k at times t_k, ascending from t_1 = 0, that add up to one. The times are
 /// continuous; `to_fir` puts a shaper whose times lie on a sample grid into the filter cascade. Build one with
 /// `make_shaper`, which checks it.
 struct Shaper {
@@ -30,7 +30,7 @@ struct Shaper {
 [[nodiscard]] double mean_s(const Shaper& shaper);
 
 /// Second central moment sum A_k (t_k - mean)^2 in s^2: the contour cost, dR/R = variance*(v/R)^2/2 on a circle of
-/// radius R at speed v (spec 0). May be negative where amplitudes are.
+/// radius R at speed v. May be negative where amplitudes are.
 [[nodiscard]] double variance_s2(const Shaper& shaper);
 
 /// True if any amplitude is below zero.
@@ -40,13 +40,13 @@ struct Shaper {
 [[nodiscard]] double abs_sum(const Shaper& shaper);
 
 /// Residual vibration of `mode` after the last tap, relative to the unshaped one:
-/// V = e^{-zeta*omega*t_N} |sum A_k e^{zeta*omega*t_k} e^{j*omega_d*t_k}| (spec 2; paper 002, eq. 8 sets it to zero).
+/// V = e^{-zeta*omega*t_N} |sum A_k e^{zeta*omega*t_k} e^{j*omega_d*t_k}| (paper 002, eq. 8 sets it to zero).
 /// The rounding floor is about 1e-16*(1 + omega*t_N)*sum|A_k|. Throws Error(argument) as `pole` does.
 [[nodiscard]] double residual_ratio(const Shaper& shaper, const Mode& mode);
 
 /// The shaper as a filter on samples `period_s` (s) apart. Exact or not at all: throws Error(design), naming the time,
 /// if a time differs from a multiple of the period by more than 1e-9 of the larger of time and period (rounding the
-/// times would undo the zeros, spec 2), and Error(argument) if the period is not finite and positive.
+/// times would undo the zeros), and Error(argument) if the period is not finite and positive.
 [[nodiscard]] Fir to_fir(const Shaper& shaper, double period_s);
 
 /// Smallest distance |z - 1| of a mode's z = e^{s*period} from +1 at which `grid_polynomial` accepts it: below it a
@@ -64,7 +64,7 @@ inline constexpr double grid_largest_residual = 1e-10;
 ///
 /// Throws Error(argument) if `modes` is empty, as `pole` does, or if the period is not finite and positive;
 /// Error(design) if a z_i is closer to +1 than `grid_least_distance_from_one`, or if rounding leaves more than
-/// `grid_largest_residual`. Source: this project (spec 2, grid-exact shapers).
+/// `grid_largest_residual`. Source: this project (grid-exact shapers).
 [[nodiscard]] Shaper grid_polynomial(std::span<const Mode> modes, double period_s);
 
 // One declaration here and one definition in families.cpp per family; those with a tolerated residual are in
@@ -134,7 +134,7 @@ struct ExtraInsensitive {
 [[nodiscard]] ExtraInsensitive extra_insensitive(const Mode& mode, double vibration_limit, int humps);
 
 /// Residual ratio of modes with damping ratio `damping_ratio` at each of `frequencies_hz` (natural frequencies), in
-/// their order. Throws Error(argument) as `pole` does. Source: spec 2.
+/// their order. Throws Error(argument) as `pole` does. Source: this project.
 [[nodiscard]] std::vector<double> sensitivity_curve(const Shaper& shaper, double damping_ratio,
                                                     std::span<const double> frequencies_hz);
 

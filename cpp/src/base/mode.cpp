@@ -1,8 +1,9 @@
 #include "shapegcode/mode.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <numbers>
-#include <sstream>
 
 #include "shapegcode/error.hpp"
 
@@ -10,15 +11,13 @@ namespace shapegcode {
 
 std::complex<double> pole(const Mode& mode) {
   if (!std::isfinite(mode.frequency_hz) || !(mode.frequency_hz > 0.0)) {
-    std::ostringstream message;
-    message << "mode frequency " << mode.frequency_hz << " Hz, must be finite and above 0";
-    throw Error(ErrorKind::argument, message.str());
+    throw Error(ErrorKind::argument,
+                fmt::format("mode frequency {:g} Hz, must be finite and above 0", mode.frequency_hz));
   }
   if (!(mode.damping_ratio >= 0.0 && mode.damping_ratio < 1.0)) {
-    std::ostringstream message;
-    message << "mode at " << mode.frequency_hz << " Hz has damping ratio " << mode.damping_ratio
-            << ", must be at least 0 and below 1";
-    throw Error(ErrorKind::argument, message.str());
+    throw Error(ErrorKind::argument,
+                fmt::format("mode at {:g} Hz has damping ratio {:g}, must be at least 0 and below 1", mode.frequency_hz,
+                            mode.damping_ratio));
   }
   const double omega = 2.0 * std::numbers::pi * mode.frequency_hz;
   const double zeta = mode.damping_ratio;

@@ -28,7 +28,7 @@ struct OscillatorMotion {
 /// little.
 ///
 /// Throws Error(argument) on an empty force or one that is not finite, a mass, stiffness or period that is not above 0,
-/// damping below 0 or theta below 1. Source: spec 8; paper 003, section 2.2; K.-J. Bathe, Finite Element
+/// damping below 0 or theta below 1. Source: paper 003, section 2.2; K.-J. Bathe, Finite Element
 /// Procedures, 9.2.
 [[nodiscard]] OscillatorMotion wilson_theta(const EquivalentOscillator& oscillator, std::span<const double> force_n,
                                             double period_s, double theta = 1.4, double displacement_m = 0.0,
@@ -66,7 +66,7 @@ struct EquivalentMass {
 ///
 /// Throws Error(argument) on signals that check_taps refuses (with an impulse, the force may be zero), a response that
 /// is zero throughout, a frequency that is not above 0, a damping ratio outside 0 ... 1, and as wilson_theta. Source:
-/// spec 8; paper 003, section 2.2.
+/// paper 003, section 2.2.
 [[nodiscard]] EquivalentMass equivalent_mass_closed_form(const MassProblem& problem);
 
 /// The same by halving the range of masses until the RMS agree: paper 003's steps 1 to 7, kept as the check. Errors

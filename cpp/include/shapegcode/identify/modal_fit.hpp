@@ -75,7 +75,7 @@ struct ModalFit {
 /// noise on the force adds, to first order, what it does to the modelled response.
 ///
 /// Throws Error(argument) on signals that check_taps refuses, a period or start outside its range, or too few samples
-/// for the parameters. Not converging is told in the result. Source: spec 8; L. Ljung, System Identification, ch. 7.
+/// for the parameters. Not converging is told in the result. Source: L. Ljung, System Identification, ch. 7.
 [[nodiscard]] ModalFit fit_modes(std::span<const TapSignals> taps, double period_s, const NaturalModes& start,
                                  const ModalFitOptions& options);
 
