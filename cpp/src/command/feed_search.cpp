@@ -36,7 +36,7 @@ class FeedSearch {
   FeedSearch(std::shared_ptr<const Path> path, const MotionLimits& limits, const RunFilter& filter,
              std::size_t steps_per_half, double tolerance_mm, double least_feed_mm_per_s)
       : path_(std::move(path)),
-        limits_(without_tolerance(limits)),
+        limits_(limits),
         filter_(filter),
         steps_per_half_(steps_per_half),
         tolerance_(tolerance_mm),
@@ -178,13 +178,6 @@ class FeedSearch {
 };
 
 }  // namespace
-
-MotionLimits without_tolerance(MotionLimits limits) {
-  limits.contour_tolerance_mm = MotionLimits::none;
-  limits.filter_variance_s2 = 0.0;
-  limits.filter_mean_deviation_s = 0.0;
-  return limits;
-}
 
 RunLimits run_limits(const MotionLimits& limits) {
   return {limits.max_feed_mm_per_s, limits.max_acceleration_mm_per_s2};

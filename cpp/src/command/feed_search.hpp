@@ -11,9 +11,6 @@
 
 namespace shapegcode {
 
-/// Limits of a plan whose contour tolerance `plan_within_tolerance` keeps: that of the limits is taken out.
-[[nodiscard]] MotionLimits without_tolerance(MotionLimits limits);
-
 /// What the axes may do while the contour is corrected.
 [[nodiscard]] RunLimits run_limits(const MotionLimits& limits);
 
@@ -29,9 +26,8 @@ struct PlannedRun {
 
 /// The highest feed at which a run keeps the contour tolerance: planned at full speed, shaped, measured, and slowed
 /// only on the arcs and at the corners that leave the tolerance, until all keep it; what was slowed too far is raised
-/// again. `tolerance_mm` is of what the filter's target says shall follow the path, in place of that of `limits`. A
-/// corner that would have to be crept through is a stop; nothing else is slowed below `least_feed_mm_per_s`, which a
-/// controller may not run.
+/// again. `tolerance_mm` is of what the filter's target says shall follow the path. A corner that would have to be
+/// crept through is a stop; nothing else is slowed below `least_feed_mm_per_s`, which a controller may not run.
 [[nodiscard]] PlannedRun plan_within_tolerance(std::shared_ptr<const Path> path, const MotionLimits& limits,
                                                const RunFilter& filter, std::size_t steps_per_half, double tolerance_mm,
                                                double least_feed_mm_per_s = 0.0);

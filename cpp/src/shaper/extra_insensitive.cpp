@@ -1,5 +1,7 @@
 #include "shapegcode/shaper.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -7,7 +9,6 @@
 #include <cstddef>
 #include <limits>
 #include <numbers>
-#include <sstream>
 #include <utility>
 
 #include "base/linear_algebra.hpp"
@@ -173,15 +174,14 @@ std::vector<double> every_second(const Eigen::VectorXd& values, Eigen::Index fir
 
 ExtraInsensitive extra_insensitive(const Mode& mode, double vibration_limit, int humps) {
   const double omega = std::abs(pole(mode));
-  std::ostringstream message;
   if (!(vibration_limit > 0.0 && vibration_limit < 1.0)) {
-    message << "the vibration limit of an extra-insensitive shaper is " << vibration_limit
-            << ", must be above 0 and below 1";
-    throw Error(ErrorKind::argument, message.str());
+    throw Error(ErrorKind::argument,
+                fmt::format("the vibration limit of an extra-insensitive shaper is {:g}, must be above 0 and below 1",
+                            vibration_limit));
   }
   if (humps < 1 || humps > most_humps) {
-    message << "an extra-insensitive shaper has 1 to " << most_humps << " humps: " << humps << " asked for";
-    throw Error(ErrorKind::argument, message.str());
+    throw Error(ErrorKind::argument,
+                fmt::format("an extra-insensitive shaper has 1 to {} humps: {} asked for", most_humps, humps));
   }
   Unknowns x = chebyshev(vibration_limit, humps);
   double zeta = 0.0;
@@ -197,10 +197,10 @@ ExtraInsensitive extra_insensitive(const Mode& mode, double vibration_limit, int
     }
     step *= 0.5;
     if (step < smallest_damping_step) {
-      message << "no extra-insensitive shaper with " << humps << " humps of " << vibration_limit
-              << " was found for the mode at " << mode.frequency_hz << " Hz, damping ratio " << mode.damping_ratio
-              << ": its solution ends near damping ratio " << zeta;
-      throw Error(ErrorKind::design, message.str());
+      throw Error(ErrorKind::design,
+                  fmt::format("no extra-insensitive shaper with {} humps of {:g} was found for the mode at {:g} Hz, "
+                              "damping ratio {:g}: its solution ends near damping ratio {:g}",
+                              humps, vibration_limit, mode.frequency_hz, mode.damping_ratio, zeta));
     }
   }
   x.amplitudes /= x.amplitudes.sum();

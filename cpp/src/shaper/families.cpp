@@ -1,11 +1,12 @@
 #include "shapegcode/shaper.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <cstddef>
 #include <numbers>
-#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -59,9 +60,8 @@ Shaper zv(const Mode& mode) {
 
 Shaper repeated_zv(const Mode& mode, int zeros) {
   if (zeros < 1 || zeros > most_repeated_zeros) {
-    std::ostringstream message;
-    message << "a ZV shaper has 1 to " << most_repeated_zeros << " zeros at its mode: " << zeros << " asked for";
-    throw Error(ErrorKind::argument, message.str());
+    throw Error(ErrorKind::argument,
+                fmt::format("a ZV shaper has 1 to {} zeros at its mode: {} asked for", most_repeated_zeros, zeros));
   }
   const Shaper once = zv(mode);
   Shaper shaper = once;
@@ -103,10 +103,9 @@ Shaper negative_zv(const Mode& mode) {
   constexpr double largest_residual = 1e-13;
   if (!(phases.second > 0.0 && phases.second < phases.third && phases.third < 2.0 * std::numbers::pi &&
         residual_ratio(shaper, mode) <= largest_residual)) {
-    std::ostringstream message;
-    message << "no shaper of taps 1, -1, 1 was found for the mode at " << mode.frequency_hz << " Hz: damping ratio "
-            << mode.damping_ratio << " is too high for it";
-    throw Error(ErrorKind::design, message.str());
+    throw Error(ErrorKind::design, fmt::format("no shaper of taps 1, -1, 1 was found for the mode at {:g} Hz: damping "
+                                               "ratio {:g} is too high for it",
+                                               mode.frequency_hz, mode.damping_ratio));
   }
   return shaper;
 }

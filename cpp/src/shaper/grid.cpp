@@ -1,11 +1,11 @@
 #include "shapegcode/shaper.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <iomanip>
-#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -56,12 +56,11 @@ std::vector<double> multiply(const std::vector<double>& a, const std::vector<dou
 }
 
 [[noreturn]] void refuse_root(const Mode& mode, double period_s, const GridRoot& root) {
-  std::ostringstream message;
-  message << "mode " << mode.frequency_hz << " Hz cannot be cancelled on a " << period_s * 1e3
-          << " ms grid: z = " << std::fixed << std::setprecision(3) << root.z.real() << std::showpos << root.z.imag()
-          << std::noshowpos << "j lies " << std::scientific << std::setprecision(1) << std::abs(root.one_minus_z)
-          << " from +1, limit " << std::defaultfloat << grid_least_distance_from_one << "; choose another block period";
-  throw Error(ErrorKind::design, message.str());
+  throw Error(ErrorKind::design,
+              fmt::format("mode {:g} Hz cannot be cancelled on a {:g} ms grid: z = {:.3f}{:+.3f}j lies {:.1e} from +1, "
+                          "limit {:g}; choose another block period",
+                          mode.frequency_hz, period_s * 1e3, root.z.real(), root.z.imag(), std::abs(root.one_minus_z),
+                          grid_least_distance_from_one));
 }
 
 }  // namespace
@@ -95,11 +94,12 @@ Shaper grid_polynomial(std::span<const Mode> modes, double period_s) {
   for (const Mode& mode : modes) {
     const double residual = residual_ratio(shaper, mode);
     if (!(residual <= grid_largest_residual)) {
-      std::ostringstream message;
-      message << "the polynomial of " << modes.size() << " modes on a " << period_s * 1e3
-              << " ms grid has sum |a| = " << abs_sum(shaper) << ", so that rounding leaves " << residual << " of mode "
-              << mode.frequency_hz << " Hz, limit " << grid_largest_residual << "; choose a longer period";
-      throw Error(ErrorKind::design, message.str());
+      throw Error(
+          ErrorKind::design,
+          fmt::format("the polynomial of {} modes on a {:g} ms grid has sum |a| = {:g}, so that rounding leaves "
+                      "{:g} of mode {:g} Hz, limit {:g}; choose a longer period",
+                      modes.size(), period_s * 1e3, abs_sum(shaper), residual, mode.frequency_hz,
+                      grid_largest_residual));
     }
   }
   return make_shaper(std::move(shaper.times_s), std::move(shaper.amplitudes));

@@ -1,12 +1,13 @@
 #include "shapegcode/shaper.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <cstddef>
 #include <numbers>
 #include <queue>
-#include <sstream>
 #include <vector>
 
 #include "shapegcode/error.hpp"
@@ -120,9 +121,8 @@ WorstResidual worst_residual(const Shaper& shaper, const Mode& mode, double lowe
   static_cast<void>(pole({lowest_hz, mode.damping_ratio}));
   static_cast<void>(pole({highest_hz, mode.damping_ratio}));
   if (lowest_hz > highest_hz) {
-    std::ostringstream message;
-    message << "a band of frequencies ascends: it goes from " << lowest_hz << " Hz to " << highest_hz << " Hz";
-    throw Error(ErrorKind::argument, message.str());
+    throw Error(ErrorKind::argument,
+                fmt::format("a band of frequencies ascends: it goes from {:g} Hz to {:g} Hz", lowest_hz, highest_hz));
   }
   const Residual residual(shaper, mode.damping_ratio);
   constexpr double turn = 2.0 * std::numbers::pi;
@@ -147,11 +147,11 @@ WorstResidual worst_residual(const Shaper& shaper, const Mode& mode, double lowe
   add(turn * lowest_hz, turn * highest_hz);
   while (parts.top().bound > worst.residual_ratio + std::max(relative_gap * worst.residual_ratio, absolute_gap)) {
     if (parts.size() > most_parts) {
-      std::ostringstream message;
-      message << "the worst residual from " << lowest_hz << " Hz to " << highest_hz << " Hz lies between "
-              << worst.residual_ratio << " and " << parts.top().bound << ": more than " << most_parts
-              << " parts of the band are needed to say more";
-      throw Error(ErrorKind::design, message.str());
+      throw Error(
+          ErrorKind::design,
+          fmt::format("the worst residual from {:g} Hz to {:g} Hz lies between {:g} and {:g}: more than {} parts "
+                      "of the band are needed to say more",
+                      lowest_hz, highest_hz, worst.residual_ratio, parts.top().bound, most_parts));
     }
     const Part part = parts.top();
     parts.pop();
@@ -166,9 +166,9 @@ WorstResidual worst_residual(const Shaper& shaper, const Mode& mode, double lowe
 FrequencyBand insensitive_band(const Shaper& shaper, const Mode& mode, double vibration_limit) {
   static_cast<void>(pole(mode));
   if (!(vibration_limit > 0.0 && vibration_limit < 1.0)) {
-    std::ostringstream message;
-    message << "the vibration limit of an insensitivity is " << vibration_limit << ", must be above 0 and below 1";
-    throw Error(ErrorKind::argument, message.str());
+    throw Error(
+        ErrorKind::argument,
+        fmt::format("the vibration limit of an insensitivity is {:g}, must be above 0 and below 1", vibration_limit));
   }
   const Residual residual(shaper, mode.damping_ratio);
   constexpr double turn = 2.0 * std::numbers::pi;

@@ -1,5 +1,7 @@
 #include "shapegcode/shaper.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -7,7 +9,6 @@
 #include <functional>
 #include <limits>
 #include <numeric>
-#include <sstream>
 #include <string>
 #include <utility>
 
@@ -21,43 +22,32 @@ namespace {
 constexpr double sum_tolerance = 1e-9;
 constexpr double grid_tolerance = 1e-9;
 
-[[noreturn]] void reject(const std::ostringstream& message) { throw Error(ErrorKind::argument, message.str()); }
-
-std::ostringstream precise_message() {
-  std::ostringstream message;
-  message.precision(12);
-  return message;
-}
+[[noreturn]] void reject(const std::string& message) { throw Error(ErrorKind::argument, message); }
 
 }  // namespace
 
 Shaper make_shaper(std::vector<double> times_s, std::vector<double> amplitudes) {
-  auto message = precise_message();
   if (times_s.empty() || times_s.size() != amplitudes.size()) {
-    message << "a shaper needs as many amplitudes as times, at least one: " << times_s.size() << " times, "
-            << amplitudes.size() << " amplitudes";
-    reject(message);
+    reject(fmt::format("a shaper needs as many amplitudes as times, at least one: {} times, {} amplitudes",
+                       times_s.size(), amplitudes.size()));
   }
   for (std::size_t k = 0; k < times_s.size(); ++k) {
     if (!std::isfinite(times_s[k]) || !std::isfinite(amplitudes[k])) {
-      message << "tap " << k + 1 << " of the shaper is not finite: time " << times_s[k] << " s, amplitude "
-              << amplitudes[k];
-      reject(message);
+      reject(fmt::format("tap {} of the shaper is not finite: time {:.12g} s, amplitude {:.12g}", k + 1, times_s[k],
+                         amplitudes[k]));
     }
     if (k > 0 && times_s[k] <= times_s[k - 1]) {
-      message << "the times of a shaper ascend: tap " << k + 1 << " at " << times_s[k] << " s follows "
-              << times_s[k - 1] << " s";
-      reject(message);
+      reject(fmt::format("the times of a shaper ascend: tap {} at {:.12g} s follows {:.12g} s", k + 1, times_s[k],
+                         times_s[k - 1]));
     }
   }
   if (times_s.front() != 0.0) {
-    message << "the first time of a shaper is 0: it is " << times_s.front() << " s";
-    reject(message);
+    reject(fmt::format("the first time of a shaper is 0: it is {:.12g} s", times_s.front()));
   }
   const double sum = std::accumulate(amplitudes.begin(), amplitudes.end(), 0.0);
   if (!(std::abs(sum - 1.0) <= sum_tolerance)) {
-    message << "the amplitudes of a shaper add up to 1: they add up to " << sum << ", tolerance " << sum_tolerance;
-    reject(message);
+    reject(fmt::format("the amplitudes of a shaper add up to 1: they add up to {:.12g}, tolerance {:g}", sum,
+                       sum_tolerance));
   }
   return Shaper{std::move(times_s), std::move(amplitudes)};
 }
@@ -97,7 +87,6 @@ double residual_ratio(const Shaper& shaper, const Mode& mode) {
 }
 
 Fir to_fir(const Shaper& shaper, double period_s) {
-  auto message = precise_message();
   require_period(period_s, "period of a shaper's grid");
   std::vector<int> delays;
   delays.reserve(shaper.times_s.size());
@@ -105,14 +94,15 @@ Fir to_fir(const Shaper& shaper, double period_s) {
     const double multiple = std::round(time / period_s);
     const double offset = time - multiple * period_s;
     if (!(std::abs(offset) <= grid_tolerance * std::max(time, period_s))) {
-      message << "the shaper's tap at " << time * 1e3 << " ms is not on the grid of " << period_s * 1e3
-              << " ms: it lies " << offset * 1e3 << " ms from the nearest multiple; design the shaper on this grid";
-      throw Error(ErrorKind::design, message.str());
+      throw Error(
+          ErrorKind::design,
+          fmt::format("the shaper's tap at {:.12g} ms is not on the grid of {:.12g} ms: it lies {:.12g} ms from "
+                      "the nearest multiple; design the shaper on this grid",
+                      time * 1e3, period_s * 1e3, offset * 1e3));
     }
     if (multiple > static_cast<double>(std::numeric_limits<int>::max())) {
-      message << "the shaper's tap at " << time << " s is " << multiple << " periods of " << period_s
-              << " s late: too many";
-      reject(message);
+      reject(fmt::format("the shaper's tap at {:.12g} s is {:.12g} periods of {:.12g} s late: too many", time, multiple,
+                         period_s));
     }
     delays.push_back(static_cast<int>(multiple));
   }

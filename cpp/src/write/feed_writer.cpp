@@ -1,5 +1,7 @@
 #include "shapegcode/write.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -124,7 +126,7 @@ class Writer {
     }
     if (!ends.empty() && !divisible(line, block, path_[line.first], options_)) {
       throw Error(ErrorKind::argument,
-                  "a feed changes within line " + std::to_string(line.number) + ", which cannot be divided");
+                  fmt::format("a feed changes within line {}, which cannot be divided", line.number));
     }
     ends.push_back(end - begin);
     write_pieces(line, block, ends, feeds);
@@ -371,8 +373,9 @@ RefedRegion write_feeds(const Program& program, const Region& region, std::span<
                         const FeedWriterOptions& options) {
   if (stretches.empty() || stretches.front().begin_mm > same_place_mm ||
       std::abs(stretches.back().end_mm - region.path->length_mm()) > same_place_mm) {
-    throw Error(ErrorKind::argument, "the stretches of a feed schedule must cover the region's path of " +
-                                         std::to_string(region.path->length_mm()) + " mm");
+    throw Error(ErrorKind::argument,
+                fmt::format("the stretches of a feed schedule must cover the region's path of {:g} mm",
+                            region.path->length_mm()));
   }
   Writer writer(program, region, stretches, options);
   for_each_line(program, region, [&](const SourceLine& line, const Block& block) { writer.write(line, block); });

@@ -1,5 +1,7 @@
 #include "write/rounding.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -29,7 +31,7 @@ constexpr std::size_t room = 2 * std::max(width_on_the_way, width_before_rest);
 ModalRounder::ModalRounder(std::span<const Mode> modes, double block_period_s, int ticks_per_period) {
   require_period(block_period_s, "block period");
   if (ticks_per_period < 1) {
-    throw Error(ErrorKind::argument, std::to_string(ticks_per_period) + " ticks in a block period, must be at least 1");
+    throw Error(ErrorKind::argument, fmt::format("{} ticks in a block period, must be at least 1", ticks_per_period));
   }
   for (const Mode& mode : modes) {
     const std::complex<double> s = pole(mode);
