@@ -129,8 +129,8 @@ def walk() -> int:
     for kind, function in FUNCTIONS:
         if function.name.startswith("__") and function.name != "__init__":
             continue
-        owner = getattr(_core, kind) if kind else _core
-        called = owner if function.name == "__init__" else getattr(owner, function.name)
+        owner: Any = getattr(_core, kind) if kind else _core
+        called: Any = owner if function.name == "__init__" else getattr(owner, function.name)
         static = any(ast.unparse(d) == "staticmethod" for d in function.decorator_list)
         arguments = function.args.args
         bound: list[Any] = []
