@@ -185,7 +185,7 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
 
 #: What they are about is in another case too, among more.
 SLOW_CASES = {
-    "G18", "G19", "helix G18", "F5", "fast corner", "a few increments", "G93", "lower case",
+    "G18", "G19", "helix G18", "F5", "fast corner", "a few increments", "lower case",
     "block period 2 ms", "block period 4 ms",
 }  # fmt: skip
 MARKED_CASES = [pytest.param(name, marks=pytest.mark.slow) if name in SLOW_CASES else name for name in CASES]
