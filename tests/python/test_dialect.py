@@ -107,15 +107,13 @@ def test_block_skip(name: str, switch: str) -> None:
 
 # ---- programs at random ----------------------------------------------------------------------------------------------
 
-
-def drawn(count: int) -> settings:
-    return settings(max_examples=count, deadline=None, suppress_health_check=list(HealthCheck))
-
-
+RANDOM = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
 MACHINE = machine_with()
 
 
-def check_macros(text: str) -> None:
+@RANDOM
+@given(text=macro_programs())
+def test_random_macro_programs(text: str) -> None:
     try:
         play(text)
     except Alarm as alarm:
@@ -128,49 +126,14 @@ def check_macros(text: str) -> None:
     compare(text, MACHINE, place_mm=1.001e-3)
 
 
-def check_coordinates(text: str) -> None:
+@RANDOM
+@given(text=coordinate_programs())
+def test_random_coordinate_modes_and_cycles(text: str) -> None:
     compare(text, MACHINE, place_mm=1.001e-3)
 
 
-def check_compensation(text: str) -> None:
-    # The rounded end of an arc is up to 0.7 µm off its circle, which a corner of 30 degrees makes 1.4 µm.
-    compare(text, MACHINE, place_mm=2.5e-3)
-
-
-@drawn(50)
-@given(text=macro_programs())
-def test_random_macro_programs(text: str) -> None:
-    check_macros(text)
-
-
-@drawn(50)
-@given(text=coordinate_programs())
-def test_random_coordinate_modes_and_cycles(text: str) -> None:
-    check_coordinates(text)
-
-
-@drawn(50)
+@RANDOM
 @given(text=compensated_programs())
 def test_random_compensation(text: str) -> None:
-    check_compensation(text)
-
-
-@pytest.mark.slow
-@drawn(150)
-@given(text=macro_programs())
-def test_more_random_macro_programs(text: str) -> None:
-    check_macros(text)
-
-
-@pytest.mark.slow
-@drawn(150)
-@given(text=coordinate_programs())
-def test_more_random_coordinate_modes_and_cycles(text: str) -> None:
-    check_coordinates(text)
-
-
-@pytest.mark.slow
-@drawn(150)
-@given(text=compensated_programs())
-def test_more_random_compensation(text: str) -> None:
-    check_compensation(text)
+    # The rounded end of an arc is up to 0.7 µm off its circle, which a corner of 30 degrees makes 1.4 µm.
+    compare(text, MACHINE, place_mm=2.5e-3)
