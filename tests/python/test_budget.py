@@ -193,7 +193,7 @@ def at_period(ms: int) -> Any:
 @pytest.mark.parametrize(
     ("limits", "which"),
     [
-        ({"baud": 19200}, 0),
+        pytest.param({"baud": 19200}, 0, marks=pytest.mark.slow),
         pytest.param({"baud": 16000}, 0, marks=pytest.mark.slow),
         pytest.param(
             {"baud": 9600},
@@ -250,7 +250,7 @@ def each_alone() -> dict[int, float]:
     return found
 
 
-@pytest.mark.parametrize("limit", [50, 99, 100, 150, 199, 200])
+@pytest.mark.parametrize("limit", [99, 150, 200, *(pytest.param(k, marks=pytest.mark.slow) for k in (50, 100, 199))])
 def test_with_a_fixed_block_period_only_the_fast_regions_are_given_up(limit: int) -> None:
     judged = budgeted(keys=PERIOD, max_blocks_per_second=limit)
     assert rates(judged)[1] <= limit * (1 + 1e-9)

@@ -183,13 +183,21 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
+#: What they are about is in another case too, among more.
+SLOW_CASES = {
+    "G18", "G19", "helix G18", "F5", "fast corner", "a few increments", "lower case",
+    "block period 2 ms", "block period 4 ms",
+}  # fmt: skip
+MARKED_CASES = [pytest.param(name, marks=pytest.mark.slow) if name in SLOW_CASES else name for name in CASES]
+
+
 @functools.cache
 def case(name: str) -> Judged:
     text, keys = CASES[name]
     return convert(text, machine_with(keys))
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", MARKED_CASES)
 def test_case(name: str) -> None:
     judged = case(name)
     whole_periods(judged)
@@ -209,7 +217,7 @@ def test_case_with_crlf(name: str) -> None:
     assert judged.conversion.text.replace(b"\r", b"") == case(name).conversion.text
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", MARKED_CASES)
 def test_emitted_blocks_are_plain(name: str) -> None:
     """Between safe line and restore line stand nothing but N, G, axis words, R, F in this order, and comments."""
     judged = case(name)
@@ -399,7 +407,7 @@ def check_made_up(text: str) -> None:
     check_figures(judged, contour_budget_s=1.0)
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
 @given(programs(max_contours=2, max_elements=5))
 def test_made_up_program(text: str) -> None:
     check_made_up(text)

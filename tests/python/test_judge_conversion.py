@@ -69,16 +69,28 @@ def chopped(record: Any, largest_sweep: float) -> list[str]:
     return lines
 
 
-@RANDOM
-@given(programs())
-def test_a_faithful_conversion_is_acquitted(text: str) -> None:
+def check_acquittal(text: str) -> None:
     assert verify_conversion(text, chop(text), contour_tolerance_um=60.0) == []
     ranges = regions(interpret(text))
     assert verify_conversion(text, chop(text), ranges) == []
 
 
+@settings(RANDOM, max_examples=25)
+@given(programs())
+def test_a_faithful_conversion_is_acquitted(text: str) -> None:
+    check_acquittal(text)
+
+
+@pytest.mark.slow
+@RANDOM
+@given(programs())
+def test_many_faithful_conversions_are_acquitted(text: str) -> None:
+    check_acquittal(text)
+
+
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "BOTTLE.NC" else name for name in SAMPLES]
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow) if name in ("BOTTLE.NC", "PARALLEL.NC") else name for name in SAMPLES],
 )
 def test_faithful_conversion_of_the_samples(name: str) -> None:
     text = read_sample(name)

@@ -178,6 +178,10 @@ def agree(program: sg.Program, text: str, machine: sg.Machine, tmp_path: Path) -
     return len(ours)
 
 
+#: Long, or the same part as another sample.
+SLOW_WRITTEN = ("BOTTLE.NC", "PROGRAM2.NC", "TEST_G91.NC")
+
+
 def source(name: str) -> str:
     text = read_sample(name) if name in SAMPLES else (DIALECT / f"{name}.nc").read_text()
     for pattern, instead in CHANGED.get(name, ([], ""))[0]:
@@ -196,10 +200,7 @@ def test_same_path_read(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(name, marks=pytest.mark.slow) if name in ("BOTTLE.NC", "PARALLEL.NC") else name
-        for name in (*SAMPLES, *SHAPED)
-    ],
+    [pytest.param(name, marks=pytest.mark.slow) if name in SLOW_WRITTEN else name for name in (*SAMPLES, *SHAPED)],
 )
 def test_same_path_written(name: str, tmp_path: Path) -> None:
     machine = machine_with({"input.compensation": "expand", **SETTINGS.get(name, {})})

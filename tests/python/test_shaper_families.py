@@ -85,7 +85,7 @@ def options(
 # --- every family ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("zeta", [0.0, 0.02, 0.1])
+@pytest.mark.parametrize("zeta", [0.02, *(pytest.param(zeta, marks=pytest.mark.slow) for zeta in (0.0, 0.1))])
 @pytest.mark.parametrize("name", [*EXACT, *TOLERANT])
 def test_one_mode_on_any_times(name: str, zeta: float) -> None:
     band = ModeBand(Mode(46.0, zeta), 0.05)
