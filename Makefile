@@ -33,6 +33,9 @@ CPP_FILES := $(shell find cpp bindings tests/cpp tests/fuzz tests/oracles -name 
 # Folders too: their time changes when a file comes or goes.
 PACKAGE_INPUTS := CMakeLists.txt cmake $(shell find cpp/include cpp/src bindings python \
                     -name __pycache__ -prune -o -print)
+# With the extension module, for the Python of .venv. The tests are configured where their packages are.
+CONFIGURE_RELEASE = cmake --preset release -D SHAPEGCODE_BUILD_PYTHON=ON -D Python_EXECUTABLE=$(CURDIR)/$(BIN)/python \
+  -D pybind11_DIR="$$($(BIN)/python -m pybind11 --cmakedir)"
 PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
 .PHONY: help demo test test-all lint bench coverage fuzz stubs format clean \
@@ -156,23 +159,26 @@ test-packages:
 	$(PIP) install -r <($(PYTHON) tests/tools/requirements.py dev)
 	touch $@
 
-# The build folders stay, so that a change costs only what depends on it, and the core is the one that the C++ tests
-# link: it is compiled once. A plain `pip install .` compiles its own.
+# The extension module is built with the core, in one graph for all processors, and only packed by pip. The build folder
+# stays, so that a change costs only what depends on it. A plain `pip install .` builds its own.
 .venv/.package: .venv/.runtime $(PACKAGE_INPUTS)
-	cmake --preset release
-	cmake --build --preset release --target shapegcode_core
-	rm -rf build/core
-	cmake --install build/release --prefix build/core --component development
-	$(PIP) install --no-build-isolation --no-deps --config-settings=build-dir=build/wheel \
-	  --config-settings=cmake.define.SHAPEGCODE_WARNINGS_AS_ERRORS=ON \
-	  --config-settings=cmake.define.SHAPEGCODE_INSTALLED_CORE=$(CURDIR)/build/core .
-	touch $@
+	@touch .venv/.building
+	$(CONFIGURE_RELEASE)
+	cmake --build --preset release --target shapegcode_core _core
+	$(PIP) install --no-build-isolation --no-deps --force-reinstall --config-settings=build-dir=build/wheel \
+	  --config-settings=cmake.define.SHAPEGCODE_BUILT_MODULE="$$(ls $(CURDIR)/build/release/_core.*.so)" .
+	mv .venv/.building $@
 
 dev: .venv/.dev
 
 package: .venv/.package
 
-release sanitize: test-packages
+release: test-packages .venv/.runtime
+	$(CONFIGURE_RELEASE)
+	cmake --build --preset $@
+	ctest --preset $@
+
+sanitize: test-packages
 	cmake --preset $@
 	cmake --build --preset $@
 	ctest --preset $@
@@ -192,8 +198,8 @@ build/fuzz/tests/fuzz/fuzz_reader: $(CORE_SOURCES) $(CPP_HEADERS) $(wildcard tes
 	cmake --preset fuzz
 	cmake --build --preset fuzz
 
-build/release/compile_commands.json: CMakeLists.txt CMakePresets.json $(CORE_SOURCES) | test-packages
-	cmake --preset release
+build/release/compile_commands.json: CMakeLists.txt CMakePresets.json $(CORE_SOURCES) | test-packages .venv/.runtime
+	$(CONFIGURE_RELEASE)
 	touch $@
 
 tidy: build/release/compile_commands.json

@@ -85,7 +85,7 @@ void register_motion(py::module_& module) {
       .def(
           "step",
           [](Interpolator& self) {
-            Vector3 position;
+            Vector3 position = Vector3::Zero();
             const bool moving = self.step(position);
             return std::make_pair(moving, position);
           },

@@ -44,7 +44,7 @@ class BlockPlayer {
   void pause_after(std::size_t block, double seconds);
   /// Next set-point, X, Y and Z, the start first; false once the end was given.
   bool step(std::span<double> out) noexcept {
-    Vector3 position;
+    Vector3 position = Vector3::Zero();
     const bool moving = step(position);
     std::copy_n(position.data(), axis_count, out.begin());
     return moving;
@@ -195,7 +195,7 @@ class RapidPlayer {
   RapidPlayer(const Vector3& start_mm, const Vector3& end_mm, const ControllerModel& model);
   /// Next set-point, X, Y and Z; false once the end was given.
   bool step(std::span<double> out) noexcept {
-    Vector3 position;
+    Vector3 position = Vector3::Zero();
     const bool moving = step(position);
     std::copy_n(position.data(), axis_count, out.begin());
     return moving;

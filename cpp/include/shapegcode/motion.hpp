@@ -135,7 +135,7 @@ class Interpolator {
 
   /// Next set-point, X, Y and Z. False once the last set-point was given; it then stays at the end.
   bool step(std::span<double> out) noexcept {
-    Vector3 position;
+    Vector3 position = Vector3::Zero();
     const bool moving = step(position);
     std::copy_n(position.data(), axis_count, out.begin());
     return moving;
