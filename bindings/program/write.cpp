@@ -89,8 +89,8 @@ void register_emission(py::module_& module) {
       [](const ShapedCommand& command, const std::vector<std::uint32_t>& breaks, const FitOptions& options) {
         const py::gil_scoped_release release;
         auto fitted = std::make_shared<FittedBlocks>();
-        fitted->blocks = fit_blocks(command.grid_mm, command.middle_mm, command.arc_normal, breaks, options,
-                                    command.run_ends, &fitted->left_periods);
+        fitted->blocks = fit_blocks(command.grid_mm, command.middle_mm, command.arc_normal, {breaks, command.run_ends},
+                                    options, &fitted->left_periods);
         return fitted;
       },
       py::arg("command"), py::arg("breaks"), py::arg("options"),

@@ -37,7 +37,7 @@ inline Command sampled(int periods, const std::function<Vector3(double)>& at, in
 
 inline std::vector<FittedBlock> fit(const Command& command, const FitOptions& options = {},
                                     const std::vector<std::uint32_t>& breaks = {}) {
-  return fit_blocks(command.grid, command.middle, command.normals, breaks, options);
+  return fit_blocks(command.grid, command.middle, command.normals, {breaks}, options);
 }
 
 inline Position rounded(const Command& command, Eigen::Index k, double increment) {

@@ -455,7 +455,7 @@ TEST_CASE("rounding: at a rest on the way the blocks are on the nearest incremen
   const FitOptions options = with_modes(0.001);
   const std::vector<std::uint32_t> breaks{70, 130};
   const std::vector<std::uint32_t> rests{70};
-  const auto blocks = fit_blocks(command.grid, command.middle, command.normals, breaks, options, rests);
+  const auto blocks = fit_blocks(command.grid, command.middle, command.normals, {breaks, rests}, options);
   bool found = false;
   int moved = 0;
   for (const FittedBlock& block : blocks) {

@@ -16,8 +16,8 @@ tidy() {
   # The compile commands are GCC's: it need not know all its warnings. A unit has none of its own and gets those of
   # the source whose name is most like its own, which may be a test: hence the folders of the core.
   clang-tidy -p build/release --quiet --header-filter="^$PWD/(cpp|build/tidy)/" \
-    --extra-arg=-Wno-unknown-warning-option --extra-arg=-Wno-ignored-optimization-argument \
-    --extra-arg=-I"$PWD/cpp/src" --extra-arg=-I"$PWD/cpp/include" --extra-arg=-I"$PWD/bindings" "$1"
+    --extra-arg=-Wno-unknown-warning-option --extra-arg=-Wno-unused-command-line-argument --extra-arg=-Wno-ignored-optimization-argument \
+    --extra-arg=-isystem"${SUNDIALS_ROOT:-/usr}/include" --extra-arg=-I"$PWD/cpp/src" --extra-arg=-I"$PWD/cpp/include" --extra-arg=-I"$PWD/bindings" "$1"
 }
 export -f tidy
 printf '%s\0' "$out"/*.cpp | xargs -0 -n 1 -P "$(nproc)" bash -c 'tidy "$0"'

@@ -48,24 +48,26 @@ struct FitOptions {
   std::uint32_t lent_periods = 0;  ///< time that the blocks before did not last (see fit_blocks)
 };
 
+/// Places of a shaped command, as ascending period indices.
+struct FitBorders {
+  std::span<const std::uint32_t> breaks = {};  ///< a block must end there (program marks)
+  std::span<const std::uint32_t> rests = {};   ///< the command is at rest there, besides its end
+};
+
 /// Turns a shaped command into blocks that each last a whole number of block periods.
 ///
 /// `grid_mm`: positions at k*T_B, (n+1, 3). `middle_mm`: positions half a period later, (n, 3), from which the
 /// curvature within a block is read. `arc_normal`: per period the axis across the plane of an arc that the command
-/// follows there, or -1: (n). `breaks`: ascending period indices at which a block must end (program marks). Every word
-/// is rounded once, to the nearest increment or, with modes, to one of its two neighbours, so nothing drifts: the
-/// blocks stay within an increment of the command, and where it rests they are on the nearest increment. `rests`:
-/// ascending periods at which the command is at rest, besides its end. F is rounded up, so that a controller that
-/// starts blocks on its interpolation ticks takes exactly the intended number of ticks. A block that rounds to nothing
-/// lends its time to its successor; at the very end it is rest and left out. A long command may be fitted in pieces:
-/// `left_periods` receives what the next one must be lent. Throws Error(argument) on mismatched sizes
-/// or a position outside +-99999.999 mm.
+/// follows there, or -1: (n). Every word is rounded once, to the nearest increment or, with modes, to one of its two
+/// neighbours, so nothing drifts: the blocks stay within an increment of the command, and where it rests they are on
+/// the nearest increment. F is rounded up, so that a controller that starts blocks on its interpolation ticks takes
+/// exactly the intended number of ticks. A block that rounds to nothing lends its time to its successor; at the very
+/// end it is rest and left out. A long command may be fitted in pieces: `left_periods` receives what the next one must
+/// be lent. Throws Error(argument) on mismatched sizes or a position outside +-99999.999 mm.
 [[nodiscard]] std::vector<FittedBlock> fit_blocks(const Eigen::Ref<const Eigen::MatrixXd>& grid_mm,
                                                   const Eigen::Ref<const Eigen::MatrixXd>& middle_mm,
-                                                  std::span<const std::int8_t> arc_normal,
-                                                  std::span<const std::uint32_t> breaks, const FitOptions& options,
-                                                  std::span<const std::uint32_t> rests = {},
-                                                  std::uint32_t* left_periods = nullptr);
+                                                  std::span<const std::int8_t> arc_normal, const FitBorders& borders,
+                                                  const FitOptions& options, std::uint32_t* left_periods = nullptr);
 
 /// What stood at a place of the original: written before the block that begins there.
 struct BlockMark {

@@ -15,12 +15,12 @@ constexpr double same_delay_s = 1e-9;
 }  // namespace
 
 RunFilter::RunFilter(std::span<const Fir> shapers, ContourTarget contour_target, const AxisModes& axis_modes,
-                     double block_period_s, double weight, const std::optional<FollowingFir>& followed,
-                     const AxisModeTables& tables)
+                     double block_period_s, double weight, const Followed& along)
     : target(contour_target),
       modes(axis_modes),
       half_period_s(0.5 * block_period_s),
-      mean_delay_s((followed ? followed->fir().mean_samples() : shapers.front().mean_samples()) * block_period_s),
+      mean_delay_s((along.shapers ? along.shapers->fir().mean_samples() : shapers.front().mean_samples()) *
+                   block_period_s),
       smoothness(weight) {
   if (shapers.size() != 1 && shapers.size() != axis_count) {
     throw Error(ErrorKind::argument, fmt::format("{} shapers: one for all axes, or one for each", shapers.size()));
@@ -36,14 +36,14 @@ RunFilter::RunFilter(std::span<const Fir> shapers, ContourTarget contour_target,
     half_shapers.push_back(shaper.on_finer_grid(2));
     longest_ = std::max(longest_, half_shapers.back().duration_samples());
   }
-  if (followed) following = followed->on_finer_grid(2);
+  if (along.shapers) following = along.shapers->on_finer_grid(2);
   const std::size_t nodes = following ? following->position_mm().size() : 1;
   for (std::size_t node = 0; node < nodes; ++node) {
     std::array<std::vector<double>, axis_count>& kernel = kernels.emplace_back();
     for (std::size_t axis = 0; axis < axis_count; ++axis) {
       std::vector<Mode> here = axis_modes[axis];
-      for (std::size_t m = 0; following && m < std::min(here.size(), tables[axis].size()); ++m) {
-        const ModeTable& table = tables[axis][m];
+      for (std::size_t m = 0; following && m < std::min(here.size(), along.tables[axis].size()); ++m) {
+        const ModeTable& table = along.tables[axis][m];
         if (!table.empty() && table.axis == following->axis()) {
           here[m] = mode_at(here[m], table, following->position_mm()[node]);
         }

@@ -13,11 +13,16 @@ namespace shapegcode {
 
 /// What follows the look-ahead of a run, on half the block grid, and how the contour is kept.
 struct RunFilter {
-  /// `shapers`: taps in whole block periods, one common to all axes or one for each, of one mean delay. `followed`: a
-  /// set of shapers along an axis, which is used instead of it; the contour is then kept with the modes at each of its
-  /// positions, by `tables`. Throws as `contour_kernel` and ContourSolver do.
+  /// A set of shapers along an axis, used instead of constant ones; the contour is then kept with the modes at each of
+  /// its positions, by the tables.
+  struct Followed {
+    std::optional<FollowingFir> shapers;
+    AxisModeTables tables;
+  };
+  /// `shapers`: taps in whole block periods, one common to all axes or one for each, of one mean delay. Throws as
+  /// `contour_kernel` and ContourSolver do.
   RunFilter(std::span<const Fir> shapers, ContourTarget target, const AxisModes& modes, double block_period_s,
-            double smoothness, const std::optional<FollowingFir>& followed = {}, const AxisModeTables& tables = {});
+            double smoothness, const Followed& along = {{}, {}});
 
   /// Half block periods by which the shaped command moves longer.
   [[nodiscard]] int shaper_rows() const noexcept { return following ? following->fir().duration_samples() : longest_; }

@@ -77,8 +77,8 @@ RegionShaper::State::State(std::shared_ptr<const Path> path, const Fir& shaper,
     : path_(std::move(path)),
       options_(std::move(options)),
       filter_(options_.axis_shapers.empty() ? std::span<const Fir>(&shaper, 1) : options_.axis_shapers, options_.target,
-              options_.modes, options_.block_period_s, options_.contour_smoothness, options_.following,
-              options_.mode_tables),
+              options_.modes, options_.block_period_s, options_.contour_smoothness,
+              {options_.following, options_.mode_tables}),
       marks_(marked_segments.begin(), marked_segments.end()) {
   const double ticks = options_.block_period_s / options_.interpolation_period_s;
   if (!(ticks >= 1.0 - 1e-9) || !(std::abs(ticks - std::round(ticks)) <= 1e-6)) {

@@ -73,16 +73,17 @@ struct Driven {
 /// The columns that one mode fills: its response, and the derivatives of that to ln omega and ln zeta if they are
 /// wanted.
 struct ModeColumns {
-  Eigen::Ref<VectorXd> response;
+  Eigen::Ref<VectorXd>* response;
   Eigen::Ref<VectorXd>* to_omega = nullptr;
   Eigen::Ref<VectorXd>* to_zeta = nullptr;
 };
 
 /// Response of a mode of unit mass. Written in real numbers: complex products of the standard look for NaN at each
 /// sample.
-void fill_mode(const Driven& driven, double omega, double zeta, ModeColumns columns) {
+void fill_mode(const Driven& driven, double omega, double zeta, const ModeColumns& columns) {
   const auto [held, force, period_s, options] = driven;
-  auto& [column, to_omega, to_zeta] = columns;
+  const auto [response, to_omega, to_zeta] = columns;
+  Eigen::Ref<VectorXd>& column = *response;
   const ModeTerms terms = mode_terms(omega, zeta, static_cast<int>(options.quantity));
   const OnePole pole = one_pole(terms.pole, period_s);
   const PeriodInput input(terms.pole, period_s, held.steps());
@@ -201,10 +202,11 @@ class TapModel final : public identification::SeparableModel {
     const Index first = local();
     const Index derivative = first + common();
     for (Index m = 0; m < modes_; ++m) {
+      Eigen::Ref<VectorXd> response(columns.col(first + m).head(n));
       Eigen::Ref<VectorXd> to_omega(columns.col(derivative + 2 * m).head(n));
       Eigen::Ref<VectorXd> to_zeta(columns.col(derivative + 2 * m + 1).head(n));
       fill_mode({held_[record], tap.force_n, period_s_, options_}, std::exp(theta[2 * m]), std::exp(theta[2 * m + 1]),
-                {columns.col(first + m).head(n), &to_omega, &to_zeta});
+                {&response, &to_omega, &to_zeta});
     }
     columns.topRows(n).middleCols(first + modes_, extra()) = lines_[record];
     columns.col(width() - 1).head(n) = Eigen::Map<const VectorXd>(tap.response.data(), n);
@@ -236,9 +238,10 @@ VectorXd model_response(const ModalFit& fit, std::span<const double> force, doub
                         const ModalFitOptions& options) {
   VectorXd response = VectorXd::Zero(static_cast<Index>(force.size()));
   VectorXd column(response.size());
+  Eigen::Ref<VectorXd> filled(column);
   const HeldForce held(force, options.hold);
   for (std::size_t m = 0; m < fit.omega_rad_s.size(); ++m) {
-    fill_mode({held, force, period_s, options}, fit.omega_rad_s[m], fit.damping_ratio[m], {column});
+    fill_mode({held, force, period_s, options}, fit.omega_rad_s[m], fit.damping_ratio[m], {&filled});
     response += fit.inverse_mass[m] * column;
   }
   if (fit.mass_line != 0.0) response += fit.mass_line * mass_line(force, period_s, options.quantity);

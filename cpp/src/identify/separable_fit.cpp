@@ -1,7 +1,5 @@
 #include "identify/separable_fit.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -97,6 +97,7 @@ Segment make_line(const Vector3& start, const Vector3& end, double feed_mm_per_s
   return segment;
 }
 
+// Each is one of the arc's own numbers.  NOLINTNEXTLINE(readability-function-size)
 Segment make_arc(const Vector3& start, const Vector3& end, const Vector3& centre, double sweep_rad, int normal,
                  double feed_mm_per_s, std::uint32_t line) {
   if (normal < 0 || normal > 2) {

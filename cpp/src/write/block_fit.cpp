@@ -198,7 +198,7 @@ class Fitter {
   }
 
   [[nodiscard]] std::optional<Candidate> arc_over(std::uint32_t k, std::uint32_t j, int normal) const {
-    const auto block = shape_.arc(position_, shape_.rounded(j), k, j, normal, j - k + lent_,
+    const auto block = shape_.arc(position_, shape_.rounded(j), {k, j}, normal, j - k + lent_,
                                   options_.merge_tolerance_increments + 0.25);
     return block ? std::optional(Candidate{*block, j - k}) : std::nullopt;
   }
@@ -245,9 +245,8 @@ class Fitter {
 // Time that was lent from before is rest in front of the command.
 std::vector<FittedBlock> fit_behind_rest(const Eigen::Ref<const Eigen::MatrixXd>& grid,
                                          const Eigen::Ref<const Eigen::MatrixXd>& middle,
-                                         std::span<const std::int8_t> arc_normal, std::span<const std::uint32_t> breaks,
-                                         FitOptions options, std::span<const std::uint32_t> rests,
-                                         std::uint32_t* left_periods) {
+                                         std::span<const std::int8_t> arc_normal, const FitBorders& borders,
+                                         FitOptions options, std::uint32_t* left_periods) {
   const std::uint32_t lent = std::exchange(options.lent_periods, 0U);
   Eigen::MatrixXd longer(grid.rows() + lent, axis_count);
   longer.topRows(lent).rowwise() = Vector3(grid.row(0)).transpose();
@@ -262,8 +261,9 @@ std::vector<FittedBlock> fit_behind_rest(const Eigen::Ref<const Eigen::MatrixXd>
     std::ranges::for_each(result, [lent](std::uint32_t& period) { period += lent; });
     return result;
   };
-  std::vector<FittedBlock> blocks =
-      fit_blocks(longer, longer_middle, normals, later(breaks), options, later(rests), left_periods);
+  const auto breaks = later(borders.breaks);
+  const auto rests = later(borders.rests);
+  std::vector<FittedBlock> blocks = fit_blocks(longer, longer_middle, normals, {breaks, rests}, options, left_periods);
   for (FittedBlock& block : blocks) {
     block.first_period -= std::min(block.first_period, lent);
   }
@@ -274,9 +274,8 @@ std::vector<FittedBlock> fit_behind_rest(const Eigen::Ref<const Eigen::MatrixXd>
 
 std::vector<FittedBlock> fit_blocks(const Eigen::Ref<const Eigen::MatrixXd>& grid_mm,
                                     const Eigen::Ref<const Eigen::MatrixXd>& middle_mm,
-                                    std::span<const std::int8_t> arc_normal, std::span<const std::uint32_t> breaks,
-                                    const FitOptions& options, std::span<const std::uint32_t> rests,
-                                    std::uint32_t* left_periods) {
+                                    std::span<const std::int8_t> arc_normal, const FitBorders& borders,
+                                    const FitOptions& options, std::uint32_t* left_periods) {
   if (grid_mm.cols() != axis_count || middle_mm.cols() != axis_count || grid_mm.rows() != middle_mm.rows() + 1 ||
       static_cast<Eigen::Index>(arc_normal.size()) != middle_mm.rows()) {
     throw Error(ErrorKind::argument, "fit_blocks needs n+1 grid rows, n middle rows and n plane entries of 3 axes");
@@ -285,10 +284,10 @@ std::vector<FittedBlock> fit_blocks(const Eigen::Ref<const Eigen::MatrixXd>& gri
     throw Error(ErrorKind::argument, "a position is not finite or outside +-99999.999 mm");
   }
   if (options.lent_periods > 0) {
-    return fit_behind_rest(grid_mm, middle_mm, arc_normal, breaks, options, rests, left_periods);
+    return fit_behind_rest(grid_mm, middle_mm, arc_normal, borders, options, left_periods);
   }
-  Fitter fitter(grid_mm, middle_mm, arc_normal, breaks, options);
-  std::vector<FittedBlock> blocks = fitter.run(rests);
+  Fitter fitter(grid_mm, middle_mm, arc_normal, borders.breaks, options);
+  std::vector<FittedBlock> blocks = fitter.run(borders.rests);
   if (left_periods != nullptr) {
     *left_periods = fitter.left_periods();
   }

@@ -309,7 +309,7 @@ class BlockRounder {
         fits = feed.has_value();
         shaped_[n].feed = feed.value_or(block.feed);
       } else {
-        const auto arc = shape_.arc(from, block.end, block.first_period, end_period(first_ + n), block.normal,
+        const auto arc = shape_.arc(from, block.end, {block.first_period, end_period(first_ + n)}, block.normal,
                                     block.periods, std::max(limit_, options_.merge_tolerance_increments + 0.25));
         fits = arc && arc->kind == block.kind;
         if (fits) {

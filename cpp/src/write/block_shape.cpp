@@ -130,9 +130,9 @@ ChordArc BlockShape::arc_of(const BlockPosition& from, const FittedBlock& block)
   return arc;
 }
 
-std::optional<FittedBlock> BlockShape::arc(const BlockPosition& from, const BlockPosition& end, std::uint32_t k,
-                                           std::uint32_t j, int normal, std::uint32_t periods,
-                                           double tolerance_increments) const {
+std::optional<FittedBlock> BlockShape::arc(const BlockPosition& from, const BlockPosition& end, Over over, int normal,
+                                           std::uint32_t periods, double tolerance_increments) const {
+  const auto [k, j] = over;
   const int a = ArcFrame(normal).a;
   const int b = ArcFrame(normal).b;
   const std::uint32_t m = j - k;

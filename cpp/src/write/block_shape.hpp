@@ -45,11 +45,13 @@ class BlockShape {
   // The arc that a controller makes of a block's words; `from`: where the block begins.
   [[nodiscard]] ChordArc arc_of(const BlockPosition& from, const FittedBlock& block) const;
 
-  // An arc over periods k ... j between two rounded positions, to last `periods`, if it follows every sample between
+  // An arc over some periods between two rounded positions, to last `periods`, if it follows every sample between
   // within a tolerance in increments; a single period needs no such check.
-  [[nodiscard]] std::optional<FittedBlock> arc(const BlockPosition& from, const BlockPosition& end, std::uint32_t k,
-                                               std::uint32_t j, int normal, std::uint32_t periods,
-                                               double tolerance_increments) const;
+  struct Over {
+    std::uint32_t first, end;
+  };
+  [[nodiscard]] std::optional<FittedBlock> arc(const BlockPosition& from, const BlockPosition& end, Over over,
+                                               int normal, std::uint32_t periods, double tolerance_increments) const;
 
  private:
   [[nodiscard]] std::int64_t nearest_feed(double length_mm, std::uint32_t periods) const;

@@ -126,6 +126,7 @@ void FeedDriveEquations::rate(const FeedDriveInput& input, double time_s, const 
   }
 }
 
+// A table of entries.  NOLINTNEXTLINE(readability-function-size)
 void FeedDriveEquations::drive_jacobian(const FeedDriveInput& input, double time_s, const double* y, double* matrix,
                                         int stride) const noexcept {
   const FeedDriveParameters& p = parameters_;

@@ -143,6 +143,7 @@ int OdeSolver::Impl::call_rhs(realtype t, N_Vector y, N_Vector rate, void* self_
   }
 }
 
+// CVODE's own form.  NOLINTNEXTLINE(readability-function-size)
 int OdeSolver::Impl::call_jacobian(realtype t, N_Vector y, N_Vector, SUNMatrix jacobian, void* self_pointer, N_Vector,
                                    N_Vector, N_Vector) noexcept {
   auto& self = *static_cast<Impl*>(self_pointer);

@@ -148,8 +148,8 @@ double most_moves_per_cut(const CannedCycle& cycle) noexcept {
   return !cuts_in_steps(cycle) ? 1.0 : cycle.code == 73 ? 2.0 : 3.0;
 }
 
-Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, double feed_mm_per_s, std::uint32_t line,
-                     std::vector<OtherMove>& moves) {
+Vector3 expand_cycle(const CannedCycle& cycle, const Vector3& position, int axis, double feed_mm_per_s,
+                     std::uint32_t line, std::vector<OtherMove>& moves) {
   return Hole(cycle, position, axis, feed_mm_per_s, line, moves).drill();
 }
 

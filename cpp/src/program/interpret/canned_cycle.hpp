@@ -27,7 +27,7 @@ struct CannedCycle {
 /// Expands one hole into rapid and feed moves along `axis` from `position` (already over the hole), for clock and
 /// picture; the text itself stays a cycle. A shallow peck makes for millions
 /// of moves: ask `cuts_per_hole` first. Returns the tool's position after it.
-Vector3 expand_cycle(const CannedCycle& cycle, Vector3 position, int axis, double feed_mm_per_s, std::uint32_t line,
-                     std::vector<OtherMove>& moves);
+Vector3 expand_cycle(const CannedCycle& cycle, const Vector3& position, int axis, double feed_mm_per_s,
+                     std::uint32_t line, std::vector<OtherMove>& moves);
 
 }  // namespace shapegcode

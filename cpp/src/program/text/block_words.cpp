@@ -9,6 +9,7 @@
 
 namespace shapegcode::detail {
 
+// A table.  NOLINTNEXTLINE(readability-function-size)
 Group group_of(int g_tenths) noexcept {
   switch (g_tenths) {
     case 0:
