@@ -198,12 +198,8 @@ build/fuzz/tests/fuzz/fuzz_reader: $(CORE_SOURCES) $(CPP_HEADERS) $(wildcard tes
 	cmake --preset fuzz
 	cmake --build --preset fuzz
 
-build/release/compile_commands.json: CMakeLists.txt CMakePresets.json $(CORE_SOURCES) | test-packages .venv/.runtime
-	$(CONFIGURE_RELEASE)
-	touch $@
-
-tidy: build/release/compile_commands.json
+tidy: test-packages
 	$(PYTHON) tests/tools/full_pass.py files | xargs -r tests/tools/tidy.sh
 
-tidy-all: build/release/compile_commands.json
+tidy-all: test-packages
 	tests/tools/tidy.sh $(CORE_SOURCES)
