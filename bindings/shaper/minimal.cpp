@@ -45,10 +45,10 @@ void register_search(py::module_& m) {
       release_gil(),
       R"(Minimal multi-mode shapers: n+1 taps that cancel n = 1 ... 6 modes, damped or not.
 
-One mode is closed form. More are searched by boxes of times, each of which is proven empty or shrunk onto a solution,
-in ascending duration, three and more also from many low-discrepancy starts: what the result says about completeness is
-`complete` and `complete_up_to_s`; two modes are settled. Shapers with fewer taps that serve all modes are listed too;
-solutions that are not isolated (undamped modes at odd ratios, which one ZV serves) are not.
+One mode is closed form and two are searched completely. Three and more are searched from many low-discrepancy starts
+and by boxes of times, each of which is proven empty or shrunk onto a solution, in ascending duration: what the result
+says about completeness is `complete` and `complete_up_to_s`. Shapers with fewer taps that serve all modes are listed
+too; solutions that are not isolated (undamped modes at odd ratios, which one ZV serves) are not.
 
 Args:
     modes: One to six modes, no two alike within 1e-6.
@@ -56,7 +56,6 @@ Args:
     max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1.
     max_starts: Most Newton starts; fewer are used once every solution was found three times over.
     max_boxes: Most boxes of times that the proof may look at (some 2 microseconds each for four modes); 0: no proof.
-        Two modes are proven whatever it is.
 
 Returns:
     The shapers, residual_ratio of every mode at most 1e-12, and what was searched.

@@ -184,8 +184,9 @@ Source: paper 002, section 2.)");
         py::arg("max_duration_s"), py::arg("max_abs_sum") = 10.0, release_gil(),
         R"(All minimal (three-impulse) shapers of two modes, ascending in duration, then in the second time.
 
-The `shapers` of `minimal_shapers`, which also says that the list is complete (but for undamped modes at an odd ratio:
-one ZV serves both and is listed with its two taps, what else there is at such a ratio is not isolated).
+Complete: boxes of the plane of the two free times are discarded only where a bound on derivatives proves that they
+hold no solution, and Newton starts from all that are left. Where one ZV serves both modes (undamped, odd ratio) it is
+listed with its two taps; where amplitudes at given times are not unique, those with the smallest sum of squares are.
 
 Args:
     first: One mode, damped or not.
@@ -195,7 +196,7 @@ Args:
         has_negative to pick the non-negative ones.
 
 Returns:
-    The shapers, residual_ratio of both modes at most 1e-12; empty if there is none in the range.
+    The shapers, residual_ratio of both modes below 1e-13; empty if there is none in the range.
 
 Raises:
     ArgumentError: The modes' poles agree within 1e-6, or a value is outside its range.

@@ -5535,10 +5535,10 @@ def minimal_shapers(modes: collections.abc.Sequence[Mode], max_duration_s: typin
     """
     Minimal multi-mode shapers: n+1 taps that cancel n = 1 ... 6 modes, damped or not.
     
-    One mode is closed form. More are searched by boxes of times, each of which is proven empty or shrunk onto a solution,
-    in ascending duration, three and more also from many low-discrepancy starts: what the result says about completeness is
-    `complete` and `complete_up_to_s`; two modes are settled. Shapers with fewer taps that serve all modes are listed too;
-    solutions that are not isolated (undamped modes at odd ratios, which one ZV serves) are not.
+    One mode is closed form and two are searched completely. Three and more are searched from many low-discrepancy starts
+    and by boxes of times, each of which is proven empty or shrunk onto a solution, in ascending duration: what the result
+    says about completeness is `complete` and `complete_up_to_s`. Shapers with fewer taps that serve all modes are listed
+    too; solutions that are not isolated (undamped modes at odd ratios, which one ZV serves) are not.
     
     Args:
         modes: One to six modes, no two alike within 1e-6.
@@ -5546,7 +5546,6 @@ def minimal_shapers(modes: collections.abc.Sequence[Mode], max_duration_s: typin
         max_abs_sum: Largest sum of the amplitudes' magnitudes (no unit), at least 1.
         max_starts: Most Newton starts; fewer are used once every solution was found three times over.
         max_boxes: Most boxes of times that the proof may look at (some 2 microseconds each for four modes); 0: no proof.
-            Two modes are proven whatever it is.
     
     Returns:
         The shapers, residual_ratio of every mode at most 1e-12, and what was searched.
@@ -5560,8 +5559,9 @@ def minimal_two_mode(first: Mode, second: Mode, max_duration_s: typing.SupportsF
     """
     All minimal (three-impulse) shapers of two modes, ascending in duration, then in the second time.
     
-    The `shapers` of `minimal_shapers`, which also says that the list is complete (but for undamped modes at an odd ratio:
-    one ZV serves both and is listed with its two taps, what else there is at such a ratio is not isolated).
+    Complete: boxes of the plane of the two free times are discarded only where a bound on derivatives proves that they
+    hold no solution, and Newton starts from all that are left. Where one ZV serves both modes (undamped, odd ratio) it is
+    listed with its two taps; where amplitudes at given times are not unique, those with the smallest sum of squares are.
     
     Args:
         first: One mode, damped or not.
@@ -5571,7 +5571,7 @@ def minimal_two_mode(first: Mode, second: Mode, max_duration_s: typing.SupportsF
             has_negative to pick the non-negative ones.
     
     Returns:
-        The shapers, residual_ratio of both modes at most 1e-12; empty if there is none in the range.
+        The shapers, residual_ratio of both modes below 1e-13; empty if there is none in the range.
     
     Raises:
         ArgumentError: The modes' poles agree within 1e-6, or a value is outside its range.

@@ -11,9 +11,8 @@
 #include "shapegcode/error.hpp"
 #include "shapegcode/minimal_shapers.hpp"
 #include "shapegcode/shaper.hpp"
-#include "shaper/minimal/minimal_starts.hpp"
+#include "shaper/minimal/minimal_boxes.hpp"
 #include "shaper/minimal/minimal_system.hpp"
-#include "shaper/minimal/small_square.hpp"
 
 using shapegcode::minimal_shapers;
 using shapegcode::minimal_two_mode;
@@ -60,56 +59,35 @@ TEST_CASE("minimal_shapers: one mode is the ZV shaper and its later relatives") 
   CHECK(largest_residual(found.shapers, {mode}) < 1e-15);
 }
 
-TEST_CASE("minimal_shapers: the boxes of two modes settle everything and find what starts find") {
+TEST_CASE("minimal_shapers: two modes are the complete two-mode search") {
+  const std::array<Mode, 2> modes{Mode{46.0, 0.02}, Mode{131.0, 0.02}};
+  const MinimalShapers found = minimal_shapers(modes, 0.06);
+  CHECK(found.complete);
+  CHECK(found.shapers == minimal_two_mode(modes[0], modes[1], 0.06));
+}
+
+TEST_CASE("minimal_shapers: the boxes of two modes find what the two-mode search finds, and settle everything") {
   using namespace shapegcode::minimal;
   for (const double damping : {0.0, 0.02, 0.2}) {
     for (const double ratio : {1.1, 1.7, 2.0, 2.85, 4.0, 8.0}) {
       const double duration = 1.5;
-      const std::array<Mode, 2> modes{Mode{1.0, damping}, Mode{ratio, damping}};
-      MinimalOptions options;
-      options.max_boxes = 0;  // two modes are proven all the same
-      const MinimalShapers found = minimal_shapers(modes, duration, options);
-      CHECK(found.complete);
-      CHECK(found.unresolved == 0);
-      CHECK(found.starts == 0);
-      CHECK(found.shapers == minimal_two_mode(modes[0], modes[1], duration));
-      const std::array<std::complex<double>, 2> poles{pole(modes[0]), pole(modes[1])};
+      const std::array<std::complex<double>, 2> poles{shapegcode::pole({1.0, damping}),
+                                                      shapegcode::pole({ratio, damping})};
       const double omega = std::abs(poles[1]);
       const System system(poles, omega);
       const Region region{duration * omega * (1.0 + 1e-9), 10.0, 1e-4};
       Collection collection(system, region);
-      search_from_starts(system, region, 100'000, collection);
+      const BoxCounts counts = BoxSearch(system, region, 1'000'000, collection).run();
+      CHECK(counts.unresolved == 0);
+      CHECK(counts.settled >= duration * omega);
+      const std::vector<Shaper> listed = minimal_two_mode({1.0, damping}, {ratio, damping}, duration);
       const std::vector<Taps> taps = collection.taps();
-      REQUIRE(taps.size() == found.shapers.size());
+      REQUIRE(taps.size() == listed.size());
       for (const Taps& each : taps) {
-        CHECK(with_times(found.shapers, {0.0, each.phases(0) / omega, each.phases(1) / omega}, 1e-9) != nullptr);
+        CHECK(with_times(listed, {0.0, each.phases(0) / omega, each.phases(1) / omega}, 1e-9) != nullptr);
       }
     }
   }
-}
-
-TEST_CASE("minimal_shapers: small linear equations") {
-  using namespace shapegcode::minimal;
-  for (const Eigen::Index n : {1, 3, 7, 13}) {
-    for (int k = 0; k < 20; ++k) {
-      const Square matrix = Square::Random(n, n);
-      const Vector right = Vector::Random(n);
-      Square inverse = matrix;
-      REQUIRE(invert(inverse));
-      CHECK((Square(matrix * inverse) - Square::Identity(n, n)).cwiseAbs().maxCoeff() < 1e-9);
-      Square overwritten = matrix;
-      Vector x = right;
-      REQUIRE(solve(overwritten, x));
-      CHECK((Vector(matrix * x) - right).cwiseAbs().maxCoeff() < 1e-9);
-    }
-  }
-  Square singular = Square::Zero(3, 3);
-  Vector right = Vector::Ones(3);
-  CHECK_FALSE(invert(singular));
-  singular.setZero();
-  CHECK_FALSE(solve(singular, right));
-  singular.setConstant(std::numeric_limits<double>::quiet_NaN());
-  CHECK_FALSE(invert(singular));
 }
 
 TEST_CASE("minimal_shapers: harmonics 1 ... n, undamped, are cancelled by n+1 equal taps 1/(n+1) apart") {

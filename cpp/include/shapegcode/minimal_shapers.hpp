@@ -10,12 +10,29 @@
 
 namespace shapegcode {
 
-/// How hard `minimal_shapers` searches.
+/// Minimal multi-mode shapers of two modes (paper 002, eq. 12-17): three impulses where the convolved ZV has four. All
+/// of them with duration up to `max_duration_s` (s) and sum |A_k| up to `max_abs_sum`, ascending in duration, then in
+/// the second time; `has_negative` tells which of them ask for a reversed impulse. Damped or not. An empty list means
+/// that there is none in the stated range.
+///
+/// Complete by construction: the plane of (t2, t3) is cut into boxes, a box is discarded only where a bound on its
+/// derivatives proves that it holds no solution, and Newton starts from every box that is left; residual_ratio of both
+/// modes is below 1e-13 (about 1e-16 as a rule). Where a tap comes out as zero (undamped modes at an odd ratio such as
+/// 1:3, which one ZV cancels) the shaper is returned without it; where the amplitudes at given times are not unique,
+/// the ones with the smallest sum of squares are.
+///
+/// Throws Error(argument) as `pole` does, if the poles lie within 1e-6 of one another (relative; use `zv`), if
+/// `max_duration_s` is not finite and positive or exceeds 100 periods of the faster mode, or if `max_abs_sum` is not
+/// finite or below 1.
+/// Sources: paper 002; the search and the elimination of the amplitudes: this project.
+[[nodiscard]] std::vector<Shaper> minimal_two_mode(const Mode& first, const Mode& second, double max_duration_s,
+                                                   double max_abs_sum = 10.0);
+
+/// How hard `minimal_shapers` searches where there are three modes or more.
 struct MinimalOptions {
   double max_abs_sum = 10.0;         ///< largest sum |A_k|, at least 1
   int max_starts = 100'000;          ///< Newton starts; fewer are used once every solution was found three times over
-  std::int64_t max_boxes = 400'000;  ///< boxes of times that the proof may look at; 0: no proof. Two modes are
-                                     ///< proven whatever it is
+  std::int64_t max_boxes = 400'000;  ///< boxes of times that the proof may look at; 0: no proof
 };
 
 /// The minimal shapers of some modes, and what is known about there being others.
@@ -37,13 +54,12 @@ struct MinimalShapers {
 /// found with duration up to `max_duration_s` (s) and sum |A_k| up to `options.max_abs_sum`; residual_ratio of every
 /// mode is at most 1e-12 (1e-16 to 1e-14 as a rule). Shapers with fewer taps that serve all modes are listed too.
 ///
-/// One mode is closed form. More are searched by halving boxes of times, each of which a bound on derivatives proves
-/// empty, or shrinks onto one solution, in ascending duration, so that `complete_up_to_s` grows with `max_boxes`; three
-/// and more before that by Newton from many low-discrepancy starts and from mirror images. The boxes settle two modes
-/// (some 1000 for one period of the faster mode), three as a rule up to the duration of the convolved ZV, four up to
-/// half of it and more. Bounds are evaluated in floating point, rounding aside. Where solutions are not isolated
-/// (undamped modes at odd ratios, which one ZV serves) boxes stay unresolved and of these solutions only the ZV is
-/// listed; then two modes are searched from starts, too.
+/// One mode is closed form, two are `minimal_two_mode`: both complete. Three and more are searched twice: by Newton
+/// from many low-discrepancy starts and from mirror images, and by halving boxes of times, each of which a bound on
+/// derivatives proves empty, or shrinks onto one solution. The boxes go in ascending duration, so that
+/// `complete_up_to_s` grows with `max_boxes`; as a rule they settle three modes up to the duration of the convolved ZV,
+/// four up to half of it and more. Bounds are evaluated in floating point, rounding aside. Where solutions are not
+/// isolated (undamped modes at odd ratios, which one ZV serves) boxes stay unresolved.
 ///
 /// Throws Error(argument) as `pole` does, on no mode or more than 6, if two poles lie within 1e-6 of one another
 /// (relative), if `max_duration_s` is not finite and positive or exceeds 100 periods of the fastest mode, if
@@ -51,11 +67,6 @@ struct MinimalShapers {
 /// Sources: paper 002; the searches: this project.
 [[nodiscard]] MinimalShapers minimal_shapers(std::span<const Mode> modes, double max_duration_s,
                                              const MinimalOptions& options = {});
-
-/// The shapers of `minimal_shapers` for two modes (paper 002, eq. 12-17): three impulses where the convolved ZV has
-/// four. An empty list means that there is none in the stated range.
-[[nodiscard]] std::vector<Shaper> minimal_two_mode(const Mode& first, const Mode& second, double max_duration_s,
-                                                   double max_abs_sum = 10.0);
 
 /// The minimal shapers of two modes over the ratio of their frequencies, joined to curves (paper 002, fig. 2 and 3).
 struct MinimalBranches {
@@ -67,7 +78,7 @@ struct MinimalBranches {
 
 /// All minimal two-mode shapers of `first` and a second mode of `ratio` times its frequency and damping
 /// `second_damping`, for each of `ratios`, joined across the ratios by continuation: from the last two shapers of a
-/// curve Newton goes in small steps to the next ratio, and what it finds there is looked up in the list of
+/// curve Newton goes in small steps to the next ratio, and what it finds there is looked up in the complete list of
 /// `minimal_two_mode`.
 ///
 /// A curve has a gap where its amplitudes exceed `max_abs_sum` (about the ratios at which their sum is zero), its

@@ -7,8 +7,10 @@
 
 namespace shapegcode::linear_algebra {
 
-/// The solution of least norm of a least-squares problem (complete orthogonal decomposition).
-[[nodiscard]] Eigen::VectorXd least_norm_solution(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
+/// The solution of least norm of a least-squares problem (complete orthogonal decomposition). `threshold`: pivots below
+/// this share of the largest count as zero; 0: what rounding leaves.
+[[nodiscard]] Eigen::VectorXd least_norm_solution(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right,
+                                                  double threshold = 0.0);
 
 /// The solution of a least-squares problem (column-pivoting QR).
 [[nodiscard]] Eigen::VectorXd least_squares(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);

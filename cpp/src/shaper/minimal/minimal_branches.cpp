@@ -1,6 +1,5 @@
 #include "shapegcode/minimal_shapers.hpp"
 
-#include <fmt/format.h>
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
@@ -9,8 +8,11 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <sstream>
 
+#include <fmt/format.h>
 #include "shapegcode/error.hpp"
+
 #include "shaper/minimal/minimal_system.hpp"
 #include "shaper/minimal/search_limits.hpp"
 
@@ -53,18 +55,21 @@ struct Curve {
 };
 
 void check_ratios(std::span<const double> ratios) {
+  std::string message;
   if (ratios.empty()) {
-    throw Error(ErrorKind::argument, "a map over the frequency ratio needs at least one ratio: 0 given");
+    message = "a map over the frequency ratio needs at least one ratio: 0 given";
+  } else {
+    const auto bad = std::ranges::find_if(ratios, [](double each) { return !(std::isfinite(each) && each > 0.0); });
+    const auto falling = std::ranges::adjacent_find(ratios, [](double a, double b) { return !(a < b); });
+    if (bad != ratios.end()) {
+      message = fmt::format("frequency ratios are finite and above 0: one is {:.12g}", *bad);
+    } else if (falling != ratios.end()) {
+      message = fmt::format("frequency ratios ascend: {:.12g} follows {:.12g}", *(falling + 1), *falling);
+    } else {
+      return;
+    }
   }
-  const auto bad = std::ranges::find_if(ratios, [](double each) { return !(std::isfinite(each) && each > 0.0); });
-  if (bad != ratios.end()) {
-    throw Error(ErrorKind::argument, fmt::format("frequency ratios are finite and above 0: one is {:.12g}", *bad));
-  }
-  const auto falling = std::ranges::adjacent_find(ratios, [](double a, double b) { return !(a < b); });
-  if (falling != ratios.end()) {
-    throw Error(ErrorKind::argument,
-                fmt::format("frequency ratios ascend: {:.12g} follows {:.12g}", *(falling + 1), *falling));
-  }
+  throw Error(ErrorKind::argument, message);
 }
 
 class Tracer {

@@ -1,21 +1,15 @@
-#include "shapegcode/minimal_shapers.hpp"
-
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <cstdint>
-#include <limits>
 #include <numbers>
-#include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include "shapegcode/error.hpp"
+#include "shapegcode/minimal_shapers.hpp"
+
 #include "shaper/minimal/minimal_boxes.hpp"
 #include "shaper/minimal/minimal_starts.hpp"
 #include "shaper/minimal/minimal_system.hpp"
@@ -39,7 +33,10 @@ double largest_size(const Poles& poles) {
   return std::abs(*std::ranges::max_element(poles, {}, [](const std::complex<double>& s) { return std::abs(s); }));
 }
 
-[[noreturn]] void refuse(const std::string& message) { throw Error(ErrorKind::argument, message); }
+template <class... Values>
+[[noreturn]] void refuse(fmt::format_string<Values...> pattern, Values&&... values) {
+  throw Error(ErrorKind::argument, fmt::format(pattern, std::forward<Values>(values)...));
+}
 
 void check_apart(std::span<const Mode> modes, const Poles& poles) {
   for (std::size_t i = 0; i < poles.size(); ++i) {
@@ -47,9 +44,9 @@ void check_apart(std::span<const Mode> modes, const Poles& poles) {
       const double size = std::max(std::abs(poles[i]), std::abs(poles[j]));
       if (std::abs(poles[i] - poles[j]) <= same_pole * size) {
         refuse(
-            fmt::format("modes {:.12g} Hz and {:.12g} Hz are the same: their poles differ by {:.3g} of their size, "
-                        "limit {:g}; name them once",
-                        modes[i].frequency_hz, modes[j].frequency_hz, std::abs(poles[i] - poles[j]) / size, same_pole));
+            "modes {:.12g} Hz and {:.12g} Hz are the same: their poles differ by {:.12g} of their size, limit {:.12g}; "
+            "name them once",
+            modes[i].frequency_hz, modes[j].frequency_hz, std::abs(poles[i] - poles[j]) / size, same_pole);
       }
     }
   }
@@ -57,7 +54,7 @@ void check_apart(std::span<const Mode> modes, const Poles& poles) {
 
 Poles checked_poles(std::span<const Mode> modes, double max_duration_s, const MinimalOptions& options) {
   if (modes.empty() || modes.size() > most_modes) {
-    refuse(fmt::format("minimal shapers are searched for 1 to {} modes: {} given", most_modes, modes.size()));
+    refuse("minimal shapers are searched for 1 to {} modes: {} given", most_modes, modes.size());
   }
   Poles poles;
   for (const Mode& mode : modes) {
@@ -67,16 +64,14 @@ Poles checked_poles(std::span<const Mode> modes, double max_duration_s, const Mi
   const double longest = most_periods * 2.0 * std::numbers::pi / largest_size(poles);
   if (!std::isfinite(max_duration_s) || max_duration_s <= 0.0 || max_duration_s > longest) {
     refuse(
-        fmt::format("the largest duration is positive and at most {:g} periods of the fastest mode ({:.12g} s): "
-                    "it is {:.12g} s",
-                    most_periods, longest, max_duration_s));
+        "the largest duration is positive and at most {:.12g} periods of the fastest mode ({:.12g} s): it is {:.12g} s",
+        most_periods, longest, max_duration_s);
   }
   if (!std::isfinite(options.max_abs_sum) || options.max_abs_sum < 1.0) {
-    refuse(fmt::format("the largest sum |a| is at least 1: it is {:.12g}", options.max_abs_sum));
+    refuse("the largest sum |a| is at least 1: it is {:.12g}", options.max_abs_sum);
   }
   if (options.max_starts < 0 || options.max_boxes < 0) {
-    refuse(fmt::format("the numbers of starts and boxes are at least 0: they are {} and {}", options.max_starts,
-                       options.max_boxes));
+    refuse("the numbers of starts and boxes are at least 0: they are {} and {}", options.max_starts, options.max_boxes);
   }
   return poles;
 }
@@ -111,24 +106,13 @@ Shaper as_shaper(const minimal::Taps& taps, double omega) {
   return out;
 }
 
-/// Two modes need so few boxes that they come first and the starts only where boxes stay open.
 void search(std::span<const Mode> modes, const Poles& poles, const MinimalOptions& options, MinimalShapers& result) {
   const double omega = largest_size(poles);
   const minimal::System system(poles, omega);
   const minimal::Region region{result.max_duration_s * omega * (1.0 + duration_slack), options.max_abs_sum, apart};
   minimal::Collection collection(system, region);
-  minimal::StartCounts starts;
-  minimal::BoxCounts boxes;
-  if (modes.size() == 2) {
-    constexpr auto no_limit = std::numeric_limits<std::int64_t>::max();
-    boxes = minimal::BoxSearch(system, region, no_limit, collection).run();
-    if (boxes.unresolved > 0) {
-      starts = minimal::search_from_starts(system, region, options.max_starts, collection);
-    }
-  } else {
-    starts = minimal::search_from_starts(system, region, options.max_starts, collection);
-    boxes = minimal::BoxSearch(system, region, options.max_boxes, collection).run();
-  }
+  const minimal::StartCounts starts = minimal::search_from_starts(system, region, options.max_starts, collection);
+  const minimal::BoxCounts boxes = minimal::BoxSearch(system, region, options.max_boxes, collection).run();
   for (const minimal::Taps& taps : collection.taps()) {
     Shaper shaper = as_shaper(taps, omega);
     if (serves(shaper, modes)) {
@@ -165,8 +149,9 @@ MinimalShapers minimal_shapers(std::span<const Mode> modes, double max_duration_
   MinimalShapers result;
   result.max_duration_s = max_duration_s;
   result.max_abs_sum = options.max_abs_sum;
-  if (modes.size() == 1) {
-    result.shapers = one_mode(poles[0], max_duration_s, options.max_abs_sum);
+  if (modes.size() <= 2) {
+    result.shapers = modes.size() == 1 ? one_mode(poles[0], max_duration_s, options.max_abs_sum)
+                                       : minimal_two_mode(modes[0], modes[1], max_duration_s, options.max_abs_sum);
     result.complete_up_to_s = max_duration_s;
   } else {
     search(modes, poles, options, result);
@@ -179,12 +164,6 @@ MinimalShapers minimal_shapers(std::span<const Mode> modes, double max_duration_
   }
   result.complete = result.complete_up_to_s >= max_duration_s;
   return result;
-}
-
-std::vector<Shaper> minimal_two_mode(const Mode& first, const Mode& second, double max_duration_s, double max_abs_sum) {
-  MinimalOptions options;
-  options.max_abs_sum = max_abs_sum;
-  return minimal_shapers(std::array{first, second}, max_duration_s, options).shapers;
 }
 
 }  // namespace shapegcode
