@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+
 #include "base/checks.hpp"
 #include "base/linear_algebra.hpp"
 #include "base/rest.hpp"

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+
 #include "shapegcode/error.hpp"
 
 #include "base/linear_algebra.hpp"

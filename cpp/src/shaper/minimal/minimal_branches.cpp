@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include <fmt/format.h>
+
 #include "shapegcode/error.hpp"
 
 #include "shaper/minimal/minimal_system.hpp"

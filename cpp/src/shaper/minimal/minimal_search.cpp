@@ -6,10 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
+#include "base/refuse.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/minimal_shapers.hpp"
-
 #include "shaper/minimal/minimal_boxes.hpp"
 #include "shaper/minimal/minimal_starts.hpp"
 #include "shaper/minimal/minimal_system.hpp"
@@ -19,6 +18,7 @@ namespace shapegcode {
 
 namespace {
 
+using detail::refuse;
 using minimal::duration_slack;
 using minimal::most_modes;
 using minimal::most_periods;
@@ -31,11 +31,6 @@ using Poles = std::vector<std::complex<double>>;
 
 double largest_size(const Poles& poles) {
   return std::abs(*std::ranges::max_element(poles, {}, [](const std::complex<double>& s) { return std::abs(s); }));
-}
-
-template <class... Values>
-[[noreturn]] void refuse(fmt::format_string<Values...> pattern, Values&&... values) {
-  throw Error(ErrorKind::argument, fmt::format(pattern, std::forward<Values>(values)...));
 }
 
 void check_apart(std::span<const Mode> modes, const Poles& poles) {
