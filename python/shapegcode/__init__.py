@@ -65,32 +65,32 @@ if TYPE_CHECKING:
     from shapegcode._core import (
         zv as zv,
     )
-    from shapegcode.block_grid import choose_grid as choose_grid
-    from shapegcode.budget import Budget as Budget
-    from shapegcode.checker import Check as Check
-    from shapegcode.checker import Finding as Finding
-    from shapegcode.checker import check as check
-    from shapegcode.converter import Conversion as Conversion
-    from shapegcode.converter import convert as convert
-    from shapegcode.identification.read import ReadOptions as ReadOptions
-    from shapegcode.identification.record import Record as Record
-    from shapegcode.identification.record import RecordError as RecordError
-    from shapegcode.identification.results import Identification as Identification
-    from shapegcode.identification.tap_test import identify as identify
-    from shapegcode.linear_response import plant_response as plant_response
+    from shapegcode.checking.check import Check as Check
+    from shapegcode.checking.check import Finding as Finding
+    from shapegcode.checking.check import check as check
+    from shapegcode.conversion.budget import Budget as Budget
+    from shapegcode.conversion.convert import Conversion as Conversion
+    from shapegcode.conversion.convert import convert as convert
+    from shapegcode.conversion.readback import RoundTripError as RoundTripError
+    from shapegcode.cutting.stock import Stock as Stock
+    from shapegcode.cutting.stock import StockError as StockError
+    from shapegcode.cutting.tool import Tool as Tool
+    from shapegcode.cutting.tool import ToolError as ToolError
+    from shapegcode.feed.schedule import FeedSchedule as FeedSchedule
+    from shapegcode.feed.schedule import schedule_feed as schedule_feed
+    from shapegcode.feed.shaped import ScheduledConversion as ScheduledConversion
+    from shapegcode.feed.shaped import convert_scheduled as convert_scheduled
+    from shapegcode.identification.identify import identify as identify
+    from shapegcode.identification.result import Identification as Identification
+    from shapegcode.io.read import ReadOptions as ReadOptions
+    from shapegcode.io.record import Record as Record
+    from shapegcode.io.record import RecordError as RecordError
     from shapegcode.machine import Machine as Machine
     from shapegcode.machine import MachineError as MachineError
-    from shapegcode.metrology import Measurement as Measurement
-    from shapegcode.metrology import measure as measure
-    from shapegcode.milling.schedule import FeedSchedule as FeedSchedule
-    from shapegcode.milling.schedule import schedule_feed as schedule_feed
-    from shapegcode.milling.shaped_schedule import ScheduledConversion as ScheduledConversion
-    from shapegcode.milling.shaped_schedule import convert_scheduled as convert_scheduled
-    from shapegcode.milling.stock_file import Stock as Stock
-    from shapegcode.milling.stock_file import StockError as StockError
-    from shapegcode.milling.tool_file import Tool as Tool
-    from shapegcode.milling.tool_file import ToolError as ToolError
-    from shapegcode.played import stream as stream
+    from shapegcode.metrology.measure import Measurement as Measurement
+    from shapegcode.metrology.measure import measure as measure
+    from shapegcode.model.response import plant_response as plant_response
+    from shapegcode.model.stream import stream as stream
     from shapegcode.program import Program as Program
     from shapegcode.shaping import (
         ModeBand as ModeBand,
@@ -107,11 +107,11 @@ if TYPE_CHECKING:
     from shapegcode.shaping import (
         shortest_non_negative as shortest_non_negative,
     )
-    from shapegcode.simulator import Simulation as Simulation
-    from shapegcode.simulator import simulate as simulate
-    from shapegcode.timing import CycleTime as CycleTime
-    from shapegcode.timing import cycle_time as cycle_time
-    from shapegcode.verify import RoundTripError as RoundTripError
+    from shapegcode.shaping.grid import choose_grid as choose_grid
+    from shapegcode.simulation.simulate import Simulation as Simulation
+    from shapegcode.simulation.simulate import simulate as simulate
+    from shapegcode.timing.cycle_time import CycleTime as CycleTime
+    from shapegcode.timing.cycle_time import cycle_time as cycle_time
 
 _HOME = {
     **dict.fromkeys(
@@ -122,29 +122,29 @@ _HOME = {
         ),
         "_core",
     ),
-    **dict.fromkeys(("Check", "Finding", "check"), "checker"),
-    "Budget": "budget",
-    "choose_grid": "block_grid",
-    **dict.fromkeys(("Conversion", "convert"), "converter"),
-    "Identification": "identification.results",
+    **dict.fromkeys(("Check", "Finding", "check"), "checking.check"),
+    "Budget": "conversion.budget",
+    "choose_grid": "shaping.grid",
+    **dict.fromkeys(("Conversion", "convert"), "conversion.convert"),
+    "Identification": "identification.result",
     **dict.fromkeys(("Machine", "MachineError"), "machine"),
-    **dict.fromkeys(("Measurement", "measure"), "metrology"),
+    **dict.fromkeys(("Measurement", "measure"), "metrology.measure"),
     "Program": "program",
-    "ReadOptions": "identification.read",
-    **dict.fromkeys(("Record", "RecordError"), "identification.record"),
-    "identify": "identification.tap_test",
-    **dict.fromkeys(("FeedSchedule", "schedule_feed"), "milling.schedule"),
-    **dict.fromkeys(("ScheduledConversion", "convert_scheduled"), "milling.shaped_schedule"),
-    **dict.fromkeys(("Stock", "StockError"), "milling.stock_file"),
-    **dict.fromkeys(("Tool", "ToolError"), "milling.tool_file"),
-    "RoundTripError": "verify",
-    "plant_response": "linear_response",
+    "ReadOptions": "io.read",
+    **dict.fromkeys(("Record", "RecordError"), "io.record"),
+    "identify": "identification.identify",
+    **dict.fromkeys(("FeedSchedule", "schedule_feed"), "feed.schedule"),
+    **dict.fromkeys(("ScheduledConversion", "convert_scheduled"), "feed.shaped"),
+    **dict.fromkeys(("Stock", "StockError"), "cutting.stock"),
+    **dict.fromkeys(("Tool", "ToolError"), "cutting.tool"),
+    "RoundTripError": "conversion.readback",
+    "plant_response": "model.response",
     **dict.fromkeys(
         ("ModeBand", "Recommendation", "choose_block_period", "choose_shaper", "shortest_non_negative"), "shaping"
     ),
-    **dict.fromkeys(("Simulation", "simulate"), "simulator"),
-    "stream": "played",
-    **dict.fromkeys(("CycleTime", "cycle_time"), "timing"),
+    **dict.fromkeys(("Simulation", "simulate"), "simulation.simulate"),
+    "stream": "model.stream",
+    **dict.fromkeys(("CycleTime", "cycle_time"), "timing.cycle_time"),
 }  # fmt: skip
 
 __all__ = sorted(_HOME)  # noqa: PLE0605

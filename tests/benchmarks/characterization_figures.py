@@ -12,9 +12,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
 
 import shapegcode as sg
 from judge.characterization import Deviation, controllers, fill_in_logs, fill_in_times, truth_of
-from shapegcode.characterize.fit import fit
-from shapegcode.characterize.plan import Box
-from shapegcode.characterize.programs import write_tests
+from shapegcode.characterization.fit import fit
+from shapegcode.characterization.plan import Box
+from shapegcode.characterization.programs import write_tests
 
 SEEDS = range(24)
 

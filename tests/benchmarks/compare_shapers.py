@@ -21,10 +21,11 @@ from table import markdown
 
 import shapegcode as sg
 from shapegcode import _core, converter
-from shapegcode.block_grid import Grid, choose_grid, make_grid
 from shapegcode.cli.console import progress
+from shapegcode.conversion.readback import Placed
+from shapegcode.model.play import play_emitted, play_original, vibration_memory_s
 from shapegcode.shaping import design, machine_bands
-from shapegcode.verify import Placed, play_emitted, play_original, vibration_memory_s
+from shapegcode.shaping.grid import Grid, choose_grid, make_grid
 
 _ROOT = Path(__file__).resolve().parents[2]
 _GOLDEN = _ROOT / "tests" / "golden" / "programs"

@@ -27,8 +27,9 @@ from table import Row, Sample, comparison_table, markdown
 import shapegcode as sg
 from acceptance import machine_with
 from shapegcode import _core
-from shapegcode.block_grid import Grid, choose_grid
-from shapegcode.emit import filter_tolerance, motion_limits, shaping_options
+from shapegcode.conversion.write import filter_tolerance, shaping_options
+from shapegcode.model.controller import motion_limits
+from shapegcode.shaping.grid import Grid, choose_grid
 
 Vector = npt.NDArray[np.float64]
 

@@ -23,9 +23,10 @@ from acceptance import Judged, convert, machine_with
 from judge import Move, path_polyline, play, residual_um, response
 from judge.plant import contour_error_um
 from shapegcode import _core
-from shapegcode.block_grid import choose_grid
-from shapegcode.demos import path_program
-from shapegcode.emit import filter_tolerance, motion_limits, shaping_options
+from shapegcode.conversion.write import filter_tolerance, shaping_options
+from shapegcode.demos.path import path_program
+from shapegcode.model.controller import motion_limits
+from shapegcode.shaping.grid import choose_grid
 
 Vector = npt.NDArray[np.float64]
 

@@ -22,8 +22,8 @@ from table import Row, Sample, comparison_table, markdown
 
 import feed_drive_reference as reference
 from shapegcode import _core
-from shapegcode.feed_drive import drive_parameters
 from shapegcode.machine import Machine
+from shapegcode.model.drives import drive_parameters
 
 Vector = npt.NDArray[np.float64]
 

@@ -21,16 +21,16 @@ from cut_by_points import Block, Cutter, Vector, engaged, peak_resultant_n
 from table import markdown
 
 from shapegcode import _core
+from shapegcode.cutting.stock import Stock
+from shapegcode.cutting.tool import Tool
+from shapegcode.demos.corner_study import CASES, CornerCase, CornerStudy, study_corner
+from shapegcode.feed.plan import limits_of, milling_force
+from shapegcode.feed.schedule import MARGIN, FeedSchedule, schedule_feed
+from shapegcode.feed.survey import SurveyedRegion, survey
+from shapegcode.feed.travel import OrdinaryMotion
 from shapegcode.machine import Machine
-from shapegcode.milling.corner_study import CASES, CornerCase, CornerStudy, study_corner
-from shapegcode.milling.feed_plan import limits_of, milling_force
-from shapegcode.milling.schedule import MARGIN, FeedSchedule, schedule_feed
-from shapegcode.milling.stock_file import Stock
-from shapegcode.milling.survey import SurveyedRegion, survey
-from shapegcode.milling.tool_file import Tool
-from shapegcode.milling.travel import OrdinaryMotion
 from shapegcode.program import Program
-from shapegcode.timing import cycle_time
+from shapegcode.timing.cycle_time import cycle_time
 
 FEED = Path(__file__).resolve().parents[1] / "golden" / "feed"
 POINT_MM = 0.02

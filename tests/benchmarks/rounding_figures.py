@@ -21,7 +21,7 @@ from judge.interpreter import interpret
 from judge.plant import residual_um
 from judge.player import play
 from shapegcode import _core
-from shapegcode.converter import convert
+from shapegcode.conversion.convert import convert
 
 MODES = ((46.0, 0.02), (131.0, 0.02), None)
 #: Name, inch, least increment in mm.

@@ -25,9 +25,9 @@ from table import Row, Sample, comparison_table, markdown
 
 import shapegcode as sg
 from shapegcode import _core
-from shapegcode.controller import controller_model
-from shapegcode.converter import choose_grid
-from shapegcode.emit import emit_region, filter_tolerance, motion_limits
+from shapegcode.conversion.convert import choose_grid
+from shapegcode.conversion.write import emit_region, filter_tolerance
+from shapegcode.model.controller import controller_model, motion_limits
 
 _MEGA = 1e6
 _FIR_SAMPLES = 1_000_000

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import tomllib
 
-from shapegcode.fanuc_parameters import import_parameters
 from shapegcode.machine import Machine
-from shapegcode.machine_errors import MachineError
+from shapegcode.machine.fanuc_import import import_parameters
+from shapegcode.settings.problems import MachineError
 
 _BASE = Machine.load("vx500")
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import cont2discrete, fftconvolve, firwin, lfilter
 
-from shapegcode.identification.record import Record
+from shapegcode.io.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 RATE_HZ = 2048.0

@@ -10,9 +10,9 @@ import pytest
 import shapegcode as sg
 from acceptance import machine_with
 from shapegcode._core import DesignError
-from shapegcode.block_grid import choose_grid
-from shapegcode.machine_output import Shaping
+from shapegcode.machine.output import Shaping
 from shapegcode.shaping import FAMILIES, choose_shaper
+from shapegcode.shaping.grid import choose_grid
 
 Axis = list[tuple[float, float, float | None]]  # Hz, damping ratio, ± % or None
 

@@ -17,14 +17,14 @@ import shapegcode as sg
 from command import run
 from judge.characterization import controllers, fill_in_logs, fill_in_times, write_csv
 from judge.controller_simulator import Hidden, play, servo_log
-from shapegcode.characterize.findings import Finding
-from shapegcode.characterize.fit import applied, fit
-from shapegcode.characterize.log import parse_units, read_log
-from shapegcode.characterize.plan import Box, Part
-from shapegcode.characterize.programs import make_tests, program_text, write_tests
-from shapegcode.characterize.results import read_results
-from shapegcode.characterize.timing import Timing, part_time_s, program_time_s
-from shapegcode.controller import controller_model
+from shapegcode.characterization.findings import Finding
+from shapegcode.characterization.fit import applied, fit
+from shapegcode.characterization.log import parse_units, read_log
+from shapegcode.characterization.plan import Box, Part
+from shapegcode.characterization.programs import make_tests, program_text, write_tests
+from shapegcode.characterization.results import read_results
+from shapegcode.characterization.timing import Timing, part_time_s, program_time_s
+from shapegcode.model.controller import controller_model
 
 MACHINE = sg.Machine.load("vx500")
 BOXES = ["0:100,0:100,0:20", "-50:50,-80:0,-5:30", "0:40,-40:0,0:10", "-300:0,0:250,0:200"]

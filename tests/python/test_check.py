@@ -11,8 +11,8 @@ import pytest
 
 import shapegcode as sg
 from effort import cpu_s
-from shapegcode import checked_runs
-from shapegcode.checker import MOST_FINDINGS, check_text
+from shapegcode.checking import runs as checked_runs
+from shapegcode.checking.check import MOST_FINDINGS, check_text
 from shapegcode.cli import main
 
 HEAD = "%\nO1\nG21G17G90G94G54G64\nG0X0Y0Z0\n"  # 4 lines

@@ -11,9 +11,9 @@ import pytest
 
 import cut_reference as reference
 from shapegcode._core import ArgumentError
-from shapegcode.milling.coefficient_fit import CoefficientFit, MeanForces, fit_coefficients
-from shapegcode.milling.cut_force import COEFFICIENTS, ForceLaw, mean_chip_mm
-from shapegcode.milling.cut_plan import CutTool, Engagement, straight_engagement
+from shapegcode.testcut.coefficient_fit import CoefficientFit, MeanForces, fit_coefficients
+from shapegcode.testcut.force import COEFFICIENTS, ForceLaw, mean_chip_mm
+from shapegcode.testcut.plan import CutTool, Engagement, straight_engagement
 
 Array = npt.NDArray[np.float64]
 

@@ -20,8 +20,9 @@ from contour_figures import (
 import shapegcode as sg
 from acceptance import BLOCK_ENDS, machine_with
 from shapegcode import _core
-from shapegcode.block_grid import choose_grid
-from shapegcode.emit import filter_tolerance, motion_limits, shaping_options
+from shapegcode.conversion.write import filter_tolerance, shaping_options
+from shapegcode.model.controller import motion_limits
+from shapegcode.shaping.grid import choose_grid
 
 
 def target_um(target: str, found: Figures) -> float:

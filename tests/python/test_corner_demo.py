@@ -11,9 +11,9 @@ import numpy.typing as npt
 import pytest
 from scipy.optimize import brentq
 
-from shapegcode import canvas
 from shapegcode.cli import main
-from shapegcode.milling.corner_demo import CornerDemo, corner_demo
+from shapegcode.demos.corner import CornerDemo, corner_demo
+from shapegcode.results import plot as canvas
 
 Vector = npt.NDArray[np.float64]
 
@@ -130,7 +130,7 @@ def test_the_command(
     demo: CornerDemo, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(canvas, "FORMATS", (".svg",))
-    monkeypatch.setattr("shapegcode.milling.corner_demo.corner_demo", lambda _progress: demo)
+    monkeypatch.setattr("shapegcode.demos.corner.corner_demo", lambda _progress: demo)
     plots = ["--plots", str(tmp_path / "plots")]
     assert main(["demo", "corner", "--json", str(tmp_path / "corner.json"), *plots]) == 0
     out = capsys.readouterr().out

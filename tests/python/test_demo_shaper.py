@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapegcode import canvas, demo_shaper
 from shapegcode.cli import main
-from shapegcode.demo_shaper import MODES, ShaperDemo, shaper_demo
+from shapegcode.demos import shaper as demo_shaper
+from shapegcode.demos.shaper import MODES, ShaperDemo, shaper_demo
+from shapegcode.results import plot as canvas
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from shapegcode import canvas
 from shapegcode.cli import main
-from shapegcode.demo_tap import COLLET, END_MILL, SYSTEM, TapDemo, tap_demo
+from shapegcode.demos.tap import COLLET, END_MILL, SYSTEM, TapDemo, tap_demo
+from shapegcode.results import plot as canvas
 
 
 @pytest.fixture(scope="module")

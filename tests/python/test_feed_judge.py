@@ -19,10 +19,10 @@ from judge.feed_verdict import Control, Verdict, constant_feed_time, judge
 from judge.feeds import Forces, Run, engagements, known
 from judge.interpreter import interpret
 from judge.milling_programs import Case, limits_toml, random_case
+from shapegcode.cutting.stock import Stock
+from shapegcode.cutting.tool import Tool
+from shapegcode.feed.schedule import FeedSchedule, schedule_feed
 from shapegcode.machine import Machine
-from shapegcode.milling.schedule import FeedSchedule, schedule_feed
-from shapegcode.milling.stock_file import Stock
-from shapegcode.milling.tool_file import Tool
 from shapegcode.program import Program
 
 FIGURE = {"resultant_n": "peak_n", "deflection_um": "deflection_um", "torque_nm": "torque_nm", "power_w": "power_w"}

@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapegcode import _core, canvas
+from shapegcode import _core
+from shapegcode.cutting.stock import Stock
+from shapegcode.cutting.tool import Tool
+from shapegcode.feed.plots import write_feed_pictures
+from shapegcode.feed.schedule import FeedSchedule, schedule_feed
+from shapegcode.feed.traces import LOADS, envelope, feed_traces, groups, wall_maps
 from shapegcode.machine import Machine
-from shapegcode.milling.feed_picture import write_feed_pictures
-from shapegcode.milling.feed_traces import LOADS, envelope, feed_traces, groups, wall_maps
-from shapegcode.milling.schedule import FeedSchedule, schedule_feed
-from shapegcode.milling.stock_file import Stock
-from shapegcode.milling.tool_file import Tool
+from shapegcode.results import plot as canvas
 
 FEED = Path(__file__).parents[1] / "golden" / "feed"
 

@@ -149,37 +149,101 @@ def imported_modules(file: Path) -> set[str]:
     return found
 
 
-def test_only_pictures_import_matplotlib() -> None:
+# The folders of the package from the bottom up: each may import what stands before it.
+PACKAGE_FOLDERS = [
+    "settings",
+    "io",
+    "machine",
+    "program",
+    "model",
+    "results",
+    "shaping",
+    "conversion",
+    "simulation",
+    "timing",
+    "checking",
+    "metrology",
+    "identification",
+    "cutting",
+    "feed",
+    "characterization",
+    "testcut",
+    "demos",
+    "cli",
+]
+# What stands at the root of the package; `errors` and the extension module may be imported by all.
+ROOT_MODULES = {"__init__", "__main__", "errors", "_core"}
+
+
+def own_imports(file: Path) -> set[str]:
+    """Full names of the own modules that a Python file imports, anywhere in it."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), filename=str(file))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return {name for name in found if name.split(".")[0] == "shapegcode"}
+
+
+def test_the_root_of_the_package_stays_small() -> None:
+    assert {file.stem for file in PACKAGE.glob("*.py*")} <= ROOT_MODULES
+    assert {file.name for file in PACKAGE.iterdir() if file.is_dir()} <= {*PACKAGE_FOLDERS, "data", "__pycache__"}
+
+
+def test_package_folders_use_only_whom_they_may() -> None:
+    offenders = []
+    for file in sorted(PACKAGE.rglob("*.py")):
+        if file.parent == PACKAGE:
+            continue
+        folder = file.relative_to(PACKAGE).parts[0]
+        allowed = {*PACKAGE_FOLDERS[: PACKAGE_FOLDERS.index(folder) + 1], "errors", "_core", "__version__"}
+        offenders += [
+            f"{file.relative_to(ROOT)} imports {name}"
+            for name in own_imports(file)
+            if name.split(".")[1] not in allowed
+        ]
+    assert offenders == []
+
+
+def test_no_module_imports_itself_through_others() -> None:
+    """Also where the import is inside a function or only for types."""
+    files = {}
+    for file in PACKAGE.rglob("*.py"):
+        parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
+        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = file
+    uses = {
+        name: {one for full in own_imports(file) for one in (full, full.rpartition(".")[0]) if one in files} - {name}
+        for name, file in files.items()
+        if name != "shapegcode"
+    }
+    while ends := {name for name, used in uses.items() if not used & uses.keys()}:
+        uses = {name: used for name, used in uses.items() if name not in ends}
+    assert sorted(uses) == [], "these import each other, or what does"
+
+
+def test_only_plots_import_matplotlib() -> None:
     users = {
         file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py") if "matplotlib" in imported_modules(file)
     }
-    assert users == {
-        "canvas.py",
-        "identification/tap_picture.py",
-        "metrology_picture.py",
-        "milling/corner_demo_picture.py",
-        "milling/feed_picture.py",
-        "motion_picture.py",
-        "plotting.py",
-        "shaper_picture.py",
-        "time_picture.py",
-    }
+    named = {name for name in users if re.search(r"(^|[/_])plots?\.py$", name)}
+    assert users - named == set()
 
 
 def test_only_files_of_settings_import_pydantic() -> None:
     users = {
         file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py") if "pydantic" in imported_modules(file)
     }
-    tables = {name for name in users if re.fullmatch(r"machine(_[a-z]+)?\.py", name)}
-    assert users - tables == {"milling/cutting_materials.py", "milling/stock_file.py", "milling/tool_file.py"}
+    tables = {name for name in users if name.startswith(("machine/", "settings/"))}
+    assert users - tables == {"cutting/materials.py", "cutting/stock.py", "cutting/tool.py"}
 
 
 def test_only_shapes_of_the_stock_import_shapely() -> None:
     users = {
         file.relative_to(PACKAGE).as_posix() for file in PACKAGE.rglob("*.py") if "shapely" in imported_modules(file)
     }
-    assert users == {"milling/offset_shapes.py", "milling/stock_shape.py"}
-    assert "shapely" not in loaded_after("import shapegcode.milling.stock_material, shapegcode.milling.stock_shape")
+    assert users == {"cutting/offset_shapes.py", "cutting/stock_shape.py"}
+    assert "shapely" not in loaded_after("import shapegcode.cutting.stock_material, shapegcode.cutting.stock_shape")
 
 
 def loaded_after(statement: str) -> set[str]:

@@ -9,8 +9,9 @@ import numpy.typing as npt
 import pytest
 
 from shapegcode.identification.fit import identify
-from shapegcode.identification.record import Record, RecordError
-from shapegcode.identification.results import Estimate, Identification, IdentifiedMode
+from shapegcode.identification.mode import Estimate, IdentifiedMode
+from shapegcode.identification.result import Identification
+from shapegcode.io.record import Record, RecordError
 from tap_truth import TrueMode, acceleration, random_modes, tap
 
 FloatArray = npt.NDArray[np.float64]

@@ -15,10 +15,10 @@ import pytest
 from scipy.signal import lsim
 
 import shapegcode as sg
-from shapegcode import canvas
 from shapegcode.cli import main
+from shapegcode.conversion.cases import stated_cases
+from shapegcode.results import plot as canvas
 from shapegcode.shaping.comparison import machine_bands
-from shapegcode.worst_case import stated_cases
 
 FloatArray = npt.NDArray[np.float64]
 PERIOD_S = 1.0 / 2048.0

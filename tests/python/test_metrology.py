@@ -20,10 +20,10 @@ from scipy import ndimage, optimize, spatial
 import shapegcode as sg
 from acceptance import machine_with
 from shapegcode import _core
-from shapegcode.demos import path_program
-from shapegcode.metrology import MeasuredRegion
-from shapegcode.metrology_demo import metrology_demo
-from shapegcode.verify import play_original
+from shapegcode.demos.metrology import metrology_demo
+from shapegcode.demos.path import path_program
+from shapegcode.metrology.measure import MeasuredRegion
+from shapegcode.model.play import play_original
 
 ROOT = Path(__file__).resolve().parents[2]
 TOOL_MM = 3.0

@@ -7,12 +7,13 @@ import pytest
 
 import shapegcode as sg
 from shapegcode import _core
-from shapegcode.block_grid import choose_grid, make_grid
-from shapegcode.emit import filter_tolerance, motion_limits, shaping_options
-from shapegcode.moving_modes import region_offset
+from shapegcode.conversion.write import filter_tolerance, shaping_options
+from shapegcode.model.controller import motion_limits
+from shapegcode.model.modes import region_offset
+from shapegcode.model.play import play_emitted
 from shapegcode.program import Program
-from shapegcode.simulator import simulate
-from shapegcode.verify import play_emitted
+from shapegcode.shaping.grid import choose_grid, make_grid
+from shapegcode.simulation.simulate import simulate
 from test_moving_modes import OVER_MASS, OVER_Z, machine_with
 
 HEAD = "%\nO0001\nG21 G90 G94 G17 G54\n"

@@ -12,21 +12,21 @@ import moving_scenario as scenario
 from shapegcode import _core
 from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode, ModeTable, VaryingFir
 from shapegcode.machine import Machine, MachineError
-from shapegcode.moving_modes import (
+from shapegcode.model.modes import (
     axis_modes,
     machine_warnings,
     mode_tables,
     moving_axis,
     region_offset,
     region_range_warnings,
-    shaper_track,
     slowest_mode,
     still_mode,
 )
+from shapegcode.model.play import play_original, playback_options
 from shapegcode.program import Program
 from shapegcode.shaping import shortest_non_negative
+from shapegcode.shaping.grid import shaper_track
 from shapegcode.shaping.track import MovingMode, design_track, shaper_of_mean
-from shapegcode.verify import play_original, playback_options
 
 OVER_Z = '{ axis = "z", position_mm = [0, 200, 400], frequency_hz = [52, 46, 41] }'
 OVER_MASS = "{ mass_kg = [0, 100, 300], frequency_hz = [50, 46, 40], damping_ratio = [0.02, 0.03, 0.05] }"

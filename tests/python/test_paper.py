@@ -13,8 +13,8 @@ import shapegcode as sg
 from acceptance import BLOCK_ENDS, convert, figures, machine_with, whole_periods
 from judge import durations, residual_um
 from shapegcode import _core
-from shapegcode.demos import ideal_command, path_demo, path_program
-from shapegcode.emit import motion_limits
+from shapegcode.demos.path import ideal_command, path_demo, path_program
+from shapegcode.model.controller import motion_limits
 
 Vector = npt.NDArray[np.float64]
 

@@ -14,12 +14,23 @@ import pytest
 from rich.console import Console
 
 from effort import cpu_s
-from shapegcode import pictures
-from shapegcode.converter import convert
+from shapegcode.conversion import plots as pictures
+from shapegcode.conversion.convert import convert
+from shapegcode.conversion.report import before_after_rows, before_after_table, next_step
 from shapegcode.machine import Machine
-from shapegcode.plotting import View, _foot_points, follow, plot_feed, plot_path, plot_vibration, thin_min_max
 from shapegcode.program import Program
-from shapegcode.report import Trace, before_after_rows, before_after_table, next_step, warning_table
+from shapegcode.results import motion_pictures
+from shapegcode.results.motion_plots import (
+    View,
+    _foot_points,
+    follow,
+    plot_feed,
+    plot_path,
+    plot_vibration,
+    thin_min_max,
+)
+from shapegcode.results.table import warning_table
+from shapegcode.results.trace import Trace
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -164,7 +175,7 @@ def test_a_long_region_shows_its_worst_place_and_its_stop(tmp_path: Path, monkey
     text = svg_text(tmp_path / "vibration.svg")
     assert "the worst place, at" in text and "the stop, at" in text and "come to rest" in text
 
-    monkeypatch.setattr(pictures, "_RECORD_SAMPLES", 20_000)
+    monkeypatch.setattr(pictures, "RECORD_SAMPLES", 20_000)
     pictures.write_pictures(conversion, machine, tmp_path)
     text = svg_text(tmp_path / "vibration.svg")
     assert "first 20 s of" in text and "come to rest" not in text and "the stop" not in text
@@ -173,7 +184,7 @@ def test_a_long_region_shows_its_worst_place_and_its_stop(tmp_path: Path, monkey
 def test_polyline_is_close_to_large_arcs() -> None:
     machine = Machine.load("vx500")
     text = "%\nO1\nG21G90G94G17\nG00X0Y0Z0\nG02X300.Y-300.I0.J-300.F3000\nM30\n%\n"
-    points = pictures._polyline(Program.from_text(text.encode(), machine, source="arc").regions[0].path)
+    points = motion_pictures._polyline(Program.from_text(text.encode(), machine, source="arc").regions[0].path)
     middles = (points[1:] + points[:-1]) / 2
     assert np.abs(np.linalg.norm(middles - [0, -300, 0], axis=1) - 300).max() < 1.01e-5
 

@@ -14,11 +14,11 @@ import pytest
 
 from judge import LineRecord, interpret, play, response, verify_conversion
 from shapegcode._core import ArgumentError, InPosition, in_position_wait_behind_s
-from shapegcode.budget import Budget
 from shapegcode.cli import main
-from shapegcode.controller import controller_model
-from shapegcode.converter import Conversion, convert
+from shapegcode.conversion.budget import Budget
+from shapegcode.conversion.convert import Conversion, convert
 from shapegcode.machine import Machine
+from shapegcode.model.controller import controller_model
 from shapegcode.program import Program
 
 Vector = npt.NDArray[np.float64]

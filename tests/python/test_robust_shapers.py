@@ -26,8 +26,8 @@ from shapegcode.shaping import (
     robust_candidate,
     shortest_non_negative,
 )
-from shapegcode.shaping.cutting_planes import proven_worst
 from shapegcode.shaping.grid_designs import lower_hull
+from shapegcode.shaping.robust.cutting_planes import proven_worst
 
 FloatArray = NDArray[np.float64]
 
@@ -279,10 +279,11 @@ def test_a_solver_that_gives_up_is_asked_again(monkeypatch: pytest.MonkeyPatch) 
         calls += 1
         return SimpleNamespace(status=4, message="cannot") if calls % 2 else linprog(*arguments, **options)
 
-    monkeypatch.setattr("shapegcode.shaping.cutting_planes.linprog", moody)
+    monkeypatch.setattr("shapegcode.shaping.robust.cutting_planes.linprog", moody)
     assert least_worst(PAPER_BANDS, 0.005, 0.03).worst_residual == pytest.approx(expected.worst_residual, rel=1e-3)
     monkeypatch.setattr(
-        "shapegcode.shaping.cutting_planes.linprog", lambda *_a, **_k: SimpleNamespace(status=4, message="cannot")
+        "shapegcode.shaping.robust.cutting_planes.linprog",
+        lambda *_a, **_k: SimpleNamespace(status=4, message="cannot"),
     )
     with pytest.raises(DesignError, match="linear program of a shaper with 8 unknowns failed: cannot"):
         least_worst(PAPER_BANDS, 0.005, 0.03)

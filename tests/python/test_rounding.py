@@ -7,7 +7,7 @@ import pytest
 from rounding_figures import PATHS, PERIODS_S, UNITS, Outcome, machine, outcomes, path
 
 import shapegcode as sg
-from shapegcode.converter import convert
+from shapegcode.conversion.convert import convert
 
 
 def _medians_um(rows: list[Outcome]) -> tuple[float, float, float, float]:

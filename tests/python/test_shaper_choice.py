@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 import shapegcode as sg
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper, convolved_zv, minimal_two_mode
-from shapegcode.block_grid import choose_grid
 from shapegcode.shaping import (
     FAMILIES,
     Design,
@@ -27,6 +26,7 @@ from shapegcode.shaping import (
     pareto_front,
     recommend,
 )
+from shapegcode.shaping.grid import choose_grid
 
 FEW = ("zv", "mzv", "polynomial", "non-negative", "robust")  # quick ones
 PAPER = [ModeBand(Mode(46.0, 0.02), 0.05), ModeBand(Mode(131.0, 0.02))]

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from shapegcode import canvas
 from shapegcode._core import ArgumentError, Mode, Shaper, convolved_zv
 from shapegcode.cli import main
-from shapegcode.modal_response import respond, shaped_step
-from shapegcode.shaper_picture import plot_pareto, residual_curve, selected
-from shapegcode.shaper_table import radial_error_um
+from shapegcode.results import plot as canvas
 from shapegcode.shaping import FAMILIES, Design, choose_shaper
+from shapegcode.shaping.modal_run import respond, shaped_step
+from shapegcode.shaping.plots import plot_pareto, residual_curve, selected
+from shapegcode.shaping.tables import radial_error_um
 
 FEW = ("--family", "zv", "mzv", "minimal", "polynomial", "non-negative", "robust")  # quick ones
 PAPER = ("--mode", "46:0.02±5%", "--mode", "131:0.02")

@@ -26,9 +26,9 @@ from shapegcode._core import (
     zv,
 )
 from shapegcode.shaping import FAMILIES, DesignOptions, ModeBand, design, parse_mode_band, shortest_non_negative
-from shapegcode.shaping.grid_families import Conditions, ResidualLimit, Zero, shortest_on_grid
+from shapegcode.shaping.families.on_grid import Conditions, ResidualLimit, Zero, shortest_on_grid
+from shapegcode.shaping.families.simultaneous import simultaneous_zv
 from shapegcode.shaping.registry import distinct
-from shapegcode.shaping.simultaneous import simultaneous_zv
 from shapegcode.shaping.taps import parse_taps
 
 SLOW = parse_mode_band("46:0.02±5%")

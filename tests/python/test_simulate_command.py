@@ -21,9 +21,9 @@ import feed_drive_reference as reference
 import shapegcode as sg
 from acceptance import PROGRAMS
 from shapegcode.cli import main
-from shapegcode.motion_picture import plot_motion
-from shapegcode.played import KINDS, REST_S, Chunk, plant_options
-from shapegcode.played_figures import Envelope, MotionFigures, MotionTraces
+from shapegcode.model.stream import KINDS, REST_S, Chunk, plant_options
+from shapegcode.simulation.motion import Envelope, MotionFigures, MotionTraces
+from shapegcode.simulation.plots import plot_motion
 
 COMMAND = Path(sys.executable).with_name("shapegcode")
 TICK_S = 0.001

@@ -16,10 +16,10 @@ import pytest
 import shapely
 
 from shapegcode import _core
-from shapegcode.machine_errors import FileError
-from shapegcode.milling.file_documentation import STOCK_EXAMPLES
-from shapegcode.milling.stock_file import Stock, StockError
-from shapegcode.milling.stock_shape import StockPiece, stock_polygons
+from shapegcode.cutting.documentation import STOCK_EXAMPLES
+from shapegcode.cutting.stock import Stock, StockError
+from shapegcode.cutting.stock_shape import StockPiece, stock_polygons
+from shapegcode.settings.problems import FileError
 
 DATA = resources.files("shapegcode") / "data" / "milling"
 RADIUS = 4.0  # of the tool

@@ -19,11 +19,11 @@ from shapegcode.identification.checks import (
 )
 from shapegcode.identification.hits import find_hits
 from shapegcode.identification.plan import rapid_stop_program, recording_for, tap_plan
-from shapegcode.identification.record import FloatArray, Record, RecordError
 from shapegcode.identification.spectra import decay_spectrum, envelope, frf, mode_envelopes
+from shapegcode.io.record import FloatArray, Record, RecordError
 from shapegcode.machine import Machine
 from shapegcode.program import Program
-from shapegcode.timing import cycle_time
+from shapegcode.timing.cycle_time import cycle_time
 
 RATE = 5000.0
 MODES = ((46.0, 0.02, 50.0), (131.0, 0.02, 80.0))

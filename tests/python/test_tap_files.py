@@ -17,10 +17,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.io import wavfile
 
-from shapegcode.identification.read import ReadOptions, read_records
-from shapegcode.identification.record import FloatArray, Record, RecordError
-from shapegcode.identification.sampling import UnevenTimeError, even_period
-from shapegcode.identification.units import find_unit, read_label
+from shapegcode.io.read import ReadOptions, read_records
+from shapegcode.io.record import FloatArray, Record, RecordError
+from shapegcode.io.sampling import UnevenTimeError, even_period
+from shapegcode.io.units import find_unit, read_label
 
 COUNT = 24
 PERIOD_S = 0.0005

@@ -17,7 +17,7 @@ import pytest
 import cut_reference as reference
 from shapegcode import _core
 from shapegcode.cli import main
-from shapegcode.milling.tool_file import Tool
+from shapegcode.cutting.tool import Tool
 
 Array = npt.NDArray[np.float64]
 

@@ -17,9 +17,10 @@ import pytest
 import shapegcode as sg
 from acceptance import PROGRAMS, SAMPLE_KEYS, SAMPLES, machine_with
 from effort import cpu_s
-from shapegcode import demos, timing
 from shapegcode.cli import main
-from shapegcode.time_table import next_step
+from shapegcode.demos import path as demos
+from shapegcode.timing import cycle_time as timing
+from shapegcode.timing.tables import next_step
 
 TICK_S = 0.001
 RATE = 10_000 / 60  # mm/s

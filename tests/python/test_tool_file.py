@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from shapegcode import _core
-from shapegcode.machine_errors import FileError, line_of
-from shapegcode.milling.cutting_materials import materials
-from shapegcode.milling.file_documentation import STEEL_TOOL, file_documentation
-from shapegcode.milling.tool_file import Tool, ToolError
+from shapegcode.cutting.documentation import STEEL_TOOL, file_documentation
+from shapegcode.cutting.materials import materials
+from shapegcode.cutting.tool import Tool, ToolError
+from shapegcode.settings.problems import FileError, line_of
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = resources.files("shapegcode") / "data" / "milling"
@@ -268,7 +268,7 @@ def test_every_entry_makes_coefficients_that_the_core_takes() -> None:
 
 def test_documentation_is_up_to_date() -> None:
     committed = (ROOT / "docs" / "tool_files.md").read_text(encoding="utf-8")
-    command = "python -m shapegcode.milling.file_documentation > docs/tool_files.md"
+    command = "python -m shapegcode.cutting.documentation > docs/tool_files.md"
     assert committed == file_documentation(), f"run: {command}"
 
 

@@ -19,12 +19,13 @@ import shapegcode as sg
 from acceptance import Judged, close, convert, machine_with
 from judge import Mode, Move, contour_error_um, durations, play, residual_um, response, starts
 from judge.player import BlockEnd, moving_average
-from shapegcode.case_table import case_table
 from shapegcode.cli import main
-from shapegcode.report import before_after_rows
+from shapegcode.conversion.case_table import case_table
+from shapegcode.conversion.cases import CaseFigures, Limits, judge_region, stated_cases
+from shapegcode.conversion.report import before_after_rows
+from shapegcode.model.play import vibration_memory_s
+from shapegcode.results.figures import Deviation
 from shapegcode.shaping import choose_shaper
-from shapegcode.verify import vibration_memory_s
-from shapegcode.worst_case import CaseFigures, Deviation, Limits, judge_region, stated_cases
 
 Vector = npt.NDArray[np.float64]
 TICK = 0.001

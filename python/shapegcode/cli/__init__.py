@@ -124,7 +124,7 @@ def _expected(error: Exception) -> bool:
     """
     if isinstance(error, OSError):
         return True
-    families = (("shapegcode._core", "ShapegcodeError"), ("shapegcode.machine_errors", "FileError"))
+    families = (("shapegcode._core", "ShapegcodeError"), ("shapegcode.settings.problems", "FileError"))
     for module, name in families:
         family = getattr(sys.modules.get(module), name, None)
         if isinstance(family, type) and isinstance(error, family):

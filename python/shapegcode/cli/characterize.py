@@ -12,7 +12,7 @@ from shapegcode.cli.options import add_machine_argument, load_machine, refuse_sa
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from shapegcode.characterize.findings import Finding
+    from shapegcode.characterization.findings import Finding
     from shapegcode.machine import Machine
 
 __all__ = ["add_arguments", "run"]
@@ -73,9 +73,9 @@ def _write(args: argparse.Namespace, machine: Machine) -> int:
     from rich.table import Table
 
     from shapegcode._core import ArgumentError
-    from shapegcode.characterize.plan import Box
-    from shapegcode.characterize.programs import write_tests
-    from shapegcode.characterize.timing import Timing, program_time_s
+    from shapegcode.characterization.plan import Box
+    from shapegcode.characterization.programs import write_tests
+    from shapegcode.characterization.timing import Timing, program_time_s
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, write_json
 
@@ -115,10 +115,11 @@ def _write(args: argparse.Namespace, machine: Machine) -> int:
 
 
 def _fit(args: argparse.Namespace, machine: Machine) -> int:
-    from shapegcode.characterize.fit import applied, assumed_value, fit
-    from shapegcode.characterize.log import parse_units
+    from shapegcode.characterization.fit import applied, assumed_value, fit
+    from shapegcode.characterization.log import parse_units
     from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, progress, write_json, write_text
+    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.io.atomic import write_text
 
     units = parse_units(args.units) if args.units is not None else None
     with progress(f"fitting {args.fit}", args.json) as bar:
@@ -168,7 +169,7 @@ def _table(machine: Machine, findings: list[Finding]) -> Table:
     from rich.table import Table
     from rich.text import Text
 
-    from shapegcode.characterize.fit import assumed_value
+    from shapegcode.characterization.fit import assumed_value
 
     table = Table(title=f"{machine.name}, measured", title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     for heading in ("quantity", "value", "95 % interval", "unit", "file has", "from", "remark"):

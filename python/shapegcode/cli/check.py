@@ -29,8 +29,8 @@ def run(args: argparse.Namespace) -> int:
         ProgramError, MachineError: bad input.
         OSError: a file cannot be read or written.
     """
-    from shapegcode.check_table import findings_table, next_step, summary
-    from shapegcode.checker import check
+    from shapegcode.checking.check import check
+    from shapegcode.checking.tables import findings_table, next_step, summary
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
 

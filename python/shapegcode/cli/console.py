@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from shapegcode.files import named_errors, replaced_file
+from shapegcode.io.atomic import write_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -25,9 +25,7 @@ __all__ = [
     "output_console",
     "print_before_after",
     "progress",
-    "write_bytes",
     "write_json",
-    "write_text",
 ]
 
 _PIPE_WIDTH = 120
@@ -56,8 +54,9 @@ def output_console(json_target: str | None = None, *, file: TextIO | None = None
 
 def print_before_after(report: Mapping[str, Any], json_target: str | None = None) -> None:
     """Print the table original / emitted of a conversion's report, its cases, warnings and the one next step."""
-    from shapegcode.case_table import case_table
-    from shapegcode.report import before_after_table, next_step, warning_table
+    from shapegcode.conversion.case_table import case_table
+    from shapegcode.conversion.report import before_after_table, next_step
+    from shapegcode.results.table import warning_table
 
     console = output_console(json_target)
     console.print(before_after_table(report))
@@ -82,46 +81,6 @@ def write_json(data: object, target: str | Path) -> None:
         sys.stdout.write(text)
     else:
         write_text(target, text)
-
-
-def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:
-    """Write a UTF-8 file so that it is either complete or as it was before; line ends as they are.
-
-    Args:
-        path: the file; a symbolic link is followed; a device or pipe is written to directly.
-        text: its content.
-        overwrite: False: an existing file is an error, even if it appears at the last moment.
-
-    Raises:
-        FileExistsError: the file exists and *overwrite* is False.
-        OSError: with the name of *path* and the reason, for example a full disk or a missing folder.
-    """
-    write_bytes(path, text.encode(), overwrite=overwrite)
-
-
-def write_bytes(path: str | Path, data: bytes, *, overwrite: bool = True) -> None:
-    """As :func:`write_text`, for bytes.
-
-    Raises:
-        FileExistsError: the file exists and *overwrite* is False.
-        OSError: with the name of *path* and the reason.
-    """
-    with named_errors(path):
-        if overwrite:
-            with replaced_file(path) as stream:
-                stream.write(data)
-        else:
-            _write_new(Path(os.path.realpath(path)), data)
-
-
-def _write_new(target: Path, data: bytes) -> None:
-    with open(target, "xb") as stream:
-        try:
-            stream.write(data)
-            stream.flush()
-        except BaseException:
-            target.unlink(missing_ok=True)
-            raise
 
 
 class ProgressBar:

@@ -26,10 +26,10 @@ from shapegcode.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from shapegcode.budget import Budget
     from shapegcode.cli.console import ProgressBar
+    from shapegcode.conversion.budget import Budget
+    from shapegcode.feed.shaped import ScheduledConversion
     from shapegcode.machine import Machine
-    from shapegcode.milling.shaped_schedule import ScheduledConversion
     from shapegcode.program import Program
 
 __all__ = ["add_arguments", "run"]
@@ -148,11 +148,12 @@ def run(args: argparse.Namespace) -> int:
         OSError: a file cannot be read or written.
     """
     from shapegcode._core import ArgumentError
-    from shapegcode.budget import Budget
     from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, print_before_after, progress, write_bytes, write_json
-    from shapegcode.compensation import read_for_conversion
-    from shapegcode.converter import convert
+    from shapegcode.cli.console import output_console, print_before_after, progress, write_json
+    from shapegcode.conversion.budget import Budget
+    from shapegcode.conversion.convert import convert
+    from shapegcode.io.atomic import write_bytes
+    from shapegcode.program.compensation import read_for_conversion
 
     output = output_file(args.output)
     limits = (args.max_bytes, args.baud, args.max_blocks_per_second)
@@ -197,11 +198,11 @@ def run(args: argparse.Namespace) -> int:
         target = output if within else failed
         report = {**conversion.report, "output": str(target)}
         if args.plots is not None:
-            from shapegcode.pictures import write_pictures
+            from shapegcode.conversion.plots import write_pictures
 
             report["plots"] = write_pictures(conversion, machine, args.plots)
             if args.feed_schedule:
-                from shapegcode.milling.feed_picture import write_feed_pictures
+                from shapegcode.feed.plots import write_feed_pictures
 
                 report["plots"] += write_feed_pictures(scheduled.schedule, args.plots)
         if args.json not in (None, "-"):
@@ -212,7 +213,7 @@ def run(args: argparse.Namespace) -> int:
         write_json(report, args.json)
     console = output_console(args.json)
     if args.feed_schedule:
-        from shapegcode.milling.feed_table import feed_tables, verdict
+        from shapegcode.feed.tables import feed_tables, verdict
 
         for table in feed_tables(report["feed_schedule"]):
             console.print(table)
@@ -229,10 +230,10 @@ def _convert_scheduled(
     args: argparse.Namespace, program: Program, machine: Machine, budget: Budget | None, bar: ProgressBar
 ) -> ScheduledConversion:
     """Feeds and shaping in one go."""
-    from shapegcode.milling.schedule import MARGIN
-    from shapegcode.milling.shaped_schedule import convert_scheduled
-    from shapegcode.milling.stock_file import Stock
-    from shapegcode.milling.tool_file import Tool
+    from shapegcode.cutting.stock import Stock
+    from shapegcode.cutting.tool import Tool
+    from shapegcode.feed.schedule import MARGIN
+    from shapegcode.feed.shaped import convert_scheduled
 
     return convert_scheduled(
         program,

@@ -56,8 +56,8 @@ def _shaper(json_target: str | None, folder: str) -> int:
 
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.demo_shaper import shaper_demo
-    from shapegcode.demo_shaper_picture import write_demo_pictures
+    from shapegcode.demos.shaper import shaper_demo
+    from shapegcode.demos.shaper_plots import write_demo_pictures
 
     with progress("paper 002", json_target) as bar:
         bar.wait()
@@ -86,8 +86,8 @@ def _tap(json_target: str | None, folder: str) -> int:
 
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.demo_tap import tap_demo
-    from shapegcode.demo_tap_picture import write_demo_pictures
+    from shapegcode.demos.tap import tap_demo
+    from shapegcode.demos.tap_plots import write_demo_pictures
 
     with progress("paper 003", json_target) as bar:
         bar.wait()
@@ -118,8 +118,8 @@ def _corner(json_target: str | None, folder: str) -> int:
 
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.milling.corner_demo import corner_demo
-    from shapegcode.milling.corner_demo_picture import write_corner_pictures
+    from shapegcode.demos.corner import corner_demo
+    from shapegcode.demos.corner_plots import write_corner_pictures
 
     with progress("paper 001", json_target) as bar:
         demo = corner_demo(bar.update)
@@ -151,7 +151,7 @@ def _path(json_target: str | None) -> int:
 
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.demos import path_demo
+    from shapegcode.demos.path import path_demo
 
     with progress("paper 000", json_target):
         result = path_demo()
@@ -192,7 +192,7 @@ def _cycle_time(json_target: str | None) -> int:
 
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.demos import cycle_time_demo
+    from shapegcode.demos.path import cycle_time_demo
 
     with progress("paper 004", json_target) as bar:
         bar.wait()
@@ -230,9 +230,9 @@ def _cycle_time(json_target: str | None) -> int:
 def _metrology(json_target: str | None, folder: str) -> int:
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.metrology_demo import metrology_demo
-    from shapegcode.metrology_picture import write_measurement_pictures
-    from shapegcode.metrology_table import demo_table
+    from shapegcode.demos.metrology import metrology_demo
+    from shapegcode.metrology.plots import write_measurement_pictures
+    from shapegcode.metrology.tables import demo_table
 
     with progress("paper 000", json_target) as bar:
         bar.wait()

@@ -39,7 +39,8 @@ def run(args: argparse.Namespace) -> int:
     """
     from shapegcode._core import ArgumentError
     from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, write_bytes, write_json
+    from shapegcode.cli.console import output_console, write_json
+    from shapegcode.io.atomic import write_bytes
     from shapegcode.program import Program
 
     if args.output == "-" and args.json == "-":

@@ -79,13 +79,14 @@ def run(args: argparse.Namespace) -> int:
         OSError: a file cannot be read or written.
     """
     from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, progress, write_bytes, write_json
-    from shapegcode.compensation import read_for_conversion
-    from shapegcode.milling.feed_table import feed_tables, next_step, verdict
-    from shapegcode.milling.schedule import MARGIN, schedule_feed
-    from shapegcode.milling.stock_file import Stock
-    from shapegcode.milling.tool_file import Tool
-    from shapegcode.report import warning_table
+    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.cutting.stock import Stock
+    from shapegcode.cutting.tool import Tool
+    from shapegcode.feed.schedule import MARGIN, schedule_feed
+    from shapegcode.feed.tables import feed_tables, next_step, verdict
+    from shapegcode.io.atomic import write_bytes
+    from shapegcode.program.compensation import read_for_conversion
+    from shapegcode.results.table import warning_table
 
     output = output_file(args.output)
     machine = load_machine(args)
@@ -108,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
         )
         report = {**result.report, "output": str(output)}
         if args.plots is not None:
-            from shapegcode.milling.feed_picture import write_feed_pictures
+            from shapegcode.feed.plots import write_feed_pictures
 
             report["plots"] = write_feed_pictures(result, args.plots)
         if args.json not in (None, "-"):

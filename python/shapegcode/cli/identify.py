@@ -13,9 +13,9 @@ from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, load_machine, refuse_same_file, seconds
 
 if TYPE_CHECKING:
-    from shapegcode.identification.read import ReadOptions
-    from shapegcode.identification.tap_test import TapTest
+    from shapegcode.identification.identify import TapTest
     from shapegcode.identification.update import MachineUpdate
+    from shapegcode.io.read import ReadOptions
 
 __all__ = ["add_arguments", "run"]
 
@@ -150,9 +150,10 @@ def _plan(args: argparse.Namespace) -> int:
 
 def _identify(args: argparse.Namespace) -> int:
     from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, progress, write_json, write_text
-    from shapegcode.identification.tap_table import print_tap_test
-    from shapegcode.identification.tap_test import tap_test
+    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.identification.identify import tap_test
+    from shapegcode.identification.tables import print_tap_test
+    from shapegcode.io.atomic import write_text
 
     _check_targets(args)
     with progress(_work(args.files), args.json) as bar:
@@ -166,7 +167,7 @@ def _identify(args: argparse.Namespace) -> int:
             start_s=args.start,
         )
         if args.plots is not None and test.found is not None:
-            from shapegcode.identification.tap_picture import write_tap_pictures
+            from shapegcode.identification.plots import write_tap_pictures
 
             write_tap_pictures(test, args.plots)
     update = _updated(args, test)
@@ -212,7 +213,7 @@ def _check_targets(args: argparse.Namespace) -> None:
 
 
 def _read_options(args: argparse.Namespace) -> ReadOptions:
-    from shapegcode.identification.read import ReadOptions
+    from shapegcode.io.read import ReadOptions
 
     return ReadOptions(
         axis=args.axis,

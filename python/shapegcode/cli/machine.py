@@ -76,9 +76,10 @@ def _import(args: argparse.Namespace) -> int:
     from rich.text import Text
 
     from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, write_json, write_text
-    from shapegcode.fanuc_parameters import read_parameters
+    from shapegcode.cli.console import output_console, write_json
+    from shapegcode.io.atomic import write_text
     from shapegcode.machine import Machine
+    from shapegcode.machine.fanuc_import import read_parameters
 
     found = read_parameters(args.dump, Machine.load(args.base) if args.base else None)
     try:
@@ -106,7 +107,7 @@ def _import(args: argparse.Namespace) -> int:
 
 def _init(args: argparse.Namespace) -> int:
     from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import write_text
+    from shapegcode.io.atomic import write_text
     from shapegcode.machine import Machine
 
     text = Machine.builtin_text(args.name)

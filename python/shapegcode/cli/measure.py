@@ -92,10 +92,10 @@ def run(args: argparse.Namespace) -> int:
     """
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.metrology import measure
-    from shapegcode.metrology_table import measurement_tables, next_step, verdicts
+    from shapegcode.metrology.measure import measure
+    from shapegcode.metrology.tables import measurement_tables, next_step, verdicts
     from shapegcode.program import Program
-    from shapegcode.report import warning_table
+    from shapegcode.results.table import warning_table
 
     machine = load_machine(args)
     names = [*args.inputs, *([args.against] if args.against is not None else [])]
@@ -121,7 +121,7 @@ def run(args: argparse.Namespace) -> int:
         )
         report = measurement.report()
         if args.plots is not None:
-            from shapegcode.metrology_picture import write_measurement_pictures
+            from shapegcode.metrology.plots import write_measurement_pictures
 
             report["plots"] = write_measurement_pictures(measurement, args.plots)
     if args.json is not None:

@@ -134,8 +134,8 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode._core import ArgumentError
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.shaper_table import designs_table, families_table, next_step, refusals_table, verdict
     from shapegcode.shaping import choose_shaper
+    from shapegcode.shaping.tables import designs_table, families_table, next_step, refusals_table, verdict
 
     console = output_console(args.json)
     if args.list_families:
@@ -164,7 +164,7 @@ def run(args: argparse.Namespace) -> int:
             taps=args.taps,
         )
         if args.plots is not None:
-            from shapegcode.shaper_picture import write_shaper_pictures
+            from shapegcode.shaping.plots import write_shaper_pictures
 
             write_shaper_pictures(result, args.plots)
     if args.json is not None:

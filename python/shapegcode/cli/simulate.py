@@ -20,8 +20,8 @@ from shapegcode.cli.options import (
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
-    from shapegcode.played_figures import MotionTraces
     from shapegcode.program import Program
+    from shapegcode.simulation.motion import MotionTraces
 
 __all__ = ["add_arguments", "run"]
 
@@ -88,11 +88,11 @@ def run(args: argparse.Namespace) -> int:
     """
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.converter import written_by_shapegcode
     from shapegcode.program import Program
-    from shapegcode.report import warning_table
-    from shapegcode.simulation_table import motion_table, simulation_table
-    from shapegcode.simulator import simulate
+    from shapegcode.program.program import written_by_shapegcode
+    from shapegcode.results.table import warning_table
+    from shapegcode.simulation.simulate import simulate
+    from shapegcode.simulation.tables import motion_table, simulation_table
 
     _check_targets(args)
     machine = load_machine(args)
@@ -114,8 +114,7 @@ def run(args: argparse.Namespace) -> int:
         )
         report = {**simulation.report, "motion": motion}
         if args.plots is not None:
-            from shapegcode.motion_picture import write_motion_pictures
-            from shapegcode.pictures import write_simulation_pictures
+            from shapegcode.simulation.plots import write_motion_pictures, write_simulation_pictures
 
             part = Path(program.source).name + (f", lines {args.lines[0]} to {args.lines[1]}" if args.lines else "")
             files = write_motion_pictures(traces, args.plots, part)
@@ -163,9 +162,9 @@ def _play_motion(
         OSError: a file cannot be written.
     """
     from shapegcode import _core
-    from shapegcode.played import playing_controller, stream
-    from shapegcode.played_figures import MotionFigures, MotionTraces
-    from shapegcode.played_files import csv_file, npz_file
+    from shapegcode.model.stream import playing_controller, stream
+    from shapegcode.simulation.files import csv_file, npz_file
+    from shapegcode.simulation.motion import MotionFigures, MotionTraces
 
     chunks = stream(program, machine, plant=args.plant, shaped=shaped, lines=args.lines)
     period_s = machine.controller.interpolation_period_s

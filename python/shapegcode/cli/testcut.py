@@ -19,9 +19,9 @@ from shapegcode.cli.options import (
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
-    from shapegcode.milling.cut_design import Conditions, Design
-    from shapegcode.milling.cut_plan import TestCut
-    from shapegcode.milling.taper_result import Measured
+    from shapegcode.testcut.design import Conditions, Design
+    from shapegcode.testcut.plan import TestCut
+    from shapegcode.testcut.taper import Measured
 
 __all__ = ["add_arguments", "run"]
 
@@ -191,9 +191,10 @@ def _write(args: argparse.Namespace) -> int:
     import dataclasses
 
     from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, write_json, write_text
-    from shapegcode.milling.cut_program import program_text
-    from shapegcode.milling.cut_table import cut_table, design_notes
+    from shapegcode.cli.console import output_console, write_json
+    from shapegcode.io.atomic import write_text
+    from shapegcode.testcut.program import program_text
+    from shapegcode.testcut.tables import cut_table, design_notes
 
     machine = load_machine(args)
     output = Path(args.output)
@@ -221,8 +222,8 @@ def _write(args: argparse.Namespace) -> int:
 
 def _conditions(args: argparse.Namespace, machine: Machine) -> Conditions:
     from shapegcode._core import ArgumentError
-    from shapegcode.milling.cut_design import Conditions
-    from shapegcode.milling.tool_file import Tool
+    from shapegcode.cutting.tool import Tool
+    from shapegcode.testcut.design import Conditions
 
     tool = Tool.load(args.tool)
     spindle = args.spindle if args.spindle is not None else tool.feed.spindle_rev_per_min
@@ -233,7 +234,7 @@ def _conditions(args: argparse.Namespace, machine: Machine) -> Conditions:
 
 
 def _design(args: argparse.Namespace, machine: Machine, given: Conditions) -> Design:
-    from shapegcode.milling.cut_design import corner_cut, corner_feed_sequence, interval_cut, taper_cut
+    from shapegcode.testcut.design import corner_cut, corner_feed_sequence, interval_cut, taper_cut
 
     diameter = 2.0 * given.tool.radius_mm
     if args.action == "taper":
@@ -252,7 +253,7 @@ def _design(args: argparse.Namespace, machine: Machine, given: Conditions) -> De
 
 
 def _corner(args: argparse.Namespace, diameter: float) -> Any:
-    from shapegcode.milling.cut_design import Corner
+    from shapegcode.testcut.design import Corner
 
     return Corner(args.allowance or 0.1 * diameter, args.rough_radius or diameter, args.finish_radius or diameter)
 
@@ -260,11 +261,12 @@ def _corner(args: argparse.Namespace, diameter: float) -> Any:
 def _fit(args: argparse.Namespace) -> int:
     from shapegcode._core import ArgumentError
     from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, progress, write_json, write_text
-    from shapegcode.milling import cut_table
-    from shapegcode.milling.cut_plan import load_cut
-    from shapegcode.milling.feed_result import corner_result, interval_result
-    from shapegcode.milling.taper_result import fit_taper
+    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.io.atomic import write_text
+    from shapegcode.testcut import tables as cut_table
+    from shapegcode.testcut.corner import corner_result, interval_result
+    from shapegcode.testcut.plan import load_cut
+    from shapegcode.testcut.taper import fit_taper
 
     cut = load_cut(args.cut)
     if cut.kind != "taper" and (args.output is not None or args.edge_forces or args.chip_thickness != "mean"):
@@ -285,7 +287,7 @@ def _fit(args: argparse.Namespace) -> int:
         else:
             result = corner_result(cut, measured) if cut.kind == "corner" else interval_result(cut, measured)
         if args.plots is not None:
-            from shapegcode.milling.cut_picture import write_cut_pictures
+            from shapegcode.testcut.plots import write_cut_pictures
 
             write_cut_pictures(result, args.plots)
     if args.output is not None:
@@ -304,8 +306,8 @@ def _fit(args: argparse.Namespace) -> int:
 
 def _measured(args: argparse.Namespace, cut: TestCut) -> list[Measured]:
     from shapegcode._core import ArgumentError
-    from shapegcode.milling.cut_record import read_forces
-    from shapegcode.milling.taper_result import Measured
+    from shapegcode.testcut.record import read_forces
+    from shapegcode.testcut.taper import Measured
 
     found: list[Measured] = []
     for place, text in enumerate(args.files, start=1):

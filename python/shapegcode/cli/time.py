@@ -59,11 +59,12 @@ def run(args: argparse.Namespace) -> int:
     """
     from shapegcode._core import ArgumentError
     from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, progress, write_json, write_text
+    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.io.atomic import write_text
     from shapegcode.program import Program
-    from shapegcode.report import warning_table
-    from shapegcode.time_table import blocks_csv, next_step, parts_table, slowest_table, tools_table
-    from shapegcode.timing import cycle_time
+    from shapegcode.results.table import warning_table
+    from shapegcode.timing.cycle_time import cycle_time
+    from shapegcode.timing.tables import blocks_csv, next_step, parts_table, slowest_table, tools_table
 
     if args.csv == "-" and args.json == "-":
         raise ArgumentError("--csv - and --json -: only one of them can have standard output")
@@ -85,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
             rapid_override=args.rapid_override,
         )
     if args.plots is not None:
-        from shapegcode.time_picture import write_time_pictures
+        from shapegcode.timing.plots import write_time_pictures
 
         write_time_pictures(time, args.plots)
     if args.csv == "-":

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.identification.results import ChartPole
+from shapegcode.identification.result import ChartPole
 
 _SAME_FREQUENCY = 0.01
 _SAME_DAMPING = 0.05

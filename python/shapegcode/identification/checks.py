@@ -10,7 +10,7 @@ import numpy as np
 from shapegcode.identification.decay import find_decay
 from shapegcode.identification.hits import Hit, find_hits, split_hits
 from shapegcode.identification.quality import DECAYED, excited_hz, is_clipped, refuse_short
-from shapegcode.identification.record import UNITS, FloatArray, Record, RecordError
+from shapegcode.io.record import UNITS, FloatArray, Record, RecordError
 
 __all__ = [
     "DOUBLE_HIT",

@@ -12,9 +12,9 @@ from scipy.signal import resample_poly
 from shapegcode import _core
 from shapegcode.identification.chart import stabilisation_chart
 from shapegcode.identification.checks import Prepared, prepare
+from shapegcode.identification.mode import IdentifiedMode
 from shapegcode.identification.model_search import Fit, Search, Starts, chart_poles, evidence_of, search, starts_of
-from shapegcode.identification.record import Record, RecordError
-from shapegcode.identification.results import Identification, IdentifiedMode
+from shapegcode.identification.result import Identification
 from shapegcode.identification.support import (
     ACCEPTED_PERCENT,
     LEAST_SWINGS,
@@ -24,6 +24,7 @@ from shapegcode.identification.support import (
     refusal_of,
     rivals_of,
 )
+from shapegcode.io.record import Record, RecordError
 
 FloatArray = npt.NDArray[np.float64]
 

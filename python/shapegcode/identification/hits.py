@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shapegcode.identification.record import FloatArray, Record
+from shapegcode.io.record import FloatArray, Record
 
 __all__ = ["Hit", "find_hits", "robust_sigma", "split_hits"]
 

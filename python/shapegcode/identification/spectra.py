@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft, signal
 
-from shapegcode.identification.record import FloatArray, Record, RecordError
+from shapegcode.io.record import FloatArray, Record, RecordError
 
 __all__ = ["Envelope", "Frf", "Peak", "Spectrum", "decay_spectrum", "envelope", "frf", "mode_envelopes"]
 

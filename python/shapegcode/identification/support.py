@@ -10,8 +10,8 @@ import numpy.typing as npt
 from scipy import stats
 
 from shapegcode import _core
+from shapegcode.identification.mode import Estimate
 from shapegcode.identification.model_search import Fit
-from shapegcode.identification.results import Estimate
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -14,10 +14,10 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from shapegcode._core import ArgumentError
-from shapegcode.identification.results import Estimate, IdentifiedMode
+from shapegcode.identification.mode import Estimate, IdentifiedMode
 from shapegcode.machine import Machine
-from shapegcode.machine_keys import toml
-from shapegcode.toml_lines import Chunk, chunks, commented_key, commented_table
+from shapegcode.settings.edit import Chunk, chunks, commented_key, commented_table
+from shapegcode.settings.keys import toml
 
 __all__ = ["MachineUpdate", "check_updatable", "update_machine_file", "update_modes"]
 

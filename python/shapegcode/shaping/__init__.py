@@ -6,7 +6,7 @@ designs on a sample grid that need an optimiser, `robust` those that hold over b
 `cutting_planes` find them), and `block_period` chooses the grid.
 """
 
-from shapegcode.shaping.band import ModeBand, parse_mode_band
+from shapegcode.shaping.bands import ModeBand, parse_mode_band
 from shapegcode.shaping.block_period import (
     BlockPeriodCandidate,
     BlockPeriodChoice,
@@ -14,13 +14,13 @@ from shapegcode.shaping.block_period import (
     choose_robust_grid,
     robust_candidate,
 )
-from shapegcode.shaping.choice import Recommendation, Refusal, choose
+from shapegcode.shaping.choose import Recommendation, Refusal, choose
 from shapegcode.shaping.comparison import candidate_periods, choose_shaper, machine_bands
 from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.ranking import pareto_front, recommend
 from shapegcode.shaping.registry import FAMILIES, DesignOptions, Family, design, family_named
-from shapegcode.shaping.robust import VIBRATION_LIMIT, RobustDesign, least_worst, minimax_robust
+from shapegcode.shaping.robust.minimax import VIBRATION_LIMIT, RobustDesign, least_worst, minimax_robust
 
 __all__ = [
     "FAMILIES",

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
-from shapegcode.shaping.band import ModeBand
+from shapegcode.shaping.bands import ModeBand
 from shapegcode.shaping.grid_designs import check_modes_and_times, ms, shortest_non_negative
-from shapegcode.shaping.robust import VIBRATION_LIMIT
-from shapegcode.shaping.robust_search import (
+from shapegcode.shaping.robust.minimax import VIBRATION_LIMIT
+from shapegcode.shaping.robust.search import (
     RobustDesign,
     Task,
     best_within,

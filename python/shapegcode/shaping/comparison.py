@@ -9,11 +9,11 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
-from shapegcode.shaping.band import NARROW_PERCENT, ModeBand, parse_mode_band
-from shapegcode.shaping.choice import Recommendation, choose
+from shapegcode.shaping.bands import NARROW_PERCENT, ModeBand, parse_mode_band
+from shapegcode.shaping.choose import Recommendation, choose
 from shapegcode.shaping.options import DesignOptions
 from shapegcode.shaping.ranking import SAME
-from shapegcode.shaping.robust_search import Task, shortest_below
+from shapegcode.shaping.robust.search import Task, shortest_below
 from shapegcode.shaping.taps import parse_taps
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
     Raises:
         ArgumentError: the machine has no mode, or an uncertainty outside its range.
     """
-    from shapegcode.moving_modes import still_mode
+    from shapegcode.model.modes import still_mode
 
     widths: dict[tuple[float, float], float] = {}
     for axis in machine.axes.as_tuple():

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shapegcode._core import Shaper, worst_residual
-from shapegcode.shaping.band import ModeBand
+from shapegcode.shaping.bands import ModeBand
 
 __all__ = ["Design", "evaluate"]
 

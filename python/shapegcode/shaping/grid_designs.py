@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog, nnls
 
 from shapegcode._core import ArgumentError, DesignError, Mode, ShapegcodeError, Shaper, grid_polynomial
-from shapegcode.shaping.band import ModeBand
+from shapegcode.shaping.bands import ModeBand
 
 __all__ = [
     "RESIDUAL_LIMIT", "check_modes_and_times", "exact_conditions", "lower_hull", "ms", "shortest_non_negative",

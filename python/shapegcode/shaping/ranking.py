@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from shapegcode._core import ArgumentError
-from shapegcode.shaping.band import ModeBand
+from shapegcode.shaping.bands import ModeBand
 from shapegcode.shaping.design import Design
 from shapegcode.shaping.registry import FAMILIES
 

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from shapegcode._core import ArgumentError, DesignError, Shaper, grid_polynomial
-from shapegcode.shaping import family_solvers as solvers
-from shapegcode.shaping.band import NARROW_PERCENT, ModeBand
+from shapegcode.shaping.bands import NARROW_PERCENT, ModeBand
 from shapegcode.shaping.design import Design, evaluate
+from shapegcode.shaping.families import solvers
+from shapegcode.shaping.families.minimal import solve_minimal
 from shapegcode.shaping.grid_designs import shortest_non_negative
-from shapegcode.shaping.minimal_family import solve_minimal
 from shapegcode.shaping.options import DesignOptions
-from shapegcode.shaping.robust import minimax_robust
+from shapegcode.shaping.robust.minimax import minimax_robust
 
 __all__ = ["FAMILIES", "DesignOptions", "Family", "design", "distinct", "family_named"]
 

@@ -1,0 +1,346 @@
+"""Single moves in a servo log: where they are, when they pass their middle, what shape they have.
+
+A move that starts and ends at rest is a rectangle of speed, smoothed. Its way is a sum of powers of time for moving
+averages, and a closed form for an exponential; time constants come from fitting that to all moves of a part at once.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode._core import ArgumentError
+from shapegcode.characterization.log import ServoLog
+from shapegcode.characterization.plan import AXES, Part, Test
+
+__all__ = [
+    "PartLog",
+    "ShapeFit",
+    "bend_samples",
+    "fit_shape",
+    "held_samples",
+    "lagged_share",
+    "line_slope",
+    "parts_of",
+    "smoothed_share",
+]
+
+Array = npt.NDArray[np.float64]
+_PAUSE_S = 0.3  # a rest of a part is shorter, the pause between two parts is 0.5 s
+_SHORTEST_BOX_S = 2e-5
+_HOLD_SHARE = 0.9
+_BEND_SHARE = 0.85
+_LONGEST_HOLD = 64
+_STAMP = 0.03
+_MOST_SAMPLES = 1500
+
+
+@dataclass(frozen=True)
+class PartLog:
+    """The samples of one part.
+
+    Attributes:
+        part: what it does.
+        times_s: time of the samples.
+        way_mm: way of the part's axis from its start, in the direction of the first move.
+        noise_mm: standard deviation of a sample at rest.
+        rows: first and last row in the log.
+    """
+
+    part: Part
+    times_s: Array
+    way_mm: Array
+    noise_mm: float
+    rows: tuple[int, int]
+
+    def middles_s(self) -> Array:
+        """The times at which a there-and-back part passes the middle of its way.
+
+        Raises:
+            ArgumentError: there are not as many as moves.
+        """
+        length = abs(self.part.length_mm)
+        if self.part.stride != 1:
+            length *= self.part.stride
+        u = self.way_mm / length - 0.5
+        # hysteresis, so that noise at the middle does not count twice
+        state = np.where(u > 0.2, 1, np.where(u < -0.2, -1, 0))
+        known = np.flatnonzero(state)
+        turns = np.flatnonzero(np.diff(state[known])) if len(known) else np.array([], dtype=int)
+        middles = []
+        for k in turns:
+            i, j = known[k], known[k + 1]
+            window = slice(i, j + 1)
+            slope, offset = (
+                np.polyfit(self.times_s[window] - self.times_s[i], u[window], 1)
+                if j - i > 1
+                else (
+                    (u[j] - u[i]) / (self.times_s[j] - self.times_s[i]),
+                    u[i],
+                )
+            )
+            middles.append(self.times_s[i] - offset / slope)
+        return np.array(middles)
+
+
+def held_samples(log: ServoLog) -> tuple[int, int]:
+    """Over how many samples the command is held, and the index of a first sample; 1 if it is not held.
+
+    A command that changes only once per interpolation period has all its increments there.
+    """
+    command = np.nan_to_num(log.command_mm)
+    increments = np.diff(command, axis=0)
+    noise = np.maximum(command[: max(3, round(0.1 / log.sampling_s))].std(axis=0), 5e-4)
+    increments = np.where(np.abs(increments) > 8.0 * noise, increments, 0.0)
+    energy = (increments**2).sum(axis=1)
+    total = float(energy.sum())
+    best = (1, 0)
+    if total > 0.0:
+        for count in range(2, _LONGEST_HOLD + 1):
+            sums = np.array([energy[first::count].sum() for first in range(count)])
+            first = int(sums.argmax())
+            if sums[first] > _HOLD_SHARE * total:
+                best = (count, (first + 1) % count)
+    return best
+
+
+@dataclass(frozen=True)
+class _Bends:
+    """How much of the bending of a command lies at every count-th sample and its successor.
+
+    Attributes:
+        share: of all bending.
+        first: index of such a sample.
+        place: of the bend between the two samples, 0 to 1.
+        energy: all bending above the noise.
+    """
+
+    share: float
+    first: int
+    place: float
+    energy: float
+
+
+def _bends(log: ServoLog, count: int) -> _Bends:
+    command = np.nan_to_num(log.command_mm)
+    bend = np.diff(command, 2, axis=0)
+    energy = (bend**2).sum(axis=1)
+    rest = max(3, round(0.1 / log.sampling_s))
+    energy = energy - energy[:rest].mean()
+    sums = np.array([energy[k::count].sum() for k in range(count)])
+    pairs = sums + np.roll(sums, -1)
+    k = int(pairs.argmax())
+    total = float(sums.sum())
+    one, two = (math.sqrt(max(float(each), 0.0)) for each in (sums[k], np.roll(sums, -1)[k]))
+    share = float(pairs[k]) / total if total > 0.0 else 0.0
+    return _Bends(share, (k + 1) % count, two / (one + two) if one + two > 0.0 else 0.0, max(total, 0.0))
+
+
+def bend_samples(logs: Sequence[ServoLog]) -> int:
+    """After how many samples the speed of a command changes that is interpolated between periods; 1: not seen.
+
+    Only periods of three samples or more can be told, and only where the command is not held.
+    """
+    best = 1
+    for count in range(3, _LONGEST_HOLD // 2):
+        every = [_bends(log, count) for log in logs]
+        total = sum(each.energy for each in every)
+        # A divisor of the true count shows all bends too: the largest counts.
+        if total > 0.0 and sum(each.share * each.energy for each in every) > _BEND_SHARE * total:
+            best = count
+    return best
+
+
+def _ticks(log: ServoLog, bend: int) -> tuple[Array, Array, int]:
+    """Times and positions, one for each interpolation period where that shows; and how many samples that is."""
+    count, first = held_samples(log)
+    if count == 1 and bend > 1:
+        found = _bends(log, bend)
+        before = np.arange(found.first, len(log.times_s) - 2, bend)
+        before = before[before > 0]
+        times = log.times_s[before] + found.place * log.sampling_s
+        x = log.command_mm
+        # The straight pieces on both sides meet at the bend.
+        left = x[before] + found.place * (x[before] - x[before - 1])
+        right = x[before + 1] - (1.0 - found.place) * (x[before + 2] - x[before + 1])
+        return times, (left + right) / 2.0, bend
+    if count == 1:
+        return log.times_s, log.command_mm, 1
+    n = (len(log.times_s) - first) // count
+    times = log.times_s[first : first + n * count : count]
+    held = log.command_mm[first : first + n * count].reshape(n, count, 3)
+    return times, held.mean(axis=1), count
+
+
+def parts_of(log: ServoLog, test: Test, bend: int = 1) -> list[PartLog]:
+    """Cut a log into the parts of its test.
+
+    Args:
+        log: the record.
+        test: what the program did.
+        bend: of :func:`bend_samples`, for all logs of the control.
+
+    Raises:
+        ArgumentError: an axis is missing, or the motion does not have as many parts or moves as the test.
+    """
+    wanted = [part for part in test.parts if part.pattern != "pause"]
+    for part in wanted:
+        if np.isnan(log.command_mm[0, AXES.index(part.axis)]):
+            raise ArgumentError(f"{log.file}: no commanded position of {part.axis}, which test {test.name} needs")
+    times, positions, _ = _ticks(log, bend)
+    used = sorted({AXES.index(part.axis) for part in wanted})
+    points = positions[:, used]
+    start = points[: max(3, int(0.1 / (times[1] - times[0])))]
+    noise = np.maximum(start.std(axis=0), 8e-4)
+    reach = max(1, round(0.024 / float(np.median(np.diff(times)))))
+    moved = np.abs(points[reach:] - points[:-reach]).max(axis=1) > max(9.0 * float(noise.max()), 0.004)
+    rows = np.flatnonzero(moved)
+    if not len(rows):
+        raise ArgumentError(f"{log.file}: nothing moves, so this is no log of test {test.name}")
+    cuts = np.flatnonzero(np.diff(times[rows]) > _PAUSE_S)
+    bounds = [(int(rows[a]), int(rows[b])) for a, b in zip([0, *(cuts + 1)], [*cuts, len(rows) - 1], strict=True)]
+    if len(bounds) != len(wanted):
+        raise ArgumentError(
+            f"{log.file}: {len(bounds)} stretches of motion with rests of {_PAUSE_S:g} s between them; test "
+            f"{test.name} has {len(wanted)}"
+        )
+    out = []
+    margin = max(2, round(0.05 / float(np.median(np.diff(times)))))
+    for part, (first, last) in zip(wanted, bounds, strict=True):
+        low, high = max(0, first - margin), min(len(times), last + reach + margin)
+        axis = AXES.index(part.axis)
+        rest = positions[low : max(low + 2, first), axis]
+        way = (positions[low:high, axis] - rest.mean()) * math.copysign(1.0, part.length_mm)
+        spread = float(noise[used.index(axis)])
+        out.append(PartLog(part, times[low:high], way, spread, (low, high)))
+        expected = abs(part.length_mm) * part.stride
+        # A turn without a stop is cut short by the smoothing.
+        least = 0.98 if part.pattern in ("dwell", "exact", "rapid") else 0.5
+        if not least * expected < way.max() - way.min() < 1.02 * expected + 10.0 * spread:
+            raise ArgumentError(
+                f"{log.file}: {part.axis} moves over {way.max() - way.min():.3f} mm in part {len(out)}, test "
+                f"{test.name} has {expected:.3f} mm there: wrong log, units or scale"
+            )
+    return out
+
+
+def smoothed_share(times: Array, boxes: Sequence[float]) -> Array:
+    """Share of the way at the times after the start, for a rectangle and moving averages of these lengths in s."""
+    used = [box for box in boxes if box > _SHORTEST_BOX_S]
+    power = len(used)
+    if not power:
+        return np.asarray(np.where(times > 0.0, 1.0, 0.0))
+    out = np.zeros_like(times)
+    for chosen in itertools.product((0, 1), repeat=power):
+        lag = sum(box for box, taken in zip(used, chosen, strict=True) if taken)
+        out += (-1.0) ** sum(chosen) * np.maximum(times - lag, 0.0) ** power
+    return np.asarray(out / (math.factorial(power) * math.prod(used)))
+
+
+def lagged_share(times: Array, rectangle_s: float, lag_s: float) -> Array:
+    """The same for a rectangle and an exponential of time constant *lag_s*."""
+
+    def ramp(t: Array) -> Array:
+        late = np.maximum(t, 0.0)
+        return np.asarray(late + lag_s * np.expm1(-late / lag_s))
+
+    return (ramp(times) - ramp(times - rectangle_s)) / rectangle_s
+
+
+@dataclass(frozen=True)
+class ShapeFit:
+    """A curve fitted to the moves of a part.
+
+    Attributes:
+        values: the fitted parameters, without the start.
+        half: half-widths of their 95 % intervals.
+        rms_mm: what the fit leaves.
+    """
+
+    values: Array
+    half: Array
+    rms_mm: float
+
+
+def fit_shape(
+    log: PartLog,
+    share: Callable[[Array, Array], Array],
+    guess: Sequence[float],
+    low: Sequence[float],
+    high: Sequence[float],
+) -> ShapeFit:
+    """Fit one curve to all moves of a there-and-back part, laid over each other at their middles.
+
+    Args:
+        log: the part.
+        share: share of the way at times after the start, from parameters in s.
+        guess: the parameters to begin with.
+        low: their lower bounds.
+        high: their upper bounds.
+    """
+    from scipy.optimize import least_squares
+
+    middles = log.middles_s()
+    length = abs(log.part.length_mm)
+    pieces_t, pieces_y = [], []
+    edges = (middles[1:] + middles[:-1]) / 2.0
+    bounds = [log.times_s[0], *edges, log.times_s[-1]]
+    for k, middle in enumerate(middles):
+        inside = (log.times_s >= bounds[k]) & (log.times_s <= bounds[k + 1])
+        way = log.way_mm[inside] / length
+        pieces_t.append(log.times_s[inside] - middle)
+        pieces_y.append(way if k % 2 == 0 else 1.0 - way)
+    t, y = np.concatenate(pieces_t), np.concatenate(pieces_y)
+    every = -(-len(t) // _MOST_SAMPLES)
+    t, y = t[::every], y[::every]
+
+    def residual(p: Array) -> Array:
+        return np.asarray((share(t - p[-1], p[:-1]) - y) * length)
+
+    grid = np.linspace(0.0, 2.0, 20001)
+    middle = float(grid[np.searchsorted(share(grid, np.array(guess)), 0.5)])
+    begin = np.array([*guess, -middle])
+    found = least_squares(
+        residual,
+        begin,
+        bounds=(np.array([*low, -2.0]), np.array([*high, 2.0])),
+        x_scale=np.maximum(np.abs(begin), 1e-3),
+        max_nfev=60,
+    )
+    n = len(guess)
+    freedom = max(1, len(t) - len(begin))
+    variance = float(found.fun @ found.fun) / freedom
+    jacobian = np.asarray(found.jac)
+    normal = jacobian.T @ jacobian
+    covariance = variance * np.linalg.pinv(normal)
+    # Time stamps are no better than a part of the sampling time, however many samples agree.
+    stamp = _STAMP * float(np.median(np.diff(log.times_s)))
+    half = np.hypot(1.96 * np.sqrt(np.maximum(np.diag(covariance)[:n], 0.0)), stamp)
+    return ShapeFit(found.x[:n], half, math.sqrt(variance))
+
+
+def line_slope(log: PartLog, settle_s: float) -> tuple[float, float] | None:
+    """Mean speed in mm/s of the way out, and its 95 % half-width; None if too little of it is steady.
+
+    Args:
+        log: the part.
+        settle_s: how long the smoothing lasts; so much is left out at both ends.
+    """
+    top = int(np.argmax(log.way_mm))
+    begin = int(np.argmax(log.way_mm > max(8.0 * log.noise_mm, 0.003)))
+    first, last = log.times_s[begin] + settle_s, log.times_s[top] - settle_s
+    inside = (log.times_s > first) & (log.times_s < last)
+    if last - first < 0.15 * (log.times_s[top] - log.times_s[begin]) or inside.sum() < 20:
+        return None
+    x = log.times_s[inside] - log.times_s[inside].mean()
+    y = log.way_mm[inside]
+    slope = float(x @ (y - y.mean()) / (x @ x))
+    rest = y - y.mean() - slope * x
+    # The ripple of the blocks is not white: it may tilt the line by its own height over the length of the line.
+    sigma = math.sqrt(float(rest @ rest) / max(1, len(x) - 2) / float(x @ x))
+    return slope, 1.96 * sigma + float(rest.std()) / float(np.ptp(x)) * 0.5

@@ -1,0 +1,88 @@
+"""What servo logs with actual positions say about the position loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode.characterization.findings import known, unknown
+from shapegcode.characterization.log import ServoLog
+from shapegcode.characterization.logstate import SOURCE, State
+from shapegcode.characterization.moves import held_samples
+from shapegcode.characterization.plan import AXES
+
+Array = npt.NDArray[np.float64]
+_SERVO_SLACK = 0.02
+_GAINS = (2.0, 1000.0)  # 1/s
+
+
+def fit_servo(state: State, logs: Mapping[str, ServoLog]) -> None:
+    """Position gain K and feed-forward f: e = −K ∫e dt + (1 − f) x + c, fitted to following error e and command x."""
+    done = False
+    for index, axis in enumerate(AXES):
+        records = [each for log in logs.values() if (each := _servo_rows(log, index)) is not None]
+        if not records:
+            continue
+        done = True
+        name = f"position gain {axis}"
+        gain, rest = _lag_of(records)
+        if rest < 0.02 or not 2.0 * _GAINS[0] < gain < 0.5 * _GAINS[1]:
+            why = "the actual position follows the command without a lag that tells it"
+            state.findings.append(unknown(name, "1/s", SOURCE, why))
+            continue
+        spread = np.std(np.array([_lag_of([record]) for record in records]), axis=0) / math.sqrt(len(records))
+        # Command and actual position may be sampled up to half a sample apart, which looks like lag.
+        apart = 0.5 * min(log.sampling_s for log in logs.values()) * gain
+        key = f"controller.position_gain_per_s.{axis.lower()}"
+        half = float(spread[0]) + (_SERVO_SLACK + apart / rest) * gain
+        state.findings.append(known(name, gain, half, "1/s", key, SOURCE))
+        half = float(spread[1]) + _SERVO_SLACK + apart
+        forward_key = f"controller.feed_forward_ratio.{axis.lower()}"
+        state.findings.append(known(f"feed-forward {axis}", max(0.0, 1.0 - rest), half, "1", forward_key, SOURCE))
+    if not done:
+        state.findings.append(unknown("position gain", "1/s", SOURCE, "no actual positions in the logs"))
+
+
+def _servo_rows(log: ServoLog, index: int) -> tuple[Array, Array, float] | None:
+    """Command, following error and time step, one row for each held command so that its stairs are no error."""
+    if log.actual_mm is None or np.isnan(log.actual_mm[0, index]) or np.isnan(log.command_mm[0, index]):
+        return None
+    count, first = held_samples(log)
+    n = (len(log.times_s) - first) // count
+
+    def rows(values: Array) -> Array:
+        return np.asarray(values[first : first + n * count].reshape(n, count).mean(axis=1))
+
+    way = rows(log.command_mm[:, index] - log.command_mm[0, index])
+    if np.ptp(way) < 1.0:
+        return None
+    error = way - rows(log.actual_mm[:, index] - log.actual_mm[0, index])
+    step = count * log.sampling_s
+    return way, error - np.median(error[: max(3, round(0.1 / step))]), step
+
+
+def _lag_of(records: list[tuple[Array, Array, float]]) -> tuple[float, float]:
+    """Position gain in 1/s and what feed-forward leaves (1 − f), from all records: least squares of the error."""
+    from scipy.optimize import minimize_scalar
+    from scipy.signal import lfilter
+
+    def solve(gain: float) -> tuple[float, float]:
+        cross = square = power = 0.0
+        for way, error, step in records:
+            kept = math.exp(-gain * step)
+            part = (1.0 - kept) / (gain * step)  # of a ramp over one step
+            model: Array = np.asarray(lfilter([part, -part], [1.0, -kept], way))
+            cross += float(model @ error)
+            square += float(model @ model)
+            power += float(error @ error)
+        rest = cross / square
+        return power - rest * cross, rest
+
+    found = minimize_scalar(
+        lambda log_gain: solve(math.exp(log_gain))[0], bounds=tuple(np.log(_GAINS)), method="bounded"
+    )
+    gain = math.exp(float(found.x))
+    return gain, float(solve(gain)[1])

@@ -1,0 +1,1 @@
+"""What the control would refuse, or not run as programmed."""

@@ -1,0 +1,325 @@
+"""What a controller would refuse in a program, and where it would not run it as programmed.
+
+The alarms are the reader's, several per run. What an accepted program still does (starve on short blocks or on a slow
+serial line, stop between two cutting moves, run below its F) is worked out from the time of each block at its feed.
+"""
+
+from __future__ import annotations
+
+import errno
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from shapegcode._core import ProgramError
+from shapegcode.checking.runs import BlockTable, Breaker, Run, block_table, look_ahead_breakers
+from shapegcode.machine import Machine
+from shapegcode.program import Program
+
+__all__ = ["MOST_FINDINGS", "Check", "Finding", "check", "check_text"]
+
+MOST_FINDINGS = 1000
+"""Findings of one code that are listed; the counts hold them all."""
+
+_SEVERITIES = ("alarm", "warning", "note")
+_MACRO_CONTROL = re.compile(r"(?<![A-Z])(IF|GOTO|WHILE)(?=\s*[\[#\d.])|(?<![A-Z])(DO|END)(?=\s*\d)")
+_COMMENT = re.compile(r"\([^()\n]*\)?")
+_ALARM_WORDS = re.compile(r" \(alarm \d+\)")
+_MACRO_FROM_DNC = 123
+_NO_ROOM = 70
+# Of one reading (most_alarms in the core's reader).
+_MOST_ALARMS = 200
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing to tell about one place of a program.
+
+    Attributes:
+        severity: "alarm": the control refuses it; "warning": it will not run as programmed; "note": worth knowing.
+        code: short stable name of the kind of finding.
+        alarm: the control's number; 0: none.
+        file: file of the place.
+        line: from 1; 0: the file as a whole.
+        column: from 1; 0: the line as a whole.
+        message: in words.
+    """
+
+    severity: str
+    code: str
+    alarm: int
+    file: str
+    line: int
+    column: int
+    message: str
+
+
+@dataclass(frozen=True)
+class Check:
+    """What was found in a program.
+
+    Attributes:
+        program: name of the program.
+        machine: name of the machine.
+        findings: sorted by place, at most `MOST_FINDINGS` of each code.
+        counts: of all findings by severity.
+        counts_by_code: of all findings by code.
+        size_bytes: of the file.
+        memory_bytes: of the control.
+        short_blocks: blocks that last less than the block time, and what they cost; None: the program was not read.
+        dnc: what the serial line carries and what the program asks for; None: not drip fed, or not read.
+    """
+
+    program: str
+    machine: str
+    findings: tuple[Finding, ...]
+    counts: dict[str, int]
+    counts_by_code: dict[str, int]
+    size_bytes: int
+    memory_bytes: int
+    short_blocks: dict[str, Any] | None
+    dnc: dict[str, Any] | None
+
+    @property
+    def refused(self) -> bool:
+        """Whether the control refuses anything."""
+        return self.counts["alarm"] > 0
+
+    def report(self) -> dict[str, Any]:
+        """The plain dictionary that ``--json`` writes."""
+        return asdict(self)
+
+
+def check(path: str | Path, machine: Machine, *, program_number: int | None = None) -> Check:
+    """Check a program file.
+
+    Args:
+        path: the file.
+        machine: whose controller would run it.
+        program_number: O number to play of a file that holds several; None: the first.
+
+    Raises:
+        ProgramError: not to be read at all, without a place to point to.
+        OSError: the file cannot be read.
+    """
+    try:
+        text = Path(path).read_bytes()
+    except OSError as error:
+        raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+    return check_text(text, machine, source=str(path), program_number=program_number, folder=Path(path).parent)
+
+
+def check_text(
+    text: bytes | str,
+    machine: Machine,
+    *,
+    source: str = "<text>",
+    program_number: int | None = None,
+    folder: Path | None = None,
+) -> Check:
+    """Check a program text; `source` names it, programs that it calls are looked for in `folder` too.
+
+    Raises:
+        ProgramError: not to be read at all, without a place to point to.
+    """
+    data = text.encode() if isinstance(text, str) else text
+    found = list(_whole_file(data, source, machine))
+    short: dict[str, Any] | None = None
+    dnc: dict[str, Any] | None = None
+    try:
+        program = Program.from_text(
+            data, machine, source=source, program_number=program_number, collect_alarms=True, folder=folder
+        )
+    except ProgramError as error:
+        if error.line < 1:
+            raise
+        message = str(error).removeprefix(f"{error.file}:{error.line}:{error.column}: ")
+        found.append(_finding("alarm", "alarm", error.alarm, error.file or source, error.line, error.column, message))
+    else:
+        found += _reader_findings(program)
+        table = block_table(program, machine)
+        found += _breaker_findings(program, look_ahead_breakers(program, machine, table))
+        found += _feed_findings(program, table)
+        short = _short_blocks(program, machine, table)
+        found += _short_findings(program, machine, table.runs)
+        if machine.controller.dnc_baud > 0:
+            dnc = _dnc(program, machine, table.runs)
+            found += _dnc_findings(program, dnc["characters_per_s"], table.runs)
+    return Check(
+        source,
+        machine.name,
+        _listed(found, source),
+        {name: sum(finding.severity == name for finding in found) for name in _SEVERITIES},
+        {code: sum(finding.code == code for finding in found) for code in sorted({each.code for each in found})},
+        len(data),
+        machine.controller.program_memory_bytes,
+        short,
+        dnc,
+    )
+
+
+def _finding(severity: str, code: str, alarm: int, file: str, line: int, column: int, message: str) -> Finding:
+    # The number has a field of its own.
+    return Finding(severity, code, alarm, file, line, column, _ALARM_WORDS.sub("", message))
+
+
+def _at(program: Program, severity: str, code: str, line: int, message: str) -> Finding:
+    """A finding at a line of the text that the control executes, told at the line of the source."""
+    number, file = program.core.origin(line)
+    return Finding(severity, code, 0, file or program.source, number, 0, message)
+
+
+def _listed(found: Iterable[Finding], source: str) -> tuple[Finding, ...]:
+    listed: list[Finding] = []
+    seen: dict[str, int] = {}
+    rank = {name: number for number, name in enumerate(_SEVERITIES)}
+    for finding in sorted(
+        found, key=lambda each: (each.file != source, each.file, each.line, each.column, rank[each.severity])
+    ):
+        seen[finding.code] = seen.get(finding.code, 0) + 1
+        if seen[finding.code] <= MOST_FINDINGS:
+            listed.append(finding)
+    return tuple(listed)
+
+
+# ---- the file, and what the reader says --------------------------------------------------------------------
+
+
+def _whole_file(data: bytes, source: str, machine: Machine) -> Iterator[Finding]:
+    controller = machine.controller
+    fed = controller.dnc_baud > 0
+    if len(data) > controller.program_memory_bytes:
+        over = f"the file has {len(data)} bytes, the memory for programs {controller.program_memory_bytes}"
+        if fed:
+            yield Finding("note", "program_memory", 0, source, 0, 0, f"{over}: it can only be drip fed")
+        else:
+            message = f"{over}: the control cannot store it; drip feed it, split it, or shorten it"
+            yield Finding("warning", "program_memory", _NO_ROOM, source, 0, 0, message)
+    if not fed:
+        return
+    for number, raw in enumerate(re.split(rb"\r\n|\n|\r", data), start=1):
+        line = raw.decode("latin-1").upper()
+        match = _MACRO_CONTROL.search(_COMMENT.sub(lambda comment: " " * len(comment[0]), line))
+        if match:
+            message = f"{match[0]} cannot run from DNC: a line once read is gone; expand the program first"
+            yield Finding("alarm", "macro_in_dnc", _MACRO_FROM_DNC, source, number, match.start() + 1, message)
+
+
+def _reader_findings(program: Program) -> Iterator[Finding]:
+    for line, column, alarm, message, file in program.core.alarms:
+        yield _finding("alarm", "alarm", alarm, file or program.source, line, column, message)
+    if len(program.core.alarms) >= _MOST_ALARMS:
+        line, _, _, _, file = program.core.alarms[-1]
+        message = f"reading stopped here after {_MOST_ALARMS} alarms: what follows is not checked"
+        yield Finding("note", "reader", 0, file or program.source, line, 0, message)
+    for line, column, alarm, message, file in program.core.warnings:
+        yield _finding("note", "reader", alarm, file or program.source, line, column, message)
+
+
+# ---- what an accepted program does -------------------------------------------------------------------------
+
+
+def _breaker_findings(program: Program, breakers: Iterable[Breaker]) -> Iterator[Finding]:
+    for breaker in breakers:
+        severity = "warning" if breaker.unasked else "note"
+        yield _at(program, severity, "look_ahead_breaker", breaker.line, breaker.message)
+
+
+def _feed_findings(program: Program, table: BlockTable) -> Iterator[Finding]:
+    for clamped in table.clamped_feeds:
+        message = (
+            f"{clamped.feed_mm_per_min:.10g} mm/min are more than the axes allow in {clamped.blocks} "
+            f"block{'' if clamped.blocks == 1 else 's'} from here on: the control goes down to "
+            f"{clamped.least_mm_per_min:.0f} mm/min"
+        )
+        yield _at(program, "warning", "axis_feed", clamped.first_line, message)
+
+
+def _short_findings(program: Program, machine: Machine, runs: Iterable[Run]) -> Iterator[Finding]:
+    block_time_s = machine.controller.block_time_s
+    for run in runs:
+        if run.short_blocks:
+            message = (
+                f"{run.short_blocks} of {run.blocks} blocks up to {_end(program, run)} are "
+                f"shorter than the block time of {block_time_s * 1e3:g} ms, the shortest {run.shortest_s * 1e3:.3g} "
+                f"ms: without blocks in store the control starves, and {run.time_s:.3f} s become {run.taken_s:.3f} s"
+            )
+            yield _at(program, "warning", "short_block", run.first_short_line, message)
+
+
+def _short_blocks(program: Program, machine: Machine, table: BlockTable) -> dict[str, Any]:
+    count, blocks = sum(run.short_blocks for run in table.runs), sum(run.blocks for run in table.runs)
+    short = [run for run in table.runs if run.short_blocks]
+    return {
+        "block_time_s": machine.controller.block_time_s,
+        "count": count,
+        "blocks": blocks,
+        "share": count / blocks if blocks else 0.0,
+        "shortest_s": min((run.shortest_s for run in short), default=None),
+        "programmed_s": sum(run.time_s for run in table.runs),
+        "taken_s": sum(run.taken_s for run in table.runs),
+        "region_count": len(short),
+        "first_places": [program.place(line) for line in table.first_short_lines],
+        "regions": [
+            {
+                "lines": _lines(program, run),
+                "count": run.short_blocks,
+                "blocks": run.blocks,
+                "shortest_s": run.shortest_s,
+                "programmed_s": run.time_s,
+                "taken_s": run.taken_s,
+            }
+            for run in short[:MOST_FINDINGS]
+        ],
+    }
+
+
+def _dnc(program: Program, machine: Machine, runs: Iterable[Run]) -> dict[str, Any]:
+    controller = machine.controller
+    carried = controller.dnc_baud / controller.dnc_bits_per_character
+    timed = [run for run in runs if run.time_s > 0.0]
+    needed = max((run.bytes / run.time_s for run in timed), default=0.0)
+    starved = [run for run in timed if run.bytes > run.time_s * carried]
+    return {
+        "baud": controller.dnc_baud,
+        "bits_per_character": controller.dnc_bits_per_character,
+        "characters_per_s": carried,
+        "needed_characters_per_s": needed,
+        "factor": needed / carried,
+        "region_count": len(starved),
+        "regions": [
+            {
+                "lines": _lines(program, run),
+                "bytes": run.bytes,
+                "time_s": run.time_s,
+                "blocks_per_s": run.blocks / run.time_s,
+                "needed_characters_per_s": run.bytes / run.time_s,
+                "factor": run.bytes / run.time_s / carried,
+            }
+            for run in starved[:MOST_FINDINGS]
+        ],
+    }
+
+
+def _dnc_findings(program: Program, carried: float, runs: Iterable[Run]) -> Iterator[Finding]:
+    for run in runs:
+        if run.bytes > run.time_s * carried > 0.0:
+            needed = run.bytes / run.time_s
+            message = (
+                f"up to {_end(program, run)} the program asks for {needed:.0f} characters/s "
+                f"({run.blocks / run.time_s:.0f} blocks/s), the serial line carries {carried:.0f}: it takes "
+                f"{needed / carried:.2f} times as long, in jerks"
+            )
+            yield _at(program, "warning", "dnc_rate", run.first_line, message)
+
+
+def _end(program: Program, run: Run) -> str:
+    """The last line of a run, with its file if it is another one than that of the first line."""
+    (number, file), (_, begun) = program.core.origin(run.last_line), program.core.origin(run.first_line)
+    return f"line {number}" if file == begun else f"line {number} of {file or program.source}"
+
+
+def _lines(program: Program, run: Run) -> list[int]:
+    return [program.core.origin(run.first_line)[0], program.core.origin(run.last_line)[0]]

@@ -1,0 +1,300 @@
+"""Cutting runs of a program as a table of blocks: how long each lasts at its feed, and what stops between them.
+
+All lines here are those of the text that the control executes (`Program.core.text`), in which every line runs once and
+in order; `Program.place` leads back to the source.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.model.controller import controller_model
+from shapegcode.program import Program
+
+__all__ = ["BlockTable", "Breaker", "ClampedFeed", "Run", "block_table", "look_ahead_breakers"]
+
+_CUTTING, _RAPID, _DWELL = (
+    kind.value for kind in (_core.BlockKind.cutting, _core.BlockKind.rapid, _core.BlockKind.dwell)
+)
+# The clock rounds the end of a run up to a period, and has no shorter one than this: so the program runs in slow
+# motion, which makes that a nanosecond.
+_PERIOD_S = 1e-5
+_SLOW_MOTION = 1e-4
+_RESOLUTION_S = _PERIOD_S * _SLOW_MOTION
+_NO_LIMIT = 1e12
+_ROUNDING = 1e-6
+_FIRST_PLACES = 20
+
+# What a stop between two cutting moves does, worst first.
+_STOPS = "the control stops reading ahead, and the tool stands in the cut"
+_CANCELS = "it cancels the look-ahead mode for its block, and the tool stands in the cut"
+_ASKED = "the tool stands in the cut, as programmed"
+_STOPS_READING = "the control reads ahead only up to here"
+_MAY_CANCEL = "in a look-ahead mode the tool would stand in the cut"
+_EFFECTS = (_STOPS, _CANCELS, _ASKED, _STOPS_READING, _MAY_CANCEL)
+_CODED = re.compile(rb"[Gg] *0*(53|9|61)(?![\d.])")
+_COMMENT = re.compile(rb"\([^()\r\n]*\)?")
+
+
+@dataclass(frozen=True)
+class Run:
+    """Cutting blocks with nothing between them.
+
+    Attributes:
+        first_line: line of the first block.
+        last_line: line of the last one.
+        bytes: of these lines, line ends included.
+        blocks: blocks that move.
+        time_s: at their feed, axis limits included, without acceleration.
+        taken_s: the same if no block takes less than the block time.
+        short_blocks: blocks below the block time.
+        shortest_s: shortest block.
+        first_short_line: line of the first short block, 0: none.
+    """
+
+    first_line: int
+    last_line: int
+    bytes: int
+    blocks: int
+    time_s: float
+    taken_s: float
+    short_blocks: int
+    shortest_s: float
+    first_short_line: int
+
+
+@dataclass(frozen=True)
+class ClampedFeed:
+    """An F that the axes cannot follow, all its blocks together.
+
+    Attributes:
+        feed_mm_per_min: as programmed.
+        first_line: line of its first block that is slowed.
+        blocks: how many are.
+        least_mm_per_min: feed along the path in the slowest of them.
+    """
+
+    feed_mm_per_min: float
+    first_line: int
+    blocks: int
+    least_mm_per_min: float
+
+
+@dataclass(frozen=True)
+class BlockTable:
+    """The blocks of a program.
+
+    Attributes:
+        runs: its cutting runs in order.
+        cutting_lines: ascending line of every cutting block.
+        rapid_lines: ascending line of every rapid.
+        dwell_lines: ascending line of every dwell.
+        first_short_lines: lines of the first short blocks.
+        clamped_feeds: by feed, ascending.
+    """
+
+    runs: tuple[Run, ...]
+    cutting_lines: npt.NDArray[np.int64]
+    rapid_lines: npt.NDArray[np.int64]
+    dwell_lines: npt.NDArray[np.int64]
+    first_short_lines: tuple[int, ...]
+    clamped_feeds: tuple[ClampedFeed, ...]
+
+
+@dataclass(frozen=True)
+class Breaker:
+    """What stops the reading ahead between two cutting moves.
+
+    Attributes:
+        line: where it stands.
+        message: in words.
+        unasked: the program does not say that it wants to stand still there.
+    """
+
+    line: int
+    message: str
+    unasked: bool
+
+
+def block_table(program: Program, machine: Machine) -> BlockTable:
+    """Time every block of a program at its feed; costs a few array operations per million blocks."""
+    limited = _timed(program, machine, with_limits=True)
+    # A move of rotary axes alone has no length here, and so no time that could be compared.
+    cutting = np.flatnonzero((limited["kind"] == _CUTTING) & (limited["duration_s"] > 0.0))
+    lines_of = {kind: limited["line"][limited["kind"] == kind].astype(np.int64) for kind in (_RAPID, _DWELL)}
+    if cutting.size == 0:
+        return BlockTable((), np.empty(0, np.int64), lines_of[_RAPID], lines_of[_DWELL], (), ())
+    free = _timed(program, machine, with_limits=False)[cutting]
+    rows = limited[cutting]
+    lines = rows["line"].astype(np.int64)
+    # Several moves of one line (a corner word) are one block.
+    run_starts = _run_starts(program, lines, cutting)
+    block_starts = np.flatnonzero(run_starts | (np.diff(lines, prepend=-1) != 0))
+    run_of_block = np.cumsum(run_starts)[block_starts] - 1
+    duration = np.add.reduceat(rows["duration_s"], block_starts) * _SLOW_MOTION
+    programmed = np.add.reduceat(free["duration_s"], block_starts) * _SLOW_MOTION
+    feed = free["feed_mm_per_s"][block_starts] * (60.0 / _SLOW_MOTION)
+    line = lines[block_starts]
+
+    block_time = machine.controller.block_time_s
+    short = duration < block_time * (1.0 - _ROUNDING)
+    ratio = programmed / np.maximum(duration, _RESOLUTION_S)
+    slowed = (ratio < 1.0 - _ROUNDING) & (duration - programmed > 2.0 * _RESOLUTION_S)
+    clamped = tuple(_clamped_feeds(line[slowed], feed[slowed], ratio[slowed]))
+    line_bytes = _line_offsets(program)
+    bounds = np.append(np.flatnonzero(np.diff(run_of_block, prepend=-1)), line.size).tolist()
+    short_at, runs = np.flatnonzero(short), []
+    taken = np.maximum(duration, block_time)
+    for begin, end in itertools.pairwise(bounds):
+        first, last = int(line[begin]), int(line[end - 1])
+        first_short = int(np.searchsorted(short_at, begin))
+        shorts = int(np.searchsorted(short_at, end)) - first_short
+        runs.append(
+            Run(
+                first,
+                last,
+                int(line_bytes[last] - line_bytes[first - 1]),
+                end - begin,
+                float(duration[begin:end].sum()),
+                float(taken[begin:end].sum()),
+                shorts,
+                float(duration[begin:end].min()),
+                int(line[short_at[first_short]]) if shorts else 0,
+            )
+        )
+    firsts = tuple(line[short_at[:_FIRST_PLACES]].tolist())
+    return BlockTable(tuple(runs), lines, lines_of[_RAPID], lines_of[_DWELL], firsts, clamped)
+
+
+def _clamped_feeds(
+    line: npt.NDArray[np.int64], feed: npt.NDArray[np.float64], ratio: npt.NDArray[np.float64]
+) -> Iterator[ClampedFeed]:
+    feeds, group = np.unique(feed.round(3), return_inverse=True)
+    if feeds.size == 0:
+        return
+    least = np.full(feeds.size, np.inf)
+    np.minimum.at(least, group, ratio)
+    first = np.full(feeds.size, np.iinfo(np.int64).max)
+    np.minimum.at(first, group, line)
+    blocks = np.bincount(group)
+    for k in range(feeds.size):
+        yield ClampedFeed(float(feeds[k]), int(first[k]), int(blocks[k]), float(feeds[k] * least[k]))
+
+
+def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDArray[Any]:
+    """One row per move in slow motion, without any acceleration: length over feed."""
+    model = controller_model(machine, feed_override=_SLOW_MOTION)
+    model.motion = _core.MotionKind.after_interpolation
+    model.filter_shape = _core.FilterShape.linear
+    model.block_end = _core.BlockEnd.carry
+    model.period_s = _PERIOD_S
+    model.time_constant_s = model.bell_time_s = 0.0
+    model.in_position = _core.InPosition.measured
+    model.in_position_s = (0.0, 0.0, 0.0)
+    limits = model.limits
+    limits.max_feed_mm_per_s = limits.max_feed_mm_per_s * _SLOW_MOTION if with_limits else np.full(3, _NO_LIMIT)
+    model.limits = limits
+    return _core.time_program(program.core, model, per_block=True).blocks
+
+
+def _run_starts(program: Program, lines: npt.NDArray[np.int64], places: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+    """Which cutting moves begin a run: another region, or something between it and the move before."""
+    starts: npt.NDArray[np.bool_] = np.diff(places, prepend=-2) != 1
+    firsts = np.array([region.first_line for region in program.regions], dtype=np.int64)
+    lasts = np.array([region.last_line for region in program.regions], dtype=np.int64)
+    if firsts.size:
+        region = np.searchsorted(firsts, lines, side="right") - 1
+        region[(region >= 0) & (lines > lasts[np.maximum(region, 0)])] = -1
+        starts |= np.diff(region, prepend=-2) != 0
+    return starts
+
+
+def _line_offsets(program: Program) -> npt.NDArray[np.int64]:
+    """Bytes of the text up to the end of each line, from 0."""
+    text = np.frombuffer(program.core.text, dtype=np.uint8)
+    ends = np.flatnonzero(text == ord(program.core.line_end[-1])) + 1
+    padding = [text.size] * max(0, program.core.line_count + 2 - ends.size)
+    return np.concatenate(([0], ends, padding)).astype(np.int64)
+
+
+def look_ahead_breakers(program: Program, machine: Machine, table: BlockTable) -> Iterator[Breaker]:
+    """What stops the reading ahead between two cutting moves without a rapid between them, once per gap."""
+    gaps: dict[int, list[tuple[int, str, str]]] = {}
+    cutting = table.cutting_lines
+
+    def note(line: int, words: str, effect: str, *, behind: bool = False) -> None:
+        # A word in a cutting block counts for the joint before it, an exact stop for the one behind it.
+        after = int(np.searchsorted(cutting, line, side="right" if behind else "left"))
+        if not 0 < after < cutting.size:
+            return
+        between = np.searchsorted(table.rapid_lines, (cutting[after - 1], cutting[after] + 1), side="left")
+        if between[0] == between[1]:
+            gaps.setdefault(after, []).append((line, words, effect))
+
+    regions = program.regions
+    for region in regions:
+        if region.exact_stop_at_end:
+            note(region.last_line, "exact stop", _ASKED, behind=True)
+    for line, code in _coded_lines(program):
+        if code == "53":
+            note(line, "G53", _STOPS_READING)
+        elif _present(cutting, line):
+            note(line, "exact stop", _ASKED, behind=True)
+    for line in table.dwell_lines.tolist():
+        note(line, "G04", _ASKED)
+    firsts = np.array([region.first_line for region in regions], dtype=np.int64)
+    functions = program.core.functions
+    for kind, index, line in program.core.steps:
+        if kind == _core.StepKind.function:
+            following = int(np.searchsorted(firsts, line))
+            mode = following < len(regions) and regions[following].look_ahead_mode
+            note(line, *_words(functions[index], machine, look_ahead_mode=mode))
+    for entries in gaps.values():
+        words = ", ".join(dict.fromkeys(word for _, word, _ in entries))
+        effect = min((effect for _, _, effect in entries), key=_EFFECTS.index)
+        yield Breaker(
+            min(line for line, _, _ in entries),
+            f"{words} between two cutting moves: {effect}",
+            effect in (_STOPS, _CANCELS),
+        )
+
+
+def _coded_lines(program: Program) -> Iterator[tuple[int, str]]:
+    """Lines with G53, G09 or G61, and which."""
+    text = program.core.text
+    if _CODED.search(text) is None:
+        return
+    if b"(" in text:
+        text = _COMMENT.sub(lambda comment: b" " * len(comment[0]), text)
+    offsets = _line_offsets(program)
+    for match in _CODED.finditer(text):
+        yield int(np.searchsorted(offsets, match.start(), side="right")), match[1].decode()
+
+
+def _present(ascending: npt.NDArray[np.int64], line: int) -> bool:
+    at = int(np.searchsorted(ascending, line))
+    return at < ascending.size and int(ascending[at]) == line
+
+
+def _words(function: tuple[list[int], int, float], machine: Machine, *, look_ahead_mode: bool) -> tuple[str, str]:
+    """The words of a block, and what they do to the reading ahead on this machine."""
+    m_codes, tool, spindle = function
+    words = [f"M{code:02d}" for code in m_codes]
+    words += [f"S{spindle:g}"] if spindle >= 0 else []
+    words += [f"T{tool}"] if tool >= 0 else []
+    if any(code in machine.controller.no_buffer_m_codes for code in m_codes):
+        effect = _STOPS
+    elif any(code in (0, 1) for code in m_codes):
+        effect = _ASKED
+    else:
+        effect = _CANCELS if look_ahead_mode else _MAY_CANCEL
+    return " ".join(words), effect

@@ -1,0 +1,326 @@
+"""What a controller, its operator and a drifting machine may do to an emitted program: the cases of the verdict.
+
+Each case varies one thing around the program as it is meant to run, and a few stand for the corners of the band that
+the machine file states (table `[verdict]`). The cases inside the band decide; the others are shown.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode.machine import Machine
+from shapegcode.results.figures import Deviation
+
+__all__ = [
+    "ALL_MODES",
+    "Case",
+    "CaseFigures",
+    "Judged",
+    "Limits",
+    "Target",
+    "judge_region",
+    "region_misses",
+    "stated_cases",
+    "summarise_cases",
+    "with_one_uncertain",
+    "worst_counted",
+]
+
+Vector = npt.NDArray[np.float64]
+Target = Literal["command", "response"]
+
+ALL_MODES = "all"
+_OVERRIDES_PERCENT = (50.0, 60.0, 70.0, 80.0, 90.0, 110.0, 120.0)
+_QUANTITIES = {"command": "contour error of the command", "response": "contour error of the response"}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One way in which the emitted text may be played.
+
+    Attributes:
+        name: in words, unique.
+        block_end: "ceil" or "carry"; None where look-ahead plans the blocks anew.
+        counts: it lies in the stated band.
+        override: feed override, 1 = 100 %.
+        mode: the mode that is off its frequency ("x.1": first of the X axis, as in the machine file), "all", or None.
+        shift: by how many of its stated uncertainties, -1 or +1.
+        look_ahead: the controller's look-ahead stays on.
+        starved_s: time for which the block buffer is empty once; 0: never.
+    """
+
+    name: str
+    block_end: str | None
+    counts: bool
+    override: float = 1.0
+    mode: str | None = None
+    shift: float = 0.0
+    look_ahead: bool = False
+    starved_s: float = 0.0
+
+    @property
+    def nominal(self) -> bool:
+        """As the program is meant to run, under either rule of block timing."""
+        return self.override == 1.0 and self.mode is None and not self.look_ahead and self.starved_s == 0.0
+
+    def needs_contour(self, target: Target) -> bool:
+        """Whether the contour has to be measured by playing the whole region in this very case.
+
+        A mode that is off changes nothing of the command; what is only shown makes do with the residual.
+        """
+        if self.nominal or self.look_ahead or self.starved_s > 0.0:
+            return True
+        return self.counts and (self.override != 1.0 or target == "response")
+
+
+@dataclass(frozen=True)
+class CaseFigures:
+    """One region played in one case.
+
+    Attributes:
+        residual_mm: largest |table - command| while the set-points rest, (3,).
+        command: deviation of the command; None: not measured.
+        response: deviation of the table; None: not measured.
+        time_s: until the set-points rest.
+    """
+
+    residual_mm: Vector
+    command: Deviation | None
+    response: Deviation | None
+    time_s: float
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a region is judged by.
+
+    Attributes:
+        residual_um: per axis, (3,).
+        contour_um: of the targeted deviation.
+        target: which deviation: of the command, or of the table (response).
+    """
+
+    residual_um: Vector
+    contour_um: float
+    target: Target = "command"
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A figure of a case beside its limit, missed or not.
+
+    Attributes:
+        figure: what it is.
+        value_um: how much.
+        limit_um: how much is allowed.
+        decimals: digits that are worth reading.
+    """
+
+    figure: str
+    value_um: float
+    limit_um: float
+    decimals: int = 2
+
+    @property
+    def share(self) -> float:
+        """Of the limit; infinite where nothing is allowed."""
+        if self.limit_um > 0.0:
+            return self.value_um / self.limit_um
+        return math.inf if self.value_um > 0.0 else 0.0
+
+    @property
+    def is_missed(self) -> bool:
+        """Whether the figure is over its limit."""
+        return self.value_um > self.limit_um * (1.0 + 1e-9)
+
+    def __str__(self) -> str:
+        """For people, with both values."""
+        return f"{self.figure} {self.value_um:.{self.decimals}f} um, limit {self.limit_um:.{self.decimals}f} um"
+
+
+def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]]]]:
+    """Key of every mode that states an uncertainty, with the words and the shift of its cases."""
+    found = []
+    for axis, table in zip("XYZ", machine.axes.as_tuple(), strict=True):
+        for number, mode in enumerate(table.modes, start=1):
+            name, damping = f"{axis} {mode.frequency_hz:g} Hz", mode.damping_uncertainty_percent
+            less = f", damping {-damping:g} %" if damping else ""
+            if percent := mode.frequency_uncertainty_percent:
+                ways = [(f"{name} {shift * percent:+g} %{less}", shift) for shift in (-1.0, 1.0)]
+            elif damping:
+                ways = [(f"{name}{less}", -1.0)]
+            else:
+                continue
+            found.append((f"{axis.lower()}.{number}", ways))
+    return found
+
+
+def stated_cases(machine: Machine) -> list[Case]:
+    """The cases in which a program of this machine is played; the two nominal ones come first (ceil, carry).
+
+    Overrides from 50 to 120 % and at the ends of the band, each mode and all of them up and down by their stated
+    uncertainty with as little damping as they state, both together at the corners of the band, the look-ahead mode
+    left on (for a controller that has one), and a block buffer that runs empty once.
+    """
+    band, own = machine.verdict, machine.controller.block_end
+    low, high = band.override_percent
+    cases = [
+        Case(f"nominal, {rule}", rule, counts=band.block_end == "both" or rule == own) for rule in ("ceil", "carry")
+    ]
+
+    def at_override(percent: float) -> Case:
+        return Case(f"override {percent:g} %", own, low <= percent <= high, override=percent / 100.0)
+
+    cases += [at_override(percent) for percent in sorted({*_OVERRIDES_PERCENT, low, high} - {100.0})]
+    modes = _uncertain_modes(machine)
+    for mode, ways in modes:
+        cases += [Case(words, own, band.mode_uncertainty, mode=mode, shift=shift) for words, shift in ways]
+    if modes:
+        together = [(-1.0, "all modes low")]
+        if any(len(ways) > 1 for _, ways in modes):
+            together.append((1.0, "all modes high"))
+        cases += [Case(words, own, band.mode_uncertainty, mode=ALL_MODES, shift=shift) for shift, words in together]
+        cases += [
+            replace(corner, name=f"{corner.name}, {words}", counts=band.mode_uncertainty, mode=ALL_MODES, shift=shift)
+            for corner in (at_override(percent) for percent in sorted({low, high} - {100.0}))
+            for shift, words in together
+        ]
+    if machine.controller.motion == "look_ahead" or band.look_ahead:
+        cases.append(Case("look-ahead on", None, band.look_ahead, look_ahead=True))
+    cases.append(Case(f"starved {band.starved_s * 1e3:g} ms", own, band.starved_block, starved_s=band.starved_s))
+    return cases
+
+
+def with_one_uncertain(machine: Machine, mode: str) -> Machine:
+    """The machine with one mode alone off its frequency: the others state no uncertainty.
+
+    Args:
+        machine: whose modes.
+        mode: "x.1" for the first of the X axis.
+    """
+    axes = {
+        letter: axis.model_copy(
+            update={
+                "modes": tuple(
+                    each
+                    if f"{letter}.{number}" == mode
+                    else each.model_copy(
+                        update={"frequency_uncertainty_percent": None, "damping_uncertainty_percent": None}
+                    )
+                    for number, each in enumerate(axis.modes, start=1)
+                )
+            }
+        )
+        for letter, axis in zip("xyz", machine.axes.as_tuple(), strict=True)
+    }
+    return machine.model_copy(update={"axes": machine.axes.model_copy(update=axes)})
+
+
+def judge_region(figures: CaseFigures, limits: Limits) -> list[Judged]:
+    """Every judged figure of a region in one case, beside its limit: residuals, and the targeted deviation."""
+    judged = [
+        Judged(f"residual vibration {axis}", float(now), float(limit))
+        for axis, now, limit in zip("XYZ", figures.residual_mm * 1e3, limits.residual_um, strict=True)
+    ]
+    deviation = figures.command if limits.target == "command" else figures.response
+    if deviation is not None:
+        judged.append(Judged(_QUANTITIES[limits.target], deviation.largest_mm * 1e3, limits.contour_um, decimals=1))
+    return judged
+
+
+def region_misses(cases: Sequence[Case], figures: Sequence[CaseFigures], limits: Limits) -> list[str]:
+    """Every figure of a region that leaves its limit in a case that counts: the worst case of each, in words."""
+    worst: dict[str, tuple[Judged, Case]] = {}
+    for case, played in zip(cases, figures, strict=True):
+        for judged in judge_region(played, limits) if case.counts else ():
+            if judged.figure not in worst or judged.value_um > worst[judged.figure][0].value_um:
+                worst[judged.figure] = (judged, case)
+    return [
+        str(judged) if case.nominal else f"{judged} ({case.name})"
+        for judged, case in worst.values()
+        if judged.is_missed
+    ]
+
+
+def summarise_cases(
+    cases: Sequence[Case],
+    figures: Sequence[Sequence[CaseFigures]],
+    limits: Sequence[Limits],
+    lines: Sequence[tuple[int, int]],
+    material_side: str | None = None,
+) -> list[dict[str, Any]]:
+    """Every case over all regions as an entry of the report's `cases`.
+
+    Args:
+        cases: as played.
+        figures: per region, one per case.
+        limits: per region.
+        lines: of the original program, per region.
+        material_side: "left" or "right" of the travel; None: not known.
+    """
+    entries = []
+    for index, case in enumerate(cases):
+        played = [region[index] for region in figures]
+        worst, where = max(
+            (
+                (judged, place)
+                for place, run, limit in zip(lines, played, limits, strict=True)
+                for judged in judge_region(run, limit)
+            ),
+            key=lambda pair: pair[0].share,
+        )
+        residual_um = np.max([run.residual_mm for run in played], axis=0) * 1e3
+        deviations = {
+            "command": _largest(run.command for run in played),
+            "response": _largest(run.response for run in played),
+        }
+        entry: dict[str, Any] = {
+            "name": case.name,
+            "block_end": case.block_end,
+            "override": case.override,
+            "mode": case.mode,
+            "shift": case.shift,
+            "look_ahead": case.look_ahead,
+            "starved_ms": case.starved_s * 1e3,
+            "counts": case.counts,
+            "residual_um": dict(zip("xyz", residual_um.tolist(), strict=True)),
+            "contour_error_um": {
+                what: None if found is None else found.largest_mm * 1e3 for what, found in deviations.items()
+            },
+            "time_s": sum(run.time_s for run in played),
+            "within": not worst.is_missed,
+            "figure": worst.figure,
+            "value_um": worst.value_um,
+            "limit_um": worst.limit_um,
+            "share_of_limit": worst.share if math.isfinite(worst.share) else None,
+            "lines": list(where),
+        }
+        if material_side is not None:
+            for name in ("gouge", "excess"):
+                entry[f"{name}_um"] = {
+                    what: None if found is None else found.gouge_and_excess_um(material_side)[name]
+                    for what, found in deviations.items()
+                }
+        entries.append(entry)
+    return entries
+
+
+def worst_counted(entries: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
+    """The case that decides: of those that count the one with the largest share of a limit; None without cases."""
+    counted = [entry for entry in entries if entry["counts"]]
+    if not counted:
+        return None
+    return max(counted, key=lambda entry: math.inf if entry["share_of_limit"] is None else entry["share_of_limit"])
+
+
+def _largest(deviations: Iterable[Deviation | None]) -> Deviation | None:
+    """Of all regions; None if one was not measured."""
+    rows = list(deviations)
+    measured = [each for each in rows if each is not None]
+    return Deviation.largest(measured) if rows and len(measured) == len(rows) else None

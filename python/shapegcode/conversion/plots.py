@@ -1,0 +1,38 @@
+"""The pictures of a conversion: the region that vibrates most, before and after."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from shapegcode.conversion.convert import Conversion
+from shapegcode.machine import Machine
+from shapegcode.model.modes import region_offset
+from shapegcode.model.play import play_emitted, play_original
+from shapegcode.results.motion_pictures import RECORD_SAMPLES, part_of, trace_of, write_motion
+
+
+def write_pictures(conversion: Conversion, machine: Machine, folder: str | Path) -> list[str]:
+    """Path, feed and vibration of the region that vibrates most after its stop, before and after.
+
+    Returns:
+        The files written; none for a program without shaped regions.
+
+    Raises:
+        OSError: the folder cannot be made or a file not be written.
+    """
+    if not conversion.placed:
+        return []
+    residuals = [max(region["residual_vibration_um"]["original"].values()) for region in conversion.report["regions"]]
+    place = conversion.placed[int(np.argmax(residuals))]
+    path = place.region.path
+    blocks = conversion.emitted.core.cutting_path(place.first_line, place.last_line)
+    offset = region_offset(place.region, machine)
+    runs = {
+        "original": play_original(path, machine, record_samples=RECORD_SAMPLES, offset=offset),
+        "emitted": play_emitted(blocks, path, machine, record_samples=RECORD_SAMPLES, offset=offset),
+    }
+    traces = [trace_of(label, run, machine) for label, run in runs.items()]
+    part = part_of(place.region.first_line, place.region.last_line, len(residuals), runs["original"], traces[0])
+    return write_motion(traces, path, part, Path(folder))

@@ -1,0 +1,1 @@
+"""Rapids written as shaped moves where that settles the table sooner."""

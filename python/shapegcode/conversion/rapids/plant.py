@@ -1,0 +1,201 @@
+"""Rapids in time, as a machine makes them: motion, wait for in-position, and the settling of the modes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.conversion.rapids.candidates import Rapid
+from shapegcode.machine import Machine
+from shapegcode.model.controller import controller_model
+from shapegcode.model.modes import region_offset, slowest_mode
+from shapegcode.model.play import play_emitted, playback_options, vibration_memory_s
+
+__all__ = ["RapidPlant", "Timing", "settling_time_s"]
+
+_LONGEST_WAIT_S = 30.0  # a vibration that takes longer counts as settled then: nobody waits so long
+_LAG_MEMORY = 20.0  # time constants of the servo loop beyond which the past does not count
+
+Vector = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Timing:
+    """One step between two cuts, in time.
+
+    Attributes:
+        motion_s: until the set-points rest, s.
+        arrival_s: wait for in-position behind them, s.
+        settling_s: from the end of the set-points until the table stays within the band, s.
+        command_mm: set-points, one per period, (n, 3); a pause has one.
+    """
+
+    motion_s: float
+    arrival_s: float
+    settling_s: float
+    command_mm: Vector
+
+    @property
+    def clock_s(self) -> float:
+        """What the control takes: motion and wait for in-position."""
+        return self.motion_s + self.arrival_s
+
+    @property
+    def settled_s(self) -> float:
+        """Until the axes have arrived and the table has settled."""
+        return self.motion_s + max(self.arrival_s, self.settling_s)
+
+
+def settling_time_s(command_mm: Vector, options: _core.PlaybackOptions, slowest_per_s: float, band_mm: float) -> float:
+    """Time from the end of a command until the table stays within a band around it, s; at most 30 s.
+
+    Args:
+        command_mm: set-points from rest to rest, one per period, (n, 3).
+        options: the plant.
+        slowest_per_s: decay rate of the slowest mode (damping ratio times angular frequency), 1/s.
+        band_mm: half the width of the band, above 0.
+    """
+    still = _core.Path([_core.Segment.line(command_mm[0], command_mm[0], 1.0)])
+    options.measure_contour = False
+    options.record_samples = 0
+    figures = _core.play_samples(np.asfortranarray(command_mm), still, options)
+    largest = float(figures.residual_mm.max())
+    if largest <= band_mm:
+        return 0.0
+    # Several modes of an axis may cancel for a while.
+    needed = math.log(4.0 * largest / band_mm) / slowest_per_s if slowest_per_s > 0.0 else math.inf
+    hold = math.ceil(min(needed, _LONGEST_WAIT_S) / options.period_s)
+    held = np.concatenate([command_mm, np.repeat(command_mm[-1:], hold, axis=0)])
+    options.record_samples = len(held)
+    played = _core.play_samples(np.asfortranarray(held), still, options)
+    apart = np.abs(played.recorded_response - played.recorded_command).max(axis=1)
+    outside = np.flatnonzero(apart > band_mm)
+    rest = round(played.duration_s / options.period_s)
+    return max(0.0, float(outside[-1] + 1 - rest) * options.period_s) if len(outside) else 0.0
+
+
+class RapidPlant:
+    """Rapids as the controller and the modes of a machine make them."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.model = controller_model(machine)
+        self.band_mm = machine.tolerance.residual_floor_um * 1e-3
+        rates = [
+            damping * 2.0 * math.pi * frequency
+            for axis in machine.axes.as_tuple()
+            for mode in axis.modes
+            for frequency, damping in (slowest_mode(mode),)
+        ]
+        self._slowest_per_s = min(rates, default=math.inf)
+        self._moving = any(mode.frequency_over is not None for axis in machine.axes.as_tuple() for mode in axis.modes)
+        self.longest_memory_s = vibration_memory_s(machine) or math.inf
+        """What moved longer ago no longer counts, s."""
+        self._known: dict[tuple[float, ...], Timing] = {}
+
+    def rapid(self, rapid: Rapid) -> Timing:
+        """A rapid as the original makes it. Where its region is not known, its modes are the nominal ones."""
+        travel = rapid.travel_mm
+        key = tuple(np.round(travel, 9))
+        if not self._moving and key in self._known:
+            return self._known[key]
+        samples = _core.rapid_samples(rapid.start_mm, rapid.end_mm, self.model)
+        timing = Timing(
+            _core.rapid_time_s(travel, self.model),
+            _core.in_position_wait_s(travel, self.model),
+            settling_time_s(samples, self._options(rapid.region), self._slowest_per_s, self.band_mm),
+            samples,
+        )
+        self._known[key] = timing
+        return timing
+
+    def play_original(self, rapid: Rapid) -> _core.PlaybackFigures:
+        """The rapid's figures beside which those of the replacement stand."""
+        options = self._options(rapid.region)
+        options.measure_contour = False
+        samples = _core.rapid_samples(rapid.start_mm, rapid.end_mm, self.model)
+        still = _core.Path([_core.Segment.line(rapid.start_mm, rapid.start_mm, 1.0)])
+        return _core.play_samples(np.asfortranarray(samples), still, options)
+
+    def blocks(self, blocks: _core.Path, region: _core.Region, stops_s: float) -> Timing:
+        """The replacement as the text has it: the slower of both rules of block end; `stops_s`: dwells before it."""
+        period = self.model.period_s
+        offset = region_offset(region, self.machine)
+        runs = []
+        for rule in (_core.BlockEnd.ceil, _core.BlockEnd.carry):
+            least = 2 + math.ceil(2.0 * blocks.programmed_time_s / period) + self._filter_periods()
+            figures = play_emitted(
+                blocks, region.path, self.machine, rule, contour=False, record_samples=least, offset=offset
+            )
+            count = round(figures.duration_s / period) + 1
+            command = np.array(figures.recorded_command[:count])
+            settling = settling_time_s(command, self._options(region), self._slowest_per_s, self.band_mm)
+            still = np.repeat(command[:1], round(stops_s / period), axis=0)
+            runs.append(
+                Timing(
+                    len(still) * period + figures.duration_s,
+                    self._arrival_s(command),
+                    settling,
+                    np.concatenate([still, command]),
+                )
+            )
+        return max(runs, key=lambda run: run.settled_s)
+
+    def pause(self, seconds: float) -> Timing:
+        """What moves no axis: a dwell, an M function."""
+        return Timing(seconds, 0.0, 0.0, np.zeros((1, 3)))
+
+    def ready_s(self, steps: Sequence[Timing], region: _core.Region) -> float:
+        """Time of steps one after the other until the table has settled behind all of them together, s.
+
+        Args:
+            steps: in order.
+            region: whose modes hold, where modes vary with position.
+        """
+        period = self.model.period_s
+        clock_s = math.fsum(step.clock_s for step in steps)
+        parts: list[Vector] = []
+        end = next((step.command_mm[-1] for step in reversed(steps) if len(step.command_mm) > 1), np.zeros(3))
+        after_s = 0.0
+        for step in reversed(steps):
+            if after_s > self.longest_memory_s:
+                break
+            wait = round(step.clock_s / period) + 1 - len(step.command_mm)
+            way = np.concatenate([step.command_mm, np.repeat(step.command_mm[-1:], wait, axis=0)])
+            way = way + (end - way[-1])  # where positions are not known, pieces do not join by themselves
+            parts.append(way[:-1] if parts else way)
+            end = way[0]
+            after_s += step.clock_s
+        command = np.concatenate(parts[::-1])
+        settling_s = settling_time_s(command, self._options(region), self._slowest_per_s, self.band_mm)
+        moves = np.flatnonzero(np.abs(np.diff(command, axis=0)).max(axis=1))
+        still_s = (len(command) - 1 - (moves[-1] + 1 if len(moves) else 0)) * period
+        return clock_s + max(0.0, settling_s - still_s)
+
+    def _filter_periods(self) -> int:
+        return math.ceil(self.machine.controller.shaped_time_constant_s / self.model.period_s) + 1
+
+    def _options(self, region: _core.Region | None) -> _core.PlaybackOptions:
+        if region is None:
+            return playback_options(self.machine)
+        return playback_options(self.machine, offset=region_offset(region, self.machine))
+
+    def _arrival_s(self, command: Vector) -> float:
+        """Wait for in-position behind a command."""
+        model = self.model
+        moved = [bool(way) for way in np.ptp(command, axis=0) > 0.0]
+        error = np.zeros(3)
+        if model.in_position == _core.InPosition.servo_lag:
+            lag = _core.ServoLag(model.position_gain_per_s, model.feed_forward_ratio, model.period_s)
+            memory = math.ceil(_LAG_MEMORY / float(np.min(model.position_gain_per_s)) / model.period_s)
+            tail = command[-memory:]
+            lag.reset(tail[0])
+            for point in tail[1:]:
+                lag.step(point)
+            error = np.array(lag.error_mm)
+        return _core.in_position_wait_behind_s(error, moved, model)

@@ -1,0 +1,98 @@
+"""The emitted text read back and held against the original: end points, modal state at every border, sweeps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.program import Program, least_increment_mm
+
+_LARGEST_SWEEP_RAD = math.pi / 2
+
+
+_STATE_FIELDS = (
+    "motion", "plane", "distance", "feed_mode", "units", "compensation", "length_offset",
+    "cycle", "cycle_return", "coordinate_system", "exact_stop", "feed",
+)  # fmt: skip
+
+
+class RoundTripError(_core.ShapegcodeError):
+    """The emitted text does not say what it should: a defect of shapegcode, never of the input. Nothing is written."""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A region and where its shaped blocks stand in the emitted text.
+
+    Attributes:
+        region: of the original program.
+        first_line: first emitted line, from 1.
+        last_line: last emitted line.
+    """
+
+    region: _core.Region
+    first_line: int
+    last_line: int
+
+
+def read_back(text: bytes, placed: Sequence[Placed], machine: Machine) -> Program:
+    """Read the emitted text and hold it against the original: end points, modal state at every border, sweeps.
+
+    Raises:
+        RoundTripError: something differs; the message names the line and both values.
+    """
+    probes = [line for place in placed for line in (place.first_line - 1, place.last_line)]
+    emitted = Program.from_text(text, machine, source="emitted program", emitted=True, probe_lines=probes)
+    states = emitted.core.probed
+    for index, place in enumerate(placed):
+        region = place.region
+        _compare_states(states[2 * index], region.entry, place.first_line - 1, region.incremental, machine)
+        _compare_states(states[2 * index + 1], region.exit, place.last_line, region.incremental, machine)
+        blocks = emitted.core.cutting_path(place.first_line, place.last_line)
+        _compare_ends(blocks, place, machine)
+        if blocks.largest_sweep_rad >= _LARGEST_SWEEP_RAD:
+            raise RoundTripError(
+                f"emitted arc between lines {place.first_line} and {place.last_line} sweeps "
+                f"{math.degrees(blocks.largest_sweep_rad):.1f} degrees (limit 90)"
+            )
+    return emitted
+
+
+def _compare_states(
+    emitted: _core.ModalState, original: _core.ModalState, line: int, incremental: bool, machine: Machine
+) -> None:
+    for field in _STATE_FIELDS:
+        was, now = getattr(original, field), getattr(emitted, field)
+        if was != now and not (field == "feed" and original.feed_mode == 93):
+            raise RoundTripError(f"emitted line {line}: modal {field} is {now}, the original has {was}")
+    if original.known != emitted.known:
+        raise RoundTripError(f"emitted line {line}: known axes {emitted.known}, the original has {original.known}")
+    if incremental:
+        return
+    limit = _end_tolerance_mm(machine, original.units)
+    for axis, known, was, now in zip("XYZ", original.known, original.position_mm, emitted.position_mm, strict=True):
+        if known and abs(was - now) > limit:
+            raise RoundTripError(f"emitted line {line}: {axis} is at {now:.6f} mm, the original at {was:.6f} mm")
+
+
+def _compare_ends(blocks: _core.Path, place: Placed, machine: Machine) -> None:
+    path = place.region.path
+    travel = path.end_mm - path.start_mm
+    gap = float(np.abs((blocks.end_mm - blocks.start_mm) - travel).max())
+    # Start and end are rounded to the increment, each once.
+    limit = 2.0 * _end_tolerance_mm(machine, place.region.exit.units)
+    if gap > limit:
+        raise RoundTripError(
+            f"shaped blocks of lines {place.region.first_line} to {place.region.last_line} end {gap * 1e3:.2f} um off "
+            f"(limit {limit * 1e3:.2f} um)"
+        )
+
+
+def _end_tolerance_mm(machine: Machine, units: int) -> float:
+    # Half an increment: a program may carry more digits than the controller resolves.
+    return 0.5 * least_increment_mm(machine, units) + 1e-9

@@ -1,0 +1,186 @@
+"""The stock file: the material that is there before the first block of a program runs.
+
+A stock file is TOML and holds one of the tables ``[box]``, ``[polygon]``, ``[allowance]``, ``[program]``. Coordinates
+are those of the program: its work coordinate system. :class:`Stock` is the model of the file; `milling.stock_shape`
+makes polygons of it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, PrivateAttr, model_validator
+
+from shapegcode.settings.keys import Float, NonNegative, Positive, Table, Text, key
+from shapegcode.settings.load import parsed, read_text, validated
+from shapegcode.settings.problems import FileError, KeyProblem, Problem, line_of
+
+__all__ = ["Allowance", "Box", "Polygon", "Rough", "Solid", "Stock", "StockError"]
+
+Range = tuple[Float, Float]
+Point = tuple[Float, Float]
+Ring = Annotated[tuple[Point, ...], Field(min_length=3)]
+
+
+class StockError(FileError):
+    """A stock file that cannot be used, or that does not suit the program."""
+
+
+def _ascends(table: Table, *names: str) -> None:
+    for name in names:
+        low, high = getattr(table, name)
+        if low >= high:
+            raise KeyProblem(name, (low, high), "the smaller number comes first, and the two must differ")
+
+
+class Box(Table):
+    """A block."""
+
+    x_mm: Range = key("from ... to along X", unit="mm")
+    y_mm: Range = key("from ... to along Y", unit="mm")
+    z_mm: Range = key("bottom and top", unit="mm")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Box:
+        _ascends(self, "x_mm", "y_mm", "z_mm")
+        return self
+
+
+class Polygon(Table):
+    """A prism over a polygon."""
+
+    points_mm: Ring = key("corners [x, y] in order, three or more; the last is joined to the first", unit="mm")
+    holes_mm: tuple[Ring, ...] = key("holes that go through, each as its corners", unit="mm", default=())
+    z_mm: Range = key("bottom and top", unit="mm")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Polygon:
+        _ascends(self, "z_mm")
+        return self
+
+
+class Allowance(Table):
+    """What roughing left on the walls that this program finishes."""
+
+    allowance_mm: Positive = key("thickness that is left on the walls", unit="mm")
+    corner_radius_mm: NonNegative = key(
+        "radius that roughing left in inside corners: that of the roughing tool, or of its path there; wider corners "
+        "keep their own. Not below the radius of the finishing tool",
+        unit="mm",
+    )
+    wall: Literal["left", "right"] = key(
+        "side of the tool's travel on which the wall of the part lies: right in climb milling with a clockwise "
+        "spindle (as with G41), left in conventional milling"
+    )
+    z_mm: Range = key("bottom and top", unit="mm")
+    width_mm: Positive = key(
+        "how deep behind the finished wall the material is taken into account: more than the tool could gouge",
+        unit="mm",
+        default=5.0,
+    )
+    lead_in_mm: NonNegative = key(
+        "length of the travel before the wall begins, in each run of cutting moves that does not close upon itself "
+        "(where one does, what leads to the closed contour is left out by itself)",
+        unit="mm",
+        default=0.0,
+    )
+    lead_out_mm: NonNegative = key("length of the travel behind the wall's end, likewise", unit="mm", default=0.0)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Allowance:
+        _ascends(self, "z_mm")
+        return self
+
+
+class Solid(Table):
+    """A plain shape: one of the two."""
+
+    box: Box | None = key("a block", default=None)
+    polygon: Polygon | None = key("a prism over a polygon", default=None)
+
+    @model_validator(mode="after")
+    def _one(self) -> Solid:
+        _exactly_one(self, "box", "polygon")
+        return self
+
+
+class Rough(Table):
+    """What a program that ran before has left."""
+
+    file: Text = key("the program that ran before; the name is relative to the folder of the stock file")
+    tool: Text = key("tool file of the tool that it ran with, likewise")
+    on: Solid = key("what was there before that program: [program.on.box] or [program.on.polygon]")
+
+
+class Stock(Table):
+    """The material before the first block, in the work coordinates of the program: one of four kinds."""
+
+    box: Box | None = key("a block", default=None)
+    polygon: Polygon | None = key("a prism over a polygon", default=None)
+    allowance: Allowance | None = key(
+        "what roughing left on the walls that this program finishes: a layer of even thickness, and more in the inside "
+        "corners. Material on the other side of the tool is taken as gone",
+        default=None,
+    )
+    program: Rough | None = key("what a program that ran before has left", default=None)
+
+    # Where the file stands, so that names in it can be resolved; its name and text, for messages.
+    _folder: Path = PrivateAttr(default=Path())
+    _source: str = PrivateAttr(default="<text>")
+    _text: str = PrivateAttr(default="")
+
+    @model_validator(mode="after")
+    def _one(self) -> Stock:
+        _exactly_one(self, "box", "polygon", "allowance", "program")
+        return self
+
+    @classmethod
+    def load(cls, path: str | Path) -> Stock:
+        """Read a stock file.
+
+        Raises:
+            StockError: not TOML, or wrong keys or values; every problem is listed.
+            OSError: the file cannot be read.
+        """
+        return cls.from_toml(read_text(Path(path), StockError), str(path), Path(path).parent)
+
+    @classmethod
+    def from_toml(cls, text: str, source: str = "<text>", folder: str | Path = ".") -> Stock:
+        """Read the text of a stock file.
+
+        Args:
+            text: the text.
+            source: name of it in messages.
+            folder: what the names of files in it are relative to.
+
+        Raises:
+            StockError: not TOML, or wrong keys or values; every problem is listed.
+        """
+        stock = validated(cls, parsed(text, source, StockError), source, text, StockError)
+        stock._folder, stock._source, stock._text = Path(folder), source, text
+        return stock
+
+    @property
+    def kind(self) -> Literal["box", "polygon", "allowance", "program"]:
+        """Which of the four tables the file has."""
+        for name in ("box", "polygon", "allowance"):
+            if getattr(self, name) is not None:
+                return name
+        return "program"
+
+    def beside(self, name: str) -> Path:
+        """The path of a file that this one names."""
+        return self._folder / name
+
+    def error(self, key: str, value: str, limit: str) -> StockError:
+        """A key of this file that does not suit the program: its dotted name, its value as TOML, what is wrong."""
+        return StockError(self._source, (Problem(key, value, limit, line_of(key, self._text)),))
+
+
+def _exactly_one(table: Table, *names: str) -> None:
+    given = [name for name in names if getattr(table, name) is not None]
+    if len(given) != 1:
+        tables = ", ".join(names)
+        found = " and ".join(given) if given else "none of them"
+        raise ValueError(f"must have exactly one of the tables {tables}: has {found}")

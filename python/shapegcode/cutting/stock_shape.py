@@ -1,0 +1,303 @@
+"""The stock of a stock file as prisms over polygons; an allowance is computed from the path of the finishing tool."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapegcode import _core
+from shapegcode.cutting.offset_shapes import chord_angle_rad, grown, swept
+from shapegcode.cutting.stock import Allowance, Box, Polygon, Solid, Stock, StockError
+from shapegcode.settings.keys import toml
+
+if TYPE_CHECKING:
+    from shapely import MultiPolygon
+    from shapely import Polygon as Area
+
+__all__ = ["StockPiece", "stock_polygons"]
+
+Points = NDArray[np.float64]
+
+# Points of a program nearer than this are the same.
+_SAME_MM = 2e-3
+# A run is a closed contour with its lead-in and lead-out if so much of its length closes upon itself.
+_CLOSED_RATIO = 0.5
+
+
+@dataclass(frozen=True)
+class StockPiece:
+    """A prism.
+
+    Attributes:
+        rings: corners, (n, 2), mm, first not repeated: the outline, counter-clockwise, then holes, clockwise.
+        bottom_mm: its lower end.
+        top_mm: its upper end.
+    """
+
+    rings: tuple[Points, ...]
+    bottom_mm: float
+    top_mm: float
+
+
+def stock_polygons(stock: Stock, paths: Sequence[_core.Path], tool_radius_mm: float) -> list[StockPiece]:
+    """The stock as prisms over polygons; of the kind `program`: what was there before that program.
+
+    Args:
+        stock: the stock file.
+        paths: cutting moves of the program, for an allowance.
+        tool_radius_mm: of the tool that the program runs with, for an allowance.
+
+    Raises:
+        StockError: a polygon that crosses itself; an allowance that does not suit the program or the tool.
+    """
+    if stock.allowance is not None:
+        return _pieces(_Allowance(stock, stock.allowance, tool_radius_mm).area(paths), stock.allowance.z_mm)
+    if stock.program is not None:
+        return _solid(stock, stock.program.on, "program.on.")
+    return _solid(stock, stock, "")
+
+
+def _solid(stock: Stock, solid: Solid | Stock, prefix: str) -> list[StockPiece]:
+    if solid.box is not None:
+        return [_box(solid.box)]
+    assert solid.polygon is not None, "one of the two is there"
+    return _polygon(stock, solid.polygon, f"{prefix}polygon")
+
+
+def _box(box: Box) -> StockPiece:
+    (left, right), (front, back) = box.x_mm, box.y_mm
+    outline = np.array([(left, front), (right, front), (right, back), (left, back)])
+    return StockPiece((outline,), *box.z_mm)
+
+
+def _polygon(stock: Stock, polygon: Polygon, key: str) -> list[StockPiece]:
+    import shapely
+
+    outline = shapely.Polygon(polygon.points_mm)
+    if not outline.is_valid or outline.area == 0:
+        raise stock.error(f"{key}.points_mm", "", f"must go round an area: {shapely.is_valid_reason(outline)}")
+    holes = [shapely.Polygon(ring) for ring in polygon.holes_mm]
+    for number, hole in enumerate(holes, start=1):
+        if not hole.is_valid or hole.area == 0:
+            reason = shapely.is_valid_reason(hole)
+            raise stock.error(f"{key}.holes_mm.{number}", "", f"must go round an area: {reason}")
+    pieces = _pieces(outline.difference(shapely.union_all(holes)), polygon.z_mm)
+    if not pieces:
+        raise stock.error(f"{key}.holes_mm", "", "must leave something of the polygon")
+    return pieces
+
+
+def _pieces(area: Area | MultiPolygon, z_mm: tuple[float, float]) -> list[StockPiece]:
+    import shapely
+
+    pieces = []
+    for part in shapely.get_parts(area):
+        if part.geom_type != "Polygon" or part.area < _SAME_MM * _SAME_MM:
+            continue  # where two shapes touch, up to rounding
+        ordered = shapely.orient_polygons(part)
+        rings = (ordered.exterior, *ordered.interiors)
+        pieces.append(StockPiece(tuple(np.asarray(ring.coords)[:-1] for ring in rings), *z_mm))
+    return pieces
+
+
+class _Allowance:
+    """Builds the area that roughing left: the part behind the walls, thickened, with the corners of roughing."""
+
+    def __init__(self, stock: Stock, allowance: Allowance, radius_mm: float) -> None:
+        self._stock, self._keys, self._radius = stock, allowance, radius_mm
+        corner = allowance.corner_radius_mm
+        if corner < radius_mm * (1 - 1e-9):
+            raise self._error(
+                "corner_radius_mm",
+                f"tool bigger than the corner: must not be below the tool's radius, {radius_mm:g} mm",
+            )
+        self._reach = radius_mm + allowance.width_mm
+        self._rough = allowance.allowance_mm + corner
+
+    def area(self, paths: Sequence[_core.Path]) -> Area | MultiPolygon:
+        """The area of the stock in the plane XY."""
+        import shapely
+
+        keys = self._keys
+        walls, swept = [], []
+        for points in self._runs(paths):
+            loops, rest = _loops(_with_touched(points))
+            closed, whole = sum(_length(np.vstack([loop, loop[:1]])) for loop in loops), _length(points)
+            if loops and closed < _CLOSED_RATIO * whole:
+                raise self._error(
+                    "wall",
+                    f"only {closed:.4g} of {whole:.4g} mm of a run of cutting moves close upon themselves: is that the "
+                    "wall? Describe the stock as [polygon]",
+                )
+            for wall, gone in map(self._closed, loops) if loops else [self._open(rest)]:
+                walls.append(wall)
+                swept.append(gone)
+        if not walls:
+            raise self._error("z_mm", "no cutting move of the program goes below the top")
+        part = shapely.union_all(walls).difference(shapely.union_all(swept))
+        if part.is_empty:
+            raise self._error("wall", "the tool's sweep leaves nothing behind the walls: wrong side?")
+        # What roughing with corner_radius_mm leaves of the layer: its path keeps allowance and radius off the part.
+        return grown(grown(part, self._rough), -keys.corner_radius_mm)
+
+    def _error(self, key: str, limit: str) -> StockError:
+        return self._stock.error(f"allowance.{key}", toml(getattr(self._keys, key)), limit)
+
+    def _runs(self, paths: Sequence[_core.Path]) -> Iterator[Points]:
+        """Stretches of the paths below the top of the stock, in the plane, without points that repeat."""
+        top = self._keys.z_mm[1] - 1e-9
+        for path in paths:
+            points = path.polyline(self._step_rad(path))
+            below = np.concatenate([[False], points[:, 2] < top, [False]])
+            edges = np.flatnonzero(below[1:] != below[:-1])
+            for first, last in zip(edges[::2], edges[1::2], strict=True):
+                plane = points[first:last, :2]
+                moved = np.hypot(*np.diff(plane, axis=0).T) > 1e-9
+                plane = plane[np.concatenate([[True], moved])]
+                if len(plane) > 1:
+                    yield plane
+
+    def _step_rad(self, path: _core.Path) -> float:
+        """Angle of the chords of a path's arcs: fine enough for what is offset from them."""
+        radius = max((path[index].radius_mm for index in range(len(path))), default=0.0)
+        return chord_angle_rad(radius + self._reach + self._rough)
+
+    def _closed(self, loop: Points) -> tuple[Area, Area]:
+        """The part behind the wall of a closed contour, and what is gone in front of it."""
+        import shapely
+
+        ring = shapely.Polygon(loop)
+        if not ring.is_valid:
+            reason = shapely.is_valid_reason(ring)
+            raise self._error("wall", f"the closed contour crosses itself ({reason}): describe the stock as [polygon]")
+        sweep = swept(np.vstack([loop, loop[:1]]), self._radius)
+        is_inside = (_signed_area(loop) > 0) == (self._keys.wall == "left")
+        if is_inside:
+            part = ring.difference(sweep)
+            if part.is_empty:
+                raise self._error("wall", "the tool's sweep leaves nothing inside the closed contour: wrong side?")
+            return part.difference(grown(part, -self._keys.width_mm)), sweep
+        pocket = ring.union(sweep)
+        # The offset of GEOS, off by some micrometres, is good enough for this question and quick.
+        if pocket.buffer(-self._rough).is_empty:
+            room = 2 * shapely.maximum_inscribed_circle(pocket, tolerance=1e-3).length
+            raise self._error(
+                "corner_radius_mm",
+                f"roughing tool bigger than the pocket: with allowance_mm on both sides it needs "
+                f"{2 * self._rough:g} mm, the pocket is {room:.4g} mm wide",
+            )
+        return grown(pocket, self._keys.width_mm), pocket
+
+    def _open(self, points: Points) -> tuple[Area | MultiPolygon, Area]:
+        """The part behind the wall of a contour that does not close, and what the tool takes."""
+        import shapely
+        from shapely.ops import substring
+
+        wall = shapely.LineString(points)
+        start, end = self._keys.lead_in_mm, wall.length - self._keys.lead_out_mm
+        if end - start <= _SAME_MM:
+            raise self._error(
+                "lead_in_mm", f"no wall is left between lead-in and lead-out of a run {wall.length:g} mm long"
+            )
+        points = np.asarray(substring(wall, start, end).coords)
+        # Beyond its ends the wall goes on straight, as far as the tool reaches there.
+        beyond = 2 * self._radius + self._rough
+        straight = _extended(points, beyond)
+        line = shapely.LineString(straight)
+        if not line.is_simple:
+            raise self._error(
+                "wall",
+                "the path crosses itself or the straight continuation of its ends: describe the stock as [polygon]",
+            )
+        band = swept(straight, self._reach, round_ends=False)
+        cut = shapely.LineString(_extended(straight, _SAME_MM))
+        faces = shapely.get_parts(shapely.polygonize([shapely.union_all([band.boundary, cut])]))
+        behind = self._behind(faces, straight)
+        return shapely.union_all(behind), swept(straight, self._radius)
+
+    def _behind(self, faces: NDArray[np.object_], points: Points) -> list[Area]:
+        """Those of the faces beside a path that lie on the side of the wall."""
+        import shapely
+
+        along = np.diff(points, axis=0)
+        to_left = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
+        to_wall = to_left if self._keys.wall == "left" else -to_left
+        middle = 0.5 * (points[:-1] + points[1:])
+        behind = []
+        for face in faces:
+            at_wall, at_free = (shapely.contains_xy(face, middle + side * 1e-4 * to_wall).any() for side in (1, -1))
+            if at_wall and at_free:
+                raise self._error("wall", "both sides of the path are one: describe the stock as [polygon]")
+            if at_wall:
+                behind.append(face)
+        return behind
+
+
+def _length(points: Points) -> float:
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())
+
+
+def _signed_area(loop: Points) -> float:
+    x, y = (loop - loop[0]).T
+    return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def _extended(points: Points, length_mm: float) -> Points:
+    """A line with its ends continued straight."""
+    first, last = points[0] - points[1], points[-1] - points[-2]
+    before = points[0] + first * (length_mm / np.hypot(*first))
+    after = points[-1] + last * (length_mm / np.hypot(*last))
+    return np.vstack([before, points, after])
+
+
+def _with_touched(points: Points) -> Points:
+    """A line with those of its points inserted that it passes through: where it runs over its beginning once more."""
+    import shapely
+
+    pieces = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))
+    touching, touched = shapely.STRtree(pieces).query(shapely.points(points), predicate="dwithin", distance=_SAME_MM)
+    inside = [
+        (piece, shapely.line_locate_point(pieces[piece], shapely.Point(points[point])), point)
+        for point, piece in zip(touching, touched, strict=True)
+        if point not in (piece, piece + 1)
+        and min(np.hypot(*(points[point] - points[piece])), np.hypot(*(points[point] - points[piece + 1]))) > _SAME_MM
+    ]
+    inside.sort()
+    return np.insert(points, [piece + 1 for piece, _, _ in inside], points[[point for _, _, point in inside]], axis=0)
+
+
+def _loops(points: Points) -> tuple[list[Points], Points]:
+    """Closed contours in a line, and what is left of it without them.
+
+    A contour closes where the line comes back to one of its own points. Loops without area (there and back on the
+    same way) are no contours.
+    """
+    loops: list[Points] = []
+    line: list[int] = []
+    seen: dict[tuple[int, int], int] = {}
+
+    def cell(point: Points) -> tuple[int, int]:
+        return (math.floor(point[0] / _SAME_MM), math.floor(point[1] / _SAME_MM))
+
+    for index, point in enumerate(points):
+        column, row = cell(point)
+        near = [seen.get((column + i, row + j), -1) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+        found = [at for at in near if at >= 0 and np.hypot(*(points[line[at]] - point)) < _SAME_MM]
+        # Neighbours on the line may be close without closing anything.
+        closing = min(found, default=-1)
+        if closing >= 0 and len(line) - closing >= 3:
+            loop = points[line[closing:]]
+            if abs(_signed_area(loop)) > _SAME_MM * _SAME_MM:
+                loops.append(loop)
+                for dropped in line[closing + 1 :]:
+                    seen.pop(cell(points[dropped]), None)
+                del line[closing + 1 :]
+                continue
+        seen[column, row] = len(line)
+        line.append(index)
+    return loops, points[line]

@@ -1,0 +1,310 @@
+"""The tool file: an end mill, the forces that it needs, the limits that it must keep and how its feed may be set.
+
+A tool file is TOML. :class:`Tool` is its model; it and its tables are the only place that holds defaults for it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, Strict, field_validator, model_validator
+
+from shapegcode import _core
+from shapegcode.cutting.materials import Exponent, Material, Name, materials
+from shapegcode.settings.keys import Float, NonNegative, Positive, Table, Text, key, toml
+from shapegcode.settings.load import loaded, parsed, validated
+from shapegcode.settings.problems import FileError, KeyProblem
+
+__all__ = ["Cutter", "Cutting", "Feed", "Limits", "Tool", "ToolError"]
+
+
+class ToolError(FileError):
+    """A tool file that cannot be used."""
+
+
+class Cutter(Table):
+    """The end mill: flat end, cylindrical."""
+
+    name: Name = key("short name, in plain ASCII because it goes into comments of programs")
+    number: Annotated[int, Strict(), Field(ge=0, le=99_999_999)] | None = key(
+        "T number; blocks that run with another tool are left as they are. Left out: the file speaks of every tool "
+        "of the program",
+        default=None,
+    )
+    diameter_mm: Positive = key("diameter of the fluted part", unit="mm")
+    flutes: Annotated[int, Strict(), Field(ge=1, le=100)] = key("number of flutes")
+    helix_deg: Annotated[NonNegative, Field(le=80)] = key(
+        "helix angle of a right-hand helix on a right-hand cutter; 0: straight flutes", unit="degrees"
+    )
+    flute_length_mm: Positive = key("length of the fluted part from the tip", unit="mm")
+    overhang_mm: Positive = key(
+        "effective length: from the tip to where the tool may be taken as clamped in its holder", unit="mm"
+    )
+    shank_diameter_mm: Positive | None = key(
+        "diameter of the shank above the flutes; left out: diameter_mm", unit="mm", default=None
+    )
+    effective_diameter_ratio: Annotated[Positive, Field(le=1)] = key(
+        "diameter of the solid cylinder that bends as the fluted part does, as a share of diameter_mm",
+        unit="1",
+        default=0.8,
+        assumed=True,
+    )
+    youngs_modulus_gpa: Positive = key(
+        "Young's modulus: about 600 for cemented carbide, 210 for high-speed steel",
+        unit="GPa",
+        default=600.0,
+        assumed=True,
+    )
+    holder_stiffness_n_per_um: Positive | None = key(
+        "stiffness of holder and spindle against a force across the axis where the tool is clamped; left out: rigid",
+        unit="N/µm",
+        default=None,
+    )
+    runout_um: tuple[Float, ...] | None = key(
+        "how far each flute stands out beyond the mean radius, one number per flute in the order in which they cut; "
+        "left out: none",
+        unit="µm",
+        default=None,
+    )
+    spindle: Literal["clockwise", "counter_clockwise"] | None = key(
+        'sense in which the spindle turns, "clockwise" (M03) or "counter_clockwise" (M04); left out: as the program '
+        "says, clockwise where it does not",
+        default=None,
+    )
+
+    @model_validator(mode="after")
+    def _fits(self) -> Cutter:
+        if self.flute_length_mm > self.overhang_mm:
+            raise KeyProblem(
+                "flute_length_mm", self.flute_length_mm, f"must not exceed overhang_mm = {toml(self.overhang_mm)}"
+            )
+        if self.runout_um is not None:
+            if len(self.runout_um) != self.flutes:
+                raise KeyProblem(
+                    "runout_um",
+                    self.runout_um,
+                    f"has {len(self.runout_um)} values: must have one per flute, flutes = {self.flutes}",
+                )
+            largest = max(abs(value) for value in self.runout_um)
+            if largest >= 500 * self.diameter_mm:
+                raise KeyProblem(
+                    "runout_um", self.runout_um, f"must stay below the radius, {toml(500 * self.diameter_mm)} µm"
+                )
+        return self
+
+
+class Cutting(Table):
+    """The cutting force: a material of the library, values of your own, or a material with some of them changed.
+
+    With the chip thickness t in mm: tangential force per length of edge k1 t + tangential_edge, radial force
+    k2 k1 t + radial_edge, where k1 = specific * t^specific_exponent and k2 = ratio * t^ratio_exponent.
+    """
+
+    material: Text | None = key(
+        "name in the library of materials; keys given beside it take the place of its values. Left out: "
+        "specific_n_per_mm2 and ratio are needed",
+        default=None,
+    )
+    specific_n_per_mm2: Positive | None = key(
+        "specific cutting force k1 at a chip 1 mm thick; for a law of Kienzle kc1.1", unit="N/mm²", default=None
+    )
+    specific_exponent: Exponent | None = key(
+        "exponent of the chip thickness in k1; for a law of Kienzle -mc. Left out without a material: 0",
+        unit="1",
+        default=None,
+    )
+    ratio: NonNegative | None = key(
+        "ratio k2 of radial to tangential force at a chip 1 mm thick", unit="1", default=None
+    )
+    ratio_exponent: Exponent | None = key(
+        "exponent of the chip thickness in k2. Left out without a material: 0", unit="1", default=None
+    )
+    tangential_edge_n_per_mm: NonNegative | None = key(
+        "tangential force of the edge per length of it (K_te). Left out without a material: 0",
+        unit="N/mm",
+        default=None,
+    )
+    radial_edge_n_per_mm: NonNegative | None = key(
+        "radial force of the edge per length of it (K_re). Left out without a material: 0", unit="N/mm", default=None
+    )
+    chip_thickness: Literal["mean", "local"] | None = key(
+        'which chip thickness the exponents belong to: "mean" of the whole engagement or "local" at each point of an '
+        'edge. Left out without a material: "mean"',
+        default=None,
+    )
+
+    @field_validator("material")
+    @classmethod
+    def _known(cls, name: str | None) -> str | None:
+        if name is not None and name not in materials():
+            close = difflib.get_close_matches(name, materials(), n=1, cutoff=0.5)
+            hint = f"; did you mean {close[0]}?" if close else ""
+            raise ValueError(f"no such material; known are {', '.join(materials())}{hint}")
+        return name
+
+    @model_validator(mode="after")
+    def _complete(self) -> Cutting:
+        if self.material is None:
+            for name in ("specific_n_per_mm2", "ratio"):
+                if getattr(self, name) is None:
+                    raise ValueError(f"needs material, or both specific_n_per_mm2 and ratio: {name} is missing")
+        exponent = self._value("specific_exponent", 0.0) + self._value("ratio_exponent", 0.0)
+        if exponent <= -1:
+            raise ValueError(
+                f"specific_exponent + ratio_exponent = {toml(exponent)}: must be greater than -1, or the radial force "
+                "would not grow with the chip"
+            )
+        return self
+
+    def library_entry(self) -> Material | None:
+        """The material of the library, None without one."""
+        return None if self.material is None else materials()[self.material]
+
+    def coefficients(self) -> _core.CuttingCoefficients:
+        """The cutting force as the core takes it."""
+        entry = self.library_entry()
+        thickness = self.chip_thickness or ("mean" if entry is None else entry.chip_thickness)
+        return _core.CuttingCoefficients(
+            specific_n_per_mm2=self._value("specific_n_per_mm2", 0.0),
+            specific_exponent=self._value("specific_exponent", 0.0),
+            ratio=self._value("ratio", 0.0),
+            ratio_exponent=self._value("ratio_exponent", 0.0),
+            tangential_edge_n_per_mm=self._value("tangential_edge_n_per_mm", 0.0),
+            radial_edge_n_per_mm=self._value("radial_edge_n_per_mm", 0.0),
+            thickness=_core.ChipThickness.__members__[thickness],
+        )
+
+    def _value(self, name: str, otherwise: float) -> float:
+        """A coefficient: as given here, else of the material, else a value."""
+        own = getattr(self, name)
+        if own is not None:
+            return float(own)
+        entry = self.library_entry()
+        return otherwise if entry is None else float(getattr(entry, name))
+
+
+class Limits(Table):
+    """What must not be exceeded; a limit that is left out does not act."""
+
+    resultant_n: Positive | None = key("resultant of the force in the XY plane", unit="N", default=None)
+    resultant: Literal["peak", "mean"] = key(
+        'what resultant_n limits: the "peak" of the resultant over one revolution or its "mean"', default="peak"
+    )
+    deflection_um: Positive | None = key("peak deflection of the tool at its tip", unit="µm", default=None)
+    torque_nm: Positive | None = key("peak torque about the axis of the tool", unit="N m", default=None)
+    power_w: Positive | None = key("mean power of the cut", unit="W", default=None)
+    feed_per_tooth_min_mm: Positive | None = key(
+        "least feed per tooth: below it the edge rubs. Left out: no feed goes below a tenth of the programmed one",
+        unit="mm",
+        default=None,
+    )
+    feed_per_tooth_max_mm: Positive | None = key("largest feed per tooth", unit="mm", default=None)
+
+    @model_validator(mode="after")
+    def _band_ascends(self) -> Limits:
+        low, high = self.feed_per_tooth_min_mm, self.feed_per_tooth_max_mm
+        if low is not None and high is not None and low >= high:
+            raise KeyProblem("feed_per_tooth_min_mm", low, f"must be less than feed_per_tooth_max_mm = {toml(high)}")
+        return self
+
+
+class Feed(Table):
+    """How the feed may be set."""
+
+    air_feed_mm_per_min: Positive | None = key(
+        "feed where the tool meets no material; left out: as programmed", unit="mm/min", default=None
+    )
+    approach_mm: NonNegative = key(
+        "distance before the tool meets material at which the feed is that of the cut again",
+        unit="mm",
+        default=1.0,
+        assumed=True,
+    )
+    max_feed_mm_per_min: Positive | None = key(
+        "largest feed that is written, in material and in air; left out: as the machine allows",
+        unit="mm/min",
+        default=None,
+    )
+    spindle_rev_per_min: Positive | None = key(
+        "speed of the spindle where the program gives none (S); left out: the program must", unit="1/min", default=None
+    )
+
+    @model_validator(mode="after")
+    def _air_feed_fits(self) -> Feed:
+        air, most = self.air_feed_mm_per_min, self.max_feed_mm_per_min
+        if air is not None and most is not None and air > most:
+            raise KeyProblem("air_feed_mm_per_min", air, f"must not exceed max_feed_mm_per_min = {toml(most)}")
+        return self
+
+
+class Tool(Table):
+    """An end mill with its cutting force, its limits and its feed, as a tool file describes them."""
+
+    tool: Cutter = key("the end mill: flat end, cylindrical")
+    cutting: Cutting = key(
+        "the cutting force: a material of the library, values of your own, or a material with some of them changed. "
+        "With the chip thickness t in mm, the tangential force per mm of edge is k1 t + K_te and the radial one "
+        "k2 k1 t + K_re, where k1 = specific * t^specific_exponent and k2 = ratio * t^ratio_exponent"
+    )
+    limits: Limits = key("what must not be exceeded; a limit that is left out does not act", default={})
+    feed: Feed = key("how the feed may be set", default={})
+
+    @model_validator(mode="after")
+    def _least_chip_can_be_reached(self) -> Tool:
+        least, most = self.limits.feed_per_tooth_min_mm, self.feed.max_feed_mm_per_min
+        speed = self.feed.spindle_rev_per_min
+        if least is not None and most is not None and speed is not None:
+            needed = least * self.tool.flutes * speed
+            if needed > most:
+                raise KeyProblem(
+                    "limits.feed_per_tooth_min_mm",
+                    least,
+                    f"asks for a feed of {needed:g} mm/min, feed.max_feed_mm_per_min is {toml(most)}",
+                )
+        return self
+
+    @classmethod
+    def load(cls, path: str | Path) -> Tool:
+        """Read a tool file.
+
+        Raises:
+            ToolError: not TOML, or wrong keys or values; every problem is listed.
+            OSError: the file cannot be read.
+        """
+        return loaded(cls, path, ToolError)
+
+    @classmethod
+    def from_toml(cls, text: str, source: str = "<text>") -> Tool:
+        """Read the text of a tool file; *source* names it in messages.
+
+        Raises:
+            ToolError: not TOML, or wrong keys or values; every problem is listed.
+        """
+        return validated(cls, parsed(text, source, ToolError), source, text, ToolError)
+
+    @property
+    def radius_mm(self) -> float:
+        """Radius of the fluted part, mm."""
+        return 0.5 * self.tool.diameter_mm
+
+    def end_mill(self) -> _core.EndMill:
+        """The tool as the core takes it."""
+        runout = [0.001 * value for value in self.tool.runout_um or ()]
+        return _core.EndMill(self.tool.diameter_mm, self.tool.flutes, math.radians(self.tool.helix_deg), runout)
+
+    def sense(self, programmed: _core.SpindleSense | None = None) -> _core.SpindleSense:
+        """Sense of the spindle: as the file says, else as *programmed*, else clockwise."""
+        match self.tool.spindle:
+            case "clockwise":
+                return _core.SpindleSense.clockwise
+            case "counter_clockwise":
+                return _core.SpindleSense.counter_clockwise
+            case _:
+                return _core.SpindleSense.clockwise if programmed is None else programmed
+
+    def coefficients(self) -> _core.CuttingCoefficients:
+        """The cutting force as the core takes it: the file's values, then those of its material."""
+        return self.cutting.coefficients()

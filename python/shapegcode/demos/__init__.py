@@ -1,0 +1,1 @@
+"""The papers' figures, repeated: one file each."""

@@ -1,0 +1,1 @@
+"""Feeds set by cutting force and deflection."""

@@ -1,0 +1,293 @@
+"""Feeds of one region: the highest that keep every limit, as the machine will really run them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.cutting.tool import Tool
+from shapegcode.feed.survey import SurveyedMove, SurveyedRegion
+from shapegcode.feed.travel import Motion, Vector
+from shapegcode.machine import Machine
+
+__all__ = [
+    "AIR",
+    "KEPT",
+    "MINIMUM",
+    "PROGRAMMED",
+    "FeedPlan",
+    "goes_on",
+    "limits_of",
+    "milling_force",
+    "plan_region",
+    "tool_beam",
+]
+
+_ATTEMPTS = 12
+_LONGEST_REACH = 2.0  # of the lag, beyond which waiting longer changes nothing
+_LOWERING = 3  # attempts that only slow down earlier, before feeds are lowered too
+_SAME_DIRECTION = 0.95  # cosine of a turn after which the load is still that of before
+_LEAST_SHARE = 0.9  # of a feed that is lowered once
+_TOO_FAST = 1e-4  # relative: rounding of the travel, far below the margin
+_DEEPER_PLUNGE = 0.01  # of the tool's end in material: a ramp cuts with its end
+_AIR_MM2 = 1e-9
+_STEEPEST_AIR = 0.7  # share of the travel in XY from which on a move in air is no plunge
+_LEAST_PROGRAMMED = 0.1  # of the programmed feed, where the tool file says no least chip
+_STEP = 0.005  # feeds that differ by less are one: a border for less gains nothing
+_LIMIT_NAMES = np.array(
+    [name for _, name in sorted((limit.value, name) for name, limit in _core.FeedLimit.__members__.items())],
+    dtype="<U16",
+)
+
+PROGRAMMED, MAX_FEED, AIR, KEPT, MINIMUM = "programmed", "max_feed", "air", "kept", "minimum"
+"""What holds a feed where no limit does: the program, the largest feed, no material, a block left alone, the least."""
+
+
+@dataclass(frozen=True)
+class FeedPlan:
+    """Feeds of a region.
+
+    Attributes:
+        surveyed: the region, and what the tool meets on it.
+        limit_mm_per_min: largest feed allowed on the stretch before each station, (n,).
+        holds: what holds it there, (n,) of names.
+        kept: per segment why its feed stays, empty where it may change.
+        stretches: the feeds, as they are written.
+        held_at_minimum: stations at which the least feed per tooth is more than the limits allow, (n,) of bool.
+        window_s: time between two teeth, over which feeds are taken.
+    """
+
+    surveyed: SurveyedRegion
+    limit_mm_per_min: Vector
+    holds: npt.NDArray[np.str_]
+    kept: tuple[str, ...]
+    stretches: tuple[_core.FeedStretch, ...]
+    held_at_minimum: npt.NDArray[np.bool_]
+    window_s: float
+
+
+def milling_force(tool: Tool, surveyed: SurveyedRegion | SurveyedMove) -> _core.MillingForce:
+    """The force model of a region, or of a move outside of the regions."""
+    return _core.MillingForce(tool.end_mill(), tool.coefficients(), surveyed.spindle_rev_per_min, surveyed.sense)
+
+
+def tool_beam(tool: Tool) -> _core.ToolBeam:
+    """The tool as the beam that bends."""
+    cutter = tool.tool
+    return _core.ToolBeam(
+        overhang_mm=cutter.overhang_mm,
+        fluted_length_mm=cutter.flute_length_mm,
+        effective_diameter_mm=cutter.effective_diameter_ratio * cutter.diameter_mm,
+        shank_diameter_mm=cutter.shank_diameter_mm or cutter.diameter_mm,
+        young_modulus_gpa=cutter.youngs_modulus_gpa,
+        holder_n_per_um=cutter.holder_stiffness_n_per_um or math.inf,
+    )
+
+
+def limits_of(tool: Tool, machine: Machine, margin: float) -> _core.FeedLimits:
+    """The limits of tool and machine, each less a margin (a share of 1)."""
+    room = 1.0 - margin
+
+    def least(*values: float | None) -> float:
+        return room * min((value for value in values if value is not None), default=math.inf)
+
+    limits, control = tool.limits, machine.feed_control
+    peak = limits.resultant == "peak"
+    return _core.FeedLimits(
+        mean_resultant_n=math.inf if peak else least(limits.resultant_n),
+        peak_resultant_n=least(limits.resultant_n) if peak else math.inf,
+        peak_deflection_um=least(limits.deflection_um),
+        peak_torque_nm=least(limits.torque_nm, control.spindle_torque_nm),
+        mean_power_w=least(limits.power_w, control.spindle_power_w),
+        feed_per_tooth_mm=limits.feed_per_tooth_max_mm or math.inf,
+        beam=tool_beam(tool),
+    )
+
+
+def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Motion, divisible: list[bool], margin: float,
+                feed_unit_mm_per_min: float) -> FeedPlan:  # fmt: skip
+    """Choose the feeds of a region whose feeds may change.
+
+    Args:
+        surveyed: the region.
+        machine: its feed control.
+        motion: how the blocks will be run; the feeds are lowered until this motion keeps the limits.
+        divisible: per segment whether its block may be divided.
+        margin: share of each limit that is left free.
+        feed_unit_mm_per_min: feeds are whole multiples of it.
+    """
+    region, tool, track = surveyed.region, surveyed.tool, surveyed.track
+    assert tool is not None and track is not None
+    teeth_per_min = tool.tool.flutes * surveyed.spindle_rev_per_min
+    path = region.path
+    segment = np.asarray(track.segment)
+    programmed = path.segment_feeds_mm_per_s * 60.0
+    least = max((tool.limits.feed_per_tooth_min_mm or 0.0) * teeth_per_min, machine.controller.minimum_feed_mm_per_min)
+    kept = _kept_segments(surveyed, programmed, least, tool)
+    # Without a least chip nobody wants the tool to rub for hours to keep a limit that cannot be kept.
+    share = 0.0 if tool.limits.feed_per_tooth_min_mm else _LEAST_PROGRAMMED
+    slowest = np.maximum(least, share * programmed)
+    lowest = (feed_unit_mm_per_min * np.ceil(slowest / feed_unit_mm_per_min - 1e-9))[segment]  # what F can say
+    limit, holds, load = _limits_along(surveyed, programmed[segment], lowest, machine, margin)
+    frozen = np.array([bool(reason) for reason in kept])
+    at_minimum = (holds == MINIMUM) & ~frozen[segment]
+    limit = np.where(frozen[segment], programmed[segment], limit)
+    holds[frozen[segment]] = KEPT
+    window_s = 60.0 / teeth_per_min
+    task = _Task(
+        path=path,
+        stations_mm=np.asarray(track.s_mm),
+        segment=segment,
+        limit=limit,
+        load=load,
+        kept=np.where(frozen, programmed, 0.0),
+        programmed=programmed,
+        divisible=divisible,
+        lowest=lowest,
+        feed_unit=feed_unit_mm_per_min,
+        window_s=window_s,
+    )
+    stretches = _stretches_that_keep(task, machine, motion)
+    return FeedPlan(surveyed, limit, holds, kept, tuple(stretches), at_minimum, window_s)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What the stretches of a region are chosen for."""
+
+    path: _core.Path
+    stations_mm: Vector
+    segment: npt.NDArray[np.uint32]  # of each station
+    limit: Vector  # at each station: what is wanted
+    load: Vector  # at each station: what the load allows, and the least feed where it allows less
+    kept: Vector  # per segment the feed that stays, 0: it may change
+    programmed: Vector  # per segment
+    divisible: list[bool]
+    lowest: Vector  # at each station
+    feed_unit: float
+    window_s: float
+
+
+def _kept_segments(surveyed: SurveyedRegion, programmed: Vector, lowest: float, tool: Tool) -> tuple[str, ...]:
+    track = surveyed.track
+    assert track is not None
+    reasons = [""] * len(programmed)
+    end_mm2 = np.pi * tool.radius_mm**2
+    plunged = np.asarray(track.plunged_mm2) > _DEEPER_PLUNGE * end_mm2
+    for index in np.unique(np.asarray(track.segment)[plunged]):
+        reasons[index] = "plunges into material"
+    for index in np.flatnonzero(programmed < lowest * (1.0 - 1e-9)):
+        reasons[index] = f"its feed, {programmed[index]:g} mm/min, is already below the least one, {lowest:g} mm/min"
+    return tuple(reasons)
+
+
+def _limits_along(
+    surveyed: SurveyedRegion, programmed: Vector, lowest: Vector, machine: Machine, margin: float
+) -> tuple[Vector, npt.NDArray[np.str_], Vector]:
+    """Wanted feed on the stretch before each station, what holds it, and what the load allows there."""
+    tool, track = surveyed.tool, surveyed.track
+    assert tool is not None and track is not None
+    axes = machine.axes
+    least, most = machine.controller.minimum_feed_mm_per_min, tool.feed.max_feed_mm_per_min
+    if most is not None and most < least:
+        raise _core.ArgumentError(
+            f"feed.max_feed_mm_per_min = {most:g} of {tool.tool.name}: must not be below "
+            f"controller.minimum_feed_mm_per_min = {least:g}"
+        )
+    fastest = min(axes.x.max_feed_mm_per_min, axes.y.max_feed_mm_per_min)
+    fastest = min(fastest, tool.feed.max_feed_mm_per_min or fastest)
+    # Without a largest chip nobody said that more than the programmed feed is wanted in material.
+    raised = tool.limits.feed_per_tooth_max_mm is not None or tool.feed.max_feed_mm_per_min is not None
+    ceiling = np.full(len(programmed), fastest) if raised else np.minimum(programmed, fastest)
+    force = milling_force(tool, surveyed)
+    highest = max(fastest, float(ceiling.max()))
+    # Searched to far below the least feed: what needs less than that is told apart from what just reaches it.
+    bound, limit, _ = _core.largest_feeds(
+        force, track, limits_of(tool, machine, margin), 1e-3 * float(lowest.min()), highest
+    )
+    top = np.where(ceiling > programmed, MAX_FEED, PROGRAMMED)
+    holds = np.where((bound < ceiling) & (limit != _core.FeedLimit.none.value), _LIMIT_NAMES[limit], top)
+    feeds = np.minimum(bound, ceiling)
+    load = np.where(bound < highest, np.maximum(bound, lowest), np.inf)
+    low = feeds < lowest
+    feeds[low] = np.minimum(lowest, ceiling)[low]
+    holds[low] = MINIMUM
+    air = np.asarray(track.section_mm2) <= _AIR_MM2
+    feeds[air] = np.minimum(programmed, fastest)[air]
+    load[air] = np.inf
+    holds[air] = AIR
+    # A station speaks for the stretch before it, on which the load changes from what the last one met.
+    passed = goes_on(track) & ~air[:-1]
+    before = np.where(passed & (feeds[:-1] < feeds[1:]), np.arange(len(feeds) - 1), np.arange(1, len(feeds)))
+    feeds[1:], holds[1:] = feeds[before], holds[before]
+    load[1:] = np.where(passed, np.minimum(load[1:], load[:-1]), load[1:])
+    if tool.feed.air_feed_mm_per_min is not None:
+        level = np.asarray(track.horizontal) > _STEEPEST_AIR  # nobody wants a tool to come down faster than he said
+        certain = air if surveyed.clear is None else surveyed.clear
+        certain = air & certain
+        near = _near_material(np.asarray(track.s_mm), certain, tool.feed.approach_mm)
+        clear = certain & (holds == AIR) & level & ~near
+        feeds[clear] = np.maximum(programmed[clear], min(tool.feed.air_feed_mm_per_min, fastest))
+    return feeds, holds, load
+
+
+def goes_on(track: _core.EngagementTrack) -> npt.NDArray[np.bool_]:
+    """Per station but the last whether the tool goes on from it in much the same direction, (n - 1,).
+
+    At a corner the load of the block before ends with the block.
+    """
+    turn = np.diff(np.asarray(track.direction_rad))
+    level = np.asarray(track.horizontal)
+    on: npt.NDArray[np.bool_] = (np.cos(turn) > _SAME_DIRECTION) & (level[1:] > 0.0) & (level[:-1] > 0.0)
+    return on
+
+
+def _stepped(limit: Vector, programmed: Vector) -> Vector:
+    """Feeds rounded down to steps of half a percent below the programmed one, or the largest if that is more."""
+    top = np.where(limit > programmed, limit.max(initial=0.0), programmed)
+    steps = np.ceil(np.log(top / limit) / math.log1p(_STEP) - 1e-9)
+    down: Vector = top * (1.0 + _STEP) ** -steps
+    return down
+
+
+def _near_material(s_mm: Vector, air: npt.NDArray[np.bool_], approach_mm: float) -> npt.NDArray[np.bool_]:
+    """Stations from which the next material is no farther than the approach."""
+    contact = np.where(air, np.inf, np.concatenate(([0.0], s_mm[:-1])))  # where the stretch of a station begins
+    following = np.minimum.accumulate(contact[::-1])[::-1]
+    near: npt.NDArray[np.bool_] = following - s_mm <= approach_mm
+    return near
+
+
+def _stretches_that_keep(task: _Task, machine: Machine, motion: Motion) -> list[_core.FeedStretch]:
+    """Plan, travel, and slow down earlier or more where the travel is still too fast."""
+    control = machine.feed_control
+    most_change = math.inf if control.max_change_mm_per_min is None else control.max_change_mm_per_min
+    floor = np.minimum(task.limit, task.lowest)
+    planned = np.maximum(_stepped(task.limit, task.programmed[task.segment]), floor)
+    before = np.full(len(planned), motion.reach_s + task.window_s)
+    behind = np.full(len(planned), motion.reach_s)
+    longest = _LONGEST_REACH * (motion.reach_s + task.window_s)
+    free = task.kept[task.segment] == 0.0
+    stretches: list[_core.FeedStretch] = []
+    for attempt in range(_ATTEMPTS):
+        feeds = _core.look_ahead_on_load(task.stations_mm, planned, task.load, before, behind)
+        stretches = _core.schedule_feed(
+            task.path.segment_ends_mm, task.kept, task.divisible, task.stations_mm, feeds, control.interval_mm,
+            most_change, task.feed_unit,
+        )  # fmt: skip
+        run = motion.travel(
+            _core.with_feeds(task.path, stretches), task.path, task.stations_mm, task.window_s
+        ).feed_mm_per_min
+        over = free & (run > task.load * (1.0 + _TOO_FAST))
+        if not over.any():
+            break
+        for reach in (before, behind):
+            reach[over] = np.minimum(1.5 * reach[over] + task.window_s, longest)
+        if attempt >= _LOWERING:
+            planned[over] *= np.maximum(task.load[over] / run[over], _LEAST_SHARE)
+            planned = np.maximum(planned, floor)
+    return stretches

@@ -1,0 +1,129 @@
+"""Feeds and shaping in one go: the feeds are chosen for the motion that the shaped program really has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from shapegcode.conversion.budget import Budget
+from shapegcode.conversion.convert import Conversion, convert, marked_out_of_tolerance
+from shapegcode.cutting.stock import Stock
+from shapegcode.cutting.tool import Tool
+from shapegcode.feed.report import RegionLoad, feed_report, load_of
+from shapegcode.feed.schedule import MARGIN, FeedSchedule, schedule_survey
+from shapegcode.feed.survey import survey
+from shapegcode.feed.travel import OrdinaryMotion, ShapedMotion, travel_emitted
+from shapegcode.machine import Machine
+from shapegcode.program import Program
+from shapegcode.program.compensation import read_for_conversion, require_decision
+from shapegcode.shaping.grid import choose_grid
+
+__all__ = ["ScheduledConversion", "convert_scheduled"]
+
+_ROUNDS = 4
+_MORE_MARGIN = 0.005  # beyond what the last round was off by
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class ScheduledConversion:
+    """A program with scheduled feeds, shaped.
+
+    Attributes:
+        conversion: the emitted program; its report holds that of the schedule under ``feed_schedule``.
+        schedule: the feeds; its loads "after" are those of the emitted program.
+    """
+
+    conversion: Conversion
+    schedule: FeedSchedule
+
+    @property
+    def within_tolerance(self) -> bool:
+        """Whether the shaped program keeps the machine's tolerances and the tool's limits."""
+        return self.conversion.within_tolerance and self.schedule.within_limits
+
+
+def convert_scheduled(
+    program: Program | str | Path,
+    machine: Machine,
+    tools: Tool | Sequence[Tool],
+    stock: Stock,
+    *,
+    margin: float = MARGIN,
+    resolution_mm: float | None = None,
+    block_period_s: float | None = None,
+    arc_feed_ratio: float | None = None,
+    budget: Budget | None = None,
+    on_progress: Progress = lambda _done: None,
+) -> ScheduledConversion:
+    """Schedule the feeds of a program, shape it, and look at the force of what was emitted.
+
+    Where the emitted program is beyond a limit, feeds are chosen again with more margin.
+
+    Args:
+        program: what to convert, or its file.
+        machine: controller, modes, tolerances.
+        tools: as :func:`shapegcode.feed.schedule.schedule_feed`.
+        stock: likewise.
+        margin: likewise.
+        resolution_mm: likewise.
+        block_period_s: as :func:`shapegcode.convert`.
+        arc_feed_ratio: likewise.
+        budget: likewise.
+        on_progress: called with the share that is done, 0 to 1.
+
+    Raises:
+        ProgramError, DesignError, ArgumentError, StockError, RoundTripError: as those two.
+    """
+    if not isinstance(program, Program):
+        program = read_for_conversion(program, machine)
+    require_decision(program, machine)
+    tools = [tools] if isinstance(tools, Tool) else list(tools)
+    surveyed = survey(
+        program, machine, tools, stock, resolution_mm=resolution_mm, on_progress=lambda d, n: on_progress(0.2 * d / n)
+    )
+    motion = ShapedMotion(machine, choose_grid(machine, block_period_s))
+    wanted = margin
+    for attempt in range(_ROUNDS):
+        planned = schedule_survey(surveyed, machine, motion=motion, margin=margin)
+        conversion = convert(
+            planned.written, machine, arc_feed_ratio=arc_feed_ratio, block_period_s=block_period_s, budget=budget
+        )
+        on_progress(0.2 + 0.8 * (attempt + 1) / _ROUNDS)
+        emitted = _measured(planned, conversion, machine, wanted)
+        excess = emitted.report["excess_ratio"]
+        if excess <= 0.0:
+            break
+        margin += excess + _MORE_MARGIN
+    report: dict[str, Any] = {**conversion.report, "feed_schedule": emitted.report}
+    report["warnings"] = list(dict.fromkeys([*emitted.report["warnings"], *conversion.report["warnings"]]))
+    text = conversion.text if emitted.within_limits else marked_out_of_tolerance(conversion.text)
+    return ScheduledConversion(replace(conversion, text=text, report=report), emitted)
+
+
+def _measured(planned: FeedSchedule, conversion: Conversion, machine: Machine, margin: float) -> FeedSchedule:
+    """The schedule with the loads of the emitted program."""
+    placed = {id(place.region): place for place in conversion.placed}
+    ordinary = OrdinaryMotion(machine)
+    loads: list[RegionLoad | None] = []
+    for part, region, load in zip(planned.survey.regions, planned.written.regions, planned.loads, strict=True):
+        if load is None or part.tool is None:
+            loads.append(load)
+            continue
+        window_s = 60.0 / (part.tool.tool.flutes * part.spindle_rev_per_min)
+        along = part.region.path
+        place = placed.get(id(region))
+        if place is None:
+            travelled = ordinary.travel(region.path, along, load.s_mm, window_s)
+        else:
+            blocks = conversion.emitted.core.cutting_path(place.first_line, place.last_line)
+            travelled = travel_emitted(blocks, along, machine, load.s_mm, window_s)
+        loads.append(replace(load, after=load_of(part, travelled)))
+    report = feed_report(planned.survey, planned.plans, loads, machine, margin)
+    times = conversion.report["cycle_time_s"]
+    report["cycle_time_s"] = {**planned.report["cycle_time_s"], "after": times["emitted"]}
+    report["blocks"] = {**planned.report["blocks"], "after": conversion.report["blocks"]["emitted"]}
+    return replace(planned, loads=tuple(loads), report=report)

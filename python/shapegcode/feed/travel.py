@@ -1,0 +1,116 @@
+"""How fast a machine really travels along a path: the feed that the cut sees, not the F word."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.conversion.write import filter_tolerance
+from shapegcode.machine import Machine
+from shapegcode.model.controller import controller_model, motion_limits
+from shapegcode.model.play import own_rule, playback_options
+from shapegcode.shaping.grid import Grid
+
+__all__ = ["Motion", "OrdinaryMotion", "ShapedMotion", "Travelled", "travel_emitted"]
+
+Vector = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Travelled:
+    """Travel along a path, one value per station.
+
+    Attributes:
+        feed_mm_per_min: largest feed per tooth on the stretch before the station, as a feed.
+        time_s: time on that stretch.
+    """
+
+    feed_mm_per_min: Vector
+    time_s: Vector
+
+    @classmethod
+    def of(cls, travel: _core.Travel) -> Travelled:
+        """What the core found."""
+        return cls(np.asarray(travel.highest_mm_per_s) * 60.0, np.asarray(travel.time_s))
+
+
+class Motion(Protocol):
+    """What makes a motion of the blocks of a region."""
+
+    @property
+    def reach_s(self) -> float:
+        """Time by which the travel lags behind a change of the commanded feed."""
+
+    def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
+        """Travel of a path made of `along`, to whose length the stations ascend; feeds are over the window."""
+
+
+class OrdinaryMotion:
+    """The controller's own motion, as it plays an ordinary program."""
+
+    def __init__(self, machine: Machine) -> None:
+        self._model = controller_model(machine)
+        self._filters = _core.acceleration_filters(self._model)
+
+    @property
+    def reach_s(self) -> float:
+        """Half of what the filters behind the interpolation last."""
+        return 0.5 * self._model.period_s * sum(filter_.duration_samples for filter_ in self._filters)
+
+    def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
+        """See `Motion`."""
+        model = self._model
+        if model.motion == _core.MotionKind.look_ahead:
+            profile = _core.plan_speed(path, model.limits)
+            return Travelled.of(
+                _core.travel_path(path, profile, along, stations_mm, model.period_s, self._filters, window_s)
+            )
+        return Travelled.of(
+            _core.travel_blocks(path, along, model.block_end, stations_mm, model.period_s, self._filters, window_s)
+        )
+
+
+class ShapedMotion:
+    """The motion that `convert` will make of a region: look-ahead within the contour tolerance, then the shaper.
+
+    What the emitted text does is measured afterwards (`travel_emitted`); this is what a schedule is planned with.
+    """
+
+    def __init__(self, machine: Machine, grid: Grid) -> None:
+        period = machine.controller.interpolation_period_s
+        ticks = round(grid.block_period_s / period)
+        self._period_s = period
+        self._limits = motion_limits(machine)
+        self._tolerance = filter_tolerance(machine, grid, machine.tolerance.contour_um)
+        shaper = _core.Fir([ticks * delay for delay in grid.fir.delays], list(grid.fir.taps))
+        own = playback_options(machine, time_constant_s=machine.controller.shaped_time_constant_s).axis_filters
+        # The emitted blocks join samples of the shaped command by straight lines.
+        self._filters = [shaper, _core.Fir.moving_average(ticks), *own]
+
+    @property
+    def reach_s(self) -> float:
+        """Half of what shaper and filters last."""
+        return 0.5 * self._period_s * sum(filter_.duration_samples for filter_ in self._filters)
+
+    def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
+        """See `Motion`."""
+        profile = _core.plan_speed(path, self._limits, self._tolerance)
+        return Travelled.of(
+            _core.travel_path(path, profile, along, stations_mm, self._period_s, self._filters, window_s)
+        )
+
+
+def travel_emitted(
+    blocks: _core.Path, path: _core.Path, machine: Machine, stations_mm: Vector, window_s: float
+) -> Travelled:
+    """Travel of shaped blocks as the controller plays them, along the programmed path; else as `Motion.travel`."""
+    options = playback_options(machine, time_constant_s=machine.controller.shaped_time_constant_s)
+    return Travelled.of(
+        _core.travel_blocks(
+            blocks, path, own_rule(machine), stations_mm, options.period_s, options.axis_filters, window_s
+        )
+    )

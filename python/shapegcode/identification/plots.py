@@ -1,0 +1,336 @@
+"""The pictures of ``shapegcode identify``: records with fit, frequency response, stabilisation chart, decay."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shapegcode.identification.identify import TapTest
+from shapegcode.identification.mode import IdentifiedMode
+from shapegcode.identification.result import Identification
+from shapegcode.identification.spectra import decay_spectrum, frf, mode_envelopes
+from shapegcode.io.record import UNITS, FloatArray, Record
+from shapegcode.results import plot as canvas
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = [
+    "plot_decay",
+    "plot_response",
+    "plot_spectrum",
+    "plot_stabilisation",
+    "plot_traces",
+    "write_tap_pictures",
+]
+
+_MOST_TRACES = 3
+_SEEN = 0.02
+_ROOM = 2.5
+_FILE_TIME = "time in the file in s"
+_FAINT = 0.35  # opacity of poles that are not stable
+_LEAST_SHOWN = 1e-5  # of the largest value, on a logarithmic axis
+_CLEAR = 3.0  # times the noise: down to here the model's envelope is the mode's
+_BELOW_NOISE = 0.3
+_BEYOND_NOISE = 1.25  # of the decay's duration, so that the noise is seen
+_MOST_ENVELOPES = 4
+_MEASURED, _FITTED = canvas.GREY, canvas.COLOURS[0]
+
+
+def write_tap_pictures(test: TapTest, folder: str | Path) -> list[str]:
+    """Write the pictures as PNG and SVG into a folder, which is made where it is missing.
+
+    Args:
+        test: with a result.
+        folder: where.
+
+    Returns:
+        The files written.
+
+    Raises:
+        ValueError: there is no result.
+        OSError: the folder cannot be made or a file not be written.
+    """
+    if test.found is None:
+        raise ValueError(f"no model of {', '.join(test.files)}: nothing to draw")
+    pictures: dict[str, Callable[[Path], None]] = {
+        "traces": lambda file: plot_traces(file, test),
+        "stabilisation": lambda file: plot_stabilisation(file, test),
+    }
+    if test.modes:
+        pictures["decay"] = lambda file: plot_decay(file, test)
+    if test.is_decay:
+        pictures["spectrum"] = lambda file: plot_spectrum(file, test)
+    else:
+        pictures["response"] = lambda file: plot_response(file, test)
+    return canvas.write_pictures(folder, "identify", pictures)
+
+
+def plot_traces(file: str | Path, test: TapTest) -> None:
+    """Force and response over time, with the model's response; of many taps the first ones.
+
+    Raises:
+        ValueError: a wrong ending.
+        OSError: the file cannot be written.
+    """
+    found = _found(test)
+    shown = list(zip(test.records, found.used, found.fitted, strict=True))[:_MOST_TRACES]
+    rows = 1 if test.is_decay else 2
+    figure = canvas.figure(4.0 + 3.6 * len(shown), 2.6 + 2.2 * rows)
+    for column, (record, (begin, end), fitted) in zip(canvas.panels(figure, rows, len(shown)), shown, strict=True):
+        time_s = record.time_s if test.is_decay else record.time_s - record.start_s
+        if record.force_n is not None:
+            column[0].plot(time_s, record.force_n, color="black", linewidth=1.0)
+            column[0].set_ylabel("force in N")
+        panel = column[-1]
+        panel.plot(time_s, record.response, color=_MEASURED, linewidth=2.2, label="measured")
+        panel.plot(time_s[begin:end], fitted, "--", color=_FITTED, linewidth=1.1, label="model")
+        panel.set_xlim(time_s[0], time_s[begin + _last_seen(np.asarray(fitted))])
+        panel.set_ylabel(_quantity(record))
+        panel.set_xlabel(_FILE_TIME if test.is_decay else "time in s")
+        column[0].set_title(Path(record.source).name, fontsize=9, loc="right")
+        canvas.legend_above(panel)
+    many = f", {len(shown)} of {len(test.records)} records" if len(test.records) > len(shown) else ""
+    canvas.heading(figure, f"Records and model ({found.fit_percent:.1f} % fit{many})", "")
+    canvas.save(figure, file)
+
+
+def plot_response(file: str | Path, test: TapTest) -> None:
+    """Frequency response, measured and of the model: magnitude, phase, coherence.
+
+    Raises:
+        ValueError: a wrong ending.
+        OSError: the file cannot be written.
+    """
+    found = _found(test)
+    measured, model = frf(_fitted_part(test)), frf(_as_fitted(test))
+    seen = _seen(measured.frequency_hz, test)
+    rows = 2 if measured.coherence is None else 3
+    figure = canvas.figure(9.0, 2.1 + 1.8 * rows)
+    column = canvas.panels(figure, rows, 1)[0]
+    magnitude, phase = column[:2]
+    for each, style, colour, width, label in (
+        (measured, "-", _MEASURED, 2.2, "measured"),
+        (model, "--", _FITTED, 1.1, "model"),
+    ):
+        frequency, ratio = each.frequency_hz[seen], each.response[seen]
+        magnitude.semilogy(frequency, np.abs(ratio), style, color=colour, linewidth=width, label=label)
+        # From -90 to 270 degrees: below a mode the phase of an acceleration is 180 and noise would wrap it.
+        phase.plot(frequency, 90.0 + np.degrees(np.angle(-1j * ratio)), style, color=colour, linewidth=width)
+    if measured.coherence is not None:
+        column[2].plot(measured.frequency_hz[seen], measured.coherence[seen], color=canvas.COLOURS[1], linewidth=1.0)
+        column[2].set_ylabel("coherence")
+        column[2].set_ylim(0.0, 1.05)
+    magnitude.set_ylabel(f"({UNITS[test.records[0].quantity]})/N")
+    phase.set_ylabel("phase in degrees")
+    phase.set_yticks([-90, 0, 90, 180, 270])
+    column[-1].set_xlabel("frequency in Hz")
+    bottom, top = magnitude.get_ylim()
+    magnitude.set_ylim(bottom, 4.0 * top)  # room for the labels
+    _mark_modes(column, found)
+    canvas.legend_above(magnitude)
+    taps = len(test.records)
+    canvas.heading(figure, f"Frequency response, {taps} {'tap' if taps == 1 else 'taps averaged'}", "")
+    canvas.save(figure, file)
+
+
+def plot_stabilisation(file: str | Path, test: TapTest) -> None:
+    """Poles by the order of the model over the spectrum, and the order that was chosen.
+
+    Raises:
+        ValueError: a wrong ending.
+        OSError: the file cannot be written.
+    """
+    found = _found(test)
+    frequency, amplitude = _spectrum(test)
+    seen = _seen(frequency, test)
+    figure = canvas.figure(9.0, 5.5)
+    panel = canvas.panels(figure, 1, 1)[0][0]
+    background = panel.twinx()
+    background.semilogy(frequency[seen], amplitude[seen], color="#c8c8c8", linewidth=1.0)
+    background.set_axis_off()
+    panel.set_zorder(background.get_zorder() + 1)
+    panel.patch.set_visible(False)
+    kinds = (
+        ("new", "x", canvas.GREY, "none"),
+        ("frequency within 1 %", "o", canvas.COLOURS[1], "none"),
+        ("and damping within 5 %", "o", canvas.COLOURS[2], canvas.COLOURS[2]),
+    )
+    highest = frequency[seen][-1]
+    for stable, (label, marker, edge, face) in enumerate(kinds):
+        poles = [
+            pole
+            for pole in found.chart
+            if pole.stable_frequency + pole.stable_damping == stable and pole.frequency_hz <= highest
+        ]
+        panel.plot(
+            [pole.frequency_hz for pole in poles], [pole.order for pole in poles], marker, linestyle="none",
+            markeredgecolor=edge, markerfacecolor=face, label=label, alpha=1.0 if stable == 2 else _FAINT,
+        )  # fmt: skip
+    panel.plot([], [], color="#c8c8c8", linewidth=1.0, label="spectrum")
+    panel.axhline(found.order, color="black", linewidth=0.8, linestyle="--", label=f"chosen: {found.order}")
+    panel.set_xlabel("frequency in Hz")
+    panel.set_ylabel("modes in the model")
+    panel.set_yticks(range(1, max((pole.order for pole in found.chart), default=1) + 1))
+    panel.set_xlim(frequency[seen][0], highest)
+    panel.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, frameon=False, borderaxespad=0.2, fontsize=9,
+        columnspacing=1.2, handletextpad=0.4,
+    )  # fmt: skip
+    canvas.heading(figure, "Stabilisation chart: poles by the order of the model", "")
+    canvas.save(figure, file)
+
+
+def plot_decay(file: str | Path, test: TapTest) -> None:
+    """Envelope of each mode's band of the first record while it decays, measured and of the model.
+
+    The model is drawn down to the noise, which is what it leaves of the response in the band. Below it the curve would
+    show how the band's filter rings.
+
+    Raises:
+        ValueError: a wrong ending, or no mode.
+        OSError: the file cannot be written.
+    """
+    found = _found(test)
+    frequencies = [mode.frequency_hz.value for mode in found.modes][:_MOST_ENVELOPES]
+    if not frequencies:
+        raise ValueError(f"no mode in {', '.join(test.files)}: no decay to draw")
+    record, model = _fitted_part(test)[0], _as_fitted(test)[0]
+    begin = _after_hit(record)
+    record, model = (replace(each, response=each.response[begin:], force_n=None) for each in (record, model))
+    figure = canvas.figure(9.0, 1.4 + 2.0 * len(frequencies))
+    column = canvas.panels(figure, len(frequencies), 1)[0]
+    left = replace(record, response=record.response - model.response)
+    bands = (mode_envelopes(each, frequencies) for each in (record, model, left))
+    time_s = record.time_s if test.is_decay else record.time_s - record.time_s[0]
+    longest = 1
+    for panel, frequency, measured, fitted, rest in zip(column, frequencies, *bands, strict=True):
+        top = float(measured.envelope.max())
+        noise = max(float(np.median(rest.envelope)), _LEAST_SHOWN * top)
+        end = _first_below(fitted.envelope, _CLEAR * noise)
+        longest = max(longest, end)
+        panel.semilogy(time_s, measured.envelope, color=_MEASURED, linewidth=2.2, label="measured")
+        panel.semilogy(time_s[:end], fitted.envelope[:end], "--", color=_FITTED, linewidth=1.1, label="model")
+        panel.axhline(noise, color="black", linewidth=0.8, linestyle=":", label="noise in the band")
+        panel.set_ylim(_BELOW_NOISE * noise, 2.0 * top)
+        panel.set_ylabel(f"{frequency:.4g} Hz, {UNITS[record.quantity]}")
+    for panel in column:
+        panel.set_xlim(time_s[0], time_s[min(round(_BEYOND_NOISE * longest), len(time_s) - 1)])
+    column[-1].set_xlabel(_FILE_TIME if test.is_decay else "time since the hit in s")
+    canvas.legend_above(column[0])
+    name = f": {Path(record.source).name}" if len(test.records) > 1 else ""
+    canvas.heading(figure, f"Decay: envelope of the {record.quantity} in the band of each mode{name}", "")
+    canvas.save(figure, file)
+
+
+def plot_spectrum(file: str | Path, test: TapTest) -> None:
+    """Amplitude spectrum of a decay with its peaks labelled, as in paper 000.
+
+    Raises:
+        ValueError: a wrong ending.
+        OSError: the file cannot be written.
+    """
+    spectrum = decay_spectrum(_fitted_part(test)[0])
+    seen = _seen(spectrum.frequency_hz, test, [peak.frequency_hz for peak in spectrum.peaks])
+    figure = canvas.figure(9.0, 4.5)
+    panel = canvas.panels(figure, 1, 1)[0][0]
+    amplitude = spectrum.amplitude[seen]
+    top = float(amplitude.max())
+    panel.semilogy(spectrum.frequency_hz[seen], amplitude, color=canvas.COLOURS[1], linewidth=1.2)
+    panel.set_xlabel("frequency in Hz")
+    panel.set_ylabel(_quantity(test.records[0]))
+    panel.set_ylim(max(_BELOW_NOISE * float(np.median(amplitude)), _LEAST_SHOWN * top), 3.0 * top)
+    for peak in spectrum.peaks:
+        if peak.frequency_hz <= spectrum.frequency_hz[seen][-1]:
+            panel.annotate(
+                peak.label, (peak.frequency_hz, peak.amplitude), (0, 6), textcoords="offset points", ha="center"
+            )
+    canvas.heading(figure, "Spectrum of the free decay", "")
+    canvas.save(figure, file)
+
+
+def _found(test: TapTest) -> Identification:
+    if test.found is None:
+        raise ValueError(f"no model of {', '.join(test.files)}: nothing to draw")
+    return test.found
+
+
+def _quantity(record: Record) -> str:
+    return f"{record.quantity} in {UNITS[record.quantity]}"
+
+
+def _fitted_part(test: TapTest) -> list[Record]:
+    """The records as far as they were fitted."""
+    return [
+        replace(
+            record,
+            response=record.response[begin:end],
+            force_n=None if record.force_n is None else record.force_n[begin:end],
+            start_s=record.start_s + begin * record.period_s,
+        )
+        for record, (begin, end) in zip(test.records, _found(test).used, strict=True)
+    ]
+
+
+def _as_fitted(test: TapTest) -> list[Record]:
+    """The same with the model's response."""
+    return [
+        replace(record, response=np.asarray(fitted))
+        for record, fitted in zip(_fitted_part(test), _found(test).fitted, strict=True)
+    ]
+
+
+def _spectrum(test: TapTest) -> tuple[FloatArray, FloatArray]:
+    """Frequencies and root mean square over the records of their amplitude spectra, 2/n |FFT|."""
+    parts = _fitted_part(test)
+    count = 1 << max(len(part.response) for part in parts).bit_length()
+    squares = [
+        (2.0 / len(part.response) * np.abs(np.fft.rfft(part.response - part.response.mean(), count))) ** 2
+        for part in parts
+    ]
+    return (
+        np.asarray(np.fft.rfftfreq(count, parts[0].period_s), dtype=np.float64),
+        np.asarray(np.sqrt(np.mean(squares, axis=0)), dtype=np.float64),
+    )
+
+
+def _seen(frequency_hz: FloatArray, test: TapTest, peaks_hz: Sequence[float] = ()) -> slice:
+    """From the first bin above 0 to well above the highest mode."""
+    found = _found(test)
+    marked = [*peaks_hz, *(mode.frequency_hz.value for mode in (*found.modes, *found.refused))]
+    return slice(1, int(np.searchsorted(frequency_hz, _ROOM * max(marked, default=frequency_hz[-1] / _ROOM))))
+
+
+def _mark_modes(column: list[Axes], found: Identification) -> None:
+    """Thin lines at the modes, refused ones dotted, their frequencies above."""
+    marked: list[tuple[IdentifiedMode, str]] = [(mode, "--") for mode in found.modes]
+    marked += [(mode, ":") for mode in found.refused]
+    for mode, style in marked:
+        hertz = mode.frequency_hz.value
+        for panel in column:
+            panel.axvline(hertz, color="black", linewidth=0.6, linestyle=style)
+        column[0].annotate(
+            f"{hertz:.4g} Hz", (hertz, 0.98), (3, 0), xycoords=("data", "axes fraction"), textcoords="offset points",
+            va="top", fontsize=8,
+        )  # fmt: skip
+
+
+def _after_hit(record: Record) -> int:
+    return 0 if record.force_n is None else int(np.argmax(np.abs(record.force_n)))
+
+
+def _first_below(envelope: FloatArray, level: float) -> int:
+    """The first sample behind the largest that lies below a level, or the number of samples."""
+    peak = int(np.argmax(envelope))
+    below = np.flatnonzero(envelope[peak:] < level)
+    return peak + int(below[0]) if len(below) else len(envelope)
+
+
+def _last_seen(fitted: FloatArray) -> int:
+    """The last sample that is worth drawing."""
+    large = np.flatnonzero(np.abs(fitted - fitted[-1]) > _SEEN * np.abs(fitted).max())
+    return int(large[-1]) if len(large) else len(fitted) - 1

@@ -1,0 +1,95 @@
+"""Files that are either complete or as they were before."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+__all__ = ["named_errors", "replaced_file", "write_bytes", "write_text"]
+
+
+@contextlib.contextmanager
+def named_errors(path: str | Path) -> Iterator[None]:
+    """Errors of the file system get the name of *path*: a failed write() has none, that of a temporary file misleads.
+
+    Raises:
+        OSError: with the name of *path* and the reason.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise type(error)(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+
+
+@contextlib.contextmanager
+def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
+    """A stream whose content takes the place of a file when the block ends well; otherwise the file stays as it was.
+
+    A symbolic link is followed; a device or pipe is written to directly.
+
+    Raises:
+        OSError: the file cannot be written, for example a full disk or a missing folder.
+    """
+    target = Path(os.path.realpath(path))
+    if target.exists() and not stat.S_ISREG(target.stat().st_mode):
+        with open(target, "wb") as stream:
+            yield stream
+        return
+    mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    try:
+        with open(temporary, "xb") as stream:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+        if mode is not None:
+            temporary.chmod(mode)
+        os.replace(temporary, target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:
+    """Write a UTF-8 file so that it is either complete or as it was before; line ends as they are.
+
+    Args:
+        path: the file; a symbolic link is followed; a device or pipe is written to directly.
+        text: its content.
+        overwrite: False: an existing file is an error, even if it appears at the last moment.
+
+    Raises:
+        FileExistsError: the file exists and *overwrite* is False.
+        OSError: with the name of *path* and the reason, for example a full disk or a missing folder.
+    """
+    write_bytes(path, text.encode(), overwrite=overwrite)
+
+
+def write_bytes(path: str | Path, data: bytes, *, overwrite: bool = True) -> None:
+    """As :func:`write_text`, for bytes.
+
+    Raises:
+        FileExistsError: the file exists and *overwrite* is False.
+        OSError: with the name of *path* and the reason.
+    """
+    with named_errors(path):
+        if overwrite:
+            with replaced_file(path) as stream:
+                stream.write(data)
+        else:
+            _write_new(Path(os.path.realpath(path)), data)
+
+
+def _write_new(target: Path, data: bytes) -> None:
+    with open(target, "xb") as stream:
+        try:
+            stream.write(data)
+            stream.flush()
+        except BaseException:
+            target.unlink(missing_ok=True)
+            raise

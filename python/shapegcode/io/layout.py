@@ -1,0 +1,323 @@
+"""Finds out how a text file with columns is written: delimiter, decimal comma, preamble, header, units, rows."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from shapegcode.io.record import RecordError
+from shapegcode.io.units import find_unit, read_label
+
+__all__ = [
+    "Layout",
+    "cells_of",
+    "find_layout",
+    "has_thousands",
+    "is_clock_time",
+    "is_number",
+    "utf8_text",
+    "without_thousands",
+]
+
+#: The header of loggers with long preambles stays within this.
+_HEAD_BYTES = 262_144
+_HEAD_LINES = 400
+#: So many rows of numbers on end are data; a preamble may hold one or two.
+_ROWS_TO_KNOW = 3
+_TEXT_BYTES = frozenset(range(32, 256)) | {9, 10, 12, 13}
+_DELIMITERS = ("\t", ";", ",", " ")
+_NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
+#: Behind a point for thousands stand three digits; the comma behind the last of them tells it from a decimal point.
+_THOUSANDS = r"\d{1,3}(?:\.\d{3})+(?=,\d)"
+_COMMA_NUMBER = re.compile(
+    rf"[+-]?({_THOUSANDS},\d+|\d+(,\d+)?|,\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE
+)
+_RATE = re.compile(
+    r"(?:sampl\w*[ _-]*(?:rate|freq\w*)|abtast(?:rate|frequenz)|sample_rate|\bfs\b)"
+    r"[^\d\w]*(k?hz)?[^\d\w]*([\d.,]+(?:e[+-]?\d+)?)\s*(k?hz)?",
+    re.IGNORECASE,
+)
+_STEP = re.compile(
+    r"(?:delta_x|sampl\w*[ _-]*(?:interval|period)|abtastintervall)"
+    r"[^\d\w]*(m?s)?[^\d\w]*([\d.,]+(?:e[+-]?\d+)?)\s*(ms|us|µs|s)?\b",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How the file is written.
+
+    Attributes:
+        delimiter: between cells; " " stands for any run of blanks.
+        decimal_comma: numbers have a comma for the point.
+        header: cells of the header; empty: there is none.
+        header_line: its line, from 1.
+        units: cells of the row of units below it; empty: there is none.
+        first_row: line of the first row of numbers, from 1.
+        columns: cells of that row.
+        skipped: lines of text before the header.
+        period_s: sampling period that the preamble states.
+    """
+
+    delimiter: str
+    decimal_comma: bool
+    header: list[str]
+    header_line: int
+    units: list[str]
+    first_row: int
+    columns: int
+    skipped: int
+    period_s: float | None = None
+
+    @property
+    def delimiter_name(self) -> str:
+        """For messages."""
+        return _NAMES[self.delimiter]
+
+
+def utf8_text(path: Path) -> bytes:
+    """The text as ASCII-compatible bytes with line feeds.
+
+    Raises:
+        RecordError: it is not text.
+    """
+    data = path.read_bytes()
+    if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
+        data = data.decode("utf-16", errors="replace").encode("utf-8")
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    strange = sorted(set(data[:65536]) - _TEXT_BYTES)
+    if strange:
+        raise RecordError(
+            f"{path}: a binary file (byte 0x{strange[0]:02x} at {data.index(bytes([strange[0]]))}); needed is text "
+            "with columns, UFF (dataset 58) or WAV"
+        )
+    if b"\n" not in data[:65536] and b"\r" in data[:65536]:
+        data = data.replace(b"\r", b"\n")
+    return data
+
+
+def cells_of(line: str, delimiter: str) -> list[str]:
+    """The cells of a line, without quotes and surrounding blanks."""
+    if delimiter == " ":
+        return line.split()
+    if '"' in line:
+        row = next(iter(csv.reader([line], delimiter=delimiter, skipinitialspace=True)), [])
+        return [cell.strip() for cell in row]
+    return [cell.strip() for cell in line.split(delimiter)]
+
+
+def is_number(cell: str, decimal_comma: bool) -> bool:
+    """Whether a cell is a number, NaN and infinity included."""
+    return (_COMMA_NUMBER if decimal_comma else _NUMBER).fullmatch(cell) is not None
+
+
+def is_clock_time(cell: str) -> bool:
+    """Whether a cell is a time of the day, with a date or without: ``10:15:00,000391``."""
+    return re.search(r"\d{1,2}:\d{2}", cell) is not None
+
+
+def has_thousands(cell: str) -> bool:
+    """Whether a number with a decimal comma has points for thousands: ``1.265,02``."""
+    return "." in cell and is_number(cell, True)
+
+
+def without_thousands(data: bytes) -> bytes:
+    """Text of numbers with decimal commas, points for thousands left out."""
+    if b"." not in data:
+        return data
+    return re.sub(rb"(?<![\d.,])" + _THOUSANDS.encode(), lambda found: found[0].replace(b".", b""), data)
+
+
+@dataclass
+class _Rows:
+    """Where the numbers begin under one delimiter."""
+
+    delimiter: str
+    start: int
+    columns: int
+    decimal_comma: bool
+    numbers: list[list[str]] = field(default_factory=list)
+
+
+def _is_row(cells: list[str], strict: bool, delimiter: str) -> bool:
+    filled = [cell for cell in cells if cell]
+    numbers = sum(is_number(cell, False) or (delimiter != "," and is_number(cell, True)) for cell in filled)
+    return numbers == len(filled) > 0 if strict else 2 * numbers > len(filled)
+
+
+def _rows(lines: list[str], delimiter: str, strict: bool, least: int) -> _Rows | None:
+    run: list[int] = []
+    split = [cells_of(line, delimiter) for line in lines]
+    filled = [index for index, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
+    for index in filled:
+        cells = split[index]
+        if len(cells) < least or not _is_row(cells, strict, delimiter):
+            run = []
+            continue
+        if run and len(split[run[-1]]) != len(cells):
+            run = []
+        run.append(index)
+        if len(run) == _ROWS_TO_KNOW or index == filled[-1]:
+            sample = [split[k] for k in run]
+            comma = delimiter != "," and any(
+                "," in cell and is_number(cell, True) for line in split[run[0] :] for cell in line
+            )
+            return _Rows(delimiter, run[0], len(cells), comma, sample)
+    return None
+
+
+def _find_rows(lines: list[str]) -> _Rows | None:
+    for strict in (True, False):
+        for delimiter in _DELIMITERS:
+            found = _rows(lines, delimiter, strict, 2)
+            if found is None:
+                continue
+            above = next((line for line in reversed(lines[: found.start]) if line.strip()), "")
+            if delimiter == "," and found.columns == 2 and above and "," not in above:
+                break  # one column with a decimal comma
+            return found
+    return _rows(lines, ";", True, 1)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text.replace(",", "."))
+    except ValueError:
+        return None
+
+
+def _stated_period(lines: list[str]) -> float | None:
+    for line in lines:
+        if match := _RATE.search(line):
+            rate = _number(match[2])
+            if rate:
+                kilo = "k" in (match[1] or match[3] or "").lower()
+                return 1.0 / (rate * (1000.0 if kilo else 1.0))
+        if match := _STEP.search(line):
+            step = _number(match[2])
+            unit = find_unit(match[1] or match[3] or "s")
+            if step and unit is not None:
+                return step * unit.factor
+    return None
+
+
+def _uncommented(line: str) -> str:
+    return re.sub(r"^\s*(#+|%+|//+|\*+)\s*", "", line)
+
+
+def _labels_known(cells: list[str]) -> int:
+    return sum(read_label(cell).measures is not None for cell in cells)
+
+
+def find_layout(path: Path, head: bytes, by_number: bool) -> Layout:
+    """Find out how a text file is written.
+
+    Args:
+        path: for messages.
+        head: its beginning, or all of it.
+        by_number: columns are named by number, so that no header is needed.
+
+    Raises:
+        RecordError: no numbers, no header, or lines between header and numbers that are neither.
+    """
+    lines = _head_lines(head)
+    rows = _find_rows(lines)
+    if rows is None:
+        shown = next((line for line in lines if line.strip()), "")
+        raise RecordError(
+            f"{path}:1: no rows of numbers among the first {len(lines)} lines; needed are columns of numbers divided "
+            f"by comma, semicolon, tab or blanks below a header such as 'time_s,force_N,acc_m/s^2'; the first line is "
+            f"{shown[:80]!r}"
+        )
+    above = [
+        (number, cells_of(_uncommented(line), rows.delimiter))
+        for number, line in enumerate(lines[: rows.start], start=1)
+        if re.search(r"\w", line)
+    ]
+    header, units = _choose_header(path, above, rows, lines)
+    if not header[1] and not by_number:
+        raise RecordError(
+            f"{path}:1: no header: the first line is {lines[rows.start][:80]!r}; needed is a line that names the "
+            "columns, such as 'time_s,force_N,acc_m/s^2', or columns named by number (--time-column 1 ...)"
+        )
+    if _labels_known(header[1][rows.columns :]) or _short(header[1], rows):
+        hint = (
+            "; decimal commas cannot be told from commas between columns: export with semicolons or decimal points"
+            if rows.delimiter == "," and rows.columns == 2 * len(header[1])
+            else ""
+        )
+        raise RecordError(
+            f"{path}:{header[0]}: cells of the header, divided by {_NAMES[rows.delimiter]}: {len(header[1])}; of line "
+            f"{rows.start + 1}: {rows.columns}; must be as many, divided by the same character{hint}; the header is "
+            f"{lines[header[0] - 1][:80]!r}"
+        )
+    return Layout(
+        delimiter=rows.delimiter,
+        decimal_comma=rows.decimal_comma,
+        header=header[1][: rows.columns],
+        header_line=header[0],
+        units=units,
+        first_row=rows.start + 1,
+        columns=rows.columns,
+        skipped=max(0, header[0] - 1),
+        period_s=_stated_period(lines[: max(0, header[0] - 1)]),
+    )
+
+
+def _short(header: list[str], rows: _Rows) -> bool:
+    """Whether cells of the rows have no name, other than empty ones behind the last delimiter."""
+    return bool(header) and any(any(row[len(header) :]) for row in rows.numbers)
+
+
+def _choose_header(
+    path: Path, above: list[tuple[int, list[str]]], rows: _Rows, lines: list[str]
+) -> tuple[tuple[int, list[str]], list[str]]:
+    if not above:
+        return (0, []), []
+    number, cells = above[-1]
+    if cells[0].lower() == "x_value":  # LabVIEW says the units of the signals, not of the time, in its preamble
+        units = next((line[1:] for _, line in reversed(above) if line[0].lower() == "y_unit_label"), [])
+        return above[-1], ["", *units] if units else []
+    filled = [cell for cell in cells if cell.strip(" -[]()")]
+    known = sum(find_unit(cell) is not None for cell in filled)
+    if filled and 2 * known >= len(filled) and len(above) > 1:
+        before = above[-2]
+        if len(before[1]) == len(cells) and (known == len(filled) or _labels_known(before[1]) > 1):
+            return before, cells
+    if _labels_known(cells) and not _is_row(cells, False, rows.delimiter):
+        return above[-1], []
+    for at in range(len(above) - 2, -1, -1):
+        if len(above[at][1]) == rows.columns and _labels_known(above[at][1]) > 1:
+            _refuse_between(path, above[at + 1 :], rows, lines)
+    if all(is_number(cell, True) or is_number(cell, False) for cell in cells if cell):
+        return (0, []), []
+    return (number, cells), []
+
+
+def _refuse_between(path: Path, between: list[tuple[int, list[str]]], rows: _Rows, lines: list[str]) -> None:
+    for number, cells in between:
+        for at, cell in enumerate(cells, start=1):
+            if not (is_number(cell, False) or (rows.delimiter != "," and is_number(cell, True))):
+                raise RecordError(
+                    f"{path}:{number}: column {at}: {cell!r} is not a number; below the header only a row of units and "
+                    f"rows of numbers may stand; the line is {lines[number - 1][:80]!r}"
+                )
+    number, cells = between[0]
+    raise RecordError(f"{path}:{number}: {len(cells)} cells, the rows below have {rows.columns}: must be as many")
+
+
+def _head_lines(head: bytes) -> list[str]:
+    part = head[:_HEAD_BYTES]
+    try:
+        text = part.decode("utf-8")
+    except UnicodeDecodeError as error:
+        whole = len(part) < len(head) and error.start > len(part) - 4
+        text = part[: error.start].decode("utf-8") if whole else part.decode("cp1252", errors="replace")
+    lines = text.split("\n")
+    if len(part) < len(head):
+        lines = lines[:-1]
+    return [line.rstrip("\r") for line in lines[:_HEAD_LINES]]

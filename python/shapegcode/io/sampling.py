@@ -1,0 +1,98 @@
+"""The time between two samples, from the instants that a file gives."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shapegcode.io.record import FloatArray
+
+__all__ = ["STATED_RATE_TOLERANCE", "UnevenTimeError", "even_period"]
+
+#: An instant may lie this share of a period away from where even sampling puts it. Rounding to the digits of the file
+#: moves it by up to half a digit; a missing or a doubled sample moves it, or a neighbour, by half a period or more.
+_OFF_GRID = 0.49
+#: A step from one instant to the next may differ from the period by this share; a missing sample doubles it.
+_OFF_STEP = 0.9
+#: Off the grid by more than this share of a period, the user is told.
+_TELL = 0.1
+#: A stated rate and the instants may differ by this share: clocks are better by far, wrong units are worse by far.
+STATED_RATE_TOLERANCE = 0.01
+_GRID_ONLY = "samples must be evenly spaced"
+
+
+class UnevenTimeError(ValueError):
+    """The instants are not evenly spaced.
+
+    Attributes:
+        row: index of the sample at which it shows.
+    """
+
+    def __init__(self, row: int, text: str) -> None:
+        super().__init__(text)
+        self.row = row
+
+
+def even_period(times_s: FloatArray, stated_s: float | None = None) -> tuple[float, list[str]]:
+    """Mean period of evenly spaced instants, and warnings.
+
+    Args:
+        times_s: (n,) instants, n at least 3.
+        stated_s: a period stated elsewhere, which the instants must agree with; rounding of the instants to whole
+            digits longer than a period is then accepted.
+
+    Raises:
+        UnevenTimeError: a gap, a repeated or a descending instant, a changing rate, or not the stated period.
+    """
+    count = len(times_s)
+    steps = np.diff(times_s)
+    backwards = np.flatnonzero(steps < 0.0)
+    if backwards.size:
+        row = int(backwards[0]) + 1
+        raise UnevenTimeError(row, f"time {times_s[row]:.9g} s comes after {times_s[row - 1]:.9g} s: must ascend")
+    mean = float(times_s[-1] - times_s[0]) / (count - 1)
+    if stated_s is not None and not abs(mean / stated_s - 1.0) <= STATED_RATE_TOLERANCE:
+        raise UnevenTimeError(
+            0,
+            f"the time column says a sample every {mean:.6g} s, {stated_s:.6g} s is stated: must agree within "
+            f"{100 * STATED_RATE_TOLERANCE:g} %; is the unit of the time right?",
+        )
+    period = mean if stated_s is None else stated_s
+    rising = steps[steps > 0.0]
+    digit = float(np.min(rising)) if rising.size else 0.0
+    coarse = stated_s is not None and digit > 1.5 * stated_s
+    repeated = np.flatnonzero(steps == 0.0)
+    if repeated.size and not coarse:
+        row = int(repeated[0]) + 1
+        raise UnevenTimeError(
+            row,
+            f"time {times_s[row]:.9g} s is repeated: must ascend; if the file gives too few digits, leave the time out "
+            "and state the period (--period)",
+        )
+    usual = float(np.median(steps))
+    if not coarse:
+        row = int(np.argmax(np.abs(steps - usual)))
+        if abs(steps[row] - usual) > _OFF_STEP * usual:
+            raise UnevenTimeError(
+                row + 1,
+                f"{steps[row]:.6g} s between {times_s[row]:.9g} s and {times_s[row + 1]:.9g} s, usually {usual:.6g} s: "
+                f"{_GRID_ONLY}; samples are missing",
+            )
+    grid = times_s[0] + period * np.arange(count)
+    off = times_s - grid
+    # The first instant is rounded like the others.
+    off -= np.median(off)
+    row = int(np.argmax(np.abs(off)))
+    share = float(abs(off[row])) / period
+    limit = max(_OFF_GRID, digit / period if coarse else 0.0)
+    if share > limit:
+        raise UnevenTimeError(
+            row,
+            f"time {times_s[row]:.9g} s is {share:.2g} periods of {period:.6g} s off even spacing (limit {limit:.2g}): "
+            f"{_GRID_ONLY} and none may be missing",
+        )
+    if share > _TELL and not coarse:
+        return period, [
+            f"times are up to {100 * share:.0f} % of a period off even spacing: taken as rounding, with the mean "
+            f"period of {period:.6g} s"
+        ]
+    return period, []

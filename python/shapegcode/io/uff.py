@@ -1,0 +1,305 @@
+"""Reads records from universal files: dataset 58 (function at nodal DOF), text or binary, with dataset 164's units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from shapegcode.io.options import ReadOptions, stated_unit
+from shapegcode.io.record import FloatArray, Quantity, Record, RecordError
+from shapegcode.io.sampling import UnevenTimeError, even_period
+from shapegcode.io.units import find_unit, read_label, units_of
+
+__all__ = ["read_uff"]
+
+_TIME_RESPONSE = 1
+_FUNCTIONS = {
+    2: "auto spectra",
+    3: "cross spectra",
+    4: "frequency response functions",
+    6: "coherence",
+    9: "power spectral densities",
+    12: "spectra",
+}
+_TIME_TYPE = 17
+_MEASURED: dict[int, Literal["force"] | Quantity] = {
+    8: "displacement",
+    9: "force",
+    11: "velocity",
+    12: "acceleration",
+    13: "force",
+}
+_AXES = {1: "x", 2: "y", 3: "z"}
+_COMPLEX = (5, 6)
+
+
+@dataclass(frozen=True, eq=False)
+class _Channel:
+    """A time record of the file: SI, positive along its axis."""
+
+    number: int
+    header: dict[str, Any]
+    measures: Literal["force"] | Quantity
+    axis: str | None
+    period_s: float
+    start_s: float
+    values: FloatArray
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """Node and axis."""
+        return int(self.header["rsp_node"]), abs(int(self.header["rsp_dir"]))
+
+
+class _File:
+    """The datasets of one file."""
+
+    def __init__(self, path: Path, options: ReadOptions) -> None:
+        import pyuff
+
+        self.path, self.options = path, options
+        self.warnings: list[str] = []
+        self.unitless: list[str] = []
+        try:
+            self.uff = pyuff.UFF(str(path))
+            self.types = [int(each) for each in self.uff.get_set_types()]
+        except Exception as error:  # pyuff raises nothing narrower
+            raise RecordError(f"{path}: the universal file cannot be read: {error}") from error
+
+    def _set(self, index: int) -> dict[str, Any]:
+        try:
+            found: dict[str, Any] = self.uff.read_sets(index)
+        except Exception as error:  # pyuff raises nothing narrower
+            raise RecordError(
+                f"{self.path}: dataset {index + 1} (type {self.types[index]}) cannot be read: {error}"
+            ) from error
+        return found
+
+    def channels(self) -> list[_Channel]:
+        """The time records.
+
+        Raises:
+            RecordError: there is none, or one cannot be used.
+        """
+        units: dict[str, Any] = {}
+        others: dict[str, int] = {}
+        found: list[_Channel] = []
+        for index, kind in enumerate(self.types):
+            if kind == 164:
+                units = self._set(index)
+            if kind != 58:
+                continue
+            data = self._set(index)
+            function = int(data["func_type"])
+            timed = function == 0 and int(data["abscissa_spec_data_type"]) == _TIME_TYPE
+            if function != _TIME_RESPONSE and not timed:
+                name = _FUNCTIONS.get(function, f"functions of type {function}")
+                others[name] = others.get(name, 0) + 1
+                continue
+            found.append(self._channel(index, data, units))
+        if not found:
+            held = ", ".join(f"{count} {name}" for name, count in others.items()) or (
+                "datasets of type " + ", ".join(map(str, sorted(set(self.types)))) if self.types else "no whole dataset"
+            )
+            raise RecordError(
+                f"{self.path}: no time record: the file holds {held}; needed are time records (dataset 58, function "
+                "type 1) of the response, and of the force for a mass: spectra no longer tell overload, double hits "
+                "and noise"
+            )
+        if self.unitless:
+            sets = "dataset" if len(self.unitless) == 1 else "datasets"
+            self.warnings.append(f"no unit in {sets} {', '.join(self.unitless)}, and no dataset 164: SI is taken")
+        return found
+
+    def _channel(self, index: int, data: dict[str, Any], units: dict[str, Any]) -> _Channel:
+        where = f"{self.path}: dataset {index + 1}"
+        values = np.asarray(data["data"])
+        if int(data["ord_data_type"]) in _COMPLEX:
+            raise RecordError(f"{where}: complex values: a time record is real")
+        if len(values) != int(data["num_pts"]):
+            raise RecordError(
+                f"{where}: {len(values)} values, its header says {data['num_pts']}: the file is cut off or damaged"
+            )
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            raise RecordError(f"{where}: value {bad[0] + 1} is {values[bad[0]]}: must be a finite number")
+        if len(values) < 16:
+            raise RecordError(
+                f"{where}: {len(values)} samples: too short; a record has at least 16, a good one some 1000"
+            )
+        direction = int(data["rsp_dir"])
+        if abs(direction) > 3:
+            raise RecordError(f"{where}: direction {direction} is a rotation: needed are x, y, z (1 to 3)")
+        measures = self._measures(where, data)
+        factor = self._factor(where, data, measures, units)
+        period, start = self._period(where, data)
+        return _Channel(
+            number=index + 1,
+            header=data,
+            measures=measures,
+            axis=_AXES.get(abs(direction)),
+            period_s=period,
+            start_s=start,
+            values=np.asarray(values * (factor if direction >= 0 else -factor), dtype=np.float64),
+        )
+
+    def _measures(self, where: str, data: dict[str, Any]) -> Literal["force"] | Quantity:
+        code = int(data["ordinate_spec_data_type"])
+        unit = find_unit(str(data.get("ordinate_axis_units_lab", "")))
+        by_unit = unit.measures if unit is not None and unit.measures != "time" else None
+        if code in _MEASURED:
+            if by_unit not in {None, _MEASURED[code]}:
+                raise RecordError(
+                    f"{where}: its data type {code} is {_MEASURED[code]}, its unit {unit.name if unit else ''} is of "
+                    f"{by_unit}: must agree"
+                )
+            return _MEASURED[code]
+        if by_unit is not None:
+            return by_unit
+        for text in (data.get("ordinate_axis_lab", ""), data.get("id1", ""), data.get("id2", "")):
+            measures = read_label(str(text)).measures
+            if measures in ("force", "acceleration", "velocity", "displacement"):
+                return measures
+            if measures == "response" and self.options.quantity:
+                return self.options.quantity
+        if self.options.quantity:
+            return self.options.quantity
+        raise RecordError(
+            f"{where}: cannot tell what it is: ordinate data type {code}, unit "
+            f"{data.get('ordinate_axis_units_lab', '')!r}, title {data.get('id1', '')!r}; needed is data type 13 "
+            "(force), 12 (acceleration), 11 (velocity) or 8 (displacement), or a unit"
+        )
+
+    def _factor(self, where: str, data: dict[str, Any], measures: str, units: dict[str, Any]) -> float:
+        options = self.options
+        force = measures == "force"
+        scale = options.force_scale if force else options.response_scale
+        if scale is not None:
+            return scale
+        stated = stated_unit(options.force_unit if force else options.response_unit, (measures,))
+        if stated is not None:
+            return stated.factor
+        text = str(data.get("ordinate_axis_units_lab", "")).strip()
+        label = find_unit(text)
+        # Dataset 164: SI value = value / factor.
+        system = 1.0 / float(units["force" if force else "length"]) if units else None
+        if label is not None:
+            if system is not None and not np.isclose(system, label.factor, rtol=1e-4):
+                self.warnings.append(
+                    f"dataset {where.rsplit(' ', 1)[1]}: its unit is {label.name}, dataset 164 says "
+                    f"{system:g} SI units: the label is taken"
+                )
+            return label.factor
+        if system is not None:
+            return system
+        if text.upper() not in {"", "NONE"}:
+            known = units_of(measures)  # type: ignore[arg-type]
+            raise RecordError(
+                f"{where}: the unit {text!r} of the {measures} is not known and there is no dataset 164; needed is one "
+                f"of {known}, or a scale (--force-scale, --response-scale)"
+            )
+        self.unitless.append(where.rsplit(" ", 1)[1])
+        return 1.0
+
+    def _period(self, where: str, data: dict[str, Any]) -> tuple[float, float]:
+        unit = find_unit(str(data.get("abscissa_axis_units_lab", "")))
+        if unit is not None and unit.measures != "time":
+            raise RecordError(f"{where}: its abscissa is in {unit.name}: a time record has its time there")
+        times = np.asarray(data["x"], dtype=np.float64) * (unit.factor if unit is not None else 1.0)
+        if not np.isfinite(times).all():
+            raise RecordError(f"{where}: a time is not a finite number")
+        try:
+            period, notes = even_period(times, self.options.period_s)
+        except UnevenTimeError as error:
+            raise RecordError(f"{where}, sample {error.row + 1}: {error}") from error
+        if not period > 0.0:
+            raise RecordError(f"{where}: its time increment is {period:g} s: must be above 0")
+        self.warnings += [f"dataset {where.rsplit(' ', 1)[1]}: {note}" for note in notes]
+        return period, float(times[0])
+
+
+def _force_of(path: Path, response: _Channel, forces: list[_Channel], responses: list[_Channel]) -> _Channel:
+    """The force that belongs to a response.
+
+    The force at the response's reference; of those, the one with its version, load case or function number where these
+    tell measurements apart; of those, by their order in the file.
+    """
+    head = response.header
+
+    def alike(channel: _Channel, channels: list[_Channel]) -> list[_Channel]:
+        for key in ("ver_num", "load_case_id", "func_id"):
+            if len({int(each.header[key]) for each in forces}) > 1:
+                same = [each for each in channels if int(each.header[key]) == int(channel.header[key])]
+                channels = same or channels
+        return channels
+
+    reference = (int(head["ref_node"]), abs(int(head["ref_dir"])))
+    candidates = [force for force in forces if force.place == reference] if reference != (0, 0) else []
+    candidates = alike(response, candidates or forces)
+    rivals = alike(response, [each for each in responses if each.place == response.place])
+    order = rivals.index(response)
+    if order >= len(candidates):
+        raise RecordError(
+            f"{path}: {len(rivals)} responses at node {response.place[0]} and {len(candidates)} forces that may belong "
+            "to them: each measurement needs its force; number them (version number of dataset 58)"
+        )
+    force = candidates[order]
+    if len(force.values) != len(response.values) or not np.isclose(force.period_s, response.period_s, rtol=1e-4):
+        raise RecordError(
+            f"{path}: the response in dataset {response.number} has {len(response.values)} samples every "
+            f"{response.period_s:g} s, its force in dataset {force.number} {len(force.values)} every "
+            f"{force.period_s:g} s: must be sampled together"
+        )
+    return force
+
+
+def read_uff(path: Path, options: ReadOptions) -> list[Record]:
+    """Read the time records of a universal file.
+
+    Returns:
+        One record per response; several measurements at one place are several records.
+
+    Raises:
+        RecordError: what was found and what is needed.
+        OSError: the file cannot be read.
+    """
+    file = _File(path, options)
+    channels = file.channels()
+    forces = [each for each in channels if each.measures == "force"]
+    responses = [each for each in channels if each.measures != "force"]
+    if options.quantity is not None:
+        responses = [each for each in responses if each.measures == options.quantity]
+    axes = {each.axis for each in responses} - {None}
+    if options.axis is not None and axes:
+        responses = [each for each in responses if each.axis == options.axis]
+    if not responses:
+        held = ", ".join(f"{each.measures} along {each.axis or 'no axis'} (dataset {each.number})" for each in channels)
+        wanted = " ".join(
+            part for part in (options.quantity or "response", f"along {options.axis}" if options.axis else "") if part
+        )
+        raise RecordError(f"{path}: no {wanted}; the file holds {held}")
+    quantities = sorted({each.measures for each in responses})
+    if len(quantities) > 1:
+        raise RecordError(
+            f"{path}: the responses are {' and '.join(quantities)}: must be one quantity; choose with --quantity"
+        )
+    records = []
+    for each in responses:
+        force = None if options.ignore_force or not forces else _force_of(path, each, forces, responses)
+        assert each.measures != "force"
+        records.append(
+            Record(
+                source=f"{path} dataset {each.number}" if len(responses) > 1 else str(path),
+                period_s=each.period_s,
+                response=each.values,
+                quantity=each.measures,
+                force_n=None if force is None else force.values,
+                axis=each.axis or options.axis,
+                start_s=each.start_s,
+                warnings=tuple(file.warnings),
+            )
+        )
+    return records

@@ -1,0 +1,251 @@
+"""The controller of a machine file: how it moves the axes, what else takes time, its state at power-on."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, Strict
+
+from shapegcode.settings.keys import (
+    AxisRatios,
+    AxisTimes,
+    AxisValues,
+    Bool,
+    Count,
+    NonNegative,
+    Positive,
+    PositiveAxisValues,
+    Table,
+    key,
+)
+
+
+class Controller(Table):
+    """How the controller turns blocks into set-points, and what it accepts."""
+
+    interpolation_period_s: Annotated[Positive, Field(le=0.1)] = key(
+        "time between two set-points", unit="s", default=0.001, assumed=True
+    )
+    block_time_s: Annotated[NonNegative, Field(le=1)] = key(
+        "shortest time in which the controller can take in a block; emitted blocks are not shorter",
+        unit="s",
+        default=0.005,
+        assumed=True,
+    )
+    block_end: Literal["ceil", "carry"] = key(
+        '"ceil": each block starts on a tick of the interpolation; "carry": the remainder of a period is '
+        "carried into the next block. The round trip is judged under both",
+        default="ceil",
+        assumed=True,
+    )
+    motion: Literal["look_ahead", "after_interpolation"] = key(
+        'how an ordinary program is played. "look_ahead": the speed is planned along the path before '
+        'interpolation; "after_interpolation": each axis is smoothed after interpolation, and cutting blocks '
+        "overlap",
+        default="look_ahead",
+        assumed=True,
+    )
+    law: Literal["constant_time", "jerk_limited"] = key(
+        'speed change before interpolation. "constant_time": it lasts time_constant_s whatever the step; '
+        '"jerk_limited": by the acceleration and jerk of the axes',
+        default="constant_time",
+        assumed=True,
+    )
+    time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
+        "duration of a speed change (look-ahead, constant time), or length of the moving average or time constant "
+        "of the exponential (after interpolation)",
+        unit="s",
+        fanuc="1622, 1771",
+        default=0.05,
+        assumed=True,
+    )
+    bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
+        "time over which the acceleration itself is built up; length of the second moving average; 0: none",
+        unit="s",
+        fanuc="1772",
+        default=0.0,
+        assumed=True,
+    )
+    after_interpolation_shape: Literal["linear", "exponential"] = key(
+        'how each axis is smoothed after interpolation. "linear": moving averages of the lengths time_constant_s '
+        'and bell_time_s; "exponential": a first-order lag of time_constant_s',
+        fanuc="1610#0, #1",
+        default="linear",
+        assumed=True,
+    )
+    look_ahead_filter_time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
+        "length of the moving average after interpolation in look-ahead mode; 0: none",
+        unit="s",
+        fanuc="1769",
+        default=0.0,
+        assumed=True,
+    )
+    corner_speed_difference_mm_per_min: AxisValues = key(
+        "largest speed step of an axis where two blocks meet; 0: stop at every corner. One number, or x, y, z",
+        unit="mm/min",
+        fanuc="1783",
+        default=500.0,
+        assumed=True,
+    )
+    centripetal_acceleration_mm_s2: Positive = key(
+        "largest acceleration across the path in arcs; it limits the feed there",
+        unit="mm/s²",
+        fanuc="1735",
+        default=1000.0,
+        assumed=True,
+    )
+    contour_acceleration_mm_s2: PositiveAxisValues | None = key(
+        "largest acceleration of an axis along a contour, corners and curves alike; left out: not limited. One "
+        "number, or x, y, z",
+        unit="mm/s²",
+        fanuc="1737",
+        default=None,
+    )
+    rapid_path: Literal["linear", "non_linear"] = key(
+        '"linear": a rapid goes straight; "non_linear": each axis travels at its own speed',
+        fanuc="1401#1",
+        default="linear",
+        assumed=True,
+    )
+    rapid_time_constant_s: AxisTimes = key(
+        "time in which a rapid reaches its speed. One number, or x, y, z",
+        unit="s",
+        fanuc="1620, 1773",
+        default=0.15,
+        assumed=True,
+    )
+    rapid_bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
+        "time over which the acceleration of a rapid is built up; 0: none",
+        unit="s",
+        fanuc="1621, 1774",
+        default=0.0,
+        assumed=True,
+    )
+    in_position_s: AxisValues = key(
+        "wait for the axis to arrive after a rapid or an exact stop; the slowest axis that moved counts. One "
+        "number, or x, y, z",
+        unit="s",
+        default={"x": 0.025, "y": 0.025, "z": 0.12},
+        assumed=True,
+    )
+    in_position: Literal["measured", "servo_lag"] = key(
+        'where the wait after a rapid or an exact stop comes from. "measured": in_position_s; "servo_lag": the time '
+        "in which the lag left by position_gain_per_s and feed_forward_ratio falls to in_position_width_um",
+        default="measured",
+    )
+    in_position_width_um: PositiveAxisValues = key(
+        "an axis has arrived when it lags by less than this. One number, or x, y, z",
+        unit="µm",
+        fanuc="1826",
+        default=20.0,
+        assumed=True,
+    )
+    position_gain_per_s: PositiveAxisValues = key(
+        "gain of the position loop (the parameter counts 0.01/s); the servo lag is feed / gain. One number, or x, y, z",
+        unit="1/s",
+        fanuc="1825",
+        default=30.0,
+        assumed=True,
+    )
+    feed_forward_ratio: AxisRatios = key(
+        "share of the servo lag that the feed-forward takes away; 0: none. One number, or x, y, z",
+        unit="1",
+        fanuc="2005#1, 2068, 2092",
+        default=0.0,
+        assumed=True,
+    )
+    shaped_time_constant_s: Annotated[NonNegative, Field(le=10)] = key(
+        "length of the controller's own moving average after interpolation while a shaped program runs (it "
+        "smooths the shaped blocks once more); 0: off",
+        unit="s",
+        fanuc="1622, 1769",
+        default=0.0,
+        assumed=True,
+    )
+    program_memory_bytes: Annotated[int, Strict(), Field(gt=0)] = key(
+        "memory for programs; a larger output gets a warning", unit="bytes", default=262_144, assumed=True
+    )
+    dnc_baud: Count = key(
+        "speed of the serial line when programs are drip fed; 0: not drip fed",
+        unit="baud",
+        fanuc="0103",
+        default=0,
+    )
+    dnc_bits_per_character: Annotated[int, Strict(), Field(ge=7, le=12)] = key(
+        "bits on the serial line for each character, with start, parity and stop bits",
+        unit="bits",
+        default=11,
+        assumed=True,
+    )
+    least_increment_mm: Annotated[Positive, Field(le=0.1)] = key(
+        "smallest coordinate step in G21", unit="mm", default=0.001
+    )
+    least_increment_inch: Annotated[Positive, Field(le=0.01)] = key(
+        "smallest coordinate step in G20", unit="inch", default=0.0001
+    )
+    arc_radius_tolerance_mm: Positive = key(
+        "start and end radius of an arc may differ by this much; beyond it the block is an error (alarm 0020)",
+        unit="mm",
+        fanuc="3410",
+        default=0.01,
+        assumed=True,
+    )
+    calculator_decimal_point: Bool = key(
+        "X10 without a decimal point: 10 mm or inch if true, 10 least increments if false",
+        fanuc="3401#0",
+        default=False,
+    )
+    feed_decimals_mm: Annotated[int, Strict(), Field(ge=0, le=6)] = key(
+        "decimals of an F word in mm/min", unit="digits", default=1, assumed=True
+    )
+    feed_decimals_inch: Annotated[int, Strict(), Field(ge=0, le=6)] = key(
+        "decimals of an F word in inch/min", unit="digits", default=2, assumed=True
+    )
+    minimum_feed_mm_per_min: Positive = key(
+        "smallest feed written in a block", unit="mm/min", default=1.0, assumed=True
+    )
+    no_buffer_m_codes: tuple[Annotated[int, Strict(), Field(ge=0, le=99_999_999)], ...] = key(
+        "M codes at which the controller stops reading ahead, besides M00, M01, M02 and M30",
+        fanuc="3411-3432",
+        default=(),
+    )
+    offset_memory: Literal["A", "B", "C"] = key(
+        'which system variables hold the tool offsets. "A": one value for each; "B": geometry and wear; "C": '
+        "geometry and wear, length and radius apart",
+        default="C",
+        assumed=True,
+    )
+    nesting_limit_subprogram: Annotated[int, Strict(), Field(ge=1, le=100)] = key(
+        "how deep subprograms may call one another; 4 on old controls", unit="levels", default=10, assumed=True
+    )
+    max_program_steps: Annotated[int, Strict(), Field(ge=1, le=10**12)] = key(
+        "a program that executes more blocks than this counts as endless", unit="blocks", default=10_000_000
+    )
+
+
+class Times(Table):
+    """What takes time beside the motion."""
+
+    tool_change_s: Annotated[NonNegative, Field(le=3600)] = key("an M06", unit="s", default=0.0, assumed=True)
+    m_function_s: Annotated[NonNegative, Field(le=3600)] = key("any other M code", unit="s", default=0.0, assumed=True)
+
+
+class PowerOn(Table):
+    """Modal state before the first block of a program."""
+
+    motion: Literal["G00", "G01", "G02", "G03"] = key("kind of motion", fanuc="3402#0", default="G00", assumed=True)
+    plane: Literal["G17", "G18", "G19"] = key("plane of arcs", fanuc="3402#1, #2", default="G17", assumed=True)
+    distance: Literal["G90", "G91"] = key(
+        "absolute (G90) or incremental (G91) coordinates", fanuc="3402#3", default="G90", assumed=True
+    )
+    units: Literal["G20", "G21"] = key("inch (G20) or mm (G21)", default="G21", assumed=True)
+    feed_mode: Literal["G93", "G94", "G95"] = key(
+        "feed per minute (G94), inverse time (G93) or per revolution (G95)", default="G94", assumed=True
+    )
+    path_mode: Literal["G61", "G64"] = key("exact stop (G61) or cutting mode (G64)", default="G64", assumed=True)
+    work_offset: Literal["G54", "G55", "G56", "G57", "G58", "G59"] = key(
+        "work coordinate system", default="G54", assumed=True
+    )
+    cycle_return: Literal["G98", "G99"] = key(
+        "level to which a drilling cycle returns: initial (G98) or R (G99)", default="G98", assumed=True
+    )

@@ -1,0 +1,216 @@
+"""How a machine file has programs shaped and written, and when the result is good."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Annotated, Literal
+
+from pydantic import Field, Strict, field_validator, model_validator
+
+from shapegcode.settings.keys import Bool, NonNegative, Positive, Table, Text, key, toml
+
+_BLOCK_CHARACTERS = re.compile(r"[A-Z0-9 .,+\-*/=#\[\]()<>_:;&]*")
+
+
+class Emission(Table):
+    """How shaped programs are written."""
+
+    block_period_s: Annotated[Positive, Field(le=1)] | None = key(
+        "duration of a short block: a whole multiple of controller.interpolation_period_s and not below "
+        "controller.block_time_s; left out: chosen for the shortest shaper",
+        unit="s",
+        default=None,
+    )
+    prologue: tuple[Text, ...] = key(
+        'lines written before each shaped stretch, for example ["G05.1 Q0"] to switch a look-ahead mode off',
+        default=(),
+    )
+    epilogue: tuple[Text, ...] = key("lines written after each shaped stretch", default=())
+    prefill_dwell_s: Annotated[NonNegative, Field(le=60)] = key(
+        "dwell before each shaped stretch, in which the block buffer fills; 0: none", unit="s", default=0.0
+    )
+    compensation_guard: Literal["alarm", "stop"] = key(
+        'where cutter compensation was expanded: "alarm" compares the offset in the control with the expanded radius '
+        'and raises an alarm if it differs; "stop" halts with M00 for the operator to compare (always so where '
+        "programs are drip fed: IF cannot run from there)",
+        default="alarm",
+    )
+    header: Bool = key(
+        "write comments: tool version, machine, modes, block period, shaper length, override, time constant",
+        default=True,
+    )
+    failed_suffix: Annotated[str, Strict(), Field(min_length=1, pattern=r"^[^/\\\x00-\x1f]+$")] = key(
+        "added to the name of an output that misses its tolerance, so that nobody runs it by mistake",
+        default=".out-of-tolerance",
+    )
+    max_line_length: Annotated[int, Strict(), Field(ge=30, le=250)] = key(
+        "longest line written", unit="characters", default=60, assumed=True
+    )
+    arc_min_chord_mm: NonNegative = key(
+        "a piece of an arc with a shorter chord is written as a line: rounding could turn it into a full circle",
+        unit="mm",
+        default=0.02,
+    )
+    merge_tolerance_increments: NonNegative = key(
+        "blocks are merged into one where the path and the feed stay within this many least increments; "
+        "0: only where they agree exactly",
+        unit="increments",
+        default=0.35,
+    )
+    rounding: Literal["vibration", "nearest"] = key(
+        'how the ends of blocks are rounded. "vibration": to that of the two neighbouring increments that leaves the '
+        'modes at rest; "nearest": each to the nearest increment, which leaves up to several increments of vibration',
+        default="vibration",
+    )
+
+    @field_validator("prologue", "epilogue")
+    @classmethod
+    def _fanuc_lines(cls, lines: tuple[str, ...]) -> tuple[str, ...]:
+        for line in lines:
+            if not _BLOCK_CHARACTERS.fullmatch(line):
+                raise ValueError(
+                    f"the line {json.dumps(line)} has a character other than capital letters, digits and "
+                    "signs that a program may hold (no %, no end of line)"
+                )
+        return lines
+
+    @model_validator(mode="after")
+    def _lines_fit(self) -> Emission:
+        for line in (*self.prologue, *self.epilogue):
+            if len(line) > self.max_line_length:
+                raise ValueError(
+                    f"the line {json.dumps(line)} has {len(line)} characters, emission.max_line_length is "
+                    f"{self.max_line_length}"
+                )
+        return self
+
+
+class Shaping(Table):
+    """What is shaped, and how."""
+
+    max_duration_s: Annotated[Positive, Field(le=10)] = key("longest shaper that is accepted", unit="s", default=0.25)
+    family: Literal[
+        "auto",
+        "zv",
+        "zvd",
+        "zvdd",
+        "mzv",
+        "ei",
+        "ei2",
+        "ei3",
+        "si",
+        "negative-zv",
+        "polynomial",
+        "non-negative",
+        "robust",
+    ] = key(
+        'family of the shaper (`shapegcode shaper` compares them); "auto": the shortest without negative taps, exact '
+        "at the modes, or below vibration_limit over their bands where frequency_uncertainty_percent states them",
+        default="auto",
+    )
+    per_axis: Bool = key(
+        "a shaper for each axis, which cancels only that axis' modes: shorter than one for all, usable because the "
+        'contour is brought back (not with contour = "off", stated bands, or modes that move with an axis)',
+        default=False,
+    )
+    vibration_limit: Annotated[Positive, Field(lt=1)] = key(
+        "largest residual vibration over the modes' bands as a share of the unshaped one, for families that leave some",
+        unit="1",
+        default=0.05,
+    )
+    arc_feed_ratio: Annotated[Positive, Field(le=1)] = key(
+        "feed in arcs as a share of the programmed feed, reached before the arc begins; 1: no reduction",
+        unit="1",
+        default=1.0,
+    )
+    contour: Literal["response", "command", "off"] = key(
+        "what is brought back to the programmed path behind the shaper, at the highest feed that keeps "
+        'tolerance.contour_um: "response" is the table with its modes, and so the part; "command" the set-points; '
+        '"off": neither, the feed alone keeps the command within the tolerance',
+        default="response",
+    )
+    rapids: Bool = key(
+        "write rapids (G00) as shaped cutting moves where the table is settled for the next cut sooner; rapid override "
+        "does not act on them",
+        default=False,
+    )
+    plunge_angle_deg: Annotated[NonNegative, Field(le=90)] = key(
+        "a corner is a forced stop of the shaped command if a side of it leans from the Z axis by no more than "
+        "this and the direction changes by 45 degrees or more: a shaper must not mix plunges with other cuts",
+        unit="degrees",
+        default=15.0,
+    )
+    part_mass_kg: NonNegative | None = key(
+        "mass of the part on the table, for modes with a table over mass_kg; left out: not known, and their "
+        "nominal frequency holds",
+        unit="kg",
+        default=None,
+    )
+
+
+_Override = Annotated[Positive, Field(le=254)]
+
+
+class Tolerance(Table):
+    """When an emitted program is good: outside these limits the conversion says so and exits with 1."""
+
+    contour_um: Positive = key(
+        "largest deviation from the programmed path of what shaping.contour names: the response, or the command",
+        unit="µm",
+        default=20.0,
+    )
+    residual_ratio: Annotated[NonNegative, Field(le=1)] = key(
+        "residual vibration passes if it is below this share of the original program's, or below residual_floor_um",
+        unit="1",
+        default=0.25,
+    )
+    residual_floor_um: NonNegative = key(
+        "residual vibration below this passes whatever the original's was", unit="µm", default=3.0
+    )
+    residual_floor_increments: NonNegative = key(
+        "residual vibration below this passes too: rounding the words alone may leave a lightly damped mode so much",
+        unit="increments",
+        default=5.0,
+    )
+
+
+class Verdict(Table):
+    """The stated band: which of the cases that are played decide. All are shown; 100 % override always counts."""
+
+    override_percent: tuple[_Override, _Override] = key(
+        "lowest and highest feed override under which the program will run: every case in between must be good. The "
+        "header of a program asks for 100 %, so only that counts unless you state more",
+        unit="%",
+        default=(100.0, 100.0),
+    )
+    mode_uncertainty: Bool = key(
+        "whether every mode must be allowed to be off by its frequency_uncertainty_percent, with less damping by its "
+        "damping_uncertainty_percent; modes that state neither are taken as exact",
+        default=True,
+    )
+    block_end: Literal["both", "own"] = key(
+        '"both": the program must be good under either rule of block timing; "own": under controller.block_end, '
+        "for a controller whose rule is known",
+        default="both",
+    )
+    look_ahead: Bool = key(
+        "whether the program must be good with the look-ahead mode left on, which plans the shaped blocks anew; "
+        "false: it is off while they run (emission.prologue)",
+        default=False,
+    )
+    starved_block: Bool = key(
+        "whether the program must be good if the block buffer runs empty once, at the worst place; false: it never "
+        "does (memory or a data server, emission.prefill_dwell_s)",
+        default=False,
+    )
+    starved_s: Annotated[Positive, Field(le=10)] = key(
+        "how long the axes then wait for the next block", unit="s", default=0.02, assumed=True
+    )
+
+    @model_validator(mode="after")
+    def _band_ascends(self) -> Verdict:
+        low, high = self.override_percent
+        if low > high:
+            raise ValueError(f"override_percent = {toml(self.override_percent)}: the lower end comes first")
+        return self

@@ -1,0 +1,1 @@
+"""What programs would measure on the part."""

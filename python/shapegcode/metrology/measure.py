@@ -1,0 +1,272 @@
+"""Virtual metrology: what the response of the machine would measure on the part, section by section of the path.
+
+Programs are played as the controller would, and the response is measured against the programmed path: vibration,
+contour, radius, the walls that a round tool leaves, their roughness. The tool is a disc that removes what it sweeps:
+cutting forces, the tool's deflection and the marks of its teeth are not in it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.metrology.sections import MeasuredProgram, MeasuredRegion, Measurement, WallProfile
+from shapegcode.model.modes import machine_warnings, region_offset, region_range_warnings
+from shapegcode.model.play import vibration_memory_s
+from shapegcode.model.stream import plant_options, playing_controller
+from shapegcode.program import Program, given_program
+from shapegcode.program.program import written_by_shapegcode
+
+__all__ = ["MeasuredProgram", "MeasuredRegion", "Measurement", "WallProfile", "measure", "measure_run"]
+
+FloatArray = npt.NDArray[np.float64]
+_MOST_SAMPLES = 100_000_000  # set-points of a region: a minute or two of computing
+_CHUNK_SAMPLES = 65_536
+_LONGEST_REST_S = 10.0  # that a vibration is waited for behind a stop
+_LEAST_REST_S = 0.25
+_MILLIONTH = math.log(1e6)
+_MOST_PROFILE_STATIONS = 200_000  # kept of each program for pictures
+_SAME_PLACE_MM = 0.005
+_SHORT_MM = 0.5
+_LAST_LINE = 2**32 - 1
+_LARGEST_TOOL_MM = 1000.0
+_LEAST_SPACING_MM = 1e-3
+_BLOCKS_PER_CURVE = 2.5  # a shaped program's own blocks are shorter than this many block periods at its feed
+
+
+def measure(
+    programs: Program | str | Path | Sequence[Program | str | Path],
+    machine: Machine,
+    tool_diameter_mm: float,
+    *,
+    plant: str = "modal",
+    against: Program | str | Path | None = None,
+    lines: Sequence[tuple[int, int]] | None = None,
+    band_um: float = 1.0,
+    station_spacing_mm: float = 0.05,
+    cutoff_mm: float | None = None,
+    lambda_s_mm: float = 0.0,
+    on_progress: Callable[[int, int], None] = lambda _done, _total: None,
+) -> Measurement:
+    """Measure one program, or several side by side.
+
+    A program that shapegcode wrote is played block by block at its feed, any other with the controller's own motion.
+
+    Args:
+        programs: what to measure: one or several, or their files.
+        machine: controller and modes.
+        tool_diameter_mm: of the disc that is swept along the response.
+        plant: "modal" or "feed-drive", see `sg.stream`.
+        against: the program whose path is the nominal one; None: the first of several if shapegcode did not write it
+            and did write all the others, else each program's own path.
+        lines: sections by lines of the nominal program, first and last; None: maximal runs of lines of one direction
+            and of arcs about one centre.
+        band_um: settled is what stays within this of the command.
+        station_spacing_mm: largest distance between two places at which walls are measured.
+        cutoff_mm: cut-off lambda c of the roughness; None: the standard's, by the length of a section.
+        lambda_s_mm: short-wave cut-off of the roughness; 0: none.
+        on_progress: called with regions done and regions in all.
+
+    Raises:
+        ArgumentError: no program, one without cuts, a value outside its range, lines that hold no cut, or a program
+            that does not cut the regions of the one it is measured against.
+        ProgramError: a program cannot be read, or a region takes longer than can be computed.
+        OSError: a file cannot be read.
+        MachineError: the machine has no feed drives.
+        NumericError: the integrator of a feed drive fails.
+    """
+    given = [programs] if isinstance(programs, Program | str | Path) else list(programs)
+    several = [given_program(each, machine) for each in given]
+    if not several:
+        raise _core.ArgumentError("no program to measure")
+    for name, value in (("tool diameter", tool_diameter_mm), ("station spacing", station_spacing_mm)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise _core.ArgumentError(f"{name} is {value:g} mm, must be above 0")
+    if tool_diameter_mm > _LARGEST_TOOL_MM:
+        raise _core.ArgumentError(f"tool diameter is {tool_diameter_mm:g} mm, must be at most {_LARGEST_TOOL_MM:g} mm")
+    if station_spacing_mm < _LEAST_SPACING_MM:
+        raise _core.ArgumentError(
+            f"station spacing is {station_spacing_mm:g} mm, must be at least {_LEAST_SPACING_MM:g} mm"
+        )
+    for name, value in (("cut-off", cutoff_mm if cutoff_mm is not None else 0.0), ("lambda s", lambda_s_mm)):
+        if not (math.isfinite(value) and value >= 0.0):
+            raise _core.ArgumentError(f"{name} is {value:g} mm, must be at least 0")
+    shaped = [written_by_shapegcode(program) for program in several]
+    if against is not None:
+        against = given_program(against, machine)
+    elif len(several) > 1 and not shaped[0] and all(shaped[1:]):
+        against = several[0]
+    for program in several if against is None else [against]:
+        if not program.regions:
+            raise _core.ArgumentError(f"{program.source}: no cutting move, so there is nothing to measure")
+    options = _core.MetrologyOptions()
+    options.period_s = machine.controller.interpolation_period_s
+    options.tool_radius_mm = tool_diameter_mm / 2.0
+    options.station_spacing_mm = station_spacing_mm
+    options.band_mm = band_um * 1e-3
+    options.cutoff_mm = cutoff_mm or 0.0
+    options.lambda_s_mm = lambda_s_mm
+    total = sum(len(program.regions) for program in several)
+    measured: list[MeasuredProgram] = []
+    done = 0
+    for program, is_shaped in zip(several, shaped, strict=True):
+        nominal = against or program
+        program.refuse_endless(_MOST_SAMPLES * options.period_s)
+        jobs = _jobs(program, nominal, machine, is_shaped, lines)
+        regions: list[MeasuredRegion] = []
+        kept = 0
+        for job in jobs:
+            region = measure_run(
+                _samples(job, machine, plant, is_shaped),
+                job.path,
+                job.sections,
+                options,
+                (job.nominal.first_line, job.nominal.last_line),
+                keep_walls=kept < _MOST_PROFILE_STATIONS,
+            )
+            kept += sum(wall.distance_mm.size for wall in region.walls if wall is not None)
+            regions.append(region)
+            done += 1
+            on_progress(min(done, total), total)
+        warnings = [
+            *program.warnings,
+            *machine_warnings(machine),
+            *region_range_warnings(program.regions, machine),
+            *(
+                f"lines {region.lines[0]} to {region.lines[1]}: so long a path that its walls are measured every "
+                f"{region.station_spacing_mm:.3g} mm, not every {station_spacing_mm:g} mm"
+                for region in regions
+                if region.station_spacing_mm > station_spacing_mm
+            ),
+        ]
+        measured.append(MeasuredProgram(program.source, is_shaped, nominal.source, tuple(regions), tuple(warnings)))
+    return Measurement(
+        machine, plant, tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm, tuple(measured)
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Job:
+    """A region to play, the nominal one, and its sections."""
+
+    played: _core.Region
+    nominal: _core.Region
+    path: _core.Path
+    sections: list[_core.PathSection]
+
+
+def _jobs(
+    program: Program, nominal: Program, machine: Machine, shaped: bool, lines: Sequence[tuple[int, int]] | None
+) -> list[_Job]:
+    """Pairs of regions that are measured, those without a section left out."""
+    jobs = []
+    for played, region in _paired(program, nominal):
+        path = region.path
+        if path.length_mm <= 0.0:
+            continue
+        if lines is None:
+            sections = _core.path_sections(path, _short_mm(path, machine, own_blocks=shaped and nominal is program))
+        else:
+            sections = _core.line_sections(path, [(min(a, _LAST_LINE), min(b, _LAST_LINE)) for a, b in lines])
+        if sections:
+            jobs.append(_Job(played, region, path, sections))
+    if lines is not None and not jobs:
+        names = ", ".join(f"{first}-{last}" for first, last in lines)
+        raise _core.ArgumentError(f"{nominal.source}: no cutting move in lines {names}")
+    return jobs
+
+
+def _paired(program: Program, nominal: Program) -> Iterator[tuple[_core.Region, _core.Region]]:
+    """Regions of a program beside those of the nominal one, found by where they start and end."""
+    if program is nominal:
+        yield from ((region, region) for region in program.regions)
+        return
+    candidates = iter(program.regions)
+    for region in nominal.regions:
+        for candidate in candidates:
+            if _same_ends(candidate.path, region.path):
+                yield candidate, region
+                break
+        else:
+            raise _core.ArgumentError(
+                f"{program.source}: no cut from {_place(region.path.start_mm)} to {_place(region.path.end_mm)} as "
+                f"{nominal.source} has in {nominal.lines(region)}: it was not made from that program, or its rapids "
+                "are shaped into the cuts; measure it without --against"
+            )
+
+
+def _same_ends(one: _core.Path, other: _core.Path) -> bool:
+    ends = ((one.start_mm, other.start_mm), (one.end_mm, other.end_mm))
+    return all(float(np.abs(a - b).max()) <= _SAME_PLACE_MM for a, b in ends)
+
+
+def _place(position_mm: npt.ArrayLike) -> str:
+    return " ".join(f"{axis}{value:.3f}" for axis, value in zip("XYZ", np.asarray(position_mm), strict=True))
+
+
+def _short_mm(path: _core.Path, machine: Machine, *, own_blocks: bool) -> float:
+    """Runs shorter than this that follow each other are one curve."""
+    if not own_blocks:
+        return _SHORT_MM
+    return max(_SHORT_MM, _BLOCKS_PER_CURVE * path.fastest_feed_mm_per_s * machine.controller.block_time_s)
+
+
+def measure_run(
+    chunks: Iterable[tuple[FloatArray, FloatArray]],
+    path: _core.Path,
+    sections: list[_core.PathSection],
+    options: _core.MetrologyOptions,
+    lines: tuple[int, int],
+    *,
+    keep_walls: bool = True,
+) -> MeasuredRegion:
+    """Measure samples of command and response, wherever they come from.
+
+    Args:
+        chunks: command and response, (n, 3) each, mm, one row per `options.period_s`.
+        path: what was programmed.
+        sections: of this path, in order.
+        options: with what is measured.
+        lines: first and last of the region, for reports.
+        keep_walls: keep the profiles of the walls.
+
+    Raises:
+        ArgumentError: an option outside its range, arrays of other shapes, or values that are not finite.
+    """
+    metrology = _core.SectionMetrology(path, sections, options)
+    for command, response in chunks:
+        metrology.feed(command, response)
+    walls = tuple(_wall(metrology, index) if keep_walls else None for index in range(len(sections)))
+    return MeasuredRegion(lines, path, metrology.finish(), walls, metrology.station_spacing_mm)
+
+
+def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
+    first_mm, spacing_mm, left, right, point, normal = metrology.wall_profile(index)
+    distance_mm = first_mm + spacing_mm * np.arange(left.size, dtype=np.float64)
+    return WallProfile(distance_mm, left * 1e3, right * 1e3, point, normal)
+
+
+def _samples(job: _Job, machine: Machine, plant: str, shaped: bool) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Command and response of a region, and what follows the stop until vibration and servo lag have decayed."""
+    memory_s = max(vibration_memory_s(machine), _LEAST_REST_S)
+    if plant != "modal":
+        # The position loop takes the lag off as exp(-gain t): to a millionth, as the vibration.
+        memory_s = max(memory_s, _MILLIONTH / min(machine.controller.position_gain_per_s.as_tuple()))
+    rest_s = min(memory_s, _LONGEST_REST_S)
+    model = playing_controller(machine, shaped=shaped)
+    options = plant_options(machine, plant, offset=region_offset(job.played, machine))
+    options.axis_filters = _core.acceleration_filters(model)
+    blocks = job.played.path
+    if model.motion == _core.MotionKind.look_ahead:
+        stream = _core.PlayedStream.of_path(blocks, _core.plan_speed(blocks, model.limits), options, rest_s)
+    else:
+        stream = _core.PlayedStream.of_blocks(blocks, model.block_end, 1.0, options, rest_s)
+    while len(chunk := stream.read(_CHUNK_SAMPLES)) > 0:
+        yield chunk.command_mm, chunk.response_mm

@@ -1,1 +1,0 @@
-"""Milling: files that describe tool, stock and work material."""

@@ -1,0 +1,72 @@
+"""From the machine file to the core's model of its controller."""
+
+from __future__ import annotations
+
+import math
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+
+
+def controller_model(
+    machine: Machine, *, feed_override: float = 1.0, rapid_override: float = 1.0
+) -> _core.ControllerModel:
+    """The controller of a machine as the core times and plays it.
+
+    Args:
+        machine: the machine.
+        feed_override: scales every programmed feed, 1 = as programmed.
+        rapid_override: scales the rapid rates, 1 = full.
+    """
+    controller = machine.controller
+    model = _core.ControllerModel()
+    model.period_s = controller.interpolation_period_s
+    model.block_end = getattr(_core.BlockEnd, controller.block_end)
+    model.motion = getattr(_core.MotionKind, controller.motion)
+    model.filter_shape = getattr(_core.FilterShape, controller.after_interpolation_shape)
+    model.time_constant_s = controller.time_constant_s
+    model.bell_time_s = controller.bell_time_s
+    model.limits = motion_limits(machine)
+    model.look_ahead_filter_time_constant_s = controller.look_ahead_filter_time_constant_s
+    model.rapid_rate_mm_per_s = [axis.rapid_mm_per_min / 60.0 for axis in machine.axes.as_tuple()]
+    model.rapid_time_constant_s = controller.rapid_time_constant_s.as_tuple()
+    model.rapid_bell_time_s = controller.rapid_bell_time_s
+    model.rapid_path = getattr(_core.RapidPath, controller.rapid_path)
+    model.in_position = getattr(_core.InPosition, controller.in_position)
+    model.in_position_s = controller.in_position_s.as_tuple()
+    model.position_gain_per_s = controller.position_gain_per_s.as_tuple()
+    model.feed_forward_ratio = controller.feed_forward_ratio.as_tuple()
+    model.in_position_width_mm = [width * 1e-3 for width in controller.in_position_width_um.as_tuple()]
+    model.feed_override = feed_override
+    model.rapid_override = rapid_override
+    model.tool_change_s = machine.times.tool_change_s
+    model.m_function_s = machine.times.m_function_s
+    return model
+
+
+def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
+    """Look-ahead limits of a machine.
+
+    Args:
+        machine: whose limits.
+        arc_feed_ratio: feed on arcs relative to the programmed one.
+    """
+    limits = _core.MotionLimits()
+    controller = machine.controller
+    axes = machine.axes.as_tuple()
+    limits.law = getattr(_core.AccelerationLaw, controller.law)
+    # A ramp of one tick stands for "no ramp": zero time has no acceleration.
+    limits.time_constant_s = max(controller.time_constant_s, controller.interpolation_period_s)
+    limits.jerk_time_s = controller.bell_time_s
+    limits.max_feed_mm_per_s = [axis.max_feed_mm_per_min / 60.0 for axis in axes]
+    limits.max_acceleration_mm_per_s2 = [axis.max_acceleration_mm_s2 for axis in axes]
+    limits.max_jerk_mm_per_s3 = [math.inf if axis.max_jerk_mm_s3 is None else axis.max_jerk_mm_s3 for axis in axes]
+    # 0 means a stop at every corner; the planner wants a speed, and this one is a stop to every purpose.
+    limits.corner_speed_difference_mm_per_s = [
+        max(value / 60.0, 1e-3) for value in controller.corner_speed_difference_mm_per_min.as_tuple()
+    ]
+    limits.centripetal_acceleration_mm_per_s2 = controller.centripetal_acceleration_mm_s2
+    if controller.contour_acceleration_mm_s2 is not None:
+        limits.contour_acceleration_mm_per_s2 = controller.contour_acceleration_mm_s2.as_tuple()
+    limits.arc_feed_ratio = arc_feed_ratio
+    return limits

@@ -1,0 +1,217 @@
+"""Modes that move: what the machine file's tables say, for the plant, for the shapers and for people.
+
+A table over the mass of the part fixes a mode for a whole program; one over the position of an axis lets it vary
+along the program. Positions in tables are the machine's: those of the program plus work offset and tool length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shapegcode import _core
+from shapegcode.machine import Machine, Mode
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = [
+    "NO_OFFSET",
+    "Offset",
+    "axis_modes",
+    "damping_scale",
+    "machine_warnings",
+    "mode_tables",
+    "moving_axis",
+    "numbered_modes",
+    "region_offset",
+    "region_range_warnings",
+    "slowest_mode",
+    "still_mode",
+]
+
+Offset = tuple[float | None, float | None, float | None]
+"""Machine position minus program position of X, Y, Z in mm; None where it is not known."""
+
+NO_OFFSET: Offset = (0.0, 0.0, 0.0)
+"""Program positions are machine positions."""
+
+_AXES = "xyz"
+
+
+def still_mode(mode: Mode, part_mass_kg: float | None) -> _core.Mode:
+    """The mode that holds where no axis position counts: nominal, or as a stated mass of the part makes it.
+
+    Args:
+        mode: of the machine file.
+        part_mass_kg: mass of the part; None: not known.
+    """
+    nominal = _core.Mode(mode.frequency_hz, mode.damping_ratio, mode.participation)
+    over = mode.frequency_over
+    if over is None or over.mass_kg is None or part_mass_kg is None:
+        return nominal
+    # The core interpolates over any abscissa.
+    return _core.ModeTable(0, over.mass_kg, over.frequency_hz, over.damping_ratio or ()).mode_at(nominal, part_mass_kg)
+
+
+def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
+    """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty, its damping at its low end.
+
+    A table over the part's mass is looked up; of one over a position the nominal frequency is taken.
+    """
+    return [
+        [
+            _core.Mode(
+                still.frequency_hz * (1.0 + shift * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
+                still.damping_ratio * damping_scale(mode, shift),
+                still.participation,
+            )
+            for mode in axis.modes
+            for still in (still_mode(mode, machine.shaping.part_mass_kg),)
+        ]
+        for axis in machine.axes.as_tuple()
+    ]
+
+
+def slowest_mode(mode: Mode) -> tuple[float, float]:
+    """Lowest frequency (Hz) by a mode's tables, and least damping ratio by them and by its stated uncertainty."""
+    over = mode.frequency_over
+    least = damping_scale(mode, 1.0)
+    if over is None:
+        return mode.frequency_hz, mode.damping_ratio * least
+    return min(over.frequency_hz), min(over.damping_ratio or (mode.damping_ratio,)) * least
+
+
+def damping_scale(mode: Mode, shift: float) -> float:
+    """What a mode's damping ratio is multiplied by where its frequency is moved by `shift` of its uncertainty.
+
+    Both ways it is the lower end of the stated damping that counts. To first order a shaper leaves the same at either
+    end: what counts is how far the pole is off, |dw/w + i dzeta|. Beyond that less damping leaves more.
+    """
+    return 1.0 - abs(shift) * (mode.damping_uncertainty_percent or 0.0) / 100.0
+
+
+def mode_tables(machine: Machine, shift: float = 0.0, offset: Offset = NO_OFFSET) -> list[list[_core.ModeTable]]:
+    """How the modes of X, Y, Z vary with the position of the command: `PlaybackOptions.mode_tables`.
+
+    Args:
+        machine: whose modes.
+        shift: share of each mode's stated uncertainty by which its frequencies are moved; see `damping_scale`.
+        offset: from the command's positions to the machine's; where it is None for the axis of a table, the mode
+            stays nominal.
+    """
+    return [[_table(mode, shift, offset) for mode in axis.modes] for axis in machine.axes.as_tuple()]
+
+
+def moving_axis(machine: Machine) -> int | None:
+    """The axis over whose position modes vary: 0, 1, 2 for X, Y, Z; None: there is none.
+
+    Raises:
+        ArgumentError: modes vary over the positions of several axes; shapers can follow one.
+    """
+    named = {mode.frequency_over.axis for _, _, mode in numbered_modes(machine) if mode.frequency_over is not None}
+    axes = sorted(axis for axis in named if axis is not None)
+    if len(axes) > 1:
+        raise _core.ArgumentError(
+            f"modes vary over the positions of {' and '.join(name.upper() for name in axes)} (frequency_over): "
+            "shapers can follow one axis"
+        )
+    return _AXES.index(axes[0]) if axes else None
+
+
+def region_offset(region: _core.Region, machine: Machine) -> Offset:
+    """From the program's positions in a region to the machine's.
+
+    The work offset is that of `input.work_offsets`, zero if it is left out there; tool length counts for Z where
+    `input.tool_length_mm` gives it. Nothing is known of an axis whose position the program does not state.
+    """
+    state = region.entry
+    system = f"G54.1P{state.coordinate_number}" if state.coordinate_system == 541 else f"G{state.coordinate_system}"
+    offsets = list(machine.input.work_offsets.get(system, (0.0, 0.0, 0.0)))
+    sign = {43: 1.0, 44: -1.0}.get(state.length_offset, 0.0)
+    number = str(state.length_number)
+    length = machine.input.tool_length_mm.get(number, 0.0) + machine.input.tool_length_wear_mm.get(number, 0.0)
+    offsets[2] += sign * length
+    x, y, z = (value if known else None for value, known in zip(offsets, state.known, strict=True))
+    return (x, y, z)
+
+
+def machine_warnings(machine: Machine) -> list[str]:
+    """What a user should know of the tables before any program is read: a mass that is missing, unused or outside."""
+    mass = machine.shaping.part_mass_kg
+    over_mass = [
+        (name, mode, mode.frequency_over.mass_kg)
+        for name, _, mode in numbered_modes(machine)
+        if mode.frequency_over is not None and mode.frequency_over.mass_kg is not None
+    ]
+    if mass is None:
+        return [
+            f"{name} has a table over mass_kg, but shaping.part_mass_kg is not given: its nominal "
+            f"{mode.frequency_hz:g} Hz holds"
+            for name, mode, _ in over_mass
+        ]
+    if not over_mass:
+        return [f"shaping.part_mass_kg = {mass:g}: no mode has a table over mass_kg, so it changes nothing"]
+    return [
+        f"shaping.part_mass_kg = {mass:g} lies outside the table of {name}, {masses[0]:g} to {masses[-1]:g} kg: its "
+        f"nearest row holds, {still_mode(mode, mass).frequency_hz:g} Hz"
+        for name, mode, masses in over_mass
+        if not masses[0] <= mass <= masses[-1]
+    ]
+
+
+def region_range_warnings(regions: Sequence[_core.Region], machine: Machine) -> list[str]:
+    """Tables that the program leaves, or whose axis' position it does not state; one sentence for each mode."""
+    warnings = []
+    for name, _, mode in numbered_modes(machine):
+        over = mode.frequency_over
+        if over is None or over.axis is None:
+            continue
+        axis = _AXES.index(over.axis)
+        reached: list[float] = []
+        unknown = None
+        for region in regions:
+            offset = region_offset(region, machine)[axis]
+            if offset is None:
+                unknown = unknown or region
+                continue
+            positions = np.asarray(region.path.polyline())[:, axis] + offset
+            reached += [float(positions.min()), float(positions.max())]
+        if unknown is not None:
+            warnings.append(
+                f"line {unknown.first_line}: the position of {over.axis.upper()} is not known, over which {name} "
+                f"varies: its nominal {mode.frequency_hz:g} Hz holds"
+            )
+        low, high = over.abscissa[0], over.abscissa[-1]
+        if reached and (min(reached) < low or max(reached) > high):
+            warnings.append(
+                f"{over.axis.upper()} moves between {min(reached):g} and {max(reached):g} mm (machine coordinates), "
+                f"the table of {name} covers {low:g} to {high:g} mm: beyond it the nearest row holds"
+            )
+    return warnings
+
+
+def _table(mode: Mode, shift: float, offset: Offset) -> _core.ModeTable:
+    over = mode.frequency_over
+    if over is None or over.axis is None:
+        return _core.ModeTable()
+    axis = _AXES.index(over.axis)
+    start = offset[axis]
+    if start is None:
+        return _core.ModeTable()
+    scale = 1.0 + shift * (mode.frequency_uncertainty_percent or 0.0) / 100.0
+    return _core.ModeTable(
+        axis,
+        [position - start for position in over.abscissa],
+        [frequency * scale for frequency in over.frequency_hz],
+        [ratio * damping_scale(mode, shift) for ratio in over.damping_ratio or ()],
+    )
+
+
+def numbered_modes(machine: Machine) -> Iterator[tuple[str, int, Mode]]:
+    """Key, axis and mode of every mode."""
+    for axis, (letter, table) in enumerate(zip(_AXES, machine.axes.as_tuple(), strict=True)):
+        for number, mode in enumerate(table.modes, start=1):
+            yield f"axes.{letter}.modes.{number}", axis, mode

@@ -1,0 +1,228 @@
+"""A program played on the machine's model as one motion in time: cuts, rapids and waits, piece by piece.
+
+The plant is at rest at the start and runs on through the whole program. Memory does not grow with its length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.model.controller import controller_model
+from shapegcode.model.modes import NO_OFFSET, Offset, axis_modes, mode_tables, region_offset
+from shapegcode.program import Program, given_program
+
+__all__ = ["KINDS", "PLANTS", "Chunk", "plant_options", "playing_controller", "stream"]
+
+PLANTS = ("modal", "feed-drive")
+"""The plants that there are: modes behind an ideal servo, or motor, ball screw and table with their servo loops."""
+
+KINDS = tuple(kind.name for kind in sorted(_core.BlockKind.__members__.values(), key=lambda kind: kind.value))
+"""Names of what `Chunk.kind` numbers."""
+
+REST_S = 0.25
+"""How long the set-points rest behind the end of a program."""
+
+_CHUNK_SAMPLES = 65536
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """A stretch of a played program; one row per interpolation period.
+
+    Attributes:
+        sample: number of each row since the start of the program, (k,).
+        time_s: since the start of the program, (k,).
+        line: of the block that is being interpolated, (k,).
+        kind: what that block is, (k,): a rank in `KINDS`. Waits for in-position count to the block before them.
+        command_mm: set-points behind every filter, (k, 3).
+        response_mm: the table, (k, 3).
+        velocity_mm_per_s: of the command over the period before, (k, 3).
+        motor_mm: feed drives only: the motor as travel of the table, (k, 3).
+        motor_force_n: feed drives only: force of the motor, (k, 3).
+        friction_force_n: feed drives only: friction of the table, against its motion, (k, 3).
+    """
+
+    sample: npt.NDArray[np.int64]
+    time_s: FloatArray
+    line: npt.NDArray[np.uint32]
+    kind: npt.NDArray[np.uint8]
+    command_mm: FloatArray
+    response_mm: FloatArray
+    velocity_mm_per_s: FloatArray
+    motor_mm: FloatArray | None = None
+    motor_force_n: FloatArray | None = None
+    friction_force_n: FloatArray | None = None
+
+    def __len__(self) -> int:
+        """Rows."""
+        return len(self.time_s)
+
+    @property
+    def error_mm(self) -> FloatArray:
+        """Response minus command, (k, 3): vibration, and with feed drives the lag of the servo loop."""
+        return self.response_mm - self.command_mm
+
+    def columns(self) -> dict[str, npt.NDArray[np.generic]]:
+        """What a file of the motion holds, by name with its unit; each of the shape (k,)."""
+        named: dict[str, npt.NDArray[np.generic]] = {"time_s": self.time_s, "line": self.line}
+        tables = {
+            "command_mm": self.command_mm,
+            "response_mm": self.response_mm,
+            "error_mm": self.error_mm,
+            "motor_mm": self.motor_mm,
+            "motor_force_n": self.motor_force_n,
+            "friction_force_n": self.friction_force_n,
+        }
+        for name, table in tables.items():
+            if table is not None:
+                named |= {f"{axis}_{name}": table[:, number] for number, axis in enumerate("xyz")}
+        return named
+
+    def rows(self, wanted: npt.NDArray[np.bool_]) -> Chunk:
+        """The rows that are wanted, (k,)."""
+        if wanted.all():
+            return self
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return replace(self, **{name: value[wanted] for name, value in values.items() if value is not None})
+
+    def every(self, step: int) -> Chunk:
+        """Of all samples of the program every `step`-th, the first among them."""
+        return self if step == 1 else self.rows(self.sample % step == 0)
+
+
+def stream(
+    program: Program | str | Path,
+    machine: Machine,
+    *,
+    plant: str = "modal",
+    shaped: bool = False,
+    lines: tuple[int, int] | None = None,
+    chunk_samples: int = _CHUNK_SAMPLES,
+) -> Iterator[Chunk]:
+    """Play a whole program and give its motion piece by piece.
+
+    Regions, other cutting moves, rapids, waits for in-position, dwells, tool changes and M functions follow each other
+    as `sg.cycle_time` counts them; behind the end the set-points rest for a quarter of a second. Where coordinates jump
+    without motion (work offset, tool length, an axis whose position was not known), command and response jump.
+
+    Args:
+        program: what to play, or its file.
+        machine: controller and plant.
+        plant: "modal" or "feed-drive".
+        shaped: the program was emitted by shapegcode, see `simulate`.
+        lines: give what happens in these lines alone, first and last, of the expanded text; the program is played from
+            its start in any case.
+        chunk_samples: rows of a piece, at most.
+
+    Raises:
+        ProgramError, OSError: the file cannot be read.
+        ArgumentError: a plant, lines or a size that do not exist, or a value that no controller can have.
+        MachineError: the machine has no feed drives.
+        NumericError: while pieces are given: the integrator of a feed drive fails.
+    """
+    if chunk_samples < 1:
+        raise _core.ArgumentError(f"chunk_samples = {chunk_samples}: must be 1 or more")
+    program = given_program(program, machine)
+    if lines is not None:
+        _check_lines(program, lines)
+    model = playing_controller(machine, shaped=shaped)
+    offsets, known = _offsets(program, machine)
+    options = plant_options(machine, plant, offset=known)
+    played = _core.PlayedStream.of_program(program.core, model, options, offsets, REST_S)
+    return _chunks(played, model.period_s, lines, chunk_samples)
+
+
+def playing_controller(machine: Machine, *, shaped: bool) -> _core.ControllerModel:
+    """The controller that plays a program: as it is, or for shaped programs block by block without look-ahead."""
+    model = controller_model(machine)
+    if shaped:
+        model.motion = _core.MotionKind.after_interpolation
+        model.filter_shape = _core.FilterShape.linear
+        model.time_constant_s = machine.controller.shaped_time_constant_s
+        model.bell_time_s = 0.0
+    return model
+
+
+def plant_options(machine: Machine, plant: str, *, offset: Offset = NO_OFFSET) -> _core.PlaybackOptions:
+    """Interpolation period and plant of a machine.
+
+    Args:
+        machine: whose plant.
+        plant: "modal" or "feed-drive".
+        offset: from the command's positions to the machine's, for modes that vary with them.
+
+    Raises:
+        ArgumentError: there is no such plant.
+        MachineError: the machine has no feed drives.
+    """
+    if plant not in PLANTS:
+        raise _core.ArgumentError(f"plant = {plant!r}: must be one of {', '.join(PLANTS)}")
+    options = _core.PlaybackOptions()
+    options.period_s = machine.controller.interpolation_period_s
+    if plant == "modal":
+        options.modes = axis_modes(machine)
+        options.mode_tables = mode_tables(machine, offset=offset)
+    else:
+        from shapegcode.model.drives import drive_parameters
+
+        options.drives = list(drive_parameters(machine))
+    return options
+
+
+def _offsets(program: Program, machine: Machine) -> tuple[list[FloatArray], Offset]:
+    """Of each region from the program's positions to the machine's, and None for axes where one of them is not known.
+
+    A mode that varies over such an axis stays nominal throughout.
+    """
+    found = [region_offset(region, machine) for region in program.regions]
+    x, y, z = (None if any(offset[axis] is None for offset in found) else 0.0 for axis in range(3))
+    return [np.array([value or 0.0 for value in offset]) for offset in found], (x, y, z)
+
+
+def _check_lines(program: Program, lines: tuple[int, int]) -> None:
+    first, last = lines
+    count = program.core.line_count
+    if not 1 <= first <= last <= count:
+        raise _core.ArgumentError(f"lines {first}-{last}: must lie within 1-{count} of {program.source}, first to last")
+
+
+def _chunks(
+    played: _core.PlayedStream, period_s: float, lines: tuple[int, int] | None, chunk_samples: int
+) -> Iterator[Chunk]:
+    rate_hz = 1.0 / period_s
+    # A whole rate divides exactly: 9 / 1000 is 0.009, 9 * 0.001 is not.
+    rate_hz = round(rate_hz) if abs(rate_hz - round(rate_hz)) < 1e-6 else rate_hz
+    while len(read := played.read(chunk_samples)):
+        sample = np.arange(read.first_sample, read.first_sample + len(read), dtype=np.int64)
+        line = read.line
+        driven = len(read.motor_mm) > 0
+        chunk = Chunk(
+            sample=sample,
+            time_s=sample / rate_hz,
+            line=line,
+            kind=read.kind,
+            command_mm=read.command_mm,
+            response_mm=read.response_mm,
+            velocity_mm_per_s=read.velocity_mm_per_s,
+            motor_mm=read.motor_mm if driven else None,
+            motor_force_n=read.motor_force_n if driven else None,
+            friction_force_n=read.friction_force_n if driven else None,
+        )
+        if lines is None:
+            yield chunk
+            continue
+        inside = (line >= lines[0]) & (line <= lines[1])
+        if inside.any():
+            yield chunk.rows(inside)
+        # A program is expanded: its lines happen in order.
+        if line[-1] > lines[1]:
+            return

@@ -1,0 +1,23 @@
+"""A CNC program as the controller reads it, and cutter compensation in it."""
+
+from shapegcode.program.program import (
+    MM_PER_INCH,
+    Program,
+    given_program,
+    least_increment_mm,
+    located_error,
+    program_loader,
+    reader_options,
+    written_by_shapegcode,
+)
+
+__all__ = [
+    "MM_PER_INCH",
+    "Program",
+    "given_program",
+    "least_increment_mm",
+    "located_error",
+    "program_loader",
+    "reader_options",
+    "written_by_shapegcode",
+]

@@ -1,0 +1,307 @@
+"""A CNC program as the controller reads it: text to the letter, cutting regions, findings."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shapegcode import _core
+from shapegcode._core import ProgramError
+
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
+
+MM_PER_INCH = 25.4
+_ARC_OFF_RADIUS = "off its radius"
+
+
+def reader_options(
+    machine: Machine,
+    *,
+    emitted: bool = False,
+    probe_lines: Sequence[int] = (),
+    program_number: int | None = None,
+    expand_compensation: bool = True,
+    collect_alarms: bool = False,
+) -> _core.ReaderOptions:
+    """Settings with which the core reads a program of this machine.
+
+    Args:
+        machine: whose controller reads the text.
+        emitted: the text was written by shapegcode: its arcs are FANUC's, whatever the original's were.
+        probe_lines: ascending line numbers behind which the modal state is kept.
+        program_number: O number to play of a file that holds several; None: the first.
+        expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
+        collect_alarms: go on behind an alarm.
+    """
+    options = _core.ReaderOptions()
+    options.calculator_decimal_point = machine.controller.calculator_decimal_point
+    options.absolute_arc_centres = machine.input.arc_centre == "absolute" and not emitted
+    options.least_increment_mm = machine.controller.least_increment_mm
+    options.least_increment_inch = machine.controller.least_increment_inch
+    options.arc_tolerance_mm = machine.controller.arc_radius_tolerance_mm
+    options.max_line_length = machine.input.max_line_length
+    options.unknown_after_tool_change = [axis in machine.input.tool_change_unknown_axes for axis in "XYZ"]
+    offsets = machine.input.work_offsets
+    if offsets:
+        options.work_offsets_mm = [offsets.get(f"G{code}", (0.0, 0.0, 0.0)) for code in range(54, 60)]
+        options.extra_work_offsets_mm = {
+            int(name[6:]): offset for name, offset in offsets.items() if name.startswith("G54.1P")
+        }
+    options.tool_offsets = _tool_offsets(machine)  # type: ignore[assignment]
+    options.offset_memory = machine.controller.offset_memory
+    options.retained_variables = {int(name): value for name, value in machine.input.variables.items()}
+    options.bindings = _bindings(machine)
+    options.program = -1 if program_number is None else program_number
+    options.opaque_programs = list(machine.input.opaque_programs)
+    options.subprogram_nesting = machine.controller.nesting_limit_subprogram
+    options.max_steps = machine.controller.max_program_steps
+    options.block_skip = [{"unknown": None, "on": True, "off": False}[machine.input.block_skip]] * 9
+    options.expand_compensation = expand_compensation
+    options.compensation_start_up = machine.input.compensation_start_up
+    options.peck_clearance_mm = machine.input.peck_clearance_mm
+    options.scale_unit = machine.input.scale_unit
+    options.collect_alarms = collect_alarms
+    state = _core.ModalState()
+    state.motion = int(machine.power_on.motion[1:])
+    state.plane = int(machine.power_on.plane[1:])
+    state.distance = int(machine.power_on.distance[1:])
+    state.units = int(machine.power_on.units[1:])
+    state.feed_mode = int(machine.power_on.feed_mode[1:])
+    state.exact_stop = int(machine.power_on.path_mode[1:])
+    state.coordinate_system = int(machine.power_on.work_offset[1:])
+    state.cycle_return = int(machine.power_on.cycle_return[1:])
+    options.power_on = state
+    options.probe_lines = list(probe_lines)
+    return options
+
+
+def _tool_offsets(machine: Machine) -> dict[int, _core.ToolOffset]:
+    offsets: dict[int, _core.ToolOffset] = {}
+    tables = machine.input
+    for table, field in (
+        (tables.tool_length_mm, "length_mm"),
+        (tables.tool_length_wear_mm, "length_wear_mm"),
+        (tables.tool_radius_mm, "radius_mm"),
+        (tables.tool_radius_wear_mm, "radius_wear_mm"),
+    ):
+        for name, value in table.items():
+            setattr(offsets.setdefault(int(name), _core.ToolOffset()), field, value)
+    return offsets
+
+
+def _bindings(machine: Machine) -> _core.CodeBindings:
+    bindings = _core.CodeBindings()
+    bindings.g_macros = {round(float(name) * 10): program for name, program in machine.input.g_macros.items()}
+    bindings.m_macros = {int(name): program for name, program in machine.input.m_macros.items()}
+    bindings.m_subprograms = {int(name): program for name, program in machine.input.m_subprograms.items()}
+    bindings.tool_program = machine.input.tool_program or -1
+    return bindings
+
+
+_SUFFIXES = ("", ".nc", ".NC", ".cnc", ".CNC", ".txt", ".TXT", ".tap", ".TAP", ".prg", ".PRG", ".ngc")
+
+
+def program_loader(folders: Sequence[Path]) -> Callable[[int], tuple[str, bytes] | None]:
+    """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix.
+
+    Args:
+        folders: where to look, in this order.
+    """
+
+    def load(number: int) -> tuple[str, bytes] | None:
+        for folder in folders:
+            for stem in (f"O{number:04d}", f"O{number}", f"o{number:04d}", f"{number:04d}", f"O{number:08d}"):
+                for suffix in _SUFFIXES:
+                    path = folder / (stem + suffix)
+                    if path.is_file():
+                        return str(path), path.read_bytes()
+        return None
+
+    return load
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program that was read.
+
+    Attributes:
+        core: what the core made of it: text, regions (runs of cutting moves between stops), other moves.
+        source: name for messages.
+    """
+
+    core: _core.ProgramText
+    source: str
+
+    @classmethod
+    def read(
+        cls,
+        path: str | Path,
+        machine: Machine | None = None,
+        *,
+        program_number: int | None = None,
+        expand_compensation: bool = True,
+        collect_alarms: bool = False,
+    ) -> Program:
+        """Read a program file as the controller of `machine` would (None: as that of the built-in ``vx500``).
+
+        Programs that it calls are looked for in the file, beside it, and in `input.program_folders`.
+
+        Args:
+            path: the file.
+            machine: whose controller reads it.
+            program_number: O number to play of a file that holds several; None: the first.
+            expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
+            collect_alarms: go on behind an alarm and keep all in `core.alarms`.
+
+        Raises:
+            ProgramError: the text is no program that can be read; the message starts with ``file:line:column``.
+            OSError: the file cannot be read.
+        """
+        try:
+            text = Path(path).read_bytes()
+        except OSError as error:
+            # A failed read() does not name the file.
+            raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+        return cls.from_text(
+            text,
+            machine,
+            source=str(path),
+            program_number=program_number,
+            expand_compensation=expand_compensation,
+            collect_alarms=collect_alarms,
+            folder=Path(path).parent,
+        )
+
+    @classmethod
+    def from_text(
+        cls,
+        text: bytes | str,
+        machine: Machine | None = None,
+        *,
+        source: str = "<text>",
+        emitted: bool = False,
+        probe_lines: Sequence[int] = (),
+        program_number: int | None = None,
+        expand_compensation: bool = True,
+        collect_alarms: bool = False,
+        folder: Path | None = None,
+    ) -> Program:
+        """Read a program text; `source` names it in messages.
+
+        Programs that it calls are looked for in the text, in `folder` and in `input.program_folders`.
+
+        Raises:
+            ProgramError: the text is no program that can be read; the message starts with ``source:line:column``.
+        """
+        from shapegcode.machine import Machine
+
+        machine = machine or Machine.load("vx500")
+        data = text.encode() if isinstance(text, str) else text
+        options = reader_options(
+            machine,
+            emitted=emitted,
+            probe_lines=probe_lines,
+            program_number=program_number,
+            expand_compensation=expand_compensation,
+            collect_alarms=collect_alarms,
+        )
+        folders = [folder] if folder is not None else []
+        folders += [Path(name).expanduser() for name in machine.input.program_folders]
+        if folders:
+            options.load_program = program_loader(folders)
+        try:
+            return cls(_core.read_program(data, options), source)
+        except ProgramError as error:
+            hint = _absolute_centre_hint(data, options) if _ARC_OFF_RADIUS in str(error) else ""
+            raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
+
+    @property
+    def regions(self) -> list[_core.Region]:
+        """Runs of cutting moves between two stops, in order."""
+        return self.core.regions
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the reader noticed, each ``source:line: text``."""
+        return [f"{file or self.source}:{line}: {message}" for line, _, _, message, file in self.core.warnings]
+
+    @property
+    def expanded_text(self) -> bytes:
+        """The plain program: calls, macros, coordinate modes and (unless kept) cutter compensation worked out.
+
+        The text to the letter where the program holds none of them.
+        """
+        return self.core.text
+
+    def place(self, line: int) -> str:
+        """``file:line`` of the source from which a line of the expanded text comes."""
+        number, file = self.core.origin(line)
+        return f"{file or self.source}:{number}"
+
+    def lines(self, region: _core.Region) -> str:
+        """The lines of a region in words: of the source, or of the expanded text."""
+        return f"lines {region.first_line} to {region.last_line}{' expanded' if self.core.expanded else ''}"
+
+    def region_error(self, region: _core.Region, message: str) -> ProgramError:
+        """An error that names the file and the lines of a region."""
+        first, file = self.core.origin(region.first_line)
+        return located_error(file or self.source, first, 1, f"{self.lines(region)}: {message}")
+
+    def refuse_endless(self, limit_s: float) -> None:
+        """Refuse a region that cuts for longer than can be computed.
+
+        Raises:
+            ProgramError: a region takes more than `limit_s` at its programmed feeds.
+        """
+        for region in self.regions:
+            time_s = region.path.programmed_time_s
+            if time_s > limit_s:
+                raise self.region_error(region, f"{time_s:.0f} s of cutting without a stop (limit {limit_s:.0f} s)")
+
+
+def least_increment_mm(machine: Machine, units: int) -> float:
+    """Least increment of the words of a program in G20 or G21, mm."""
+    controller = machine.controller
+    return controller.least_increment_inch * MM_PER_INCH if units == 20 else controller.least_increment_mm
+
+
+def located_error(source: str, line: int, column: int, message: str, alarm: int = 0) -> ProgramError:
+    """A ProgramError whose message starts with ``source:line:column``."""
+    error = ProgramError(f"{source}:{line}:{column}: {message}")
+    error.__dict__.update(line=line, column=column, alarm=alarm, file=source)
+    return error
+
+
+def _absolute_centre_hint(text: bytes, options: _core.ReaderOptions) -> str:
+    # A post for another kind of control: say so where it explains every arc, but never guess.
+    options.absolute_arc_centres = not options.absolute_arc_centres
+    try:
+        _core.read_program(text, options)
+    except ProgramError:
+        return ""
+    kind = "absolute" if options.absolute_arc_centres else "incremental"
+    return f'; with {kind} I J K the whole program reads: set input.arc_centre = "{kind}"'
+
+
+def given_program(program: Program | str | Path, machine: Machine) -> Program:
+    """A program as it is, or read from its file as the controller of `machine` would.
+
+    Raises:
+        ProgramError, OSError: see :meth:`Program.read`.
+    """
+    return program if isinstance(program, Program) else Program.read(program, machine)
+
+
+_HEADER_MARK = b"(SHAPEGCODE "
+
+
+_HEADER_REACH = 4096
+
+
+def written_by_shapegcode(program: Program) -> bool:
+    """Whether the header comment of this tool stands in the program."""
+    return _HEADER_MARK in program.core.slice(0, _HEADER_REACH)

@@ -1,0 +1,1 @@
+"""What every result shares: figures, tables, plots, JSON."""

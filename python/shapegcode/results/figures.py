@@ -1,0 +1,84 @@
+"""Figures of playbacks as results state them: per axis, in µm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+
+Vector = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How far a track leaves the programmed path.
+
+    Attributes:
+        largest_mm: distance, either side; corners that the track cuts short count too.
+        left_mm: to the left of the travel, or above.
+        right_mm: to the right of it, or below.
+    """
+
+    largest_mm: float
+    left_mm: float
+    right_mm: float
+
+    @classmethod
+    def of(cls, stats: Iterable[_core.DeviationStats]) -> Deviation:
+        """The largest of one or several runs."""
+        return cls.largest(cls(each.max_abs_mm, each.most_positive_mm, -each.most_negative_mm) for each in stats)
+
+    @classmethod
+    def largest(cls, deviations: Iterable[Deviation]) -> Deviation:
+        """The largest of each."""
+        rows = list(deviations)
+        return cls(
+            max(each.largest_mm for each in rows),
+            max(each.left_mm for each in rows),
+            max(each.right_mm for each in rows),
+        )
+
+    def gouge_and_excess_um(self, material_side: str) -> dict[str, float]:
+        """What is cut away too much and what is left standing.
+
+        Args:
+            material_side: "left" or "right" of the travel, where the workpiece is; a tool that strays there gouges.
+        """
+        gouge, excess = (self.left_mm, self.right_mm) if material_side == "left" else (self.right_mm, self.left_mm)
+        return {"gouge": gouge * 1e3, "excess": excess * 1e3}
+
+
+def xyz(values: Iterable[float]) -> dict[str, float]:
+    """One value per axis under its letter."""
+    return {axis: float(value) for axis, value in zip("xyz", values, strict=True)}
+
+
+def largest_um(vectors: Iterable[Vector]) -> dict[str, float]:
+    """Largest of each axis, mm to µm."""
+    rows = list(vectors)
+    return xyz(np.max(rows, axis=0) * 1e3 if rows else np.zeros(3))
+
+
+def deviation_um(stats: Iterable[_core.DeviationStats], material_side: str | None = None) -> dict[str, float]:
+    """Largest magnitude, RMS over all samples and largest on either side of the path, µm.
+
+    Args:
+        stats: of one or several runs.
+        material_side: "left" or "right" of the travel, where the workpiece is: adds `gouge` and `excess`.
+    """
+    rows = list(stats)
+    count = sum(row.count for row in rows)
+    squares = sum(row.sum_of_squares_mm2 for row in rows)
+    largest = Deviation.of(rows) if rows else Deviation(0.0, 0.0, 0.0)
+    found = {
+        "max": largest.largest_mm * 1e3,
+        "rms": math.sqrt(squares / count) * 1e3 if count else 0.0,
+        "left": largest.left_mm * 1e3,
+        "right": largest.right_mm * 1e3,
+    }
+    return found if material_side is None else found | largest.gouge_and_excess_um(material_side)

@@ -1,0 +1,212 @@
+"""A machine in words: its values with their origin, its commented file, the reference of the keys."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from pydantic.fields import FieldInfo
+
+from shapegcode.settings.keys import InlineTable, KeyInfo, KeyValue, Table, item_type, key_info, table_type, toml
+
+_LINE_WIDTH = 110
+
+
+def values_of(table: Table, prefix: str = "", given: bool = True) -> Iterator[KeyValue]:
+    """Every key below a table with its value and origin, in the order of the file.
+
+    Args:
+        table: a machine or a part of it.
+        prefix: what stands before the names of its keys.
+        given: True if the file has this table.
+    """
+    for name, field in type(table).model_fields.items():
+        value, key = getattr(table, name), f"{prefix}{name}"
+        from_file = given and name in table.model_fields_set
+        if isinstance(value, Table) and not isinstance(value, InlineTable):
+            yield from values_of(value, f"{key}.", from_file)
+        elif item_type(field) and value:
+            for number, item in enumerate(value, start=1):
+                yield from values_of(item, f"{key}.{number}.", from_file)
+        else:
+            yield KeyValue(
+                info=key_info(field, key),
+                value="not set" if value is None else toml(value),
+                origin="file" if from_file else "default",
+            )
+
+
+def write_toml(machine: Table, remarks: Mapping[str, str]) -> str:
+    """A machine as a commented machine file.
+
+    Args:
+        machine: what to write.
+        remarks: text for the end of a key's line by its dotted key.
+
+    Raises:
+        KeyError: a remark for a key that does not exist.
+    """
+    return _TomlWriter(dict(remarks)).write(machine)
+
+
+class _TomlWriter:
+    """Writes a machine as commented TOML."""
+
+    def __init__(self, remarks: dict[str, str]) -> None:
+        self._remarks = remarks
+        self._lines: list[str] = []
+
+    def write(self, machine: Table) -> str:
+        self._lines = []
+        self._comment(
+            "Machine file of shapegcode. Keys and defaults: docs/machine.md. A key that is left "
+            "out has its default; `shapegcode machine show FILE` prints every value."
+        )
+        self._lines.append("")
+        self._table(machine, "")
+        if self._remarks:
+            raise KeyError(f"remarks for unknown keys: {', '.join(sorted(self._remarks))}")
+        return "\n".join(self._lines).rstrip("\n") + "\n"
+
+    def _comment(self, text: str) -> None:
+        self._lines += textwrap.wrap(
+            text,
+            _LINE_WIDTH,
+            initial_indent="# ",
+            subsequent_indent="# ",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+
+    def _table(self, table: Table, prefix: str) -> None:
+        """Plain keys first, then the tables below, as TOML asks."""
+        below: list[tuple[str, FieldInfo, Any]] = []
+        for name, field in type(table).model_fields.items():
+            value = getattr(table, name)
+            if (isinstance(value, Table) and not isinstance(value, InlineTable)) or item_type(field):
+                below.append((name, field, value))
+            else:
+                self._plain(f"{prefix}{name}", name, field, value)
+        for name, field, value in below:
+            key = f"{prefix}{name}"
+            if item := item_type(field):
+                self._list(key, field, item, value)
+                continue
+            # A table of nothing but tables needs no head.
+            if not all(table_type(inner) for inner in type(value).model_fields.values()):
+                self._head(f"[{key}]", field.description or "")
+            self._table(value, f"{key}.")
+
+    def _head(self, header: str, meaning: str) -> None:
+        if self._lines and self._lines[-1]:
+            self._lines.append("")
+        self._lines.append(f"{header}  # {meaning}" if meaning else header)
+
+    def _plain(self, key: str, name: str, field: FieldInfo, value: object) -> None:
+        info = key_info(field, key)
+        meaning = info.meaning[:1].upper() + info.meaning[1:]
+        unit = f" [{info.unit}]" if info.unit and info.unit != "1" else ""
+        fanuc = f" (FANUC parameter {info.fanuc})" if info.fanuc else ""
+        self._comment(f"{meaning}{unit}{fanuc}.")
+        remark = self._remarks.pop(key, "")
+        line = f"# {name} = ..." if value is None else f"{name} = {toml(value)}"
+        self._lines.append(f"{line}  # {remark}" if remark else line)
+
+    def _list(self, key: str, field: FieldInfo, item: type[Table], tables: tuple[Table, ...]) -> None:
+        if not tables:
+            self._lines.append("")
+            self._comment(f"{key}: {field.description}.")
+            remark = self._remarks.pop(key, "")
+            self._lines.append(f"# [[{key}]]" + (f"  # {remark}" if remark else ""))
+            self._lines += [f"# {name} = ..." for name, inner in item.model_fields.items() if inner.is_required()]
+        for number, table in enumerate(tables, start=1):
+            self._head(f"[[{key}]]", (item.__doc__ or "").rstrip(".") if number == 1 else "")
+            self._table(table, f"{key}.{number}.")
+
+
+def documentation(model: type[Table], builtin_names: Sequence[str]) -> str:
+    """The reference of a machine file's keys as Markdown.
+
+    Args:
+        model: the table that the file is read as.
+        builtin_names: machines that can be named in place of a file.
+    """
+    builtin = ", ".join(f"`{name}`" for name in builtin_names)
+    lines = [
+        "# The machine file",
+        "",
+        "<!-- Generated: python -m shapegcode.machine > docs/machine.md -->",
+        "",
+        "A machine file is TOML. `shapegcode machine init` writes a commented one to start from,",
+        "`shapegcode machine show FILE` prints every value with its origin. An unknown key, a number that is",
+        "not finite or a value outside its limits is an error, and all errors of a file are listed at once.",
+        "",
+        f"Built-in machines, usable by name in place of a file: {builtin}.",
+        "",
+        "A default marked **assumed** is not known for real controllers in general: look it up or measure",
+        "it. The FANUC column names the parameter that corresponds to a key; numbers differ between series,",
+        "so check your manual.",
+    ]
+    return "\n".join([*lines, *key_tables(model)]) + "\n"
+
+
+def key_tables(model: type[Table], *, fanuc: bool = True, heading: str = "##") -> list[str]:
+    """The keys of a file as Markdown: a heading and a table for each of its tables, a line each.
+
+    Args:
+        model: the table that the file is read as.
+        fanuc: with the column of FANUC parameters.
+        heading: what a heading begins with.
+    """
+    lines: list[str] = []
+    columns = ("key", "unit", "default", "FANUC", "meaning") if fanuc else ("key", "unit", "default", "meaning")
+    for table, meaning, infos in _documented(model, ""):
+        lines += ["", f"{heading} {_heading(table)}", ""]
+        if meaning:
+            lines += [f"{meaning[:1].upper()}{meaning[1:]}.", ""]
+        lines += [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
+        for info in infos:
+            name = info.key.removeprefix(f"{table}.")
+            default = info.default if info.default in ("required", "not set") else f"`{info.default}`"
+            cells = {
+                "key": f"`{name}`",
+                "unit": info.unit or "–",
+                "default": default + (" **assumed**" if info.assumed else ""),
+                "FANUC": info.fanuc or "–",
+                "meaning": info.meaning,
+            }
+            lines.append("| " + " | ".join(cells[column].replace("|", "\\|") for column in columns) + " |")
+    return lines
+
+
+def _documented(model: type[Table], prefix: str) -> Iterator[tuple[str, str, list[KeyInfo]]]:
+    """Per table of the file: its name, its meaning, its keys."""
+    keys: list[KeyInfo] = []
+    below: list[tuple[str, str, type[Table]]] = []
+    for name, field in model.model_fields.items():
+        sub, key = table_type(field), f"{prefix}{name}"
+        if sub is None or issubclass(sub, InlineTable):
+            keys.append(key_info(field, key))
+            continue
+        alike = [other for other, inner in model.model_fields.items() if table_type(inner) is sub]
+        if item_type(field):
+            below.append((f"{key}[].", field.description or "", sub))
+        elif len(alike) == 1:
+            below.append((f"{key}.", field.description or "", sub))
+        elif name == alike[0]:
+            # Tables of one type, such as the axes, are described once, by the words of their type.
+            below.append((f"{prefix}<{'|'.join(alike)}>.", (sub.__doc__ or "").rstrip("."), sub))
+    if keys:
+        yield prefix.rstrip("."), "", keys
+    for sub_prefix, meaning, sub in below:
+        for table, text, infos in _documented(sub, sub_prefix):
+            yield table, text or meaning, infos
+
+
+def _heading(table: str) -> str:
+    if not table:
+        return "Top level"
+    if table.endswith("[]"):
+        return f"`[[{table.removesuffix('[]')}]]`"
+    return f"`[{table}]`"

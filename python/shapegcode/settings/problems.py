@@ -1,0 +1,252 @@
+"""What is wrong in a file of settings, in words that name the key, the value, the limit and the line."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from shapegcode.settings.keys import Table, facts, table_type, toml, toml_key
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong in a file of settings.
+
+    Attributes:
+        key: dotted name of the key, for example ``axes.x.max_feed_mm_per_min``; empty if the file is bad.
+        value: the offending value as written in TOML; empty where there is none (a missing key).
+        limit: what the value must be.
+        line: line number in the file where it is known, else None.
+    """
+
+    key: str
+    value: str
+    limit: str
+    line: int | None = None
+
+    def __str__(self) -> str:
+        """The problem as ``key = value: limit``, without the file's name."""
+        subject = f"{self.key} = {self.value}" if self.value else self.key
+        return f"{subject}: {self.limit}" if subject else self.limit
+
+
+class KeyProblem(ValueError):
+    """What a validator raises of a key that does not fit another one: found again in the file by its name."""
+
+    def __init__(self, key: str, value: object, limit: str) -> None:
+        """Name the key, dotted, from the table of the validator on; its value; what it must be."""
+        self.key = key
+        self.value = value
+        self.limit = limit
+        super().__init__(f"{key} = {toml(value)}: {limit}")
+
+
+class FileError(ValueError):
+    """A file of settings that cannot be used; the message lists every problem, one line each.
+
+    Attributes:
+        file: name of the file (or of what is built in).
+        problems: what is wrong, in the order of the keys.
+    """
+
+    def __init__(self, file: str, problems: tuple[Problem, ...]) -> None:
+        """Build the message ``file[:line]: key = value: limit``, one line per problem."""
+        self.file = file
+        self.problems = problems
+        super().__init__(
+            "\n".join(
+                f"{file}:{problem.line}: {problem}" if problem.line is not None else f"{file}: {problem}"
+                for problem in problems
+            )
+        )
+
+
+class MachineError(FileError):
+    """A machine file that cannot be used."""
+
+
+def syntax_problem(message: str, text: str) -> Problem:
+    """The place of a TOML syntax error, which tomllib only tells in words."""
+    found = re.search(r"\s*\(at line (\d+), column (\d+)\)$", message)
+    if found:
+        return Problem("", "", f"{message[: found.start()]} (column {found[2]})", int(found[1]))
+    last = text.rstrip().count("\n") + 1
+    return Problem("", "", message.replace(" (at end of document)", " (end of file)"), last)
+
+
+def problems_of(error: ValidationError, model: type[Table], data: dict[str, Any], text: str) -> tuple[Problem, ...]:
+    """Pydantic's errors as problems of the file: dotted keys, TOML values, limits with units.
+
+    Args:
+        error: of validating the data.
+        model: what the file is read as.
+        data: the tables of the file.
+        text: the file, for line numbers.
+    """
+    problems: list[Problem] = []
+    for detail in error.errors(include_url=False):
+        location, value = _locate(detail["loc"], data, detail["type"])
+        if detail["type"] == "too_short" and isinstance(value, list) and len(value) >= detail["ctx"]["min_length"]:
+            continue  # short only of its bad items, which are listed themselves
+        # A list counts from 0 in pydantic, from 1 for people.
+        key = ".".join(str(part + 1) if isinstance(part, int) else toml_key(part) for part in location)
+        limit = _limit(detail["type"], detail.get("ctx", {}), detail["msg"])
+        cause = detail.get("ctx", {}).get("error")
+        if isinstance(cause, KeyProblem):
+            name = f"{key}.{cause.key}" if key else cause.key
+            problem = Problem(name, _short(cause.value), cause.limit)
+        elif detail["type"] == "extra_forbidden":
+            problem = Problem(key, _short(value), "unknown key" + _suggestion(model, location))
+        elif detail["type"] == "missing":
+            problem = Problem(key, "", limit + _unit_remark(model, location))
+        elif detail["type"] == "value_error" and isinstance(value, dict):
+            problem = Problem(key, "", limit)
+        elif detail["type"] == "string_pattern_mismatch":
+            field = _field(model, location)
+            problem = Problem(key, _short(value), f"malformed; {field.description if field else limit}")
+        else:
+            problem = Problem(key, _short(value), limit + _unit_remark(model, location))
+        problem = Problem(problem.key, problem.value, problem.limit, line_of(problem.key, text))
+        if problem not in problems:
+            problems.append(problem)
+    return tuple(problems)
+
+
+def _number(limit: float) -> str:
+    return f"{limit:g}" if abs(limit) < 1e6 else str(limit)
+
+
+def _limit(kind: str, context: Mapping[str, Any], message: str) -> str:
+    """What a value must be, in words, from pydantic's description of the error."""
+    match kind:
+        case "missing":
+            return "required, but missing"
+        case "greater_than":
+            return f"must be greater than {_number(context['gt'])}"
+        case "greater_than_equal":
+            return f"must be {_number(context['ge'])} or more"
+        case "less_than":
+            return f"must be less than {_number(context['lt'])}"
+        case "less_than_equal":
+            return f"must be {_number(context['le'])} or less"
+        case "finite_number":
+            return "must be a finite number"
+        case "float_type":
+            return "must be a number"
+        case "int_type" | "int_from_float":
+            return "must be a whole number"
+        case "bool_type":
+            return "must be true or false"
+        case "string_type":
+            return "must be a text in quotes"
+        case "literal_error":
+            return f"must be {context['expected']}".replace("'", '"')
+        case "model_type" | "model_attributes_type" | "dict_type":
+            return "must be a table"
+        case "too_short":
+            return f"must have {context['min_length']} or more values"
+        case "too_long":
+            return f"must have {context['max_length']} or fewer values"
+        case "tuple_type" | "list_type":
+            return "must be a list"
+        case "value_error":
+            return str(context["error"])
+        case _:
+            return message[:1].lower() + message[1:]
+
+
+def _short(value: object) -> str:
+    text = "{...}" if isinstance(value, dict) and value else toml(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _locate(location: tuple[int | str, ...], data: object, kind: str) -> tuple[tuple[int | str, ...], object]:
+    """The part of a pydantic location that exists in the file, and the value there."""
+    value = data
+    for depth, part in enumerate(location):
+        in_table = isinstance(value, dict) and part in value
+        in_list = isinstance(value, list) and isinstance(part, int) and part < len(value)
+        if in_table or in_list:
+            value = value[part]  # type: ignore[index]
+        elif kind == "missing" and isinstance(value, dict | list):
+            return location, None
+        else:
+            return location[:depth], value
+    return location, value
+
+
+def _field(root: type[Table], location: tuple[int | str, ...]) -> FieldInfo | None:
+    """The field of a model at a location, None if there is none."""
+    model: type[BaseModel] | None = root
+    field: FieldInfo | None = None
+    for part in location:
+        if isinstance(part, int):
+            continue
+        if model is None or part not in model.model_fields:
+            return field if model is None else None
+        field = model.model_fields[part]
+        model = table_type(field)
+    return field
+
+
+def _unit_remark(root: type[Table], location: tuple[int | str, ...]) -> str:
+    # The keys x, y, z of a PerAxis have the unit of the key above them.
+    unit = facts(_field(root, location)).get("unit") or facts(_field(root, location[:-1])).get("unit")
+    return f" (unit: {unit})" if unit and unit != "1" else ""
+
+
+def _suggestion(root: type[Table], location: tuple[int | str, ...]) -> str:
+    """The known key that an unknown one most likely stands for."""
+    parent = [part for part in location[:-1] if not isinstance(part, int)]
+    model: type[BaseModel] | None = root
+    for part in parent:
+        field = model.model_fields.get(part) if model is not None else None
+        model = table_type(field) if field is not None else None
+    if model is None:
+        return ""
+    name = str(location[-1])
+    close = difflib.get_close_matches(name, model.model_fields, n=1, cutoff=0.5)
+    if close:
+        return f"; did you mean {close[0]}?"
+    return f"; known here: {', '.join(model.model_fields)}"
+
+
+_HEADER = re.compile(r"\s*\[{1,2}\s*([^\[\]]+?)\s*\]{1,2}\s*(?:#.*)?")
+
+
+def line_of(key: str, text: str) -> int | None:
+    """Line of a dotted key in a text of the plain layout ``[table]`` / ``key = value``; None if not found there."""
+    table, counts = "", dict[str, int]()
+    inside = 0  # depth of the brackets of a list that goes over several lines
+    for number, line in enumerate(text.splitlines(), start=1):
+        if inside:
+            inside += _open_brackets(line)
+            continue
+        header = _HEADER.fullmatch(line)
+        if header:
+            table = re.sub(r"\s*\.\s*", ".", header[1])
+            if line.lstrip().startswith("[["):
+                counts[table] = counts.get(table, 0) + 1
+                table = f"{table}.{counts[table]}"
+            if table == key:
+                return number
+            continue
+        assignment = re.match(r'\s*([A-Za-z0-9_.-]+|"[^"]*")\s*=', line)
+        if assignment:
+            name = f"{table}.{assignment[1]}" if table else assignment[1]
+            if key == name or key.startswith(name + "."):
+                return number
+            inside = _open_brackets(line[assignment.end() :])
+    return None
+
+
+def _open_brackets(line: str) -> int:
+    """How many more lists begin in a line than end in it; texts and comments do not count."""
+    bare = re.sub(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|#.*', "", line)
+    return bare.count("[") - bare.count("]")

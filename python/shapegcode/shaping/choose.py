@@ -1,0 +1,307 @@
+"""The choice among shapers: every family that can be designed, which designs are worth a look, and which to take.
+
+How designs rank is said in :mod:`shapegcode.shaping.ranking`.
+"""
+
+from __future__ import annotations
+
+import cmath
+import contextlib
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from shapegcode._core import ArgumentError, DesignError, ShapegcodeError
+from shapegcode.shaping.bands import ModeBand
+from shapegcode.shaping.design import Design, evaluate
+from shapegcode.shaping.ranking import OBJECTIVES, is_within, pareto_front, reason_for, recommend, spoken
+from shapegcode.shaping.registry import FAMILIES, DesignOptions, Family, design, family_named
+from shapegcode.shaping.robust.minimax import least_worst
+
+__all__ = ["Recommendation", "Refusal", "choose"]
+
+_ROBUST = "robust"  # the family of which a design is shown even if it leaves more than the limit
+_OWN_TAPS = "taps"  # the family of taps that the user gives
+_MOST_PERIODS = 5000  # of the longest shaper: finer grids are as good as continuous times
+_NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of swings per period
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A family that has no design.
+
+    Attributes:
+        family: name of its row in the registry.
+        period_s: grid on which it was tried, s; None: continuous times.
+        reason: why there is none, with what is nearest where the family knows.
+    """
+
+    family: str
+    period_s: float | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """A comparison of shapers and the one to take.
+
+    Attributes:
+        bands: what is to be cancelled.
+        options: limits of the comparison; its `period_s` plays no part.
+        objective: a name of `OBJECTIVES`.
+        allow_negative: whether a design with negative taps may be taken.
+        designs: every design, in the order of the registry and of the periods.
+        pareto: for each design whether it is worth a look (see `pareto_front`).
+        index: of the design to take.
+        reason: why it is that one, in a sentence.
+        refusals: families without a design.
+    """
+
+    bands: tuple[ModeBand, ...]
+    options: DesignOptions
+    objective: str
+    allow_negative: bool
+    designs: tuple[Design, ...]
+    pareto: tuple[bool, ...]
+    index: int
+    reason: str
+    refusals: tuple[Refusal, ...]
+
+    @property
+    def design(self) -> Design:
+        """The design to take."""
+        return self.designs[self.index]
+
+    @property
+    def within_limit(self) -> bool:
+        """Whether its worst residual stays within the vibration limit."""
+        return is_within(self.design, self.options.vibration_limit)
+
+    @property
+    def grid_index(self) -> int | None:
+        """Index of the design to take of those on a grid, which alone can be written as blocks; None: there is none."""
+        return self._best_of([place for place, each in enumerate(self.designs) if each.period_s is not None])
+
+    @property
+    def best_by_period(self) -> dict[float, int]:
+        """Index of the design to take on each grid, by its period in s, ascending."""
+        places: dict[float, list[int]] = {}
+        for place, each in enumerate(self.designs):
+            if each.period_s is not None:
+                places.setdefault(each.period_s, []).append(place)
+        best = {period_s: self._best_of(places[period_s]) for period_s in sorted(places)}
+        return {period_s: place for period_s, place in best.items() if place is not None}
+
+    def _best_of(self, places: Sequence[int]) -> int | None:
+        if not places:
+            return None
+        designs = [self.designs[place] for place in places]
+        return places[recommend(designs, self.options.vibration_limit, self.objective, self.allow_negative)]
+
+    def report(self) -> dict[str, Any]:
+        """Everything as plain values: `modes`, `designs`, `recommended` (index), `reason`, `refused`, limits."""
+        return {
+            "modes": [
+                {
+                    "frequency_hz": band.mode.frequency_hz,
+                    "damping_ratio": band.mode.damping_ratio,
+                    "uncertainty": band.uncertainty,
+                }
+                for band in self.bands
+            ],
+            "designs": [
+                {
+                    "family": each.family,
+                    "period_s": each.period_s,
+                    "times_s": each.shaper.times_s.tolist(),
+                    "amplitudes": each.shaper.amplitudes.tolist(),
+                    "duration_s": each.duration_s,
+                    "variance_s2": each.variance_s2,
+                    "residual": each.residual,
+                    "worst_residual": each.worst_residual,
+                    "abs_sum": each.abs_sum,
+                    "negative": each.negative,
+                    "pareto": pareto,
+                }
+                for each, pareto in zip(self.designs, self.pareto, strict=True)
+            ],
+            "recommended": self.index,
+            "recommended_on_grid": self.grid_index,
+            "reason": self.reason,
+            "within_limit": self.within_limit,
+            "objective": self.objective,
+            "vibration_limit": self.options.vibration_limit,
+            "max_duration_s": self.options.max_duration_s,
+            "refused": [vars(refusal).copy() for refusal in self.refusals],
+        }
+
+
+def choose(
+    bands: Sequence[ModeBand],
+    periods_s: Sequence[float | None] = (None,),
+    options: DesignOptions | None = None,
+    *,
+    families: Sequence[str] | None = None,
+    objective: str = "shortest",
+    allow_negative: bool = False,
+    on_progress: Callable[[float], None] = lambda _: None,
+) -> Recommendation:
+    """Design every family on every kind of times, compare, and recommend.
+
+    Args:
+        bands: at least one mode with its band, no two modes equal.
+        periods_s: grids on which the taps may lie, s; None among them: continuous times too.
+        options: limits, and taps to compare with the rest; `period_s` plays no part; None: the defaults.
+        families: names of the families to compare; None: all.
+        objective: a name of `OBJECTIVES`: what is least in the design to take.
+        allow_negative: whether a design with negative taps may be taken.
+        on_progress: called with the share of the work done, 0 to 1.
+
+    Returns:
+        The comparison and the design to take.
+
+    Raises:
+        ArgumentError: no mode, equal modes, no period, or a limit, a name or a period that cannot be.
+        DesignError: a mode cannot be cancelled on any of the grids, or no family has a design within the limits.
+
+    Source: this project.
+    """
+    options = options or DesignOptions()
+    _check(bands, periods_s, options, objective)
+    rows = _rows(families, options)
+    usable = _usable(bands, periods_s)
+    found: list[Design] = []
+    refusals: list[Refusal] = []
+    work = list(itertools.product(rows, usable))
+    for done, (row, period_s) in enumerate(work):
+        on_progress(done / len(work))
+        if row.continuous if period_s is None else row.on_grid:
+            designs, refusal = _designs(row, bands, replace(options, period_s=period_s))
+            found += designs
+            refusals += [Refusal(row.name, period_s, refusal)] if refusal else []
+    refusals += _never_tried(rows, usable)
+    refusals += [
+        Refusal(row.name, period_s, _aliases(bands, period_s))
+        for row, period_s in itertools.product(rows, periods_s)
+        if period_s is not None and period_s not in usable and row.on_grid
+    ]
+    least = _least_worst(rows, usable, bands, options, found)
+    found += least
+    shown_anyway = {(each.family, each.period_s) for each in least}
+    refusals = [each for each in refusals if (each.family, each.period_s) not in shown_anyway]
+    if not found:
+        reasons = "; ".join(dict.fromkeys(f"{refusal.family}: {refusal.reason}" for refusal in refusals))
+        raise DesignError(f"no family has a shaper for {spoken(bands)} within {_ms(options.max_duration_s)}: {reasons}")
+    index = recommend(found, options.vibration_limit, objective, allow_negative)
+    return Recommendation(
+        bands=tuple(bands),
+        options=options,
+        objective=objective,
+        allow_negative=allow_negative,
+        designs=tuple(found),
+        pareto=tuple(pareto_front(found)),
+        index=index,
+        reason=reason_for(found, index, bands, options.vibration_limit, objective, allow_negative),
+        refusals=tuple(refusals),
+    )
+
+
+def _rows(families: Sequence[str] | None, options: DesignOptions) -> tuple[Family, ...]:
+    """The families to compare: the user's taps only where there are some."""
+    if families is None:
+        return tuple(row for row in FAMILIES if row.name != _OWN_TAPS or options.taps is not None)
+    names = [*families, *([] if options.taps is None else [_OWN_TAPS])]
+    return tuple(family_named(name) for name in dict.fromkeys(names))
+
+
+def _check(
+    bands: Sequence[ModeBand], periods_s: Sequence[float | None], options: DesignOptions, objective: str
+) -> None:
+    if not bands:
+        raise ArgumentError("a shaper needs at least one mode: 0 given")
+    for (first, one), (second, other) in itertools.combinations(enumerate(bands, start=1), 2):
+        if (one.mode.frequency_hz, one.mode.damping_ratio) == (other.mode.frequency_hz, other.mode.damping_ratio):
+            raise ArgumentError(f"modes {first} and {second} are equal ({one}): give each mode once")
+    if not periods_s:
+        raise ArgumentError("a comparison needs at least one kind of times: 0 periods given")
+    positive = [("max_duration_s", options.max_duration_s), ("vibration_limit", options.vibration_limit)]
+    positive += [("period", period_s) for period_s in periods_s if period_s is not None]
+    for name, value in positive:
+        if not (math.isfinite(value) and value > 0.0):
+            raise ArgumentError(f"{name} is {value:g}: it must be finite and above 0")
+    finest_s = min((period_s for period_s in periods_s if period_s is not None), default=math.inf)
+    if options.max_duration_s > _MOST_PERIODS * finest_s:
+        raise ArgumentError(
+            f"a shaper of {_ms(options.max_duration_s)} on a grid of {_ms(finest_s)} has up to "
+            f"{options.max_duration_s / finest_s:.3g} taps, at most {_MOST_PERIODS} can be searched: take a longer "
+            "period or a shorter duration"
+        )
+    if objective not in OBJECTIVES:
+        raise ArgumentError(f"{objective!r} is no objective: {', '.join(OBJECTIVES)}")
+
+
+def _usable(bands: Sequence[ModeBand], periods_s: Sequence[float | None]) -> list[float | None]:
+    """The kinds of times on which every mode can be cancelled.
+
+    Raises:
+        DesignError: none is left.
+    """
+    wanted = list(dict.fromkeys(periods_s))
+    usable = [period_s for period_s in wanted if period_s is None or not _aliases(bands, period_s)]
+    if not usable:
+        raise DesignError(next(_aliases(bands, period_s) for period_s in wanted if period_s is not None))
+    return usable
+
+
+def _aliases(bands: Sequence[ModeBand], period_s: float) -> str:
+    """Why a mode cannot be cancelled on a grid, empty if all can: at the grid's instants it seems to stand still."""
+    for band in bands:
+        swings = abs(band.mode.pole.imag) * period_s / (2.0 * math.pi)
+        if swings > 0.5 and abs(cmath.exp(band.mode.pole * period_s) - 1.0) < _NEAR_ONE:
+            return (
+                f"the mode at {band.mode.frequency_hz:g} Hz cannot be cancelled on a grid of {_ms(period_s)}: its "
+                f"{swings:.4g} swings per period look like standing still there; take another period"
+            )
+    return ""
+
+
+def _designs(row: Family, bands: Sequence[ModeBand], options: DesignOptions) -> tuple[list[Design], str]:
+    """The family's designs within the limits, or why there is none."""
+    try:
+        return design(row.name, bands, options), ""
+    except ShapegcodeError as error:
+        return [], str(error)
+
+
+def _least_worst(
+    rows: Sequence[Family],
+    usable: Sequence[float | None],
+    bands: Sequence[ModeBand],
+    options: DesignOptions,
+    found: Sequence[Design],
+) -> list[Design]:
+    """What leaves least within the longest duration, on each grid; none if a design without negative taps is good."""
+    wanted = any(row.name == _ROBUST for row in rows) and any(band.uncertainty for band in bands)
+    if not wanted or any(not each.negative and is_within(each, options.vibration_limit) for each in found):
+        return []
+    designs = []
+    for period_s in usable:
+        if period_s is not None:
+            with contextlib.suppress(DesignError):
+                shaper = least_worst(bands, period_s, options.max_duration_s).shaper
+                designs.append(evaluate(_ROBUST, shaper, bands, period_s))
+    return designs
+
+
+def _never_tried(rows: Sequence[Family], usable: Sequence[float | None]) -> Iterator[Refusal]:
+    for row in rows:
+        if not row.on_grid and None not in usable:
+            yield Refusal(row.name, usable[0], "is designed at continuous times only")
+        if not row.continuous and usable == [None]:
+            yield Refusal(row.name, None, "is designed on a grid: give a period")
+
+
+def _ms(time_s: float) -> str:
+    return f"{time_s * 1e3:.6g} ms"

@@ -1,0 +1,211 @@
+"""On what a conversion is written: the block period and the shaper on it, chosen for a machine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.model.modes import axis_modes, mode_tables, moving_axis, numbered_modes, still_mode
+
+if TYPE_CHECKING:
+    from shapegcode.shaping import BlockPeriodCandidate, ModeBand
+    from shapegcode.shaping.track import ShaperTrack
+
+__all__ = ["Grid", "choose_grid", "make_grid"]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """On what a conversion is written: block period and the shaper on it.
+
+    Attributes:
+        block_period_s: T_B.
+        shaper: the design, times on the block grid.
+        fir: the same in whole block periods.
+        track: shapers along an axis, used instead where its position is known; None: no mode varies with position.
+        family: name of the design's row in the registry of families.
+        note: what a user should know of the choice; empty: nothing.
+        axis_firs: a shaper for each of X, Y, Z in whole block periods, used instead; empty: the one for all.
+        per_axis_duration_s: how long such shapers would be, s; None: not looked for, or not shorter.
+    """
+
+    block_period_s: float
+    shaper: _core.Shaper
+    fir: _core.Fir
+    track: ShaperTrack | None = None
+    family: str = ""
+    note: str = ""
+    axis_firs: tuple[_core.Fir, ...] = ()
+    per_axis_duration_s: float | None = None
+
+    @property
+    def shapers(self) -> tuple[_core.Shaper, ...]:
+        """All shapers that may act."""
+        return (self.shaper, *(node.shaper for node in (self.track.nodes if self.track else ())))
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last tap of the longest shaper, s."""
+        if self.axis_firs:
+            return max(fir.duration_samples for fir in self.axis_firs) * self.block_period_s
+        return max(shaper.duration_s for shaper in self.shapers)
+
+
+def make_grid(
+    block_period_s: float, shaper: _core.Shaper, track: ShaperTrack | None = None, *, family: str = "", note: str = ""
+) -> Grid:
+    """Grid of a shaper whose times are whole block periods, and of shapers that follow an axis."""
+    delays = [round(t / block_period_s) for t in shaper.times_s]
+    return Grid(block_period_s, shaper, _core.Fir(delays, list(shaper.amplitudes)), track, family, note)
+
+
+def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
+    """Block period and shaper for all modes of a machine, and shapers that follow moving modes.
+
+    With `shaping.family` = "auto" the shortest shaper without negative taps that leaves at most
+    `shaping.vibration_limit` of the vibration anywhere in the modes' stated bands; exact where no band is stated. With
+    a named family its shortest one.
+
+    Args:
+        machine: modes and controller.
+        block_period_s: a period to use; None: `emission.block_period_s`, or the best one.
+
+    Raises:
+        DesignError: no shaper exists within `shaping.max_duration_s`.
+        ArgumentError: the machine has no mode, its modes vary over several axes, or the period does not fit the
+            controller.
+    """
+    # SciPy's solvers take a quarter of a second to load: not before they are needed.
+    from shapegcode.shaping import choose_robust_grid, machine_bands, robust_candidate
+    from shapegcode.shaping.comparison import check_block_period
+
+    if not any(axis.modes for axis in machine.axes.as_tuple()):
+        raise _core.ArgumentError("the machine file gives no vibration mode (axes.x.modes): nothing to shape for")
+    bands = machine_bands(machine)
+    shaping, controller = machine.shaping, machine.controller
+    period = block_period_s if block_period_s is not None else machine.emission.block_period_s
+    if period is not None:
+        check_block_period(period, machine)
+    if shaping.family != "auto":
+        if shaping.per_axis:
+            raise _core.ArgumentError(f'shaping.per_axis needs shaping.family = "auto": it is {shaping.family!r}')
+        if moving_axis(machine) is not None:
+            raise _core.ArgumentError(
+                f"shaping.family = {shaping.family!r}: modes that move with an axis (frequency_over) are followed by "
+                'shapers without negative taps; use "auto"'
+            )
+        return _of_family(shaping.family, bands, machine, period)
+    family = "robust" if any(band.uncertainty for band in bands) else "non-negative"
+    best: BlockPeriodCandidate
+    if period is None:
+        choice = choose_robust_grid(
+            bands, controller.interpolation_period_s, controller.block_time_s,
+            max_duration_s=shaping.max_duration_s, vibration_limit=shaping.vibration_limit,
+        )  # fmt: skip
+        best = next(each for each in choice.candidates if each.period_s == choice.period_s)
+    else:
+        best = robust_candidate(bands, period, shaping.max_duration_s, shaping.vibration_limit)
+    assert best.shaper is not None  # what is chosen exists
+    grid = make_grid(best.period_s, best.shaper, _track(machine, best.period_s), family=family, note=best.note)
+    return _per_axis(grid, machine, exact=family == "non-negative")
+
+
+def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
+    """The grid with a shaper for each axis where the machine file asks for it, or with a word of how long it would be.
+
+    Raises:
+        ArgumentError: they are asked for where the contour is not brought back or modes vary.
+        DesignError: they are asked for, and there are none.
+    """
+    from shapegcode.shaping.per_axis import design_per_axis
+
+    wanted = machine.shaping.per_axis
+    possible = exact and grid.track is None and machine.shaping.contour != "off"
+    if not possible:
+        if wanted:
+            raise _core.ArgumentError(
+                "shaping.per_axis needs shaping.contour (different shapers distort the path), shaping.family = "
+                '"auto", and modes without frequency_uncertainty_percent and frequency_over axis'
+            )
+        return grid
+    longest = machine.shaping.max_duration_s if wanted else grid.shaper.duration_s - 0.5 * grid.block_period_s
+    firs = design_per_axis(axis_modes(machine), grid.block_period_s, longest)
+    if firs is None:
+        if wanted:
+            raise _core.DesignError(
+                f"no shapers of equal mean delay for each axis within {longest * 1e3:g} ms on a "
+                f"{grid.block_period_s * 1e3:g} ms grid; the one for all axes lasts {grid.shaper.duration_s * 1e3:g} ms"
+            )
+        return grid
+    if wanted:
+        return replace(grid, axis_firs=tuple(firs))
+    duration_s = max(fir.duration_samples for fir in firs) * grid.block_period_s
+    return replace(grid, per_axis_duration_s=duration_s)
+
+
+def _of_family(name: str, bands: list[ModeBand], machine: Machine, period_s: float | None) -> Grid:
+    """The shortest shaper of a family, on one grid or on the one on which it is shortest."""
+    from shapegcode.shaping import DesignOptions, candidate_periods, design
+
+    shaping = machine.shaping
+    periods_s = (
+        [period_s]
+        if period_s is not None
+        else candidate_periods(bands, machine, shaping.max_duration_s, shaping.vibration_limit)
+    )
+    found = []
+    refusals = []
+    for each in periods_s:
+        options = DesignOptions(each, shaping.max_duration_s, vibration_limit=shaping.vibration_limit)
+        try:
+            found.append((design(name, bands, options)[0], each))
+        except _core.DesignError as error:
+            refusals.append(str(error))
+    if not found:
+        raise _core.DesignError(f"shaping.family = {name!r}: {refusals[0]}")
+    best, period = min(found, key=lambda pair: (pair[0].duration_s, -pair[1]))
+    note = ""
+    if best.worst_residual > shaping.vibration_limit:
+        note = (
+            f"the {name} shaper leaves up to {best.worst_residual:.1%} of the vibration within the modes' bands, "
+            f"shaping.vibration_limit is {shaping.vibration_limit:.1%}"
+        )
+    return make_grid(period, best.shaper, _track(machine, period), family=name, note=note)
+
+
+def _track(machine: Machine, period_s: float) -> ShaperTrack | None:
+    return None if moving_axis(machine) is None else shaper_track(machine, period_s)
+
+
+def shaper_track(
+    machine: Machine, period_s: float, max_duration_s: float | None = None, *, residual_limit: float = 0.01
+) -> ShaperTrack:
+    """Shapers for all modes of a machine along the axis over which some of them vary.
+
+    Args:
+        machine: whose modes; the whole span of their tables is covered.
+        period_s: grid of the shapers (block period), s.
+        max_duration_s: longest shaper, s; None: `shaping.max_duration_s`.
+        residual_limit: largest residual ratio of a mode anywhere along the axis.
+
+    Raises:
+        ArgumentError: no mode varies with position, or modes vary over several axes.
+        DesignError: somewhere there is no shaper within the duration and the limit.
+    """
+    # SciPy's solvers take a quarter of a second to load: not before they are needed.
+    from shapegcode.shaping.track import MovingMode, design_track
+
+    axis = moving_axis(machine)
+    if axis is None:
+        raise _core.ArgumentError("no mode of the machine file varies with the position of an axis (frequency_over)")
+    tables = [table for of_axis in mode_tables(machine) for table in of_axis]
+    modes = [
+        MovingMode(still_mode(mode, machine.shaping.part_mass_kg), table if len(table.position_mm) else None)
+        for (_, _, mode), table in zip(numbered_modes(machine), tables, strict=True)
+    ]
+    reached = [position for table in tables for position in table.position_mm]
+    longest = machine.shaping.max_duration_s if max_duration_s is None else max_duration_s
+    span = (min(reached), max(reached))
+    return design_track(modes, axis, span, period_s, longest, residual_limit=residual_limit)

@@ -1,0 +1,1 @@
+"""Shapers that hold over bands of frequency."""

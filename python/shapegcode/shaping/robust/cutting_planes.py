@@ -1,0 +1,320 @@
+"""Taps on a grid whose residual stays below a bound over whole frequency bands: linear programs with cuts.
+
+The condition ``|R(w)| <= v`` for every frequency w of a band is infinitely many second-order cones. Each of them
+holds exactly when ``Re(e^{-ja} R(w)) <= v`` for every direction a, which is linear in the taps. So a linear program
+with some (w, a) is a relaxation: its optimum is a lower bound on what any design can reach. The taps that it returns
+are swept over the bands, and where they break the bound the plane (w, a = arg R(w)) that cuts them off is added.
+Bound and sweep close in on the optimum from both sides, and the search ends when they meet.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from shapegcode._core import DesignError, Shaper
+from shapegcode.shaping.bands import ModeBand
+
+__all__ = ["NO_RESIDUAL", "SAME_RESIDUAL", "Bounds", "CutPool", "TapProblem", "proven_worst"]
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+SAME_RESIDUAL = 1e-3
+"""Relative gap between the lower bound and the design at which the design counts as optimal."""
+
+NO_RESIDUAL = 1e-6
+"""Residual ratio that counts as none: no gap is pursued below it."""
+
+_STEP_RAD = 0.1  # of the sweep, seen from the middle of the shaper; the peaks are refined
+_FEWEST_STEPS = 8
+_MOST_ROUNDS = 60
+_STARTS = 5  # frequencies of a band at which every search begins
+_BOUNDS_SHARE = 0.5  # of the worst residual: a plane that the taps come less close to did not bound them
+_PROOF_SHARE = 1e-4  # of the residual: what a proven sweep may add for what lies between its samples
+_PROOF_SAMPLES = 200_000
+# Tolerance and presolve: now and then the solver gives up, or goes round in circles, at the first of them.
+_WAYS = ((1e-9, True), (1e-9, False), (1e-8, True), (1e-7, True), (1e-7, False))
+_MOST_PIVOTS = 20  # per unknown and condition; some 1 is usual
+_SAME_VALUE = 1e-6  # relative
+_INFEASIBLE = 2
+_QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * math.pi
+
+
+class Bounds(NamedTuple):
+    """What a search for the least worst residual found."""
+
+    taps: FloatArray
+    """Best taps at 0, 1 ... periods."""
+    lower: float
+    """No design of this duration has a smaller worst residual."""
+    upper: float
+    """Worst residual of `taps`, by a sweep."""
+
+
+@dataclass
+class CutPool:
+    """Planes found so far, per band: angular frequency and direction. Good for every duration.
+
+    Directions are counted from the phase of an impulse in the middle of the shaper, where that of the best design
+    hardly depends on its duration.
+    """
+
+    omegas: list[list[float]]
+    directions: list[list[float]]
+    starts: int = 0
+    """Planes of each band that are never taken out."""
+
+    @classmethod
+    def around(cls, bands: Sequence[ModeBand]) -> CutPool:
+        """Four directions at a few frequencies of every band, for a start."""
+        pool = cls([], [], _STARTS * len(_QUARTERS))
+        for band in bands:
+            low, high = _ends(band)
+            pool.omegas.append(np.repeat(np.linspace(low, high, _STARTS), len(_QUARTERS)).tolist())
+            pool.directions.append(np.tile(_QUARTERS, _STARTS).tolist())
+        return pool
+
+
+class _Band:
+    """Exponents of one mode's residual terms on a grid, and the frequencies of its sweep."""
+
+    def __init__(self, band: ModeBand, times_s: FloatArray) -> None:
+        zeta = band.mode.damping_ratio
+        end = times_s[-1]
+        # R(w) = sum of a_k*exp(w*q_k): q is free of w because zeta is the same over the band
+        self.q = -zeta * (end - times_s) + 1j * math.sqrt(1.0 - zeta**2) * (times_s - 0.5 * end)
+        self.low, self.high = _ends(band)
+        steps = max(_FEWEST_STEPS, math.ceil((self.high - self.low) * 0.5 * end / _STEP_RAD))
+        self.omegas = np.linspace(self.low, self.high, steps + 1 if self.high > self.low else 1)
+        self.terms = np.exp(np.outer(self.omegas, self.q))
+
+    def residual(self, taps: FloatArray, omegas: FloatArray) -> ComplexArray:
+        return np.asarray(np.exp(np.outer(omegas, self.q)) @ taps, dtype=np.complex128)
+
+    def peaks(self, taps: FloatArray) -> tuple[FloatArray, ComplexArray]:
+        """Frequencies of the local maxima of |R|, refined, and R there."""
+        size = np.abs(self.terms @ taps)
+        padded = np.concatenate([[-1.0], size, [-1.0]])
+        at = np.flatnonzero((size >= padded[:-2]) & (size >= padded[2:]))
+        omegas, step = self.omegas[at], self.omegas[1] - self.omegas[0] if len(self.omegas) > 1 else 0.0
+        for _ in range(2 if step else 0):
+            three = np.clip(omegas[:, None] + step * np.array([-1.0, 0.0, 1.0]), self.low, self.high)
+            left, middle, right = (np.abs(self.residual(taps, three.ravel())) ** 2).reshape(-1, 3).T
+            bend = left - 2.0 * middle + right
+            inner = (three[:, 2] - three[:, 0] > 1.99 * step) & (bend < 0.0)
+            shift = np.where(inner, 0.5 * (left - right) / np.where(inner, bend, -1.0), 0.0)
+            omegas = np.clip(omegas + step * np.clip(shift, -1.0, 1.0), self.low, self.high)
+            step *= 0.1
+        omegas = np.concatenate([self.omegas[at], omegas])
+        values = self.residual(taps, omegas)
+        better = np.argmax(np.abs(values).reshape(2, -1), axis=0)
+        pick = better * len(at) + np.arange(len(at))
+        return omegas[pick], values[pick]
+
+
+@dataclass
+class TapProblem:
+    """Taps at 0, 1 ... `last` periods, sum 1, under conditions on their residual over bands.
+
+    Attributes:
+        bands: where the residual is bounded; angular frequencies are swept, the damping ratio is the nominal one.
+        period_s: of the grid, s.
+        last: number of periods.
+        equalities: matrix and right-hand side of the linear conditions, the sum among them.
+        max_abs_sum: largest sum of the taps' magnitudes; None: no tap is negative.
+        pool: planes, shared between problems of different duration.
+        last_tap: the tap at `last` periods is at least that.
+    """
+
+    bands: Sequence[ModeBand]
+    period_s: float
+    last: int
+    equalities: tuple[FloatArray, FloatArray]
+    max_abs_sum: float | None
+    pool: CutPool
+    last_tap: float = 0.0
+    _bands: list[_Band] = field(init=False)
+    _rows: list[list[FloatArray]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Prepare the sweeps."""
+        times_s = np.arange(self.last + 1, dtype=np.float64) * self.period_s
+        self._bands = [_Band(band, times_s) for band in self.bands]
+        self._rows = [[] for _ in self.bands]
+
+    def least_worst(self, limit: float | None = None) -> Bounds | None:
+        """Taps with the least worst residual, or None if the equalities have no solution.
+
+        With a limit the search ends as soon as it is known on which side of it the optimum lies.
+
+        Raises:
+            DesignError: bound and design did not meet, or the solver failed.
+        """
+        best = np.zeros(self.last + 1)
+        lower, upper = 0.0, math.inf
+        # far below what is asked for the program would be degenerate, and the solver may go round in circles
+        floor = 0.5 * NO_RESIDUAL if limit is None else 0.5 * limit
+        for _ in range(_MOST_ROUNDS):
+            found = self._solve(None, floor)
+            if found is None:
+                return None
+            taps, value = found
+            if value > (1.0 + _SAME_VALUE) * floor:
+                lower = max(lower, value)
+            reached = self._add_cuts(taps, value)
+            if reached < upper:
+                best, upper = taps, reached
+            decided = limit is not None and (lower > limit or upper <= limit)
+            if decided or upper <= max((1.0 + SAME_RESIDUAL) * lower, NO_RESIDUAL):
+                self._forget(best, upper)
+                return Bounds(best, min(lower, upper), upper)
+        raise DesignError(
+            f"after {_MOST_ROUNDS} linear programs the worst residual lies between {lower:.4g} and {upper:.4g}: "
+            "no design is proven best"
+        )
+
+    def cheapest(self, cost: FloatArray, limit: float) -> FloatArray | None:
+        """Taps of least cost whose residual stays below the limit (to `SAME_RESIDUAL`), or None.
+
+        The cost is that of the taps or, where they may be negative, of their magnitudes.
+        """
+        for _ in range(_MOST_ROUNDS):
+            found = self._solve(cost, limit)
+            if found is None:
+                return None
+            if self._add_cuts(found[0], limit) <= (1.0 + SAME_RESIDUAL) * limit:
+                return found[0]
+        return None
+
+    def _add_cuts(self, taps: FloatArray, bound: float) -> float:
+        """Cut off what exceeds the bound; the largest residual over the bands, seen at the last period."""
+        worst = 0.0
+        for band, omegas, directions in zip(self._bands, self.pool.omegas, self.pool.directions, strict=True):
+            where, values = band.peaks(taps)
+            size = np.abs(values)
+            worst = max(worst, float(size.max()))
+            over = size > (1.0 + 0.1 * SAME_RESIDUAL) * bound
+            omegas.extend(where[over].tolist())
+            directions.extend(np.angle(values[over]).tolist())
+        return worst
+
+    def _forget(self, taps: FloatArray, worst: float) -> None:
+        """Take out of the pool what was found on the way and does not bound the result."""
+        for rows, omegas, directions in zip(self._rows, self.pool.omegas, self.pool.directions, strict=True):
+            keep = [
+                k for k in range(len(rows)) if k < self.pool.starts or float(rows[k] @ taps) >= _BOUNDS_SHARE * worst
+            ]
+            rows[:] = [rows[k] for k in keep]
+            omegas[:] = [omegas[k] for k in keep]
+            directions[:] = [directions[k] for k in keep]
+
+    def _planes(self) -> FloatArray:
+        """One row per plane of the pool; those of earlier rounds are kept."""
+        for band, rows, omegas, directions in zip(
+            self._bands, self._rows, self.pool.omegas, self.pool.directions, strict=True
+        ):
+            done = len(rows)
+            if done < len(omegas):
+                turned = np.exp(np.outer(omegas[done:], band.q) - 1j * np.array(directions[done:])[:, None])
+                rows.extend(turned.real)
+        return np.array([row for rows in self._rows for row in rows]).reshape(-1, self.last + 1)
+
+    def _solve(self, cost: FloatArray | None, limit: float) -> tuple[FloatArray, float] | None:
+        """The linear program with the planes so far: least cost below the limit, or the least bound above it."""
+        planes = self._planes()
+        matrix, right = self.equalities
+        signed = self.max_abs_sum is not None
+        if signed:
+            planes, matrix = np.hstack([planes, -planes]), np.hstack([matrix, -matrix])
+        count = planes.shape[1]
+        above = np.full(len(planes), limit)
+        if cost is None:  # one more unknown: how far above the limit the bound lies
+            planes = np.hstack([planes, np.full((len(planes), 1), -1.0)])
+            matrix = np.hstack([matrix, np.zeros((len(matrix), 1))])
+            objective = np.eye(count + 1)[count]
+        else:
+            objective = np.tile(cost, 2) if signed else cost
+        if self.max_abs_sum is not None:
+            planes = np.vstack([planes, np.r_[np.ones(count), np.zeros(planes.shape[1] - count)]])
+            above = np.append(above, self.max_abs_sum)
+        least = np.zeros(len(objective))
+        least[self.last] = self.last_tap
+        x = _linear_program(objective, (planes, above), (matrix, right), least)
+        if x is None:
+            return None
+        taps = x[: self.last + 1] - x[self.last + 1 : count] if signed else x[:count]
+        return taps, float(objective @ x) + (limit if cost is None else 0.0)
+
+
+def _linear_program(
+    objective: FloatArray,
+    above: tuple[FloatArray, FloatArray],
+    equal: tuple[FloatArray, FloatArray],
+    least: FloatArray,
+) -> FloatArray | None:
+    """Least objective over ``x >= least``, ``above[0] @ x <= above[1]`` and ``equal[0] @ x == equal[1]``, or None.
+
+    Raises:
+        DesignError: the solver does not know, whichever way it is asked.
+    """
+    for tolerance, presolve in _WAYS:
+        result = linprog(
+            objective, A_ub=above[0], b_ub=above[1], A_eq=equal[0], b_eq=equal[1],
+            bounds=[(low, None) for low in least.tolist()],
+            method="highs-ds",
+            options={
+                "primal_feasibility_tolerance": tolerance, "dual_feasibility_tolerance": tolerance,
+                "presolve": presolve, "maxiter": _MOST_PIVOTS * (len(objective) + len(above[1])),
+            },
+        )  # fmt: skip
+        if result.status == 0:
+            return np.asarray(result.x, dtype=np.float64)
+        if result.status == _INFEASIBLE:
+            return None
+    raise DesignError(f"the linear program of a shaper with {len(objective)} unknowns failed: {result.message}")
+
+
+def _ends(band: ModeBand) -> tuple[float, float]:
+    omega = 2.0 * math.pi * band.mode.frequency_hz
+    return omega * (1.0 - band.uncertainty), omega * (1.0 + band.uncertainty)
+
+
+def proven_worst(shaper: Shaper, bands: Sequence[ModeBand]) -> float:
+    """Upper bound on the residual ratio over the bands, at most 0.01 % above the largest value of a sweep.
+
+    Between two samples a distance h apart, |R| is at most the larger of the two plus ``h²/8*max|R''|``, and R'' is
+    bounded by the taps' magnitudes times |q|²; the sweep is as fine as that asks for.
+
+    Raises:
+        DesignError: the shaper is too long for a sweep of 200 000 samples of a band.
+    """
+    worst = 0.0
+    for band in bands:
+        worst = max(worst, _proven(shaper, band))
+    return worst
+
+
+def _proven(shaper: Shaper, band: ModeBand) -> float:
+    view = _Band(band, np.asarray(shaper.times_s))
+    taps = np.asarray(shaper.amplitudes)
+    curvature = float(np.abs(taps) @ (np.abs(view.q) ** 2 * np.exp(view.q.real * view.low)))
+    found = float(np.abs(view.terms @ taps).max())
+    width = view.high - view.low
+    allowed = max(_PROOF_SHARE * found, 0.1 * NO_RESIDUAL)
+    steps = math.ceil(width * math.sqrt(curvature / (8.0 * allowed)))
+    if steps > _PROOF_SAMPLES:
+        raise DesignError(f"{steps} samples would be needed to prove the residual of {band}, limit {_PROOF_SAMPLES}")
+    if steps > 0:
+        omegas = np.linspace(view.low, view.high, steps + 1)
+        found = max(
+            float(np.abs(view.residual(taps, part)).max()) for part in np.array_split(omegas, 1 + steps // 4096)
+        )
+        found += (width / steps) ** 2 * curvature / 8.0
+    return found

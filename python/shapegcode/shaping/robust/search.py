@@ -1,0 +1,286 @@
+"""The search behind the robust designs: the smallest number of periods, and the best taps for it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
+from shapegcode.shaping.bands import ModeBand
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, exact_conditions, lower_hull, ms, shortest_non_negative
+from shapegcode.shaping.robust.cutting_planes import (
+    NO_RESIDUAL,
+    SAME_RESIDUAL,
+    Bounds,
+    CutPool,
+    TapProblem,
+    proven_worst,
+)
+
+__all__ = [
+    "RobustDesign", "Task", "best_within", "check_time", "names", "no_exact", "shortest_below",
+    "smallest_below", "unreachable",
+]  # fmt: skip
+
+FloatArray = NDArray[np.float64]
+
+_ON_GRID = 1e-9  # periods; forgives the rounding of a quotient
+_NO_TAP = 1e-9  # smaller amplitudes are the solver's dust
+_GROWTH = 1.4  # of the number of periods while it is searched
+_WHOLE = 1e-3  # swings per period from a whole number
+_LAST_TAP = 1e-3
+"""Where the best use of the last periods of a damped mode is to wait, a tap this large marks their end."""
+_SAME_VARIANCE = 5e-3  # relative
+
+
+@dataclass(frozen=True)
+class RobustDesign:
+    """A shaper on a grid, its worst residual, and how much better any other one could be.
+
+    Attributes:
+        shaper: the taps; times are multiples of `period_s`.
+        period_s: period of the grid, s.
+        worst_residual: largest residual ratio over the bands, proven: at most 0.01 % above the true one.
+        least_possible: no design of this duration or a shorter one has a smaller worst residual.
+    """
+
+    shaper: Shaper
+    period_s: float
+    worst_residual: float
+    least_possible: float
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is asked for, whatever the duration.
+
+    Attributes:
+        bands: modes with their bands; one without a band is cancelled exactly.
+        period_s: of the grid, s.
+        max_abs_sum: largest sum of the taps' magnitudes; None: no tap is negative.
+        zeros_at_nominal: every mode is cancelled exactly at its nominal frequency.
+        pool: planes found so far.
+    """
+
+    bands: tuple[ModeBand, ...]
+    period_s: float
+    max_abs_sum: float | None
+    zeros_at_nominal: bool
+    pool: CutPool
+
+    @classmethod
+    def checked(
+        cls, bands: Sequence[ModeBand], period_s: float, non_negative: bool, max_abs_sum: float, zeros_at_nominal: bool
+    ) -> Task:
+        """The task, its values checked.
+
+        Raises:
+            ArgumentError: no mode, or a value outside its range.
+        """
+        if not bands:
+            raise ArgumentError("a shaper needs at least one mode: 0 given")
+        check_time("period_s", period_s)
+        if not (math.isfinite(max_abs_sum) and max_abs_sum >= 1.0):
+            raise ArgumentError(f"max_abs_sum is {max_abs_sum}: it must be finite and at least 1, the sum of the taps")
+        bands = tuple(bands)
+        wide = [band for band in bands if band.uncertainty]
+        return cls(bands, period_s, None if non_negative else max_abs_sum, zeros_at_nominal, CutPool.around(wide))
+
+    @property
+    def wide(self) -> list[ModeBand]:
+        """The modes whose residual is bounded over a band."""
+        return [band for band in self.bands if band.uncertainty]
+
+    @property
+    def exact(self) -> list[Mode]:
+        """The modes that are cancelled exactly."""
+        return [band.mode for band in self.bands if self.zeros_at_nominal or not band.uncertainty]
+
+    def periods(self, duration_s: float) -> int:
+        """Whole periods within a duration."""
+        return math.floor(duration_s / self.period_s + _ON_GRID)
+
+    def problem(self, last: int, last_tap: float = 0.0) -> TapProblem:
+        """The taps at 0 ... `last` periods, the last one at least `last_tap`."""
+        conditions = exact_conditions(self.exact, self.period_s, last)
+        return TapProblem(self.wide, self.period_s, last, conditions, self.max_abs_sum, self.pool, last_tap)
+
+    def at_period(self, period_s: float) -> Task:
+        """The same on another grid."""
+        return Task(self.bands, period_s, self.max_abs_sum, self.zeros_at_nominal, CutPool.around(self.wide))
+
+    def finished(self, taps: FloatArray, lower: float) -> RobustDesign | None:
+        """The taps without dust, their zeros solved again to rounding, judged; None if that breaks them."""
+        support = np.flatnonzero(np.abs(taps) > _NO_TAP)
+        matrix, right = exact_conditions(self.exact, self.period_s, len(taps) - 1)
+        amplitudes, columns = taps[support], matrix[:, support]
+        for _ in range(3):
+            amplitudes = amplitudes + np.linalg.lstsq(columns, right - columns @ amplitudes, rcond=1e-14)[0]
+        total = float(amplitudes.sum())
+        if abs(total - 1.0) > RESIDUAL_LIMIT or (self.max_abs_sum is None and np.any(amplitudes <= 0.0)):
+            return None
+        shaper = Shaper(((support - support[0]) * self.period_s).tolist(), (amplitudes / total).tolist())
+        if any(shaper.residual_ratio(mode) > RESIDUAL_LIMIT * shaper.abs_sum for mode in self.exact):
+            return None
+        worst = proven_worst(shaper, self.bands)
+        return RobustDesign(shaper, self.period_s, worst, min(lower, worst))
+
+
+def shortest_below(task: Task, limit: float, max_duration_s: float, *, least_cost: bool = True) -> RobustDesign | None:
+    """The shortest design whose worst residual is below the limit, or None.
+
+    Of that duration the one of least contour cost is taken, or, to save the time that takes, any one.
+    """
+    most = task.periods(max_duration_s)
+    if not task.wide and task.max_abs_sum is None:
+        return _exact(task, max_duration_s)
+    if unreachable(task):
+        return None
+    last = smallest_below(task, limit, most)
+    while last is not None and last <= most:
+        found = _within(task, last, limit, least_cost)
+        if found is not None:
+            return found
+        last += 1  # the taps did not survive full precision
+    return None
+
+
+def _exact(task: Task, max_duration_s: float) -> RobustDesign | None:
+    try:
+        shaper = shortest_non_negative(task.exact, task.period_s, max_duration_s)
+    except DesignError:
+        return None
+    worst = proven_worst(shaper, task.bands)
+    return RobustDesign(shaper, task.period_s, worst, 0.0)
+
+
+def best_within(task: Task, last: int) -> RobustDesign | None:
+    """The least worst residual within `last` periods; None if the exact zeros have no solution."""
+    bounds = task.problem(last).least_worst()
+    if bounds is None:
+        return None
+    found = task.finished(bounds.taps, bounds.lower)
+    if found is None:
+        raise DesignError(
+            f"the design of {ms(last * task.period_s)} on a {ms(task.period_s)} grid does not survive being "
+            f"solved in full precision for modes {names(task.bands)}; try another period"
+        )
+    reached = max((1.0 + SAME_RESIDUAL) * bounds.upper, NO_RESIDUAL)
+    if found.worst_residual > reached:
+        # The best use of the last periods was to wait, and the residual counts from the last tap.
+        last = smallest_below(task, reached, last) or last
+        for last_tap in (0.0, _LAST_TAP):
+            ended = task.problem(last, last_tap).least_worst()
+            other = None if ended is None else task.finished(ended.taps, bounds.lower)
+            if other is not None and other.worst_residual < found.worst_residual:
+                found = other
+    return found
+
+
+def _below(task: Task, last: int, limit: float) -> Bounds | None:
+    """Taps within `last` periods whose worst residual is below the limit, or None."""
+    bounds = task.problem(last).least_worst(limit)
+    return bounds if bounds is not None and bounds.upper <= limit else None
+
+
+def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, precision: float = 0.0) -> int | None:
+    """Smallest number of periods that stays below the limit, or None if it exceeds `most`.
+
+    A design stays one with further taps at zero, so growing and then halving finds it. The start is half a period of
+    each mode, what zero vibration takes, or `too_few`, if that is known not to suffice. With a relative `precision`
+    the answer suffices, but may exceed the smallest by that much.
+    """
+    start = max(1.0, sum(0.5 / band.mode.frequency_hz for band in task.bands) / task.period_s, _GROWTH * too_few)
+    enough = min(most, math.ceil(start))
+    while enough < most and _below(task, enough, limit) is None:
+        too_few, enough = enough, max(enough + 1, math.ceil(_GROWTH * enough))
+    enough = min(enough, most)
+    if enough <= too_few or _below(task, enough, limit) is None:
+        return None
+    while enough - too_few > max(1, math.floor(precision * enough)):
+        middle = (too_few + enough) // 2
+        if _below(task, middle, limit) is None:
+            too_few = middle
+        else:
+            enough = middle
+    return enough
+
+
+def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesign | None:
+    """A design of `last` periods below the limit, that of least contour cost if asked for; None if none survives."""
+    for last_tap in (0.0, _LAST_TAP):
+        problem = task.problem(last, last_tap)
+        bounds = problem.least_worst(limit)
+        plain = None if bounds is None else task.finished(bounds.taps, bounds.lower)
+        if plain is not None and plain.worst_residual <= limit:
+            break
+    else:
+        return None
+    inner = (1.0 - 2.0 * SAME_RESIDUAL) * limit  # room for the gap of the planes and for the proof
+    candidates = []
+    if least_cost and task.max_abs_sum is None:
+        candidates = lower_hull(lambda cost: problem.cheapest(cost, inner), last, _SAME_VARIANCE)
+    elif least_cost:
+        least = problem.cheapest(np.ones(last + 1), inner)
+        candidates = [] if least is None else [least]
+    for taps in candidates:
+        found = task.finished(taps, plain.least_possible)
+        if found is not None and found.worst_residual <= limit:
+            return found
+    return plain
+
+
+def check_time(name: str, value_s: float) -> None:
+    """Refuse a time that is not finite and above 0.
+
+    Raises:
+        ArgumentError: with name and value.
+    """
+    if not (math.isfinite(value_s) and value_s > 0.0):
+        raise ArgumentError(f"{name} is {value_s} s: it must be finite and above 0")
+
+
+def names(bands: Sequence[ModeBand]) -> str:
+    """Modes with their bands for a message."""
+    return ", ".join(f"{band} Hz" for band in bands)
+
+
+def no_exact(task: Task, duration_s: float) -> str:
+    """Why the modes without a band have no design of a duration, for a message."""
+    modes = ", ".join(f"{mode.frequency_hz:g} Hz (zeta {mode.damping_ratio:g})" for mode in task.exact)
+    taps = "non-negative taps" if task.max_abs_sum is None else f"taps with sum|a| up to {task.max_abs_sum:g}"
+    return f"{taps} up to {ms(duration_s)} on a {ms(task.period_s)} grid do not cancel {modes} exactly"
+
+
+def refusal(task: Task, limit: float, max_duration_s: float) -> str:
+    """That there is no design below the limit, and the reason if it is known, for a message."""
+    reason = unreachable(task)
+    return (
+        f"no design within {ms(max_duration_s)} on a {ms(task.period_s)} grid leaves at most {100.0 * limit:.3g} % of "
+        f"{names(task.bands)}" + (f"; {reason}" if reason else "")
+    )
+
+
+def unreachable(task: Task) -> str:
+    """What no non-negative shaper of this grid can reduce, for a message; empty if there is nothing.
+
+    At a frequency that swings a whole number of times per period every tap adds to the others: what a shaper seems
+    to take away is only what dies out while it lasts.
+    """
+    if task.max_abs_sum is not None:
+        return ""
+    for band in task.bands:
+        turns_per_hz = math.sqrt(1.0 - band.mode.damping_ratio**2) * task.period_s
+        low, high = (band.mode.frequency_hz * (1.0 + side * band.uncertainty) * turns_per_hz for side in (-1.0, 1.0))
+        turns = max(1, math.ceil(low - _WHOLE))
+        if turns <= high + _WHOLE:
+            often = "once" if turns == 1 else f"{turns} times"
+            return (
+                f"{band} Hz swings {often} per period of {ms(task.period_s)} at {turns / turns_per_hz:.5g} Hz, "
+                "where all taps add up (z close to +1)"
+            )
+    return ""

@@ -1,0 +1,1 @@
+"""A program played on the machine: figures and motion."""

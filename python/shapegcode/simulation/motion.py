@@ -1,0 +1,149 @@
+"""What stays of a motion that passes by: its largest values, and envelopes for pictures. Memory is bounded."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode.model.stream import Chunk
+from shapegcode.results.figures import xyz
+
+__all__ = ["Envelope", "MotionFigures", "MotionTraces"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_BUCKETS = 4000
+
+
+class Envelope:
+    """Least and largest value of several curves over equal stretches of samples, each as short as room allows."""
+
+    def __init__(self, most: int = _BUCKETS) -> None:
+        """At most *most* stretches, 2 or more."""
+        self._most = most
+        self._low: FloatArray | None = None
+        self._high: FloatArray | None = None
+        self._rest: FloatArray | None = None
+        self.samples_per_bucket = 1
+
+    def add(self, values: FloatArray) -> None:
+        """Further samples, (k, curves)."""
+        rest = values if self._rest is None else np.concatenate([self._rest, values])
+        whole = len(rest) // self.samples_per_bucket
+        body = rest[: whole * self.samples_per_bucket].reshape(whole, self.samples_per_bucket, rest.shape[1])
+        self._rest = rest[whole * self.samples_per_bucket :].copy()
+        low, high = body.min(axis=1), body.max(axis=1)
+        self._low = low if self._low is None else np.concatenate([self._low, low])
+        self._high = high if self._high is None else np.concatenate([self._high, high])
+        while len(self._low) > self._most:
+            self._merge()
+
+    def _merge(self) -> None:
+        """Pairs of stretches become one; an odd last one goes back to the samples that wait."""
+        assert self._low is not None
+        assert self._high is not None
+        assert self._rest is not None
+        pairs = len(self._low) // 2
+        if len(self._low) % 2:
+            # Its two extremes stand for it until its stretch is full.
+            self._rest = np.concatenate([self._padded(self._low[-1], self._high[-1]), self._rest])
+        self._low = self._low[: 2 * pairs].reshape(pairs, 2, self._low.shape[1]).min(axis=1)
+        self._high = self._high[: 2 * pairs].reshape(pairs, 2, self._high.shape[1]).max(axis=1)
+        self.samples_per_bucket *= 2
+
+    def _padded(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        rows = np.repeat(low[None, :], self.samples_per_bucket, axis=0)
+        rows[-1] = high
+        return rows
+
+    def result(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Middle of each stretch in samples since the first, (n,); least and largest values, (n, curves).
+
+        The two are the same where every sample has a stretch of its own.
+        """
+        if self._low is None or self._high is None or self._rest is None:
+            raise ValueError("no sample: an envelope needs one or more")
+        low, high = self._low, self._high
+        starts = np.arange(len(low), dtype=np.float64) * self.samples_per_bucket
+        middles = starts + (self.samples_per_bucket - 1) / 2
+        if len(self._rest):
+            low = np.concatenate([low, self._rest.min(axis=0, keepdims=True)])
+            high = np.concatenate([high, self._rest.max(axis=0, keepdims=True)])
+            last = len(starts) * self.samples_per_bucket + (len(self._rest) - 1) / 2
+            middles = np.append(middles, last)
+        return middles, low, high
+
+
+class MotionFigures:
+    """Largest values of a motion, axis by axis."""
+
+    def __init__(self, period_s: float) -> None:
+        """Of a motion whose samples are one period apart."""
+        self._period_s = period_s
+        self._samples = 0
+        self._last_s = 0.0
+        self._largest: dict[str, FloatArray] = {}
+        self._velocity: FloatArray | None = None
+
+    def add(self, chunk: Chunk) -> FloatArray:
+        """Further samples; returns the acceleration of the command, (k, 3), mm/s²."""
+        before = chunk.velocity_mm_per_s[:1] if self._velocity is None else self._velocity
+        acceleration = np.diff(np.concatenate([before, chunk.velocity_mm_per_s]), axis=0) / self._period_s
+        self._velocity = chunk.velocity_mm_per_s[-1:].copy()
+        self._samples += len(chunk)
+        self._last_s = float(chunk.time_s[-1])
+        self._note("largest_speed_mm_per_min", chunk.velocity_mm_per_s * 60.0)
+        self._note("largest_acceleration_mm_per_s2", acceleration)
+        self._note("largest_error_um", chunk.error_mm * 1e3)
+        if chunk.motor_force_n is not None and chunk.friction_force_n is not None:
+            self._note("largest_motor_force_n", chunk.motor_force_n)
+            self._note("largest_friction_force_n", chunk.friction_force_n)
+        return acceleration
+
+    def _note(self, name: str, values: FloatArray) -> None:
+        largest = np.abs(values).max(axis=0)
+        known = self._largest.get(name)
+        self._largest[name] = largest if known is None else np.maximum(known, largest)
+
+    def report(self) -> dict[str, Any]:
+        """`samples`, `end_s` (time of the last one) and the largest values by axis."""
+        return {
+            "samples": self._samples,
+            "end_s": self._last_s,
+            **{name: xyz(values) for name, values in self._largest.items()},
+        }
+
+
+class MotionTraces:
+    """Envelopes of a motion for its picture."""
+
+    def __init__(self, period_s: float) -> None:
+        """Of a motion whose samples are one period apart."""
+        self.period_s = period_s
+        self.begin_s = 0.0
+        self.driven = False
+        self._envelope = Envelope()
+        self._begun = False
+
+    def add(self, chunk: Chunk, acceleration_mm_per_s2: FloatArray) -> None:
+        """Further samples with the acceleration of their command."""
+        if not self._begun:
+            self._begun = True
+            self.begin_s = float(chunk.time_s[0])
+            self.driven = chunk.motor_force_n is not None
+        curves = [chunk.command_mm, chunk.response_mm, chunk.velocity_mm_per_s, acceleration_mm_per_s2, chunk.error_mm]
+        if chunk.motor_force_n is not None and chunk.friction_force_n is not None:
+            curves += [chunk.motor_force_n, chunk.friction_force_n]
+        self._envelope.add(np.concatenate(curves, axis=1))
+
+    def result(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Times in s, (n,), and least and largest values, (n, curves, 3).
+
+        The curves: command and response (mm), speed (mm/s), acceleration (mm/s²), response minus command (mm), with
+        feed drives also force of the motor and friction (N).
+        """
+        middles, low, high = self._envelope.result()
+        times = self.begin_s + middles * self.period_s
+        return times, low.reshape(len(low), -1, 3), high.reshape(len(high), -1, 3)

@@ -1,0 +1,1 @@
+"""Test cuts: their design, their programs, and fits to their records."""

@@ -1,0 +1,378 @@
+"""Coefficients of the cutting force from mean forces: weighted non-linear least squares with 95 % intervals.
+
+The forces come from the core (`_core.MillingForce`); here they are only laid over the measured ones. The power laws are
+fitted about the middle of the chip thicknesses, where factor and exponent do not disturb each other.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode._core import ArgumentError
+from shapegcode.testcut.force import ForceLaw, mean_chip_mm
+from shapegcode.testcut.noise import neighbour_correlation, noise_of
+from shapegcode.testcut.plan import CutTool, Engagement
+
+__all__ = ["Coefficient", "CoefficientFit", "MeanForces", "fit_coefficients"]
+
+Array = npt.NDArray[np.float64]
+
+#: The thickest mean chip over the thinnest; below it exponents are not told apart from factors.
+LEAST_CHIP_RATIO = 1.5
+#: The same of the feeds, for edge forces.
+LEAST_FEED_RATIO = 1.3
+_ROUNDS = 6
+_HUBER = 2.5
+_OUTLIER = 4.0
+_LEAST_OUTLIER = 0.02
+_LARGEST_SHARE_OUT = 0.25
+_STEP = 1e-5
+_DONE = 1e-7
+_SETTLED = 1e-4
+_MOST_STEPS = 40
+
+_NAMES = (
+    ("specific_n_per_mm2", "N/mm²"),
+    ("specific_exponent", ""),
+    ("ratio", ""),
+    ("ratio_exponent", ""),
+    ("tangential_edge_n_per_mm", "N/mm"),
+    ("radial_edge_n_per_mm", "N/mm"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class MeanForces:
+    """Mean forces on the tool over whole revolutions, with what it met.
+
+    Attributes:
+        met: n engagements.
+        feed_mm_per_min: (n,).
+        spindle_rev_per_min: (n,).
+        force_n: (n, 2) along the feed and to its left.
+        revolutions: (n,) how many each is the mean of.
+        group: (n,) number of the pass or file, in the order in which it was cut.
+        displaced: n engagements if the place of the tool were off by its standard error, the same way for all rows of
+            a group; None: the engagements are exact.
+        torque_nm: (n,) mean torque of the spindle; None: not measured.
+    """
+
+    met: Engagement
+    feed_mm_per_min: Array
+    spindle_rev_per_min: Array
+    force_n: Array
+    revolutions: Array
+    group: npt.NDArray[np.intp]
+    displaced: Engagement | None = None
+    torque_nm: Array | None = None
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """One value with its 95 % interval.
+
+    Attributes:
+        name: key of ``[cutting]``.
+        value: the best.
+        low: lower end.
+        high: upper end.
+        unit: of all three.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class CoefficientFit:
+    """What a fit found.
+
+    Attributes:
+        coefficients: in the order of ``[cutting]``.
+        thickness: "mean" or "local": to which chip thickness they belong.
+        middle_chip_mm: geometric mean of the mean chip thicknesses.
+        at_chip: k1 in N/mm² and k2 there: much better known than the factors, which are those of a chip of 1 mm.
+        chip_mm: (n,) mean chip thickness of each row.
+        predicted_n: (n, 2) mean force of the fit.
+        outlier: (n,) rows that were left out, as their force is not that of the others.
+        rms_n: (2,) root mean square of what the fit leaves of the others, along the feed and to its left.
+        rms_percent: the same, of both, as a share of the resultant.
+        correlation: how far neighbours share what the fit leaves, 0 to 1; the intervals allow for it.
+    """
+
+    coefficients: tuple[Coefficient, ...]
+    thickness: str
+    middle_chip_mm: float
+    at_chip: tuple[Coefficient, ...]
+    chip_mm: Array
+    predicted_n: Array
+    outlier: npt.NDArray[np.bool_]
+    rms_n: Array
+    rms_percent: float
+    correlation: float
+
+    def cutting(self) -> dict[str, Any]:
+        """The table ``[cutting]``."""
+        return {**{each.name: each.value for each in self.coefficients}, "chip_thickness": self.thickness}
+
+
+class _Model:
+    """Mean forces over the parameters: ln k1 and ln k2 at the reference chip, their exponents, edge forces."""
+
+    def __init__(
+        self, tool: CutTool, axial_depth_mm: float, data: MeanForces, thickness: str, reference_mm: float
+    ) -> None:
+        self.tool, self.depth, self.data, self.thickness = tool, axial_depth_mm, data, thickness
+        self.reference = reference_mm
+        # A torque is laid over as the force at the tool's radius that makes it.
+        self.at_radius = 1e3 / tool.radius_mm
+        torque = [] if data.torque_nm is None else [self.at_radius * data.torque_nm]
+        self.measured = np.column_stack([data.force_n, *torque])
+
+    def values(self, parameters: Array) -> dict[str, Any]:
+        """The keys of ``[cutting]``."""
+        logarithm = math.log(self.reference)
+        found = {
+            "specific_n_per_mm2": math.exp(parameters[0] - parameters[1] * logarithm),
+            "specific_exponent": float(parameters[1]),
+            "ratio": math.exp(parameters[2] - parameters[3] * logarithm),
+            "ratio_exponent": float(parameters[3]),
+            "chip_thickness": self.thickness,
+        }
+        if len(parameters) > 4:
+            found["tangential_edge_n_per_mm"], found["radial_edge_n_per_mm"] = parameters[4:]
+        return found
+
+    def forces(self, parameters: Array) -> Array:
+        return self.with_values(self.values(parameters))
+
+    def with_values(self, values: Mapping[str, Any]) -> Array:
+        found = np.zeros(self.measured.shape)
+        for speed, at, met in _by_speed(self.data):
+            law = ForceLaw(self.tool, values, speed, self.depth)
+            forces = law.forces(met, self.data.feed_mm_per_min[at])
+            found[at, :2] = forces.mean_n
+            found[at, 2:] = self.at_radius * forces.mean_torque_nm[:, None]
+        return found
+
+    def slopes(self, parameters: Array, at: Array) -> Array:
+        """(all measured values, p) change of the forces with each parameter; the edge forces act as they are."""
+        columns = []
+        for k in range(len(parameters)):
+            moved = parameters.copy()
+            step = _STEP if k < 4 else 0.1
+            moved[k] += step
+            columns.append((self.forces(moved) - at).ravel() / step)
+        return np.column_stack(columns)
+
+
+def fit_coefficients(
+    data: MeanForces, tool: CutTool, axial_depth_mm: float, *, thickness: str = "mean", edge: bool = False
+) -> CoefficientFit:
+    """Fit k1(t) and k2(t), and if asked the edge forces.
+
+    Args:
+        data: mean forces; at several radial depths or feeds.
+        tool: the end mill.
+        axial_depth_mm: of all of them.
+        thickness: the chip thickness that the power laws are of, "mean" of the engagement or "local".
+        edge: with edge forces.
+
+    Raises:
+        ArgumentError: too few forces, chips too alike to tell the exponents, forces that no cut gives (sign or axes).
+    """
+    count = 6 if edge else 4
+    chip = _chips(tool, axial_depth_mm, data)
+    _check(data, chip, count, edge)
+    middle = math.exp(float(np.mean(np.log(chip))))
+    model = _Model(tool, axial_depth_mm, data, thickness, middle)
+    parameters = _start(model, data, count)
+    noise, robust = np.ones(model.measured.shape), np.ones(model.measured.shape)
+    for _ in range(_ROUNDS):
+        before = parameters
+        parameters, left, slopes = _solved(model, parameters, robust / noise**2)
+        noise = noise_of(left, model.forces(parameters), data.revolutions, robust)
+        scaled = np.abs(left) / noise
+        robust = np.minimum(1.0, _HUBER / np.maximum(scaled, 1e-12))
+        if np.all(np.abs(parameters - before) < _SETTLED * np.maximum(np.abs(parameters), 1.0)):
+            break
+    # Noise may be so small that the law itself is off by more than it: that alone makes no outlier.
+    size = np.linalg.norm(model.measured, axis=1)[:, None]
+    outlier = np.any((np.abs(left) > _OUTLIER * noise) & (np.abs(left) > _LEAST_OUTLIER * size), axis=1)
+    if outlier.mean() > _LARGEST_SHARE_OUT:
+        raise ArgumentError(
+            f"{100 * outlier.mean():.0f} % of the forces do not follow one law: was the tool worn, did it chatter, or "
+            "is the work piece not the one described?"
+        )
+    weights = np.where(outlier[:, None], 0.0, 1.0 / noise**2)
+    parameters, left, slopes = _solved(model, parameters, weights)
+    correlation = neighbour_correlation(left / noise, data.group, outlier)
+    predicted = data.force_n - left[:, :2]
+    covariance = _covariance(slopes, left, weights, correlation) + _of_place(model, parameters, slopes, weights)
+    kept = left[~outlier, :2]
+    size = np.linalg.norm(data.force_n[~outlier], axis=1)
+    free = int((weights > 0.0).sum()) - count
+    return CoefficientFit(
+        _with_intervals(model, parameters, covariance, free, 1.0),
+        thickness,
+        model.reference,
+        _with_intervals(model, parameters, covariance, free, model.reference)[:4:2],
+        chip,
+        predicted,
+        outlier,
+        np.sqrt(np.mean(kept**2, axis=0)),
+        100.0 * float(np.sqrt(np.sum(kept**2) / np.sum(size**2))),
+        correlation,
+    )
+
+
+def _chips(tool: CutTool, depth: float, data: MeanForces) -> Array:
+    found = np.zeros(len(data.feed_mm_per_min))
+    for speed, at, met in _by_speed(data):
+        found[at] = mean_chip_mm(tool, speed, depth, met, data.feed_mm_per_min[at])
+    return found
+
+
+def _by_speed(data: MeanForces) -> Iterator[tuple[float, npt.NDArray[np.intp], Engagement]]:
+    """Each spindle speed with the rows and engagements at it."""
+    for speed in np.unique(data.spindle_rev_per_min):
+        at = np.flatnonzero(data.spindle_rev_per_min == speed)
+        yield float(speed), at, Engagement(*(column[at] for column in vars(data.met).values()))
+
+
+def _check(data: MeanForces, chip: Array, count: int, edge: bool) -> None:
+    rows = len(chip)
+    if rows < 2 * count:
+        raise ArgumentError(f"{rows} mean forces are too few for {count} coefficients: needed are {2 * count} or more")
+    if not np.all(chip > 0.0):
+        raise ArgumentError("some forces belong to places where the tool meets nothing: leave them out")
+    low, high = float(chip.min()), float(chip.max())
+    feeds = np.unique(np.round(data.feed_mm_per_min, 3))
+    if high / low < LEAST_CHIP_RATIO:
+        raise ArgumentError(
+            f"the exponents cannot be told: the mean chip is {low * 1e3:.2f} to {high * 1e3:.2f} um thick, a ratio of "
+            f"{high / low:.2f}, and must have one of {LEAST_CHIP_RATIO:g} or more: let the radial depth grow from "
+            "0.05 D to 0.35 D (ratio 2.7), or add passes with other feeds"
+        )
+    if edge and feeds.max() / feeds.min() < LEAST_FEED_RATIO:
+        raise ArgumentError(
+            f"edge forces cannot be told from the exponents at feeds from {feeds.min():g} to {feeds.max():g} mm/min: "
+            f"measure with feeds of a ratio of {LEAST_FEED_RATIO:g} or more, better 3"
+        )
+
+
+def _start(model: _Model, data: MeanForces, count: int) -> Array:
+    """Constant k1 and k2 that fit best: with exponent 0 the force is linear in k1 and k1 k2."""
+    unit = {"specific_n_per_mm2": 1.0, "chip_thickness": model.thickness}
+    along = model.with_values({**unit, "ratio": 0.0})
+    across = model.with_values({**unit, "ratio": 1.0}) - along
+    columns = np.column_stack([along.ravel(), across.ravel()])
+    weight = np.repeat(1.0 / np.maximum(np.linalg.norm(data.force_n, axis=1), 1e-9), model.measured.shape[1])
+    (tangential, radial), *_ = np.linalg.lstsq(columns * weight[:, None], model.measured.ravel() * weight, rcond=None)
+    if tangential <= 0.0 or radial <= 0.0:
+        raise ArgumentError(
+            f"no cut gives such forces: they would need {tangential:.4g} N/mm² along and {radial:.4g} N/mm² across the "
+            "cutting edge, both must be above 0: check --forces-on, the signs and names of fx (along the feed) and fy "
+            "(to its left), and up or down milling"
+        )
+    start = np.zeros(count)
+    start[0], start[2] = math.log(tangential), math.log(radial / tangential)
+    return start
+
+
+def _solved(model: _Model, start: Array, weights: Array) -> tuple[Array, Array, Array]:
+    """Levenberg-Marquardt steps to the weighted least squares: parameters, what they leave, slopes."""
+    root = np.sqrt(weights).ravel()
+    parameters = start
+    predicted = model.forces(parameters)
+    left = model.measured - predicted
+    error = float(np.sum((root * left.ravel()) ** 2))
+    damping = 1e-3
+    slopes = model.slopes(parameters, predicted)
+    for _ in range(_MOST_STEPS):
+        weighted = slopes * root[:, None]
+        scale = np.linalg.norm(weighted, axis=0)
+        matrix = np.vstack([weighted, np.diag(math.sqrt(damping) * scale)])
+        step, *_ = np.linalg.lstsq(matrix, np.concatenate([root * left.ravel(), np.zeros(len(start))]), rcond=None)
+        # A law whose force does not grow with the chip is none.
+        moved = parameters + np.clip(step, -_largest_step(len(start)), _largest_step(len(start)))
+        moved[1], moved[3] = max(moved[1], -0.9), max(moved[3], -0.95 - moved[1])
+        moved[4:] = np.maximum(moved[4:], 0.0)
+        new = model.forces(moved)
+        new_error = float(np.sum((root * (model.measured - new).ravel()) ** 2))
+        if new_error > error * (1.0 + 1e-12):
+            damping = max(damping, 1e-9) * 10.0
+            if damping > 1e9:
+                break
+            continue
+        gained = error - new_error
+        change = float(np.max(np.abs(moved - parameters)))
+        parameters, predicted, error, damping = moved, new, new_error, damping * 0.1
+        left = model.measured - predicted
+        slopes = model.slopes(parameters, predicted)
+        if gained <= _DONE * error or change < _DONE:
+            break
+    return parameters, left, slopes
+
+
+def _largest_step(count: int) -> Array:
+    return np.array([1.0, 0.5, 1.0, 0.5, 1e3, 1e3])[:count]
+
+
+def _covariance(slopes: Array, left: Array, weights: Array, correlation: float) -> Array:
+    weighted = slopes * np.sqrt(weights).ravel()[:, None]
+    free = int((weights > 0.0).sum()) - slopes.shape[1]
+    square = float(np.sum(weights * left**2)) / max(free, 1)
+    scale = np.maximum(np.linalg.norm(weighted, axis=0), 1e-300)
+    inner = np.linalg.pinv((weighted / scale).T @ (weighted / scale))
+    return np.asarray(inner / np.outer(scale, scale) * square * (1.0 + correlation) / (1.0 - correlation))
+
+
+def _of_place(model: _Model, parameters: Array, slopes: Array, weights: Array) -> Array:
+    """Covariance that comes from not knowing exactly where the tool was in each group."""
+    data, count = model.data, len(parameters)
+    found = np.zeros((count, count))
+    if data.displaced is None:
+        return found
+    there = dataclasses.replace(data, met=data.displaced)
+    moved = _Model(model.tool, model.depth, there, model.thickness, model.reference)
+    change = moved.forces(parameters) - model.forces(parameters)
+    root = np.sqrt(weights)
+    inverse = np.linalg.pinv(slopes * root.ravel()[:, None])
+    for group in np.unique(data.group):
+        effect = inverse @ (root * np.where((data.group == group)[:, None], change, 0.0)).ravel()
+        found += np.outer(effect, effect)
+    return found
+
+
+def _with_intervals(
+    model: _Model, parameters: Array, covariance: Array, free: int, chip_mm: float
+) -> tuple[Coefficient, ...]:
+    """Values with their intervals; the factors k1 and k2 at a chip thickness."""
+    from scipy.stats import t as student
+
+    quantile = float(student.ppf(0.975, max(free, 1)))
+    way = math.log(chip_mm / model.reference)
+    found = []
+    for k, (name, unit) in enumerate(_NAMES[: len(parameters)]):
+        factor = k in (0, 2)
+        direction = np.zeros(len(parameters))
+        direction[k] = 1.0
+        if factor:
+            direction[k + 1] = way
+        value = float(direction @ parameters)
+        half = quantile * math.sqrt(max(float(direction @ covariance @ direction), 0.0))
+        ends = (value, value - half, value + half)
+        best, low, high = (math.exp(each) for each in ends) if factor else ends
+        found.append(Coefficient(name, best, low, high, unit))
+    return tuple(found)
