@@ -110,8 +110,8 @@ if TYPE_CHECKING:
     from shapegcode.shaping.grid import choose_grid as choose_grid
     from shapegcode.simulation.simulate import Simulation as Simulation
     from shapegcode.simulation.simulate import simulate as simulate
-    from shapegcode.timing.cycle_time import CycleTime as CycleTime
     from shapegcode.timing.cycle_time import cycle_time as cycle_time
+    from shapegcode.timing.result import CycleTime as CycleTime
 
 _HOME = {
     **dict.fromkeys(
@@ -144,7 +144,8 @@ _HOME = {
     ),
     **dict.fromkeys(("Simulation", "simulate"), "simulation.simulate"),
     "stream": "model.stream",
-    **dict.fromkeys(("CycleTime", "cycle_time"), "timing.cycle_time"),
+    "CycleTime": "timing.result",
+    "cycle_time": "timing.cycle_time",
 }  # fmt: skip
 
 __all__ = sorted(_HOME)  # noqa: PLE0605

@@ -100,7 +100,7 @@ def pocket(machine: Machine, samples: int) -> dict[str, Any]:
     written = result.written
     constant = _constant_feed(result, tool, machine)
     text = re.sub(r"F1500\.", f"F{constant:.1f}", (FEED / "POCKET.NC").read_text(encoding="ascii"))
-    times = [cycle_time(each, machine).total_s for each in (written, Program.from_text(text, machine))]
+    times = [cycle_time(each, machine).cycle_time_s for each in (written, Program.from_text(text, machine))]
     return {
         "limit_n": limit,
         "peak_n": float(result.report["resultant_force_n"]["after"]["max"]),

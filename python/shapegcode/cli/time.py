@@ -3,17 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import (
-    add_input_arguments,
-    add_plots_argument,
-    load_machine,
-    override,
-    ratio,
-    refuse_same_file,
-)
+from shapegcode.cli.options import add_input_arguments, add_plots_argument, load_machine, override, ratio
 
 __all__ = ["add_arguments", "run"]
 
@@ -57,24 +49,14 @@ def run(args: argparse.Namespace) -> int:
         ProgramError, MachineError, ArgumentError: bad input.
         OSError: a file cannot be read or written.
     """
-    from shapegcode._core import ArgumentError
-    from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.io.atomic import write_text
+    from shapegcode.cli import runner
+    from shapegcode.io.atomic import write_lines
     from shapegcode.program import Program
-    from shapegcode.results.table import warning_table
     from shapegcode.timing.cycle_time import cycle_time
-    from shapegcode.timing.tables import blocks_csv, next_step, parts_table, slowest_table, tools_table
 
-    if args.csv == "-" and args.json == "-":
-        raise ArgumentError("--csv - and --json -: only one of them can have standard output")
     machine = load_machine(args)
-    targets = [Path(name) for name in (args.csv, args.json) if name not in (None, "-")]
-    refuse_same_file(targets, [Path(args.input), Path(args.machine)])
-    refuse_same_file(targets[:1], targets[1:])
-    stdout = "-" if "-" in (args.csv, args.json) else None
-    with progress(f"timing {args.input}", stdout) as bar:
-        bar.wait()
+    runner.check_files(args)
+    with runner.progress(f"timing {args.input}", args, endless=True):
         program = Program.read(args.input, machine, program_number=args.program)
         wanted = args.csv is not None or args.blocks
         time = cycle_time(
@@ -85,26 +67,10 @@ def run(args: argparse.Namespace) -> int:
             feed_override=args.override,
             rapid_override=args.rapid_override,
         )
-    if args.plots is not None:
-        from shapegcode.timing.plots import write_time_pictures
-
-        write_time_pictures(time, args.plots)
-    if args.csv == "-":
-        print(blocks_csv(time), end="")
-    elif args.csv is not None:
-        write_text(args.csv, blocks_csv(time))
-    if args.json is not None:
-        write_json(time.report(blocks=args.blocks), args.json)
-    console = output_console(stdout)
-    console.print(parts_table(time))
-    if time.tools:
-        console.print(tools_table(time))
-    if time.regions or time.blocks:
-        console.print(slowest_table(time))
-    if time.warnings:
-        console.print(warning_table(time.warnings))
+    if args.csv is not None:
+        write_lines(args.csv, time.csv_lines())
     free = sum(block.kind in ("tool_change", "function") and block.duration_s <= 0.0 for block in time.blocks)
-    if free:
-        console.print(f"tool changes and M codes count 0 s on this machine ({free} in the program)", markup=False)
-    console.print(f"next: {next_step(time)}", markup=False)
-    return ExitCode.OK if time.agrees else ExitCode.OUT_OF_TOLERANCE
+    note = f"tool changes and M codes count 0 s on this machine ({free} in the program)"
+    return runner.finish(
+        time if args.blocks else time.without_blocks(), args, tables=time.tables(), notes=[note] if free else []
+    )

@@ -15,7 +15,8 @@ from shapegcode.model.controller import motion_limits
 from shapegcode.model.play import playback_options
 from shapegcode.program import Program
 from shapegcode.results.figures import largest_um
-from shapegcode.timing.cycle_time import AGREEMENT_PERCENT, PARTS, cycle_time
+from shapegcode.timing.cycle_time import cycle_time
+from shapegcode.timing.result import AGREEMENT_PERCENT, PARTS
 
 # Paper 000, Table 2 (orbit error of the command in %) and its text on time ("up to 37 %", "under 4 %").
 _PAPER_ORBIT_PERCENT = {(100, 40): 0.0270, (200, 40): 0.1075, (100, 1): 0.1051, (200, 1): 0.3546}
@@ -135,7 +136,7 @@ def cycle_time_demo() -> dict[str, Any]:
                 "rapid_time_constant_s": constants[0],
                 "rapid_bell_time_s": constants[1],
                 "time_constant_s": constants[2],
-                "closed_form_s": closed.total_s,
+                "closed_form_s": closed.cycle_time_s,
                 "full_interpolation_s": full.full_interpolation_s,
                 "difference_percent": full.difference_percent,
                 "computing_s": {"closed_form": middle - began, "full_interpolation": ended - middle},

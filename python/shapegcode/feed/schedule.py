@@ -151,8 +151,8 @@ def schedule_survey(
         on_progress(_PLANNING + (1.0 - _PLANNING) * (index + 1) / total)
     report = feed_report(surveyed, plans, loads, machine, margin)
     report["cycle_time_s"] = {
-        "before": cycle_time(program, machine).total_s,
-        "after": cycle_time(written, machine).total_s,
+        "before": cycle_time(program, machine).cycle_time_s,
+        "after": cycle_time(written, machine).cycle_time_s,
     }
     report["blocks"] = {"before": sum(region.blocks for region in program.regions), "after": blocks}
     return FeedSchedule(text, written, surveyed, tuple(plans), tuple(loads), report)

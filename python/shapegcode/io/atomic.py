@@ -6,11 +6,12 @@ import contextlib
 import errno
 import os
 import stat
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-__all__ = ["named_errors", "replaced_file", "write_bytes", "write_text"]
+__all__ = ["named_errors", "replaced_file", "write_bytes", "write_lines", "write_text"]
 
 
 @contextlib.contextmanager
@@ -68,6 +69,20 @@ def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:
         OSError: with the name of *path* and the reason, for example a full disk or a missing folder.
     """
     write_bytes(path, text.encode(), overwrite=overwrite)
+
+
+def write_lines(path: str | Path, lines: Iterable[str]) -> None:
+    """As `write_text`, line by line, without holding all of them; ``-`` is standard output.
+
+    Raises:
+        OSError: with the name of *path* and the reason.
+    """
+    if path == "-":
+        sys.stdout.writelines(lines)
+        return
+    with named_errors(path), replaced_file(path) as stream:
+        for line in lines:
+            stream.write(line.encode())
 
 
 def write_bytes(path: str | Path, data: bytes, *, overwrite: bool = True) -> None:

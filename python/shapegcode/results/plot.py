@@ -1,4 +1,7 @@
-"""The paper of the pictures: figures, panels, titles, files.
+"""The paper of the pictures: one style, figures and panels, titles, files.
+
+A plot is a function ``plot_x(result, ax=None) -> Axes``: it draws into the caller's axes or into a new figure, and
+writes nothing. `axes` gives it one panel, `grid` several; `save` writes what was drawn.
 
 Matplotlib is imported when the first figure is made and draws to files only (PNG or SVG, by the file's ending); no
 window system and no global state are touched. Colours are those of Okabe and Ito, which colour-blind readers can tell
@@ -15,7 +18,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "FORMATS", "GREY", "figure", "heading", "legend_above", "panels", "save", "write_pictures"]
+__all__ = [
+    "COLOURS",
+    "FORMATS",
+    "GREY",
+    "axes",
+    "figure",
+    "grid",
+    "heading",
+    "legend_above",
+    "legend_below",
+    "panels",
+    "save",
+    "save_all",
+    "write_pictures",
+]
 
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
 GREY = "#8a8a8a"
@@ -30,6 +47,68 @@ def figure(width_inch: float, height_inch: float) -> Figure:
     new = Figure(figsize=(width_inch, height_inch), layout="constrained", facecolor="white")
     FigureCanvasAgg(new)
     return new
+
+
+def axes(ax: Axes | None = None, *, size_inch: tuple[float, float] = (8.0, 4.5), title: str = "") -> Axes:
+    """One panel in the house's style.
+
+    Args:
+        ax: where to draw; None: into a new figure.
+        size_inch: width and height of a new figure.
+        title: of the panel.
+    """
+    panel: Axes = figure(*size_inch).subplots() if ax is None else ax
+    _style(panel)
+    if title:
+        panel.set_title(title, loc="left", fontsize=11)
+    return panel
+
+
+def grid(
+    ax: Axes | None,
+    rows: int,
+    columns: int,
+    *,
+    size_inch: tuple[float, float] = (9.0, 6.0),
+    title: str = "",
+    part: str = "",
+    **subplots: Any,
+) -> list[list[Axes]]:
+    """Panels of one picture, row by row: of a new figure, or in the place of the caller's axes.
+
+    Args:
+        ax: whose place is divided (it shows no axis of its own then); None: a new figure.
+        rows: of panels.
+        columns: of panels.
+        size_inch: width and height of a new figure.
+        title: of the whole picture.
+        part: which part of the program it shows.
+        subplots: what matplotlib's `subplots` knows beside them: sharex, sharey, height_ratios, width_ratios.
+    """
+    if ax is None:
+        new = figure(*size_inch)
+        heading(new, title, part)
+        found = new.subplots(rows, columns, squeeze=False, **subplots)
+    else:
+        ratios = {name: subplots.pop(name) for name in ("height_ratios", "width_ratios") if name in subplots}
+        ax.set_axis_off()
+        ax.set_title(title + (f"\n{part}" if part else ""), loc="left", fontsize=11)
+        place = ax.get_subplotspec()
+        if place is None:
+            raise ValueError("ax has no place in a grid of panels: make it with figure.subplots() or plt.subplots()")
+        parent: Any = ax.get_figure()
+        spec: Any = place.subgridspec(rows, columns, **ratios)
+        found = spec.subplots(squeeze=False, **subplots)
+        parent.sca(ax)
+    for panel in found.flat:
+        _style(panel)
+    return [list(row) for row in found]
+
+
+def _style(panel: Axes) -> None:
+    panel.grid(True, color="#e4e4e4", linewidth=0.6)
+    panel.set_axisbelow(True)
+    panel.spines[["top", "right"]].set_visible(False)
 
 
 def panels(figure: Figure, rows: int, columns: int) -> list[list[Axes]]:
@@ -51,6 +130,21 @@ def heading(figure: Figure, text: str, part: str) -> None:
 def legend_above(panel: Axes) -> None:
     """Legend between the panel and what is above it, where it hides no curve."""
     panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.2, fontsize=9)
+
+
+def legend_below(panel: Axes, *, of: Axes | None = None, columns: int = 4) -> None:
+    """Legend below the panel, and below the name of its axis.
+
+    Args:
+        panel: the lowest of a picture.
+        of: whose curves it names; None: its own.
+        columns: of the legend.
+    """
+    handles, labels = (of or panel).get_legend_handles_labels()
+    panel.legend(
+        handles, labels, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=columns, frameon=False, fontsize=9,
+        borderaxespad=4.5,
+    )  # fmt: skip
 
 
 def write_pictures(folder: str | Path, prefix: str, pictures: Mapping[str, Callable[[Path], None]]) -> list[str]:
@@ -77,8 +171,34 @@ def write_pictures(folder: str | Path, prefix: str, pictures: Mapping[str, Calla
     return [str(file) for file in files]
 
 
-def save(figure: Figure, file: str | Path) -> None:
-    """Write the picture as PNG or SVG, by the file's ending; the same data gives the same bytes.
+def save_all(plots: Mapping[str, Callable[..., Axes]], folder: str | Path) -> list[str]:
+    """Draw pictures and write each in every format into a folder, which is made where it is missing.
+
+    Args:
+        plots: what draws each picture, by the name of its file without ending.
+        folder: into which.
+
+    Returns:
+        The files written.
+
+    Raises:
+        OSError: the folder cannot be made or a file not be written.
+    """
+    if not plots:
+        return []
+    place = Path(folder)
+    place.mkdir(parents=True, exist_ok=True)
+    files = []
+    for name, plot in plots.items():
+        drawn = plot()
+        for suffix in FORMATS:
+            files.append(place / f"{name}{suffix}")
+            save(drawn, files[-1])
+    return [str(file) for file in files]
+
+
+def save(drawn: Axes | Figure, file: str | Path) -> None:
+    """Write the picture to which the axes belong as PNG or SVG, by the file's ending; same data, same bytes.
 
     Raises:
         ValueError: a wrong ending.
@@ -86,6 +206,7 @@ def save(figure: Figure, file: str | Path) -> None:
     """
     import matplotlib
 
+    figure: Any = drawn.figure.figure  # of axes in a part of a figure: the whole
     path = Path(file)
     suffix = path.suffix.lower()
     if suffix not in FORMATS:

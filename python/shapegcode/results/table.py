@@ -1,20 +1,164 @@
-"""Tables on the terminal."""
+"""Tables, declared once: columns with name, unit, value and digits; for the terminal, Markdown and HTML.
+
+>>> COLUMNS = (Column("lines", value="lines"), Column("time", "s", "duration_s", digits=3))
+>>> console.print(Table("slowest", COLUMNS, regions))
+
+A table fits 80 columns: numbers stay whole, texts wrap between words, and a column without any entry is left out.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.console import Console, ConsoleOptions, RenderResult
+    from rich.table import Table as RichTable
+
+__all__ = ["Column", "Table", "share_percent", "warning_table"]
+
+_NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
-def warning_table(warnings: Iterable[str]) -> Table:
+@dataclass(frozen=True)
+class Column:
+    """One column.
+
+    Attributes:
+        name: heading.
+        unit: behind the heading; empty: none.
+        value: what a cell shows: name of an attribute of the row (dots lead further), or a function of the row.
+        digits: behind the point of numbers; None: as text.
+        text: of words, which wrap and stand at the left; other columns stand at the right and are never cut.
+        style: of a cell, as rich names it, from the row; None: plain.
+    """
+
+    name: str
+    unit: str = ""
+    value: str | Callable[[Any], object] = ""
+    digits: int | None = None
+    text: bool = False
+    style: Callable[[Any], str] | None = None
+
+    @property
+    def heading(self) -> str:
+        """Name and unit."""
+        return f"{self.name} {self.unit}".strip()
+
+    def cell(self, row: object) -> str:
+        """What stands in a row; empty where there is nothing."""
+        take = attrgetter(self.value or self.name) if isinstance(self.value, str) else self.value
+        value = take(row)
+        if value is None:
+            return ""
+        if isinstance(value, float) and self.digits is not None:
+            return f"{value:z.{self.digits}f}"
+        return str(value)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table as data.
+
+    Attributes:
+        title: above it; empty: none.
+        columns: from left to right.
+        rows: what the columns read, from top to bottom.
+        caption: below it; empty: none.
+        sections: ranks of the rows before which a line is drawn.
+        row_style: of a whole row, as rich names it.
+        caption_style: as rich names it.
+    """
+
+    title: str
+    columns: tuple[Column, ...]
+    rows: Sequence[Any]
+    caption: str = ""
+    sections: Collection[int] = ()
+    row_style: Callable[[Any], str] | None = None
+    caption_style: str = ""
+
+    def cells(self) -> list[list[str]]:
+        """Headings and rows as texts, without the columns that are empty in every row."""
+        filled = [[column.cell(row) for column in self.columns] for row in self.rows]
+        kept = [rank for rank in range(len(self.columns)) if not filled or any(cells[rank] for cells in filled)]
+        whole = [[column.heading for column in self.columns], *filled]
+        return [[cells[rank] for rank in kept] for cells in whole]
+
+    def _shown(self) -> list[Column]:
+        return [column for column in self.columns if not self.rows or any(column.cell(row) for row in self.rows)]
+
+    def markdown(self) -> str:
+        """The table for a page of text, its title as a line above it."""
+        head, *rows = self.cells()
+        rules = ["---" if column.text else "---:" for column in self._shown()]
+        lines = [f"| {' | '.join(cells)} |" for cells in (head, rules, *rows)]
+        return "\n".join(
+            [*([self.title, ""] if self.title else []), *lines, *(["", self.caption] if self.caption else [])]
+        )
+
+    def __str__(self) -> str:
+        """As on a terminal of 80 columns, without colours."""
+        import io
+
+        from rich.console import Console
+
+        stream = io.StringIO()
+        Console(file=stream, width=80, color_system=None, highlight=False).print(self)
+        return stream.getvalue().rstrip("\n")
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """How rich prints it."""
+        yield self._rich()
+
+    def _rich(self) -> RichTable:
+        from rich.box import SIMPLE_HEAD
+        from rich.table import Table as RichTable
+        from rich.text import Text
+
+        shown = self._shown()
+        table = RichTable(
+            title=Text(self.title, style="bold") if self.title else None, title_justify="left", box=SIMPLE_HEAD,
+            show_edge=False, pad_edge=False, padding=(0, 1, 0, 0), caption_justify="left",
+            caption=Text(self.caption, style=self.caption_style) if self.caption else None,
+        )  # fmt: skip
+        rows = [[_whole(column, column.cell(row)) for column in shown] for row in self.rows]
+        for rank, column in enumerate(shown):
+            words = [*column.heading.split(), *(word for cells in rows for word in cells[rank].split(" "))]
+            # Narrower would cut a figure or a word; a path may be longer than the terminal is wide, and folds.
+            least = min(max(map(len, words), default=1), 24 if column.text else 60)
+            table.add_column(
+                column.heading, justify="left" if column.text else "right", min_width=least, overflow="fold",
+            )  # fmt: skip
+        for rank, (row, cells) in enumerate(zip(self.rows, rows, strict=True)):
+            if rank in self.sections and rank > 0:
+                table.add_section()
+            styled = [
+                Text(cell, style=column.style(row) if column.style else "")
+                for column, cell in zip(shown, cells, strict=True)
+            ]
+            table.add_row(*styled, style=self.row_style(row) if self.row_style else None)
+        return table
+
+
+def _whole(column: Column, cell: str) -> str:
+    """A figure with its interval or unit is one word."""
+    return cell if column.text else cell.replace(" ", _NO_BREAK)
+
+
+def share_percent(part: float, whole: float) -> str:
+    """A part in percent of the whole, for a cell; empty where there is no whole."""
+    return f"{part / whole * 100.0:.1f} %" if whole > 0.0 else ""
+
+
+def warning_table(warnings: Iterable[str]) -> RichTable:
     """Warnings one below the other; a long one wraps under its own text, not under the word `warning`."""
-    from rich.table import Table
+    from rich.table import Table as RichTable
     from rich.text import Text
 
-    table = Table.grid(padding=(0, 1))
+    table = RichTable.grid(padding=(0, 1))
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
     for warning in warnings:

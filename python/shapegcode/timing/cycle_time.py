@@ -8,168 +8,25 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, fields
+from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.controller import controller_model
-from shapegcode.program import Program
+from shapegcode.program import Program, given_program
+from shapegcode.timing.result import PARTS, BlockTime, CycleTime, RegionTime, ToolTime
 
-__all__ = ["AGREEMENT_PERCENT", "BlockTime", "CycleTime", "RegionTime", "TimeParts", "ToolTime", "cycle_time"]
-
-AGREEMENT_PERCENT = 0.5
-"""Closed form and full interpolation agree if they differ by no more than this."""
+__all__ = ["cycle_time"]
 
 _KINDS = {value: name for name, value in ((kind.name, kind.value) for kind in _core.BlockKind.__members__.values())}
 _CUTTING, _RAPID = _core.BlockKind.cutting.value, _core.BlockKind.rapid.value
 
 
-@dataclass(frozen=True)
-class TimeParts:
-    """Where a stretch of time goes; the parts add up to the whole.
-
-    Attributes:
-        total_s: the whole.
-        cutting_s: cutting blocks at their feed.
-        rapid_s: rapids at their rate.
-        in_position_s: waits for the axes to arrive, behind rapids and exact stops.
-        dwell_s: G04, and the dwells of drilling cycles.
-        acceleration_s: what acceleration adds to cutting blocks and rapids; in look-ahead also what the limits at
-            corners and on arcs add.
-        tool_change_s: M06.
-        function_s: every other M code.
-    """
-
-    total_s: float
-    cutting_s: float
-    rapid_s: float
-    in_position_s: float
-    dwell_s: float
-    acceleration_s: float
-    tool_change_s: float
-    function_s: float
-
-
-PARTS = tuple(field.name for field in fields(TimeParts) if field.name != "total_s")
-"""Names of the parts, in the order in which they are shown."""
-
-
-@dataclass(frozen=True)
-class ToolTime(TimeParts):
-    """All uses of one tool together.
-
-    Attributes:
-        tool: T number; None before the first tool is known.
-        first_line: of its first use, from 1.
-    """
-
-    tool: int | None
-    first_line: int
-
-
-@dataclass(frozen=True)
-class RegionTime:
-    """A run of cutting moves between two stops.
-
-    Attributes:
-        lines: first and last line, from 1.
-        tool: T number in use; None where it is not known.
-        start_s: since the start of the program.
-        duration_s: from rest to rest, the wait of an exact stop at its end included.
-        programmed_s: its length at the programmed feeds and the override, nothing rounded or limited.
-        cutting_s: its blocks at their feed, in whole interpolation periods.
-        acceleration_s: what acceleration adds.
-        in_position_s: wait of an exact stop at its end.
-        length_mm: length of its path.
-    """
-
-    lines: tuple[int, int]
-    tool: int | None
-    start_s: float
-    duration_s: float
-    programmed_s: float
-    cutting_s: float
-    acceleration_s: float
-    in_position_s: float
-    length_mm: float
-
-
-@dataclass(frozen=True)
-class BlockTime:
-    """One cutting block, rapid, dwell, or block with M codes.
-
-    Attributes:
-        line: from 1.
-        kind: "cutting", "rapid", "dwell", "tool_change" or "function".
-        start_s: since the start of the program.
-        duration_s: until the next one starts; the last block of a run has the run's acceleration and wait.
-        length_mm: 0 for what does not move.
-        programmed_feed_mm_per_min: F as programmed; None for what is no cutting block.
-        mean_feed_mm_per_min: length over duration.
-        reached_feed_mm_per_min: highest speed along the path; 0 for what does not move.
-    """
-
-    line: int
-    kind: str
-    start_s: float
-    duration_s: float
-    length_mm: float
-    programmed_feed_mm_per_min: float | None
-    mean_feed_mm_per_min: float
-    reached_feed_mm_per_min: float
-
-
-@dataclass(frozen=True)
-class CycleTime(TimeParts):
-    """How long a program takes.
-
-    Attributes:
-        program: name of the program.
-        machine: name of the machine.
-        full_interpolation_s: the whole time by giving every set-point; None: not asked for.
-        tools: per tool, in the order of first use.
-        regions: per region, in order.
-        blocks: per block, in order; empty unless asked for.
-        warnings: what the reader noticed.
-    """
-
-    program: str
-    machine: str
-    full_interpolation_s: float | None
-    tools: tuple[ToolTime, ...]
-    regions: tuple[RegionTime, ...]
-    blocks: tuple[BlockTime, ...]
-    warnings: tuple[str, ...]
-
-    @property
-    def difference_percent(self) -> float | None:
-        """Closed form over full interpolation, in % of the latter; None without one."""
-        full = self.full_interpolation_s
-        if full is None:
-            return None
-        return (self.total_s / full - 1.0) * 100.0 if full > 0.0 else 0.0
-
-    @property
-    def agrees(self) -> bool:
-        """Closed form and full interpolation differ by no more than `AGREEMENT_PERCENT`, or only one was asked for."""
-        difference = self.difference_percent
-        return difference is None or abs(difference) <= AGREEMENT_PERCENT
-
-    def report(self, *, blocks: bool = False) -> dict[str, Any]:
-        """The plain dictionary that ``--json`` writes; `blocks` says whether the blocks are in it."""
-        data = asdict(self)
-        data["difference_percent"] = self.difference_percent
-        if not blocks:
-            del data["blocks"]
-        return data
-
-
 def cycle_time(
-    program: Program,
+    program: Program | str | Path,
     machine: Machine,
     *,
     per_block: bool = False,
@@ -183,7 +40,7 @@ def cycle_time(
     count what is known of them.
 
     Args:
-        program: what to time.
+        program: what to time, or its file.
         machine: whose controller plays it.
         per_block: give `CycleTime.blocks` too.
         full: check the closed form by full interpolation.
@@ -193,24 +50,30 @@ def cycle_time(
     Raises:
         ArgumentError: a value that no controller can have, or a program too long to interpolate.
     """
+    program = given_program(program, machine)
     model = controller_model(machine, feed_override=feed_override, rapid_override=rapid_override)
     timed = _core.time_program(program.core, model, per_block)
     return CycleTime(
         **_parts(timed),
+        cycle_time_s=float(timed.total_s),
         program=program.source,
         machine=machine.name,
         full_interpolation_s=_core.interpolate_program(program.core, model).total_s if full else None,
-        tools=tuple(
-            ToolTime(**_parts(tool), tool=_tool(tool.tool), first_line=tool.first_line) for tool in timed.tools
-        ),
+        tools=tuple(_tool_time(tool) for tool in timed.tools),
         regions=tuple(_regions(timed.regions, program, feed_override)),
         blocks=tuple(_blocks(timed.blocks, program)) if per_block else (),
         warnings=tuple(program.warnings),
     )
 
 
+def _tool_time(timed: _core.ToolTime) -> ToolTime:
+    return ToolTime(
+        **_parts(timed), duration_s=float(timed.total_s), tool=_tool(timed.tool), first_line=timed.first_line
+    )
+
+
 def _parts(timed: _core.CycleTime | _core.ToolTime) -> dict[str, float]:
-    return {name: float(getattr(timed, name)) for name in ("total_s", *PARTS)}
+    return {name: float(getattr(timed, name)) for name in PARTS}
 
 
 def _tool(number: int) -> int | None:
@@ -260,9 +123,3 @@ def _moves(program: Program) -> dict[tuple[int, bool], deque[tuple[float, float]
         note(path[index] for index in range(len(path)))
     note(segment for segment, dwell_s in program.core.other_moves if dwell_s <= 0.0)
     return found
-
-
-def slowest_blocks(blocks: tuple[BlockTime, ...], count: int) -> list[BlockTime]:
-    """The blocks that take longest, longest first."""
-    order = np.argsort([-block.duration_s for block in blocks], kind="stable")[:count]
-    return [blocks[index] for index in order]

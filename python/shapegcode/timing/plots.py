@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapegcode.results import plot as canvas
-from shapegcode.timing.cycle_time import PARTS, CycleTime
-from shapegcode.timing.tables import LABELS, slowest_regions, tool_name
+from shapegcode.results import plot
+from shapegcode.results.result import Plot
+from shapegcode.timing.result import LABELS, PARTS, CycleTime, tool_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_time", "write_time_pictures"]
+__all__ = ["plot_time", "plots_of"]
 
 _COLOUR = dict(
     zip(
         ("acceleration_s", "cutting_s", "dwell_s", "in_position_s", "rapid_s", "tool_change_s", "function_s"),
-        canvas.COLOURS,
+        plot.COLOURS,
         strict=True,
     )
 )
@@ -26,57 +27,43 @@ _REGIONS = 10
 _TOOLS = 16
 
 
-def write_time_pictures(time: CycleTime, folder: str | Path) -> list[str]:
-    """Write ``time.png`` and ``time.svg`` into a folder, which is made where it is missing.
-
-    Returns:
-        The files written; none for a program that takes no time.
-
-    Raises:
-        OSError: the folder cannot be made or a file not be written.
-    """
-    if time.total_s <= 0.0:
-        return []
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / f"time{suffix}" for suffix in canvas.FORMATS]
-    for file in files:
-        plot_time(file, time)
-    return [str(file) for file in files]
+def plots_of(time: CycleTime) -> dict[str, Plot]:
+    """Its pictures by name."""
+    return {"time": partial(plot_time, time)}
 
 
-def plot_time(file: str | Path, time: CycleTime) -> None:
+def plot_time(time: CycleTime, ax: Axes | None = None) -> Axes:
     """Where does the time go? One bar per tool, and one for each of the regions that take longest, both by parts.
 
     Of many tools the ones that take longest are drawn.
 
     Args:
-        file: ``.png`` or ``.svg``.
         time: what was timed.
+        ax: where to draw; None: a new figure.
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Returns:
+        The upper panel.
     """
-    longest = sorted(time.tools, key=lambda tool: -tool.total_s)[:_TOOLS]
+    longest = sorted(time.tools, key=lambda tool: -tool.duration_s)[:_TOOLS]
     tools = [tool for tool in time.tools if tool in longest]
-    regions = slowest_regions(time, _REGIONS)
+    regions = time.slowest_regions(_REGIONS)
     heights = [max(len(tools), 1), *([len(regions)] if regions else [])]
-    figure = canvas.figure(9.0, 1.8 + 0.32 * sum(heights) + 0.5 * len(heights))
-    grid = figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
+    rows = plot.grid(
+        ax, len(heights), 1, size_inch=(9.0, 1.8 + 0.32 * sum(heights) + 0.5 * len(heights)), height_ratios=heights,
+        title=f"Where the time goes: {time.cycle_time_s:.1f} s on {time.machine}", part=Path(time.program).name,
+    )  # fmt: skip
+    panels = [row[0] for row in rows]
     used = [part for part in PARTS if getattr(time, part) > 0.0]
-    _bars(grid[0], [tool_name(tool.tool) for tool in tools], [vars(tool) for tool in tools], used)
-    handles, labels = grid[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    _bars(panels[0], [tool_name(tool.tool) for tool in tools], [vars(tool) for tool in tools], used)
+    plot.legend_below(panels[-1], of=panels[0])
     left_out = len(time.tools) - len(tools)
-    grid[0].set_title("by tool" + (f", without {left_out} short ones" if left_out else ""), loc="left", fontsize=10)
+    panels[0].set_title("by tool" + (f", without {left_out} short ones" if left_out else ""), loc="left", fontsize=10)
     if regions:
         names = ["lines {} to {}, {}".format(*region.lines, tool_name(region.tool)) for region in regions]
-        _bars(grid[1], names, [vars(region) for region in regions], used)
-        grid[1].set_title(f"the {len(regions)} regions that take longest", loc="left", fontsize=10)
-    grid[-1].set_xlabel("time in s")
-    canvas.heading(figure, f"Where the time goes: {time.total_s:.1f} s on {time.machine}", Path(time.program).name)
-    canvas.save(figure, file)
+        _bars(panels[1], names, [vars(region) for region in regions], used)
+        panels[1].set_title(f"the {len(regions)} regions that take longest", loc="left", fontsize=10)
+    panels[-1].set_xlabel("time in s")
+    return panels[0]
 
 
 def _bars(panel: Axes, names: Sequence[str], rows: Sequence[Mapping[str, float]], parts: Sequence[str]) -> None:
@@ -91,7 +78,5 @@ def _bars(panel: Axes, names: Sequence[str], rows: Sequence[Mapping[str, float]]
         panel.annotate(f"{end:.1f}", (end, place), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8)
     panel.set_yticks(list(places), names, fontsize=8)
     panel.invert_yaxis()
-    panel.grid(True, axis="x", color="#e4e4e4", linewidth=0.6)
-    panel.set_axisbelow(True)
+    panel.grid(False, axis="y")
     panel.margins(x=0.08)
-    panel.spines[["top", "right"]].set_visible(False)

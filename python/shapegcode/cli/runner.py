@@ -1,0 +1,136 @@
+"""What every command does around its one call: files, progress, answer, tables, pictures, next step, exit code.
+
+def run(args):
+    from shapegcode.timing import cycle_time
+    machine = load_machine(args)
+    runner.check_files(args)
+    with runner.progress(f"timing {args.input}", args) as bar:
+        result = cycle_time(args.input, machine, ...)
+    return runner.finish(result, args)
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from shapegcode.cli import console as terminal
+
+if TYPE_CHECKING:
+    from shapegcode.results.result import Result
+    from shapegcode.results.table import Table
+
+__all__ = ["check_files", "finish", "progress"]
+
+# Options that name a file which a command reads, and those that name one which it writes.
+_READ = (
+    "input", "inputs", "machine", "tool", "stock", "against", "records", "cut", "update", "dump", "base",
+)  # fmt: skip
+_WRITTEN = ("output", "json", "csv", "npz")
+
+
+def check_files(args: argparse.Namespace, *, also_written: Sequence[str | Path] = ()) -> None:
+    """Refuse to write a file that the same run reads, or writes twice; only one of them can have standard output.
+
+    Args:
+        args: of the command; of its options those are looked at whose names say that they are files.
+        also_written: files that no option names, such as the one of a program out of tolerance.
+
+    Raises:
+        ArgumentError: names both files.
+    """
+    from shapegcode._core import ArgumentError
+    from shapegcode.cli.options import refuse_same_file
+
+    given = {name: value for name in _WRITTEN if (value := getattr(args, name, None)) is not None}
+    piped = [f"--{name} -" for name, value in given.items() if value == "-" and name != "output"]
+    if len(piped) > 1:
+        raise ArgumentError(f"{' and '.join(piped)}: only one of them can have standard output")
+    targets = [Path(value) for value in (*given.values(), *also_written) if value != "-"]
+    refuse_same_file(targets, _read_files(args))
+    for rank, target in enumerate(targets):
+        refuse_same_file([target], targets[rank + 1 :])
+
+
+def _read_files(args: argparse.Namespace) -> list[Path]:
+    named: list[Any] = [getattr(args, name, None) for name in _READ]
+    flat = [entry for value in named for entry in (value if isinstance(value, list | tuple) else [value])]
+    return [Path(entry) for entry in flat if entry is not None]
+
+
+def standard_output(args: argparse.Namespace) -> str | None:
+    """ "-" where a file goes to standard output, which then holds nothing else; else None."""
+    return "-" if "-" in (getattr(args, "json", None), getattr(args, "csv", None)) else None
+
+
+@contextlib.contextmanager
+def progress(description: str, args: argparse.Namespace, *, endless: bool = False) -> Iterator[terminal.ProgressBar]:
+    """A bar on standard error for the block, if that is a terminal and the work takes longer than a second.
+
+    Args:
+        description: what is being done.
+        args: of the command.
+        endless: the work cannot tell how much of it is done.
+    """
+    with terminal.progress(description, standard_output(args)) as bar:
+        if endless:
+            bar.wait()
+        yield bar
+
+
+def finish(
+    result: Result,
+    args: argparse.Namespace,
+    *,
+    tables: Sequence[Table] | None = None,
+    notes: Sequence[str] = (),
+    wrote: Sequence[str | Path] = (),
+) -> int:
+    """Write --json and --plots, and say it: the answer first, tables, warnings, notes, files, the next step.
+
+    Args:
+        result: what was found.
+        args: of the command; `json` and `plots` are looked at where they are there.
+        tables: to show; None: those of the result.
+        notes: further lines, below the warnings.
+        wrote: files that the command has written already.
+
+    Returns:
+        The exit code.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    from shapegcode.results.table import warning_table
+
+    report = result.to_dict()
+    plots = getattr(args, "plots", None)
+    pictures: list[str] = []
+    if plots is not None:
+        pictures = result.save_plots(plots)
+        report["plots"] = pictures
+    if getattr(args, "json", None) is not None:
+        terminal.write_json(report, args.json)
+    console = terminal.output_console(standard_output(args))
+
+    def say(text: str, style: str | None = None) -> None:
+        console.print(text, markup=False, soft_wrap=True, style=style)
+
+    say(result.answer, "bold" if result.ok else "bold red")
+    for table in result.tables() if tables is None else tables:
+        console.print()
+        console.print(table)
+    if result.warnings:
+        console.print()
+        console.print(warning_table(result.warnings))
+    for note in notes:
+        say(note)
+    for file in wrote:
+        say(f"wrote {file}")
+    if plots is not None:
+        say(f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: none, as there is nothing to draw")
+    say(f"next: {result.next_step}")
+    return result.exit_code

@@ -1,0 +1,198 @@
+"""One serialiser for every JSON, and the schema of a result from its class.
+
+A dataclass becomes an object whose keys are the names of its fields, in their order; what its field's metadata calls
+`hidden` (samples, programs, texts) stays out. Numbers are written as a person would write them: nine digits, no minus
+zero, nothing below a millionth of a unit of length, time or percent. What is no number in JSON (NaN, infinity) is null.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import json
+import math
+import types
+import typing
+from collections.abc import Mapping, Sequence
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+
+__all__ = ["exact", "hidden", "plain", "schema", "to_text"]
+
+_DIGITS = 9
+_NOTHING = 1e-9  # of a unit in which nobody measures so little
+_COARSE_UNITS = ("_um", "_mm", "_s", "_percent")
+
+
+def hidden() -> dict[str, Any]:
+    """Metadata of a field that no JSON holds: ``field(metadata=hidden())``."""
+    return {"hidden": True}
+
+
+def exact() -> dict[str, Any]:
+    """Metadata of a field whose numbers keep every digit: ``field(metadata=exact())``."""
+    return {"exact": True}
+
+
+def plain(value: object) -> Any:
+    """A value as what JSON knows: objects, lists, texts, numbers, true, false, null.
+
+    Args:
+        value: dataclass, mapping, sequence, array, enumeration, path, number or text.
+
+    Raises:
+        TypeError: something that has no form in JSON.
+    """
+    return _plain(value, coarse=False, every_digit=False)
+
+
+def _plain(value: object, *, coarse: bool, every_digit: bool) -> Any:
+    def inner(entry: object, key: str = "", digits: bool = False) -> Any:
+        return _plain(entry, coarse=coarse or key.endswith(_COARSE_UNITS), every_digit=every_digit or digits)
+
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = [field for field in dataclasses.fields(value) if not field.metadata.get("hidden")]
+        return {
+            field.name: inner(getattr(value, field.name), field.name, bool(field.metadata.get("exact")))
+            for field in fields
+        }
+    if isinstance(value, Mapping):
+        return {str(key): inner(entry, str(key)) for key, entry in value.items()}
+    if isinstance(value, enum.Enum):
+        return value.name
+    if isinstance(value, np.ndarray):
+        return inner(value.tolist())
+    if isinstance(value, np.generic):
+        return inner(value.item())
+    if isinstance(value, float):
+        return _number(value, coarse=coarse, every_digit=every_digit)
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, PurePath):
+        return str(value)
+    if isinstance(value, Sequence | set | frozenset) and not isinstance(value, bytes):
+        return [inner(entry) for entry in value]
+    raise TypeError(f"{type(value).__name__} has no form in JSON")
+
+
+def _number(value: float, *, coarse: bool, every_digit: bool) -> float | None:
+    if not math.isfinite(value):
+        return None
+    if every_digit:
+        return value + 0.0  # -0.0 becomes 0.0
+    return 0.0 if coarse and abs(value) < _NOTHING else float(f"{value:.{_DIGITS}g}") + 0.0
+
+
+def to_text(value: object) -> str:
+    """A plain value as stable JSON: sorted keys, two spaces, one newline at the end.
+
+    Raises:
+        ValueError: a number in it is NaN or infinite: it did not come from `plain`.
+    """
+    return json.dumps(value, sort_keys=True, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+# --- the schema -------------------------------------------------------------------------------------------------------
+
+_SIMPLE: dict[Any, dict[str, Any]] = {
+    bool: {"type": "boolean"},
+    int: {"type": "integer"},
+    float: {"type": "number"},
+    str: {"type": "string"},
+    type(None): {"type": "null"},
+    Any: {},
+    object: {},
+}
+
+
+def schema(result: type) -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of what `plain` makes of a dataclass, from its annotations and docstrings.
+
+    Args:
+        result: the class. One with `json_extra` (names to types) has those keys too, and where the command wrote
+            pictures and a program, their names under `plots` and `output`.
+
+    Raises:
+        TypeError: an annotation that has no form in JSON.
+    """
+    definitions: dict[str, Any] = {}
+    root = _object(result, {}, definitions)
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": result.__name__}
+    return head | root | ({"$defs": dict(sorted(definitions.items()))} if definitions else {})
+
+
+def _object(cls: Any, arguments: Mapping[Any, Any], definitions: dict[str, Any]) -> dict[str, Any]:
+    hints = typing.get_type_hints(cls)
+    meanings = _meanings(cls)
+    shown = {field.name: hints[field.name] for field in dataclasses.fields(cls) if not field.metadata.get("hidden")}
+    shown |= getattr(cls, "json_extra", {})
+    files = {"plots": tuple[str, ...], "output": str} if hasattr(cls, "json_extra") else {}
+    properties = {}
+    for name, hint in (shown | files).items():
+        properties[name] = _of(arguments.get(hint, hint), definitions)
+        if name in meanings:
+            properties[name] = properties[name] | {"description": meanings[name]}
+    summary = (cls.__doc__ or "").strip().partition("\n")[0]
+    return {
+        "type": "object",
+        "description": summary,
+        "properties": properties,
+        "required": sorted(shown),
+        "additionalProperties": False,
+    }
+
+
+def _meanings(cls: type) -> dict[str, str]:
+    """What the docstrings of a class and its bases say under `Attributes:`, and those of the properties."""
+    found: dict[str, str] = {}
+    for name in getattr(cls, "json_extra", {}):
+        said = getattr(cls, name, None)
+        if isinstance(said, property) and said.__doc__:
+            found[name] = said.__doc__.strip().partition("\n")[0]
+    for base in reversed(cls.__mro__):
+        lines = (base.__doc__ or "").splitlines()
+        at = next((rank for rank, line in enumerate(lines) if line.strip() == "Attributes:"), len(lines))
+        name = ""
+        for line in lines[at + 1 :]:
+            if not line.strip():
+                break
+            head, colon, rest = line.strip().partition(": ")
+            if line.startswith(" " * 8) and not line.startswith(" " * 9) and colon and head.isidentifier():
+                name, found[head] = head, rest
+            elif name:
+                found[name] += " " + line.strip()
+    return found
+
+
+def _of(hint: Any, definitions: dict[str, Any]) -> dict[str, Any]:
+    if hint in _SIMPLE:
+        return dict(_SIMPLE[hint])
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (types.UnionType, typing.Union):
+        return {"anyOf": [_of(each, definitions) for each in arguments]}
+    if origin is typing.Literal:
+        return {"enum": list(arguments)}
+    cls = origin or hint
+    if dataclasses.is_dataclass(cls) and isinstance(cls, type):
+        bound = dict(zip(getattr(cls, "__parameters__", ()), arguments, strict=False))
+        name = cls.__name__ + "".join(f"_{getattr(each, '__name__', 'of')}" for each in arguments)
+        if name not in definitions:
+            definitions[name] = {}
+            definitions[name] = _object(cls, bound, definitions)
+        return {"$ref": f"#/$defs/{name}"}
+    if isinstance(cls, type) and issubclass(cls, np.ndarray):
+        return {"type": "array"}
+    if isinstance(cls, type) and issubclass(cls, enum.Enum):
+        return {"enum": [each.name for each in cls]}
+    if cls is tuple and arguments[-1:] != (...,) and arguments:
+        items = [_of(each, definitions) for each in arguments]
+        return {"type": "array", "prefixItems": items, "minItems": len(items), "maxItems": len(items)}
+    if isinstance(cls, type) and issubclass(cls, Mapping):
+        return {"type": "object", "additionalProperties": _of(arguments[1], definitions) if arguments else {}}
+    if isinstance(cls, type) and issubclass(cls, PurePath):
+        return {"type": "string"}
+    if isinstance(cls, type) and issubclass(cls, Sequence | set | frozenset):
+        return {"type": "array", **({"items": _of(arguments[0], definitions)} if arguments else {})}
+    raise TypeError(f"{hint} has no form in JSON")

@@ -1,0 +1,140 @@
+"""What every result is: a frozen dataclass that says whether it is good, what to heed, and what to do next.
+
+>>> time = sg.cycle_time("part.nc", machine)
+>>> time.ok, time.warnings, time.next_step
+>>> time.to_dict()                       # what --json writes
+>>> print(time.tables()[0])              # what the command shows
+>>> time.plots()["time"](ax)             # draws into the caller's axes
+
+The same fields give JSON, table, picture and page. A result's pictures are drawn by the module `plots` beside it, which
+is loaded when somebody asks for them.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+
+from shapegcode.results.json import plain
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from shapegcode.results.table import Table
+
+__all__ = ["Pair", "Plot", "Result", "Xyz"]
+
+T = TypeVar("T")
+
+Plot = Callable[..., "Axes"]
+"""Draws one picture: ``plot(ax=None) -> Axes``, into the caller's axes or into a new figure."""
+
+
+@dataclass(frozen=True)
+class Pair(Generic[T]):
+    """A figure before and after.
+
+    Attributes:
+        original: of the program as it was.
+        emitted: of the program as it was written.
+    """
+
+    original: T
+    emitted: T
+
+
+@dataclass(frozen=True)
+class Xyz(Generic[T]):
+    """One value per axis.
+
+    Attributes:
+        x: of X.
+        y: of Y.
+        z: of Z.
+    """
+
+    x: T
+    y: T
+    z: T
+
+    def __iter__(self) -> Any:
+        """X, Y, Z."""
+        return iter((self.x, self.y, self.z))
+
+    def __getitem__(self, axis: str) -> T:
+        """The value of "x", "y" or "z"."""
+        if axis not in ("x", "y", "z"):
+            raise KeyError(axis)
+        value: T = getattr(self, axis)
+        return value
+
+
+class Result:
+    """Base of every result. A class that inherits it is a frozen dataclass and says what is abstract here.
+
+    `json_extra` names the properties that the JSON holds beside the fields, with their types.
+    """
+
+    json_extra: ClassVar[dict[str, Any]] = {"ok": bool, "warnings": tuple[str, ...], "next_step": str}
+
+    warnings: tuple[str, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether it is done and within tolerance."""
+        raise NotImplementedError
+
+    @property
+    def answer(self) -> str:
+        """What was asked, answered in one line: the first that the command says."""
+        raise NotImplementedError
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        raise NotImplementedError
+
+    @property
+    def exit_code(self) -> int:
+        """Of the command: 0 done and within tolerance, 1 done but out of tolerance, 2 refused."""
+        return 0 if self.ok else 1
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``--json`` writes: the fields and `json_extra`, as JSON knows them; see `shapegcode.results.json`."""
+        found: dict[str, Any] = plain(self)
+        extra: dict[str, Any] = plain({name: getattr(self, name) for name in self.json_extra})
+        return found | extra
+
+    def tables(self) -> list[Table]:
+        """What the command shows below its answer, in this order."""
+        return []
+
+    def plots(self) -> Mapping[str, Plot]:
+        """What can be drawn of it, by name; each is called as ``plot(ax=None)`` and returns the axes."""
+        return {}
+
+    def save_plots(self, folder: str | Path) -> list[str]:
+        """Write every picture as PNG and SVG into a folder, which is made where it is missing.
+
+        Returns:
+            The files written.
+
+        Raises:
+            OSError: the folder cannot be made or a file not be written.
+        """
+        from shapegcode.results.plot import save_all
+
+        return save_all(self.plots(), folder)
+
+    def __repr__(self) -> str:
+        """Class and answer: a result may hold millions of samples."""
+        return f"<{type(self).__name__}: {self.answer}>"
+
+    def _drawn_beside(self) -> Mapping[str, Plot]:
+        """The pictures that the module `plots` of the result's folder offers for it: its `plots_of(result)`."""
+        module = importlib.import_module(f"{type(self).__module__.rpartition('.')[0]}.plots")
+        found: Mapping[str, Plot] = module.plots_of(self)
+        return found

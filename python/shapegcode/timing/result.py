@@ -1,0 +1,307 @@
+"""How long a program takes: figures, tables, the file of its blocks, the next step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import astuple, dataclass, fields, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from shapegcode.results.result import Plot, Result
+from shapegcode.results.table import Column, Table, share_percent
+
+__all__ = ["AGREEMENT_PERCENT", "LABELS", "PARTS", "BlockTime", "CycleTime", "RegionTime", "TimeParts", "ToolTime"]
+
+AGREEMENT_PERCENT = 0.5
+"""Closed form and full interpolation agree if they differ by no more than this."""
+
+
+@dataclass(frozen=True)
+class TimeParts:
+    """Where a stretch of time goes; the parts add up to the whole.
+
+    Attributes:
+        cutting_s: cutting blocks at their feed.
+        rapid_s: rapids at their rate.
+        in_position_s: waits for the axes to arrive, behind rapids and exact stops.
+        dwell_s: G04, and the dwells of drilling cycles.
+        acceleration_s: what acceleration adds to cutting blocks and rapids; in look-ahead also what the limits at
+            corners and on arcs add.
+        tool_change_s: M06.
+        function_s: every other M code.
+    """
+
+    cutting_s: float
+    rapid_s: float
+    in_position_s: float
+    dwell_s: float
+    acceleration_s: float
+    tool_change_s: float
+    function_s: float
+
+
+PARTS = tuple(field.name for field in fields(TimeParts))
+"""Names of the parts, in the order in which they are shown."""
+
+
+@dataclass(frozen=True)
+class ToolTime(TimeParts):
+    """All uses of one tool together.
+
+    Attributes:
+        duration_s: the whole.
+        tool: T number; None before the first tool is known.
+        first_line: of its first use, from 1.
+    """
+
+    duration_s: float
+    tool: int | None
+    first_line: int
+
+
+@dataclass(frozen=True)
+class RegionTime:
+    """A run of cutting moves between two stops.
+
+    Attributes:
+        lines: first and last line, from 1.
+        tool: T number in use; None where it is not known.
+        start_s: since the start of the program.
+        duration_s: from rest to rest, the wait of an exact stop at its end included.
+        programmed_s: its length at the programmed feeds and the override, nothing rounded or limited.
+        cutting_s: its blocks at their feed, in whole interpolation periods.
+        acceleration_s: what acceleration adds.
+        in_position_s: wait of an exact stop at its end.
+        length_mm: length of its path.
+    """
+
+    lines: tuple[int, int]
+    tool: int | None
+    start_s: float
+    duration_s: float
+    programmed_s: float
+    cutting_s: float
+    acceleration_s: float
+    in_position_s: float
+    length_mm: float
+
+
+@dataclass(frozen=True)
+class BlockTime:
+    """One cutting block, rapid, dwell, or block with M codes.
+
+    Attributes:
+        line: from 1.
+        kind: "cutting", "rapid", "dwell", "tool_change" or "function".
+        start_s: since the start of the program.
+        duration_s: until the next one starts; the last block of a run has the run's acceleration and wait.
+        length_mm: 0 for what does not move.
+        programmed_feed_mm_per_min: F as programmed; None for what is no cutting block.
+        mean_feed_mm_per_min: length over duration.
+        reached_feed_mm_per_min: highest speed along the path; 0 for what does not move.
+    """
+
+    line: int
+    kind: str
+    start_s: float
+    duration_s: float
+    length_mm: float
+    programmed_feed_mm_per_min: float | None
+    mean_feed_mm_per_min: float
+    reached_feed_mm_per_min: float
+
+
+LABELS = {
+    "cutting_s": "cutting",
+    "rapid_s": "rapid",
+    "in_position_s": "in-position",
+    "dwell_s": "dwell",
+    "acceleration_s": "lost to acceleration",
+    "tool_change_s": "tool change",
+    "function_s": "M functions",
+}
+"""Name of each part in tables and pictures."""
+
+_SLOWEST = 5
+# A part of the time that deserves the next look.
+_NOTABLE = 0.1
+_REMEDIES = {
+    "acceleration_s": "join short blocks, or look at the time constants and corner limits of the machine file",
+    "rapid_s": "shorten the rapids, or take tools in an order that needs fewer of them",
+    "in_position_s": "spare rapids and exact stops, each of which waits for its axes",
+    "dwell_s": "look whether the dwells may be shorter",
+    "tool_change_s": "take the tools in an order that needs fewer changes",
+    "function_s": "put M codes into blocks that move, where the control allows it",
+}
+
+
+@dataclass(frozen=True, repr=False)
+class CycleTime(TimeParts, Result):
+    """How long a program takes.
+
+    Attributes:
+        cycle_time_s: the whole, in closed form.
+        program: name of the program.
+        machine: name of the machine.
+        full_interpolation_s: the whole time by giving every set-point; None: not asked for.
+        tools: per tool, in the order of first use.
+        regions: per region, in order.
+        blocks: per block, in order; empty unless asked for.
+        warnings: what the reader noticed.
+    """
+
+    json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "difference_percent": float | None}
+
+    cycle_time_s: float
+    program: str
+    machine: str
+    full_interpolation_s: float | None
+    tools: tuple[ToolTime, ...]
+    regions: tuple[RegionTime, ...]
+    blocks: tuple[BlockTime, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def difference_percent(self) -> float | None:
+        """Closed form over full interpolation, in % of the latter; None without one."""
+        full = self.full_interpolation_s
+        if full is None:
+            return None
+        return (self.cycle_time_s / full - 1.0) * 100.0 if full > 0.0 else 0.0
+
+    @property
+    def ok(self) -> bool:
+        """Closed form and full interpolation differ by no more than `AGREEMENT_PERCENT`, or only one was asked for."""
+        difference = self.difference_percent
+        return difference is None or abs(difference) <= AGREEMENT_PERCENT
+
+    @property
+    def answer(self) -> str:
+        """The whole time, and whether the check agrees."""
+        said = f"{self.program} takes {self.cycle_time_s:.3f} s ({_clock(self.cycle_time_s)}) on {self.machine}"
+        if self.difference_percent is None:
+            return said
+        agrees = "agrees" if self.ok else "DIFFERS"
+        return f"{said}; full interpolation {agrees} ({self.difference_percent:+.3f} %)"
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        if not self.ok:
+            return (
+                f"trust the full interpolation: the closed form differs by {self.difference_percent:+.2f} % "
+                f"(limit {AGREEMENT_PERCENT:g} %)."
+            )
+        if self.cycle_time_s <= 0.0:
+            return "nothing in the program takes time: is it the right one?"
+        cutting, programmed = sum(r.cutting_s for r in self.regions), sum(r.programmed_s for r in self.regions)
+        if cutting - programmed > _NOTABLE * self.cycle_time_s:
+            return (
+                f"cutting takes {cutting / programmed:.2f} times what its feeds say: look for feeds above the limits "
+                "of the axes, and for blocks of a few interpolation periods, which are rounded up to whole ones."
+            )
+        worst = max(_REMEDIES, key=lambda part: float(getattr(self, part)))
+        if getattr(self, worst) > _NOTABLE * self.cycle_time_s:
+            share = share_percent(getattr(self, worst), self.cycle_time_s)
+            return f"{LABELS[worst]} takes {share} of the time: {_REMEDIES[worst]}."
+        if self.regions:
+            region = self.slowest_regions(1)[0]
+            first, last = region.lines
+            share = share_percent(region.duration_s, self.cycle_time_s)
+            return f"most of it is cutting: begin with lines {first} to {last} ({tool_name(region.tool)}, {share})."
+        return "look at the blocks: --csv FILE."
+
+    def slowest_regions(self, count: int = _SLOWEST) -> list[RegionTime]:
+        """The regions that take longest, longest first."""
+        return sorted(self.regions, key=lambda region: -region.duration_s)[:count]
+
+    def slowest_blocks(self, count: int = _SLOWEST) -> list[BlockTime]:
+        """The blocks that take longest, longest first."""
+        order = np.argsort([-block.duration_s for block in self.blocks], kind="stable")[:count]
+        return [self.blocks[index] for index in order]
+
+    def without_blocks(self) -> CycleTime:
+        """The same without the single blocks, of which there may be millions."""
+        return replace(self, blocks=())
+
+    def tables(self) -> list[Table]:
+        """Parts; tools; the slowest regions and blocks."""
+        found = [self._parts_table()]
+        if self.tools:
+            found.append(self._tools_table())
+        if self.regions or self.blocks:
+            found.append(self._slowest_table())
+        return found
+
+    def _parts_table(self) -> Table:
+        whole = self.cycle_time_s
+        rows = [("cycle time", whole, _clock(whole))]
+        rows += [(LABELS[part], getattr(self, part), share_percent(getattr(self, part), whole)) for part in PARTS]
+        if self.full_interpolation_s is not None:
+            rows.append(("cycle time by full interpolation", self.full_interpolation_s, ""))
+        columns = (
+            Column("time", value=lambda row: row[0], text=True),
+            Column("s", value=lambda row: row[1], digits=3),
+            Column("of the whole", value=lambda row: row[2]),
+        )
+        return Table("", columns, rows, sections=(1, 1 + len(PARTS)))
+
+    def _tools_table(self) -> Table:
+        columns = (
+            Column("tool", value=lambda tool: tool_name(tool.tool), text=True),
+            Column("from line", value="first_line"),
+            Column("total", value="duration_s", digits=2),
+            Column("share", value=lambda tool: share_percent(tool.duration_s, self.cycle_time_s)),
+            *(Column(LABELS[part], value=part, digits=2) for part in PARTS if getattr(self, part) > 0.0),
+        )
+        return Table("by tool, s", columns, self.tools)
+
+    def _slowest_table(self) -> Table:
+        regions, blocks = self.slowest_regions(), self.slowest_blocks()
+        columns = (
+            Column("lines", value=_lines, text=True),
+            Column("what", value=_what, text=True),
+            Column("s", value="duration_s", digits=3),
+            Column("share", value=lambda row: share_percent(row.duration_s, self.cycle_time_s)),
+            Column("mm", value=lambda row: row.length_mm or None, digits=1),
+            Column("mean mm/min", value=_mean_feed, digits=0),
+        )
+        return Table("slowest", columns, [*regions, *blocks], sections=(len(regions),))
+
+    def plots(self) -> Mapping[str, Plot]:
+        """`time`: where the time goes, by tool and by region; none for a program that takes no time."""
+        return self._drawn_beside() if self.cycle_time_s > 0.0 else {}
+
+    def csv_lines(self) -> Iterator[str]:
+        """One line per block below a line of headings: the attributes of `BlockTime`, seconds to a microsecond."""
+        yield ",".join(field.name for field in fields(BlockTime)) + "\n"
+        for block in self.blocks:
+            cells = astuple(block)
+            yield ",".join("" if c is None else f"{c:.6f}" if isinstance(c, float) else str(c) for c in cells) + "\n"
+
+
+def tool_name(tool: int | None) -> str:
+    """A tool in words."""
+    return "no tool yet" if tool is None else f"T{tool}"
+
+
+def _lines(row: RegionTime | BlockTime) -> str:
+    return "{} to {}".format(*row.lines) if isinstance(row, RegionTime) else str(row.line)
+
+
+def _what(row: RegionTime | BlockTime) -> str:
+    if isinstance(row, RegionTime):
+        return f"region, {tool_name(row.tool)}"
+    return f"block, {row.kind.replace('_', ' ')}"
+
+
+def _mean_feed(row: RegionTime | BlockTime) -> float | None:
+    return row.length_mm / row.duration_s * 60.0 if row.length_mm > 0.0 and row.duration_s > 0.0 else None
+
+
+def _clock(seconds: float) -> str:
+    """Hours, minutes and seconds."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}"

@@ -1,0 +1,89 @@
+"""The published JSON Schemas: of every result, as its class says, and valid themselves."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from typing import Any
+
+import jsonschema
+import pytest
+import write_schemas
+
+from shapegcode.results.json import exact, hidden, plain, schema, to_text
+from shapegcode.results.result import Pair, Xyz
+
+RESULTS = write_schemas.results()
+
+
+def test_what_is_published_is_what_the_classes_say() -> None:
+    published = {file.name: file.read_text(encoding="utf-8") for file in write_schemas.FOLDER.glob("*.json")}
+    assert published == write_schemas.texts(), "run `make schemas`"
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_schemas_are_schemas_and_say_what_each_key_means(name: str) -> None:
+    found = schema(RESULTS[name])
+    jsonschema.Draft202012Validator.check_schema(found)
+    assert {"ok", "warnings", "next_step"} <= set(found["required"])
+    for where in (found, *found.get("$defs", {}).values()):
+        silent = [
+            key
+            for key, entry in where.get("properties", {}).items()
+            if "description" not in entry and key not in {"warnings", "plots", "output"}
+        ]
+        assert silent == [], name
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_results_are_frozen_dataclasses(name: str) -> None:
+    cls = RESULTS[name]
+    assert dataclasses.is_dataclass(cls)
+    assert cls.__dataclass_params__.frozen  # type: ignore[attr-defined]
+
+
+@dataclasses.dataclass(frozen=True)
+class _Part:
+    """A part.
+
+    Attributes:
+        error_um: of it.
+        taps: of a shaper.
+        samples: many.
+        before: and after.
+    """
+
+    error_um: Xyz[float]
+    taps: tuple[float, ...] = dataclasses.field(metadata=exact())
+    samples: tuple[float, ...] = dataclasses.field(metadata=hidden())
+    before: Pair[float | None]
+
+
+def test_numbers_are_written_as_a_person_would() -> None:
+    part = _Part(Xyz(1e-12, -0.0, 1.0 / 3.0), (1.0 / 3.0, -0.0), (1.0,), Pair(math.nan, 1e-12))
+    assert plain(part) == {
+        "error_um": {"x": 0.0, "y": 0.0, "z": 0.333333333},
+        "taps": [1.0 / 3.0, 0.0],
+        "before": {"original": None, "emitted": 1e-12},
+    }
+    assert "-0" not in to_text(plain(part))
+    with pytest.raises(TypeError, match="bytes has no form in JSON"):
+        plain({"a": b"x"})
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        to_text(math.inf)
+
+
+def test_a_schema_refuses_what_the_class_has_not() -> None:
+    found: dict[str, Any] = schema(_Part)
+    good = json.loads(to_text(plain(_Part(Xyz(1.0, 2.0, 3.0), (1.0,), (), Pair(None, 1.0)))))
+    jsonschema.validate(good, found)
+    for wrong in (
+        {"error_um": {"x": 1.0}},
+        {"before": {"original": "a", "emitted": 1.0}},
+        {"more": 1},
+        {"taps": [None]},
+    ):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(good | wrong, found)
+    assert found["properties"]["error_um"]["description"] == "of it."
