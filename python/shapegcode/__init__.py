@@ -71,11 +71,13 @@ if TYPE_CHECKING:
     from shapegcode.conversion.budget import Budget as Budget
     from shapegcode.conversion.convert import Conversion as Conversion
     from shapegcode.conversion.convert import convert as convert
-    from shapegcode.conversion.readback import RoundTripError as RoundTripError
     from shapegcode.cutting.stock import Stock as Stock
-    from shapegcode.cutting.stock import StockError as StockError
     from shapegcode.cutting.tool import Tool as Tool
-    from shapegcode.cutting.tool import ToolError as ToolError
+    from shapegcode.errors import MachineError as MachineError
+    from shapegcode.errors import RecordError as RecordError
+    from shapegcode.errors import RoundTripError as RoundTripError
+    from shapegcode.errors import StockError as StockError
+    from shapegcode.errors import ToolError as ToolError
     from shapegcode.feed.schedule import FeedSchedule as FeedSchedule
     from shapegcode.feed.schedule import schedule_feed as schedule_feed
     from shapegcode.feed.shaped import ScheduledConversion as ScheduledConversion
@@ -84,9 +86,7 @@ if TYPE_CHECKING:
     from shapegcode.identification.result import Identification as Identification
     from shapegcode.io.read import ReadOptions as ReadOptions
     from shapegcode.io.record import Record as Record
-    from shapegcode.io.record import RecordError as RecordError
     from shapegcode.machine import Machine as Machine
-    from shapegcode.machine import MachineError as MachineError
     from shapegcode.metrology.measure import Measurement as Measurement
     from shapegcode.metrology.measure import measure as measure
     from shapegcode.model.response import plant_response as plant_response
@@ -127,17 +127,17 @@ _HOME = {
     "choose_grid": "shaping.grid",
     **dict.fromkeys(("Conversion", "convert"), "conversion.convert"),
     "Identification": "identification.result",
-    **dict.fromkeys(("Machine", "MachineError"), "machine"),
+    "Machine": "machine",
+    **dict.fromkeys(("MachineError", "RecordError", "RoundTripError", "StockError", "ToolError"), "errors"),
     **dict.fromkeys(("Measurement", "measure"), "metrology.measure"),
     "Program": "program",
     "ReadOptions": "io.read",
-    **dict.fromkeys(("Record", "RecordError"), "io.record"),
+    "Record": "io.record",
     "identify": "identification.identify",
     **dict.fromkeys(("FeedSchedule", "schedule_feed"), "feed.schedule"),
     **dict.fromkeys(("ScheduledConversion", "convert_scheduled"), "feed.shaped"),
-    **dict.fromkeys(("Stock", "StockError"), "cutting.stock"),
-    **dict.fromkeys(("Tool", "ToolError"), "cutting.tool"),
-    "RoundTripError": "conversion.readback",
+    "Stock": "cutting.stock",
+    "Tool": "cutting.tool",
     "plant_response": "model.response",
     **dict.fromkeys(
         ("ModeBand", "Recommendation", "choose_block_period", "choose_shaper", "shortest_non_negative"), "shaping"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import tomllib
 
+from shapegcode.errors import MachineError
 from shapegcode.machine import Machine
 from shapegcode.machine.fanuc_import import import_parameters
-from shapegcode.settings.problems import MachineError
 
 _BASE = Machine.load("vx500")
 

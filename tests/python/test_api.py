@@ -79,8 +79,11 @@ def test_figures_only_keeps_no_samples() -> None:
 
 def test_errors_are_one_family_and_carry_their_place() -> None:
     machine = sg.Machine.load("vx500")
-    for error in (sg.ArgumentError, sg.DesignError, sg.NumericError, sg.ProgramError):
-        assert issubclass(error, sg.ShapegcodeError)
+    found = [getattr(sg, name) for name in sg.__all__ if name.endswith("Error")]
+    assert len(found) > 9
+    assert all(issubclass(error, sg.ShapegcodeError) for error in found)
+    for error in (sg.MachineError, sg.ToolError, sg.StockError, sg.ArgumentError):
+        assert issubclass(error, ValueError)
     with pytest.raises(sg.ProgramError, match=r"^part\.nc:2:3: ") as caught:
         sg.Program.from_text("%\nG1XF100\n%", machine, source="part.nc")
     assert (caught.value.line, caught.value.column) == (2, 3)

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from effort import cpu_s
 from shapegcode.cli import main
-from shapegcode.machine import Machine, MachineError
+from shapegcode.errors import MachineError
+from shapegcode.machine import Machine
 from shapegcode.machine.fanuc_import import import_parameters, read_parameters
 
 DUMPS = Path(__file__).resolve().parents[1] / "golden" / "parameters"

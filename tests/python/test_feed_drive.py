@@ -14,7 +14,8 @@ from scipy.signal import lsim
 import feed_drive_reference as reference
 from acceptance import machine_with
 from shapegcode import ArgumentError, NumericError, _core
-from shapegcode.machine import Machine, MachineError
+from shapegcode.errors import MachineError
+from shapegcode.machine import Machine
 from shapegcode.model.drives import drive_parameters
 
 Vector = npt.NDArray[np.float64]

@@ -8,10 +8,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from shapegcode.errors import RecordError
 from shapegcode.identification.fit import identify
 from shapegcode.identification.mode import Estimate, IdentifiedMode
 from shapegcode.identification.result import Identification
-from shapegcode.io.record import Record, RecordError
+from shapegcode.io.record import Record
 from tap_truth import TrueMode, acceleration, random_modes, tap
 
 FloatArray = npt.NDArray[np.float64]

@@ -13,7 +13,8 @@ import pytest
 
 from shapegcode.cli import COMMANDS, main
 from shapegcode.cli.console import write_json, write_text
-from shapegcode.machine import Machine, MachineError, Mode, key_documentation
+from shapegcode.errors import MachineError
+from shapegcode.machine import Machine, Mode, key_documentation
 from shapegcode.settings.keys import PerAxis
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -11,9 +11,10 @@ import pytest
 import scipy.linalg
 
 from shapegcode._core import ArgumentError
+from shapegcode.errors import MachineError
 from shapegcode.identification.mode import Estimate, IdentifiedMode
 from shapegcode.identification.update import update_machine_file, update_modes
-from shapegcode.machine import Machine, MachineError
+from shapegcode.machine import Machine
 from shapegcode.settings.edit import chunks
 
 VX500 = Machine.builtin_text("vx500")

@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 import moving_scenario as scenario
 from shapegcode import _core
 from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode, ModeTable, VaryingFir
-from shapegcode.machine import Machine, MachineError
+from shapegcode.errors import MachineError
+from shapegcode.machine import Machine
 from shapegcode.model.modes import (
     axis_modes,
     machine_warnings,

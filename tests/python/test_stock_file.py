@@ -17,9 +17,9 @@ import shapely
 
 from shapegcode import _core
 from shapegcode.cutting.documentation import STOCK_EXAMPLES
-from shapegcode.cutting.stock import Stock, StockError
+from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.stock_shape import StockPiece, stock_polygons
-from shapegcode.settings.problems import FileError
+from shapegcode.errors import FileError, StockError
 
 DATA = resources.files("shapegcode") / "data" / "milling"
 RADIUS = 4.0  # of the tool

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from shapegcode.errors import RecordError
 from shapegcode.identification.checks import (
     Prepared,
     excited_hz,
@@ -20,7 +21,7 @@ from shapegcode.identification.checks import (
 from shapegcode.identification.hits import find_hits
 from shapegcode.identification.plan import rapid_stop_program, recording_for, tap_plan
 from shapegcode.identification.spectra import decay_spectrum, envelope, frf, mode_envelopes
-from shapegcode.io.record import FloatArray, Record, RecordError
+from shapegcode.io.record import FloatArray, Record
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.timing.cycle_time import cycle_time

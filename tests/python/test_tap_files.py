@@ -17,8 +17,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.io import wavfile
 
+from shapegcode.errors import RecordError
 from shapegcode.io.read import ReadOptions, read_records
-from shapegcode.io.record import FloatArray, Record, RecordError
+from shapegcode.io.record import FloatArray, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.units import find_unit, read_label
 

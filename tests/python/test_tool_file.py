@@ -14,8 +14,9 @@ import pytest
 from shapegcode import _core
 from shapegcode.cutting.documentation import STEEL_TOOL, file_documentation
 from shapegcode.cutting.materials import materials
-from shapegcode.cutting.tool import Tool, ToolError
-from shapegcode.settings.problems import FileError, line_of
+from shapegcode.cutting.tool import Tool
+from shapegcode.errors import FileError, ToolError
+from shapegcode.settings.problems import line_of
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = resources.files("shapegcode") / "data" / "milling"

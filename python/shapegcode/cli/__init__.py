@@ -118,18 +118,12 @@ def _build_parser(selected: str | None) -> argparse.ArgumentParser:
 
 
 def _expected(error: Exception) -> bool:
-    """True for errors of the input or the file system, whose message is all that the user needs.
-
-    A class can only be the error's if its module is loaded: so nothing is imported to find out.
-    """
-    if isinstance(error, OSError):
-        return True
-    families = (("shapegcode._core", "ShapegcodeError"), ("shapegcode.settings.problems", "FileError"))
-    for module, name in families:
-        family = getattr(sys.modules.get(module), name, None)
-        if isinstance(family, type) and isinstance(error, family):
-            return True
-    return isinstance(error, ModuleNotFoundError) and error.name == "matplotlib"
+    """True for errors of the input or the file system, whose message is all that the user needs."""
+    if isinstance(error, ModuleNotFoundError):
+        return error.name == "matplotlib"
+    # An error of shapegcode has loaded its class: nothing is imported to find out.
+    core = sys.modules.get("shapegcode._core")
+    return isinstance(error, OSError if core is None else (OSError, core.ShapegcodeError))
 
 
 def _message(error: Exception) -> str:

@@ -82,7 +82,8 @@ def load_machine(args: argparse.Namespace) -> Machine:
     Raises:
         MachineError: a bad file, key or value.
     """
-    from shapegcode.machine import Machine, MachineError, Problem
+    from shapegcode.errors import MachineError, Problem
+    from shapegcode.machine import Machine
 
     machine = Machine.load(args.machine)
     if not args.set:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shapegcode import _core
+from shapegcode.errors import RoundTripError
 from shapegcode.machine import Machine
 from shapegcode.program import Program, least_increment_mm
 
@@ -19,10 +20,6 @@ _STATE_FIELDS = (
     "motion", "plane", "distance", "feed_mode", "units", "compensation", "length_offset",
     "cycle", "cycle_return", "coordinate_system", "exact_stop", "feed",
 )  # fmt: skip
-
-
-class RoundTripError(_core.ShapegcodeError):
-    """The emitted text does not say what it should: a defect of shapegcode, never of the input. Nothing is written."""
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict, model_validator
 
+from shapegcode.errors import FileError
 from shapegcode.settings.keys import Float, NonNegative, Positive, Table, Text, key
 from shapegcode.settings.load import parsed, validated
-from shapegcode.settings.problems import FileError, KeyProblem
+from shapegcode.settings.problems import KeyProblem
 
 __all__ = ["Material", "materials"]
 

@@ -12,19 +12,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field, PrivateAttr, model_validator
 
+from shapegcode.errors import Problem, StockError
 from shapegcode.settings.keys import Float, NonNegative, Positive, Table, Text, key
 from shapegcode.settings.load import parsed, read_text, validated
-from shapegcode.settings.problems import FileError, KeyProblem, Problem, line_of
+from shapegcode.settings.problems import KeyProblem, line_of
 
-__all__ = ["Allowance", "Box", "Polygon", "Rough", "Solid", "Stock", "StockError"]
+__all__ = ["Allowance", "Box", "Polygon", "Rough", "Solid", "Stock"]
 
 Range = tuple[Float, Float]
 Point = tuple[Float, Float]
 Ring = Annotated[tuple[Point, ...], Field(min_length=3)]
-
-
-class StockError(FileError):
-    """A stock file that cannot be used, or that does not suit the program."""
 
 
 def _ascends(table: Table, *names: str) -> None:

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
-from shapegcode.cutting.stock import Rough, Stock, StockError
+from shapegcode.cutting.stock import Rough, Stock
 from shapegcode.cutting.stock_shape import stock_polygons
 from shapegcode.cutting.tool import Tool
+from shapegcode.errors import StockError
 from shapegcode.program import Program
 from shapegcode.settings.keys import toml
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from shapegcode import _core
 from shapegcode.cutting.offset_shapes import chord_angle_rad, grown, swept
-from shapegcode.cutting.stock import Allowance, Box, Polygon, Solid, Stock, StockError
+from shapegcode.cutting.stock import Allowance, Box, Polygon, Solid, Stock
+from shapegcode.errors import StockError
 from shapegcode.settings.keys import toml
 
 if TYPE_CHECKING:

@@ -14,15 +14,12 @@ from pydantic import Field, Strict, field_validator, model_validator
 
 from shapegcode import _core
 from shapegcode.cutting.materials import Exponent, Material, Name, materials
+from shapegcode.errors import ToolError
 from shapegcode.settings.keys import Float, NonNegative, Positive, Table, Text, key, toml
 from shapegcode.settings.load import loaded, parsed, validated
-from shapegcode.settings.problems import FileError, KeyProblem
+from shapegcode.settings.problems import KeyProblem
 
-__all__ = ["Cutter", "Cutting", "Feed", "Limits", "Tool", "ToolError"]
-
-
-class ToolError(FileError):
-    """A tool file that cannot be used."""
+__all__ = ["Cutter", "Cutting", "Feed", "Limits", "Tool"]
 
 
 class Cutter(Table):

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from shapegcode import _core
-from shapegcode.conversion.readback import RoundTripError
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
+from shapegcode.errors import RoundTripError
 from shapegcode.feed.plan import FeedPlan, plan_region
 from shapegcode.feed.report import RegionLoad, feed_report, region_load
 from shapegcode.feed.survey import Survey, survey

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shapegcode.errors import RecordError
 from shapegcode.identification.decay import find_decay
 from shapegcode.identification.hits import Hit, find_hits, split_hits
 from shapegcode.identification.quality import DECAYED, excited_hz, is_clipped, refuse_short
-from shapegcode.io.record import UNITS, FloatArray, Record, RecordError
+from shapegcode.io.record import UNITS, FloatArray, Record
 
 __all__ = [
     "DOUBLE_HIT",

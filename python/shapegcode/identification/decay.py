@@ -10,8 +10,9 @@ import numpy.typing as npt
 from scipy import signal
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from shapegcode.errors import RecordError
 from shapegcode.identification.spectra import decay_spectrum
-from shapegcode.io.record import FloatArray, Record, RecordError
+from shapegcode.io.record import FloatArray, Record
 
 __all__ = ["find_decay"]
 

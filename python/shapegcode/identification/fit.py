@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.signal import resample_poly
 
 from shapegcode import _core
+from shapegcode.errors import RecordError
 from shapegcode.identification.chart import stabilisation_chart
 from shapegcode.identification.checks import Prepared, prepare
 from shapegcode.identification.mode import IdentifiedMode
@@ -24,7 +25,7 @@ from shapegcode.identification.support import (
     refusal_of,
     rivals_of,
 )
-from shapegcode.io.record import Record, RecordError
+from shapegcode.io.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 

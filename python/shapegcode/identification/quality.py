@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from shapegcode.errors import RecordError
 from shapegcode.identification.spectra import decay_spectrum
-from shapegcode.io.record import FloatArray, Record, RecordError
+from shapegcode.io.record import FloatArray, Record
 
 __all__ = ["DECAYED", "EXCITED_HALF_SINE", "FOLDING", "LEAST_PERIODS", "excited_hz", "is_clipped", "refuse_short"]
 

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft, signal
 
-from shapegcode.io.record import FloatArray, Record, RecordError
+from shapegcode.errors import RecordError
+from shapegcode.io.record import FloatArray, Record
 
 __all__ = ["Envelope", "Frf", "Peak", "Spectrum", "decay_spectrum", "envelope", "frf", "mode_envelopes"]
 

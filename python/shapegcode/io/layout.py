@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from shapegcode.io.record import RecordError
+from shapegcode.errors import RecordError
 from shapegcode.io.units import find_unit, read_label
 
 __all__ = [

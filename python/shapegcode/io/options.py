@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from shapegcode.io.record import Quantity, RecordError
+from shapegcode.errors import RecordError
+from shapegcode.io.record import Quantity
 from shapegcode.io.units import Measured, Unit, find_unit, units_of
 
 __all__ = ["ReadOptions", "stated_unit"]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from shapegcode.errors import RecordError
 from shapegcode.io.options import ReadOptions
-from shapegcode.io.record import Record, RecordError
+from shapegcode.io.record import Record
 
 __all__ = ["ReadOptions", "read_records"]
 

@@ -8,16 +8,12 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode import _core
+from shapegcode.errors import RecordError
 
 FloatArray = npt.NDArray[np.float64]
 Quantity = Literal["acceleration", "velocity", "displacement"]
 
 UNITS: dict[Quantity, str] = {"acceleration": "m/s²", "velocity": "m/s", "displacement": "m"}
-
-
-class RecordError(_core.ArgumentError):
-    """A record cannot be used: the message says what was found and what is needed."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shapegcode.errors import RecordError
 from shapegcode.io.layout import (
     Layout,
     cells_of,
@@ -22,7 +23,7 @@ from shapegcode.io.layout import (
     without_thousands,
 )
 from shapegcode.io.options import ReadOptions, stated_unit
-from shapegcode.io.record import FloatArray, Quantity, Record, RecordError
+from shapegcode.io.record import FloatArray, Quantity, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.units import Label, read_label, units_of
 

@@ -8,8 +8,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from shapegcode.errors import RecordError
 from shapegcode.io.options import ReadOptions, stated_unit
-from shapegcode.io.record import FloatArray, Quantity, Record, RecordError
+from shapegcode.io.record import FloatArray, Quantity, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.units import find_unit, read_label, units_of
 

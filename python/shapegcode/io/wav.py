@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from scipy.io import wavfile
 
+from shapegcode.errors import RecordError
 from shapegcode.io.options import ReadOptions
-from shapegcode.io.record import FloatArray, Record, RecordError
+from shapegcode.io.record import FloatArray, Record
 from shapegcode.io.sampling import STATED_RATE_TOLERANCE
 
 __all__ = ["read_wav"]

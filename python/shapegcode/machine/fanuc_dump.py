@@ -10,7 +10,7 @@ import re
 from collections.abc import Container
 from dataclasses import dataclass, field
 
-from shapegcode.settings.problems import MachineError, Problem
+from shapegcode.errors import MachineError, Problem
 
 __all__ = ["Dump", "Entry", "read_dump"]
 

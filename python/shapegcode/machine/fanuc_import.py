@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from shapegcode.machine import Machine, MachineError, Problem
+from shapegcode.errors import MachineError, Problem
+from shapegcode.machine import Machine
 from shapegcode.machine.fanuc_dump import Dump, Entry, read_dump
 
 __all__ = ["ParameterImport", "import_parameters", "read_parameters"]

@@ -17,6 +17,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, Strict, model_validator
 
+from shapegcode.errors import MachineError, Problem
 from shapegcode.machine.axes import Axes, Axis, Mode
 from shapegcode.machine.controller import Controller, PowerOn, Times
 from shapegcode.machine.drive import Drive
@@ -26,7 +27,7 @@ from shapegcode.machine.output import Emission, Shaping, Tolerance, Verdict
 from shapegcode.settings.describe import documentation, values_of, write_toml
 from shapegcode.settings.keys import KeyInfo, KeyValue, PerAxis, Table, Text, key, toml
 from shapegcode.settings.load import parsed, read_text, validated
-from shapegcode.settings.problems import KeyProblem, MachineError, Problem
+from shapegcode.settings.problems import KeyProblem
 
 __all__ = [
     "Axes",
@@ -39,11 +40,9 @@ __all__ = [
     "KeyInfo",
     "KeyValue",
     "Machine",
-    "MachineError",
     "Mode",
     "PerAxis",
     "PowerOn",
-    "Problem",
     "Shaping",
     "Times",
     "Tolerance",

@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.machine import Axis, Machine, MachineError, Problem
+from shapegcode.errors import MachineError, Problem
+from shapegcode.machine import Axis, Machine
 from shapegcode.machine.drive import Drive
 
 _UM = 1e-6  # m

@@ -8,8 +8,9 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from shapegcode.errors import FileError, Problem
 from shapegcode.settings.keys import Table
-from shapegcode.settings.problems import FileError, Problem, problems_of, syntax_problem
+from shapegcode.settings.problems import problems_of, syntax_problem
 
 _Model = TypeVar("_Model", bound=Table)
 

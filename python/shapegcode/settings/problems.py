@@ -5,35 +5,13 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from shapegcode.errors import Problem
 from shapegcode.settings.keys import Table, facts, table_type, toml, toml_key
-
-
-@dataclass(frozen=True)
-class Problem:
-    """One thing wrong in a file of settings.
-
-    Attributes:
-        key: dotted name of the key, for example ``axes.x.max_feed_mm_per_min``; empty if the file is bad.
-        value: the offending value as written in TOML; empty where there is none (a missing key).
-        limit: what the value must be.
-        line: line number in the file where it is known, else None.
-    """
-
-    key: str
-    value: str
-    limit: str
-    line: int | None = None
-
-    def __str__(self) -> str:
-        """The problem as ``key = value: limit``, without the file's name."""
-        subject = f"{self.key} = {self.value}" if self.value else self.key
-        return f"{subject}: {self.limit}" if subject else self.limit
 
 
 class KeyProblem(ValueError):
@@ -45,30 +23,6 @@ class KeyProblem(ValueError):
         self.value = value
         self.limit = limit
         super().__init__(f"{key} = {toml(value)}: {limit}")
-
-
-class FileError(ValueError):
-    """A file of settings that cannot be used; the message lists every problem, one line each.
-
-    Attributes:
-        file: name of the file (or of what is built in).
-        problems: what is wrong, in the order of the keys.
-    """
-
-    def __init__(self, file: str, problems: tuple[Problem, ...]) -> None:
-        """Build the message ``file[:line]: key = value: limit``, one line per problem."""
-        self.file = file
-        self.problems = problems
-        super().__init__(
-            "\n".join(
-                f"{file}:{problem.line}: {problem}" if problem.line is not None else f"{file}: {problem}"
-                for problem in problems
-            )
-        )
-
-
-class MachineError(FileError):
-    """A machine file that cannot be used."""
 
 
 def syntax_problem(message: str, text: str) -> Problem:

@@ -1,0 +1,89 @@
+"""Every error of shapegcode that is the user's to mend, as one family under :class:`ShapegcodeError`.
+
+The core's: :class:`ArgumentError`, :class:`DesignError`, :class:`NumericError`, :class:`ProgramError`. Of files of
+settings: :class:`MachineError`, :class:`ToolError`, :class:`StockError`. Of measured records: :class:`RecordError`.
+Files that cannot be read or written raise what Python raises, :class:`OSError`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from shapegcode._core import ArgumentError, DesignError, NumericError, ProgramError, ShapegcodeError
+
+__all__ = [
+    "ArgumentError",
+    "DesignError",
+    "FileError",
+    "MachineError",
+    "NumericError",
+    "Problem",
+    "ProgramError",
+    "RecordError",
+    "RoundTripError",
+    "ShapegcodeError",
+    "StockError",
+    "ToolError",
+]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong in a file of settings.
+
+    Attributes:
+        key: dotted name of the key, for example ``axes.x.max_feed_mm_per_min``; empty if the file is bad.
+        value: the offending value as written in TOML; empty where there is none (a missing key).
+        limit: what the value must be.
+        line: line number in the file where it is known, else None.
+    """
+
+    key: str
+    value: str
+    limit: str
+    line: int | None = None
+
+    def __str__(self) -> str:
+        """The problem as ``key = value: limit``, without the file's name."""
+        subject = f"{self.key} = {self.value}" if self.value else self.key
+        return f"{subject}: {self.limit}" if subject else self.limit
+
+
+class FileError(ShapegcodeError, ValueError):
+    """A file of settings that cannot be used; the message lists every problem, one line each.
+
+    Attributes:
+        file: name of the file (or of what is built in).
+        problems: what is wrong, in the order of the keys.
+    """
+
+    def __init__(self, file: str, problems: tuple[Problem, ...]) -> None:
+        """Build the message ``file[:line]: key = value: limit``, one line per problem."""
+        self.file = file
+        self.problems = problems
+        super().__init__(
+            "\n".join(
+                f"{file}:{problem.line}: {problem}" if problem.line is not None else f"{file}: {problem}"
+                for problem in problems
+            )
+        )
+
+
+class MachineError(FileError):
+    """A machine file, or a dump of a control's parameters, that cannot be used."""
+
+
+class ToolError(FileError):
+    """A tool file that cannot be used."""
+
+
+class StockError(FileError):
+    """A stock file that cannot be used, or that does not suit the program."""
+
+
+class RecordError(ArgumentError):
+    """A record cannot be used: the message says what was found and what is needed."""
+
+
+class RoundTripError(ShapegcodeError):
+    """The emitted text does not say what it should: a defect of shapegcode, never of the input. Nothing is written."""
