@@ -11,7 +11,7 @@ import jsonschema
 import pytest
 import write_schemas
 
-from shapegcode.results.json import exact, hidden, plain, schema, to_text
+from shapegcode.results.json import exact, hidden, plain, schema, sparse, to_text
 from shapegcode.results.result import Pair, Xyz
 
 RESULTS = write_schemas.results()
@@ -52,12 +52,14 @@ class _Part:
         taps: of a shaper.
         samples: many.
         before: and after.
+        gouge: only where a side is known.
     """
 
     error_um: Xyz[float]
     taps: tuple[float, ...] = dataclasses.field(metadata=exact())
     samples: tuple[float, ...] = dataclasses.field(metadata=hidden())
     before: Pair[float | None]
+    gouge: float | None = dataclasses.field(default=None, metadata=sparse())
 
 
 def test_numbers_are_written_as_a_person_would() -> None:
@@ -76,8 +78,10 @@ def test_numbers_are_written_as_a_person_would() -> None:
 
 def test_a_schema_refuses_what_the_class_has_not() -> None:
     found: dict[str, Any] = schema(_Part)
+    assert "gouge" not in found["required"]
     good = json.loads(to_text(plain(_Part(Xyz(1.0, 2.0, 3.0), (1.0,), (), Pair(None, 1.0)))))
     jsonschema.validate(good, found)
+    jsonschema.validate(good | {"gouge": 1.0}, found)
     for wrong in (
         {"error_um": {"x": 1.0}},
         {"before": {"original": "a", "emitted": 1.0}},

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.results.json import sparse
+from shapegcode.results.result import Xyz
 
 Vector = npt.NDArray[np.float64]
 
@@ -51,6 +53,46 @@ class Deviation:
         """
         gouge, excess = (self.left_mm, self.right_mm) if material_side == "left" else (self.right_mm, self.left_mm)
         return {"gouge": gouge * 1e3, "excess": excess * 1e3}
+
+
+@dataclass(frozen=True)
+class ContourError:
+    """How far a track leaves the programmed path, in µm.
+
+    Attributes:
+        max: distance, either side; corners that the track cuts short count too.
+        rms: root mean square over all samples.
+        left: largest to the left of the travel, or above.
+        right: largest to the right of it, or below.
+        gouge: largest towards the workpiece, which cuts too much; only where the side of the workpiece is known.
+        excess: largest away from it, which leaves material standing; likewise.
+    """
+
+    max: float
+    rms: float
+    left: float
+    right: float
+    gouge: float | None = field(default=None, metadata=sparse())
+    excess: float | None = field(default=None, metadata=sparse())
+
+    @classmethod
+    def of(cls, stats: Iterable[_core.DeviationStats], material_side: str | None = None) -> ContourError:
+        """Of one or several runs together; all zero without any.
+
+        Args:
+            stats: of the runs, in mm.
+            material_side: "left" or "right" of the travel, where the workpiece is; None: not known.
+        """
+        return cls(**deviation_um(stats, material_side))
+
+
+def largest_xyz_um(vectors: Iterable[Vector]) -> Xyz[float]:
+    """Largest of each axis, mm to µm.
+
+    Args:
+        vectors: each of shape (3,); none: all zero.
+    """
+    return Xyz(**largest_um(vectors))
 
 
 def xyz(values: Iterable[float]) -> dict[str, float]:

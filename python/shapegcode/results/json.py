@@ -1,8 +1,9 @@
 """One serialiser for every JSON, and the schema of a result from its class.
 
 A dataclass becomes an object whose keys are the names of its fields, in their order; what its field's metadata calls
-`hidden` (samples, programs, texts) stays out. Numbers are written as a person would write them: nine digits, no minus
-zero, nothing below a millionth of a unit of length, time or percent. What is no number in JSON (NaN, infinity) is null.
+`hidden` (samples, programs, texts) stays out, and what it calls `sparse` where it is None. Numbers are written as a
+person would write them: nine digits, no minus zero, nothing below a millionth of a unit of length, time or percent.
+What is no number in JSON (NaN, infinity) is null.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["exact", "hidden", "plain", "schema", "to_text"]
+__all__ = ["exact", "hidden", "plain", "schema", "sparse", "to_text"]
 
 _DIGITS = 9
 _NOTHING = 1e-9  # of a unit in which nobody measures so little
@@ -34,6 +35,11 @@ def hidden() -> dict[str, Any]:
 def exact() -> dict[str, Any]:
     """Metadata of a field whose numbers keep every digit: ``field(metadata=exact())``."""
     return {"exact": True}
+
+
+def sparse() -> dict[str, Any]:
+    """Metadata of a field whose key is left out where its value is None: ``field(default=None, metadata=sparse())``."""
+    return {"sparse": True}
 
 
 def plain(value: object) -> Any:
@@ -53,7 +59,12 @@ def _plain(value: object, *, coarse: bool, every_digit: bool) -> Any:
         return _plain(entry, coarse=coarse or key.endswith(_COARSE_UNITS), every_digit=every_digit or digits)
 
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = [field for field in dataclasses.fields(value) if not field.metadata.get("hidden")]
+        fields = [
+            field
+            for field in dataclasses.fields(value)
+            if not field.metadata.get("hidden")
+            and not (field.metadata.get("sparse") and getattr(value, field.name) is None)
+        ]
         return {
             field.name: inner(getattr(value, field.name), field.name, bool(field.metadata.get("exact")))
             for field in fields
@@ -128,6 +139,7 @@ def _object(cls: Any, arguments: Mapping[Any, Any], definitions: dict[str, Any])
     meanings = _meanings(cls)
     shown = {field.name: hints[field.name] for field in dataclasses.fields(cls) if not field.metadata.get("hidden")}
     shown |= getattr(cls, "json_extra", {})
+    left_out = {field.name for field in dataclasses.fields(cls) if field.metadata.get("sparse")}
     files = {"plots": tuple[str, ...], "output": str} if hasattr(cls, "json_extra") else {}
     properties = {}
     for name, hint in (shown | files).items():
@@ -139,7 +151,7 @@ def _object(cls: Any, arguments: Mapping[Any, Any], definitions: dict[str, Any])
         "type": "object",
         "description": summary,
         "properties": properties,
-        "required": sorted(shown),
+        "required": sorted(shown.keys() - left_out),
         "additionalProperties": False,
     }
 
