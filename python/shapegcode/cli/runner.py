@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli import console as terminal
+from shapegcode.io.atomic import write_bytes
 
 if TYPE_CHECKING:
     from shapegcode.results.result import Result
@@ -88,8 +89,9 @@ def finish(
     tables: Sequence[Table] | None = None,
     notes: Sequence[str] = (),
     wrote: Sequence[str | Path] = (),
+    output: tuple[str | Path, bytes] | None = None,
 ) -> int:
-    """Write --json and --plots, and say it: the answer first, tables, warnings, notes, files, the next step.
+    """Write --json, --plots and the program, and say it: answer first, tables, warnings, notes, files, next step.
 
     Args:
         result: what was found.
@@ -97,6 +99,7 @@ def finish(
         tables: to show; None: those of the result.
         notes: further lines, below the warnings.
         wrote: files that the command has written already.
+        output: name and content of a program to write.
 
     Returns:
         The exit code.
@@ -112,8 +115,16 @@ def finish(
     if plots is not None:
         pictures = result.save_plots(plots)
         report["plots"] = pictures
-    if getattr(args, "json", None) is not None:
-        terminal.write_json(report, args.json)
+    target = getattr(args, "json", None)
+    if output is not None:
+        report["output"] = str(output[0])
+    if target not in (None, "-"):
+        terminal.write_json(report, target)
+    if output is not None:
+        # Last of all, so that no program stands there when something else could not be written.
+        write_bytes(*output)
+    if target == "-":
+        terminal.write_json(report, target)
     console = terminal.output_console(standard_output(args))
 
     def say(text: str, style: str | None = None) -> None:
@@ -128,7 +139,7 @@ def finish(
         console.print(warning_table(result.warnings))
     for note in notes:
         say(note)
-    for file in wrote:
+    for file in (*wrote, *([output[0]] if output is not None else [])):
         say(f"wrote {file}")
     if plots is not None:
         say(f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: none, as there is nothing to draw")
