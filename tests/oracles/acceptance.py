@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import functools
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -41,21 +39,9 @@ MOVE_KINDS = {_core.SegmentKind.rapid: "rapid", _core.SegmentKind.line: "line", 
 HEADER_LINE = re.compile(r"\([A-Z0-9 .-]{1,60}\)\r?")
 
 
-@functools.cache
-def _builtin(name: str) -> dict[str, Any]:
-    return sg.Machine.load(name).model_dump(exclude_none=True)
-
-
 def machine_with(keys: Mapping[str, Any] | None = None, base: str = "vx500") -> sg.Machine:
     """A built-in machine with other values for some dotted keys."""
-    data = copy.deepcopy(_builtin(base))
-    for key, value in (keys or {}).items():
-        *tables, last = key.split(".")
-        table = data
-        for name in tables:
-            table = table[name]
-        table[last] = value
-    return sg.Machine.from_data(data, "machine of a test")
+    return sg.Machine.load(base).with_values(keys or {})
 
 
 def moves_of(program: sg.Program) -> list[tuple[Any, float]]:

@@ -98,6 +98,39 @@ residual_floor_um = 0
     assert machine.tolerance.residual_floor_um == 0
 
 
+def test_other_values_are_checked_as_those_of_a_file() -> None:
+    machine = Machine.load("vx500")
+    other = machine.with_values({"tolerance.contour_um": 5, "axes.x.modes.1.damping_ratio": 0.03, "name": "B"})
+    assert (other.tolerance.contour_um, other.axes.x.modes[0].damping_ratio, other.name) == (5.0, 0.03, "B")
+    assert machine == Machine.load("vx500")
+    assert other.with_values({}) == other
+    assert machine.with_values("tolerance.contour_um", 5).tolerance.contour_um == 5.0
+    assert machine.with_values("axes.y.modes", machine.axes.x.modes).axes.y.modes == machine.axes.x.modes
+    assert machine.with_values('input.work_offsets."G54.1P2"', [1, 2, 3]).input.work_offsets["G54.1P2"] == (1, 2, 3)
+    with pytest.raises(MachineError) as caught:
+        machine.with_values({"tolerance.contour_um": -5, "shaping.famly": "zvd"})
+    assert str(caught.value).splitlines() == [
+        'VX500: shaping.famly = "zvd": unknown key; did you mean family?',
+        "VX500: tolerance.contour_um = -5: must be greater than 0 (unit: µm)",
+    ]
+    for key in ("name.x", "axes.x.modes.3.damping_ratio", "axes.x.modes.0.damping_ratio"):
+        with pytest.raises(MachineError, match=rf"^here: {key} = 0.5: no such key$"):
+            machine.with_values(key, 0.5, source="here")
+
+
+def test_other_values_leave_the_defaults_what_they_are() -> None:
+    machine = Machine.from_toml(MINIMAL)
+    other = machine.with_values("controller.in_position_s.y", 0.5)
+    assert other.controller.in_position_s.as_tuple() == (0.025, 0.5, 0.12)
+    from_file = {value.info.key for value in other.values() if value.origin == "file"}
+    assert from_file - {value.info.key for value in machine.values() if value.origin == "file"} == {
+        "controller.in_position_s"
+    }
+    assert other.with_values("controller.in_position_s", None) == machine
+    with pytest.raises(MachineError, match="rapid_mm_per_min: required, but missing"):
+        machine.with_values("axes.x.rapid_mm_per_min", None)
+
+
 def test_machine_never_changes_after_loading() -> None:
     machine = Machine.load("vx500")
     with pytest.raises(ValueError, match="frozen"):

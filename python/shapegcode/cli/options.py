@@ -86,24 +86,13 @@ def load_machine(args: argparse.Namespace) -> Machine:
     from shapegcode.machine import Machine
 
     machine = Machine.load(args.machine)
-    if not args.set:
-        return machine
-    data = machine.model_dump(exclude_none=True)
+    values = {}
     for assignment in args.set:
         key, sign, text = assignment.partition("=")
         if not sign:
             raise MachineError("--set", (Problem(assignment, "", "must be KEY=VALUE"),))
-        *tables, last = key.strip().split(".")
-        place: Any = data
-        for name in tables:
-            place = _inside(place, name)
-        if isinstance(place, list) and last.isdigit() and 0 < int(last) <= len(place):
-            place[int(last) - 1] = _toml_value(text)
-        elif isinstance(place, dict):
-            place[last] = _toml_value(text)
-        else:
-            raise MachineError("--set", (Problem(key, text, "no such key"),))
-    return Machine.from_data(data, f"{args.machine} with --set")
+        values[key.strip()] = _toml_value(text)
+    return machine.with_values(values, source=f"{args.machine} with --set") if values else machine
 
 
 def with_values(machine: Machine, *values: tuple[str, object]) -> Machine:
@@ -116,24 +105,8 @@ def with_values(machine: Machine, *values: tuple[str, object]) -> Machine:
     Raises:
         MachineError: a value that a machine file could not have.
     """
-    from shapegcode.machine import Machine
-
-    stated = [(key.split("."), value) for key, value in values if value is not None]
-    if not stated:
-        return machine
-    data = machine.model_dump(exclude_none=True)
-    for (table, key), value in stated:
-        data[table][key] = value
-    return Machine.from_data(data, "options")
-
-
-def _inside(place: Any, name: str) -> Any:
-    """A table of the file by its name; the entries of a list count from 1, as `machine show` prints them."""
-    if isinstance(place, dict):
-        return place.setdefault(name, {})
-    if isinstance(place, list | tuple) and name.isdigit() and 0 < int(name) <= len(place):
-        return place[int(name) - 1]
-    return None
+    stated = {key: value for key, value in values if value is not None}
+    return machine.with_values(stated, source="options") if stated else machine
 
 
 def _toml_value(text: str) -> Any:

@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, overload
 
 from pydantic import Field, Strict, model_validator
 
@@ -24,6 +24,7 @@ from shapegcode.machine.drive import Drive
 from shapegcode.machine.feed import FeedControl
 from shapegcode.machine.input import Input
 from shapegcode.machine.output import Emission, Shaping, Tolerance, Verdict
+from shapegcode.settings import change
 from shapegcode.settings.describe import documentation, values_of, write_toml
 from shapegcode.settings.keys import KeyInfo, KeyValue, PerAxis, Table, Text, key, toml
 from shapegcode.settings.load import parsed, read_text, validated
@@ -158,6 +159,30 @@ class Machine(Table):
             KeyError: a remark for a key that does not exist.
         """
         return write_toml(self, remarks or {})
+
+    @overload
+    def with_values(self, key: str, value: object, /, *, source: str = "") -> Machine: ...
+    @overload
+    def with_values(self, values: Mapping[str, object], /, *, source: str = "") -> Machine: ...
+    def with_values(self, key: str | Mapping[str, object], value: object = None, /, *, source: str = "") -> Machine:
+        """The machine with other values for some keys, checked as those of a machine file are.
+
+        >>> machine.with_values("tolerance.contour_um", 5)
+        >>> machine.with_values({"shaping.family": "zvd", "axes.x.modes.1.frequency_hz": 44.5})
+
+        Args:
+            key: dotted name of a key (modes count from 1, as `shapegcode machine show` prints them), or values by key.
+            value: of the key, in its unit; None takes the key out, so that its default holds.
+            source: names the machine in messages; its name where this is left out.
+
+        Returns:
+            A new machine; this one stays as it is.
+
+        Raises:
+            MachineError: no such key, or a value that a machine file could not have; every problem is listed.
+        """
+        values = {key: value} if isinstance(key, str) else key
+        return change.with_values(self, values, source or self.name, MachineError)
 
     def values(self) -> list[KeyValue]:
         """Every key with its value and origin, in the order of the file."""

@@ -1,0 +1,85 @@
+"""Other values for some keys of settings that are loaded, checked as those of a file are."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from shapegcode.errors import FileError, Problem
+from shapegcode.settings.keys import InlineTable, Table, toml
+from shapegcode.settings.load import validated
+
+__all__ = ["with_values"]
+
+_Model = TypeVar("_Model", bound=Table)
+# A part of a dotted key: in quotes where it holds a dot itself.
+_PART = re.compile(r'"([^"]*)"|([^."]+)')
+
+
+def with_values(settings: _Model, values: Mapping[str, object], source: str, error: type[FileError]) -> _Model:
+    """The settings with other values; what was a default stays one.
+
+    Args:
+        settings: what was loaded.
+        values: by dotted key; the tables of a list count from 1, as in ``axes.x.modes.1.frequency_hz``. None takes a
+            key out, so that its default holds.
+        source: names the settings in messages.
+        error: what to raise.
+
+    Returns:
+        New settings; the old ones stay as they are.
+
+    Raises:
+        FileError: the given kind of it: a key that does not exist, or a value that a file could not have; every
+            problem is listed.
+    """
+    data = _plain(settings)
+    for key, value in values.items():
+        *tables, last = [quoted or bare for quoted, bare in _PART.findall(key)] or [key]
+        place: Any = data
+        held: Any = settings
+        for name in tables:
+            held = _below(held, name)
+            place = _entry(place, name, held)
+        if isinstance(place, list) and _is_row(last, place):
+            place[int(last) - 1] = value
+        elif isinstance(place, dict) and value is None:
+            place.pop(last, None)
+        elif isinstance(place, dict):
+            place[last] = value
+        else:
+            raise error(source, (Problem(key, toml(value), "no such key"),))
+    return validated(type(settings), data, source, "", error)
+
+
+def _plain(value: Any) -> Any:
+    """What a file says of a value, in the dictionaries and lists of a TOML file."""
+    if isinstance(value, Table):
+        fields = {name: getattr(value, name) for name in value.model_fields_set}
+        return {name: _plain(held) for name, held in fields.items() if held is not None}
+    if isinstance(value, Mapping):
+        return {name: _plain(held) for name, held in value.items()}
+    return [_plain(held) for held in value] if isinstance(value, list | tuple) else value
+
+
+def _is_row(name: str, rows: list[Any] | tuple[Any, ...]) -> bool:
+    return name.isdigit() and 0 < int(name) <= len(rows)
+
+
+def _below(held: Any, name: str) -> Any:
+    """What the loaded settings hold under a name, defaults as well; None where there is nothing."""
+    if isinstance(held, Mapping):
+        return held.get(name)
+    if isinstance(held, list | tuple):
+        return held[int(name) - 1] if _is_row(name, held) else None
+    return getattr(held, name, None) if isinstance(held, Table) else None
+
+
+def _entry(place: Any, name: str, held: Any) -> Any:
+    """A table of the file by its name, made where the file leaves it out; None where there can be none."""
+    if isinstance(place, dict):
+        # A value that is a table goes as a whole: its other keys must not be lost.
+        whole = held is not None and (isinstance(held, InlineTable) or not isinstance(held, Table))
+        return place.setdefault(name, _plain(held) if whole else {})
+    return place[int(name) - 1] if isinstance(place, list) and _is_row(name, place) else None
