@@ -23,7 +23,7 @@ import shapegcode as sg
 from shapegcode import _core, converter
 from shapegcode.cli.console import progress
 from shapegcode.conversion.readback import Placed
-from shapegcode.model.play import play_emitted, play_original, vibration_memory_s
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping import design, machine_bands
 from shapegcode.shaping.grid import Grid, choose_grid, make_grid
 
@@ -176,10 +176,10 @@ def as_programmed(program: Path) -> Outcome:
     machine = sg.Machine.load("vx500")
     read = sg.Program.read(program, machine)
     paths = [region.path for region in read.regions]
-    runs = [play_original(path, machine) for path in paths]
+    runs = [MachineModel(machine).play_original(path) for path in paths]
     return Outcome(
         "as programmed",
-        residual_um=_over_bands(machine, lambda other: (play_original(path, other) for path in paths)),
+        residual_um=_over_bands(machine, lambda other: (MachineModel(other).play_original(path) for path in paths)),
         peak_um=_largest_um(run.peak_mm for run in runs),
         command_um=1e3 * max(run.command.max_abs_mm for run in runs),
         response_um=1e3 * max(run.response.max_abs_mm for run in runs),
@@ -189,7 +189,8 @@ def as_programmed(program: Path) -> Outcome:
 
 
 def _residual_of(blocks: _core.Path, place: Placed, machine: sg.Machine) -> _core.PlaybackFigures:
-    return play_emitted(blocks, place.region.path, machine, contour=False, last_seconds=vibration_memory_s(machine))
+    model = MachineModel(machine)
+    return model.play_emitted(blocks, place.region.path, contour=False, last_seconds=model.vibration_memory_s)
 
 
 def _over_bands(

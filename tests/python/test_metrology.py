@@ -23,7 +23,7 @@ from shapegcode import _core
 from shapegcode.demos.metrology import metrology_demo
 from shapegcode.demos.path import path_program
 from shapegcode.metrology.measure import MeasuredRegion
-from shapegcode.model.play import play_original
+from shapegcode.model.machine_model import MachineModel
 
 ROOT = Path(__file__).resolve().parents[2]
 TOOL_MM = 3.0
@@ -50,7 +50,7 @@ def paper_region(feed: float = 200.0) -> MeasuredRegion:
 def paper_samples(feed: float = 200.0) -> tuple[FloatArray, FloatArray, _core.Path, _core.PlaybackFigures]:
     machine = sg.Machine.load("vx500")
     path = path_program(feed, machine).regions[-1].path
-    played = play_original(path, machine, record_samples=10**6)
+    played = MachineModel(machine).play_original(path, record_samples=10**6)
     return played.recorded_command, played.recorded_response, path, played
 
 
@@ -219,7 +219,7 @@ def test_random_programs_keep_what_the_playback_says() -> None:
         text = program(moves, machine)
         measured = sg.measure(text, machine, 4.0)
         figures = measured.programs[0].regions[0].figures
-        played = play_original(text.regions[0].path, machine)
+        played = MachineModel(machine).play_original(text.regions[0].path)
         assert figures.duration_s == pytest.approx(played.duration_s)
         assert figures.response.max_abs_mm == pytest.approx(played.response.max_abs_mm, abs=1e-6)
         assert sum(section.section.length_mm for section in figures.sections) == pytest.approx(

@@ -9,8 +9,8 @@ import shapegcode as sg
 from shapegcode import _core
 from shapegcode.conversion.write import filter_tolerance, shaping_options
 from shapegcode.model.controller import motion_limits
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import region_offset
-from shapegcode.model.play import play_emitted
 from shapegcode.program import Program
 from shapegcode.shaping.grid import choose_grid, make_grid
 from shapegcode.simulation.simulate import simulate
@@ -82,7 +82,7 @@ def test_following_leaves_a_fraction_of_what_one_shaper_leaves(contour: str) -> 
     fixed_machine = sg.Machine.from_toml(machine.to_toml().replace("frequency_over = ", "# frequency_over = ", 1))
     fixed = sg.convert(Program.from_text(zig_zag(21, 40.0), fixed_machine), fixed_machine)
     blocks = fixed.emitted.core.cutting_path(fixed.placed[0].first_line, fixed.placed[0].last_line)
-    one_left = play_emitted(blocks, program.regions[0].path, machine).residual_mm[0] * 1e3
+    one_left = MachineModel(machine).play_emitted(blocks, program.regions[0].path).residual_mm[0] * 1e3
     assert was > 20.0
     assert left < 0.01 * was
     assert left < 0.2 * one_left

@@ -13,6 +13,7 @@ from shapegcode import _core
 from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode, ModeTable, VaryingFir
 from shapegcode.errors import MachineError
 from shapegcode.machine import Machine
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import (
     axis_modes,
     machine_warnings,
@@ -23,7 +24,6 @@ from shapegcode.model.modes import (
     slowest_mode,
     still_mode,
 )
-from shapegcode.model.play import play_original, playback_options
 from shapegcode.program import Program
 from shapegcode.shaping import shortest_non_negative
 from shapegcode.shaping.grid import shaper_track
@@ -110,7 +110,7 @@ def test_position_tables_go_to_the_plant_shifted_and_in_program_coordinates() ->
     )
     machine = Machine.from_toml(text)
     assert moving_axis(machine) == 2
-    table = playback_options(machine, shift=-1.0, offset=(0.0, 0.0, 150.0)).mode_tables[0][0]
+    table = MachineModel(machine).options(shift=-1.0, offset=(0.0, 0.0, 150.0)).mode_tables[0][0]
     assert table.axis == 2
     assert list(table.position_mm) == [-150.0, 50.0, 250.0]
     assert list(table.frequency_hz) == pytest.approx([46.8, 41.4, 36.9])
@@ -360,10 +360,10 @@ def test_the_verdict_sees_the_mode_that_moves() -> None:
     machine, slow = machine_with(OVER_Z), machine_with(OVER_Z, nominal=41.0)
     plain = Machine.from_toml(slow.to_toml().replace("frequency_over =", "# frequency_over =", 1))
     path = _core.Path([_core.Segment.line([0.0, 0.0, 100.0], [30.0, 0.0, 100.0], 100.0)])
-    deep = play_original(path, machine, offset=(0.0, 0.0, 300.0)).residual_mm[0]
-    assert deep == pytest.approx(play_original(path, plain).residual_mm[0], rel=1e-4)
-    unknown = play_original(path, machine, offset=(0.0, 0.0, None)).residual_mm[0]
-    nominal = play_original(path, Machine.load("vx500")).residual_mm[0]
+    deep = MachineModel(machine).play_original(path, offset=(0.0, 0.0, 300.0)).residual_mm[0]
+    assert deep == pytest.approx(MachineModel(plain).play_original(path).residual_mm[0], rel=1e-4)
+    unknown = MachineModel(machine).play_original(path, offset=(0.0, 0.0, None)).residual_mm[0]
+    nominal = MachineModel(Machine.load("vx500")).play_original(path).residual_mm[0]
     assert unknown == nominal
     assert abs(deep - nominal) > 1e-4
 

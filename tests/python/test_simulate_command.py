@@ -21,7 +21,8 @@ import feed_drive_reference as reference
 import shapegcode as sg
 from acceptance import PROGRAMS
 from shapegcode.cli import main
-from shapegcode.model.stream import KINDS, REST_S, Chunk, plant_options
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.stream import KINDS, REST_S, Chunk
 from shapegcode.simulation.motion import Envelope, MotionFigures, MotionTraces
 from shapegcode.simulation.plots import plot_motion
 
@@ -266,7 +267,7 @@ def test_feed_drive_response_is_that_of_solve_ivp(folder: Path) -> None:
     words = ["--plant", "feed-drive", "--npz", "m.npz", "--json", "r.json"]
     assert main(["simulate", "part.nc", "-m", toml_file(folder, machine), *words]) == 0
     columns = np.load(folder / "m.npz")
-    drive = plant_options(machine, "feed-drive").drives[0]
+    drive = MachineModel(machine).options(plant="feed-drive").drives[0]
     command = columns["x_command_mm"][:160]
     assert np.ptp(command) > 1.0
     assert command[0] == 0.0

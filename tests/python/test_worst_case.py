@@ -23,7 +23,7 @@ from shapegcode.cli import main
 from shapegcode.conversion.case_table import case_table
 from shapegcode.conversion.cases import CaseFigures, Limits, judge_region, stated_cases
 from shapegcode.conversion.report import before_after_rows
-from shapegcode.model.play import vibration_memory_s
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.results.figures import Deviation
 from shapegcode.shaping import choose_shaper
 
@@ -115,7 +115,7 @@ def test_an_uncertain_damping_has_its_cases(stated: dict[str, float], names: lis
     cases = [case for case in stated_cases(machine) if case.mode is not None]
     assert [case.name for case in cases] == names
     if "damping_uncertainty_percent" in stated:
-        assert vibration_memory_s(machine) == pytest.approx(math.log(1e6) / (0.016 * 2.0 * math.pi * 46.0))
+        assert MachineModel(machine).vibration_memory_s == pytest.approx(math.log(1e6) / (0.016 * 2.0 * math.pi * 46.0))
 
 
 def test_less_damping_is_the_worse_end() -> None:

@@ -162,13 +162,14 @@ def _play_motion(
         OSError: a file cannot be written.
     """
     from shapegcode import _core
-    from shapegcode.model.stream import playing_controller, stream
+    from shapegcode.model.machine_model import MachineModel
+    from shapegcode.model.stream import stream
     from shapegcode.simulation.files import csv_file, npz_file
     from shapegcode.simulation.motion import MotionFigures, MotionTraces
 
     chunks = stream(program, machine, plant=args.plant, shaped=shaped, lines=args.lines)
     period_s = machine.controller.interpolation_period_s
-    whole_s = _core.time_program(program.core, playing_controller(machine, shaped=shaped)).total_s or period_s
+    whole_s = _core.time_program(program.core, MachineModel(machine).playing(shaped=shaped).model).total_s or period_s
     figures, traces = MotionFigures(period_s), MotionTraces(period_s)
     with contextlib.ExitStack() as files:
         written = [

@@ -28,7 +28,6 @@ __all__ = [
     "region_misses",
     "stated_cases",
     "summarise_cases",
-    "with_one_uncertain",
     "worst_counted",
 ]
 
@@ -195,31 +194,6 @@ def stated_cases(machine: Machine) -> list[Case]:
         cases.append(Case("look-ahead on", None, band.look_ahead, look_ahead=True))
     cases.append(Case(f"starved {band.starved_s * 1e3:g} ms", own, band.starved_block, starved_s=band.starved_s))
     return cases
-
-
-def with_one_uncertain(machine: Machine, mode: str) -> Machine:
-    """The machine with one mode alone off its frequency: the others state no uncertainty.
-
-    Args:
-        machine: whose modes.
-        mode: "x.1" for the first of the X axis.
-    """
-    axes = {
-        letter: axis.model_copy(
-            update={
-                "modes": tuple(
-                    each
-                    if f"{letter}.{number}" == mode
-                    else each.model_copy(
-                        update={"frequency_uncertainty_percent": None, "damping_uncertainty_percent": None}
-                    )
-                    for number, each in enumerate(axis.modes, start=1)
-                )
-            }
-        )
-        for letter, axis in zip("xyz", machine.axes.as_tuple(), strict=True)
-    }
-    return machine.model_copy(update={"axes": machine.axes.model_copy(update=axes)})
 
 
 def judge_region(figures: CaseFigures, limits: Limits) -> list[Judged]:

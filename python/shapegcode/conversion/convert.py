@@ -20,13 +20,12 @@ from shapegcode.conversion.warnings import binding_warnings, controller_warnings
 from shapegcode.conversion.write import emit_region, filter_tolerance
 from shapegcode.machine import Machine
 from shapegcode.model.controller import motion_limits
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import (
     axis_modes,
     machine_warnings,
-    region_offset,
     region_range_warnings,
 )
-from shapegcode.model.play import other_time_s, play_original
 from shapegcode.program import Program, written_by_shapegcode
 from shapegcode.program.compensation import guard_lines, header_lines, read_for_conversion, require_decision
 from shapegcode.shaping.grid import Grid, choose_grid
@@ -122,11 +121,11 @@ def convert(
     room_um = [machine.tolerance.contour_um * _CONTOUR_MARGIN] * len(program.regions)
     spending = None if budget is None else Spending(budget, program, machine)
     # The originals are played on the other cores while this one shapes.
+    model = MachineModel(machine)
     pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
     try:
         playbacks = [
-            pool.submit(play_original, region.path, machine, offset=region_offset(region, machine))
-            for region in program.regions
+            pool.submit(model.play_original, region.path, offset=model.offset(region)) for region in program.regions
         ]
         settle = partial(
             _settle, program, machine, arc_feed_ratio=ratio, room_um=room_um, playbacks=playbacks, pool=pool,
@@ -362,7 +361,7 @@ def _report(
     cutting = {
         which: sum(region["time_s"][which] for region in figures["regions"]) for which in ("original", "emitted")
     }
-    other = kept_s + other_time_s(program.core, machine)
+    other = kept_s + MachineModel(machine).other_time_s(program.core)
     prefill = machine.emission.prefill_dwell_s * len(placed)
     if spending is not None and (sentence := spending.warning(grid)):
         warnings.append(sentence)

@@ -19,14 +19,12 @@ from shapegcode.conversion.cases import (
     region_misses,
     stated_cases,
     summarise_cases,
-    with_one_uncertain,
     worst_counted,
 )
 from shapegcode.conversion.readback import Placed
 from shapegcode.machine import Machine
-from shapegcode.model.controller import motion_limits
-from shapegcode.model.modes import Offset, region_offset
-from shapegcode.model.play import own_rule, play_emitted, play_planned, vibration_memory_s
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.modes import Offset
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.results.figures import Deviation, deviation_um, largest_um, xyz
 
@@ -75,12 +73,13 @@ def measure(
         on_step: called with regions done and regions in all.
     """
     cases = stated_cases(machine)
-    limits = motion_limits(machine)
+    model = MachineModel(machine)
+    limits = model.limits()
     running = []
     for place in placed:
         player = _CasePlayer(
-            emitted.core.cutting_path(place.first_line, place.last_line), place.region.path, machine, cases,
-            region_offset(place.region, machine), _core.ContourTracker(place.region.path),
+            emitted.core.cutting_path(place.first_line, place.last_line), place.region.path, machine, model, cases,
+            model.offset(place.region), _core.ContourTracker(place.region.path),
         )  # fmt: skip
         runs = [pool.submit(player.nominal, rule) for rule in _BLOCK_ENDS]
         planned = pool.submit(player.planned)
@@ -107,23 +106,24 @@ class _CasePlayer:
     blocks: _core.Path
     path: _core.Path
     machine: Machine
+    model: MachineModel
     cases: Sequence[Case]
     offset: Offset
     tracker: _core.ContourTracker
 
     def nominal(self, rule: _core.BlockEnd) -> _core.PlaybackFigures:
         """Blocks at 100 %; under the controller's own rule also with an empty buffer where a stop excites most."""
-        own = rule == own_rule(self.machine)
-        return play_emitted(
-            self.blocks, self.path, self.machine, rule, offset=self.offset,
+        own = rule == self.model.own_rule
+        return self.model.play_emitted(
+            self.blocks, self.path, rule, offset=self.offset,
             starved_blocks=_core.fastest_block_ends(self.blocks) if own else (),
-            memory_s=vibration_memory_s(self.machine), tracker=self.tracker,
+            memory_s=self.model.vibration_memory_s, tracker=self.tracker,
         )  # fmt: skip
 
     def planned(self) -> _core.PlaybackFigures | None:
         """The look-ahead left on; None where no case asks."""
         wanted = any(case.look_ahead for case in self.cases)
-        return play_planned(self.blocks, self.path, self.machine, offset=self.offset) if wanted else None
+        return self.model.play_planned(self.blocks, self.path, offset=self.offset) if wanted else None
 
     def groups(self) -> list[list[Case]]:
         """Overrides and shifted modes: those played in full each by itself, the short ones in one task."""
@@ -134,13 +134,13 @@ class _CasePlayer:
 
     def others(self, cases: Sequence[Case]) -> dict[str, _core.PlaybackFigures]:
         """A group of them by the name of their case."""
-        memory_s = vibration_memory_s(self.machine)
+        memory_s = self.model.vibration_memory_s
         played = {}
         for case in cases:
-            machine = self.machine if case.mode in (None, ALL_MODES) else with_one_uncertain(self.machine, case.mode)
-            whole = case.needs_contour(contour_target(machine))
-            played[case.name] = play_emitted(
-                self.blocks, self.path, machine, override=case.override, shift=case.shift, offset=self.offset,
+            whole = case.needs_contour(contour_target(self.machine))
+            played[case.name] = self.model.play_emitted(
+                self.blocks, self.path, override=case.override, shift=case.shift,
+                only=None if case.mode == ALL_MODES else case.mode, offset=self.offset,
                 contour=whole, command_contour=case.override != 1.0, last_seconds=0.0 if whole else memory_s,
                 tracker=self.tracker,
             )  # fmt: skip
@@ -154,7 +154,7 @@ class _CasePlayer:
     ) -> tuple[CaseFigures, ...]:
         """One entry per case."""
         by_rule = {rule.name: run for rule, run in zip(_BLOCK_ENDS, nominal, strict=True)}
-        own = by_rule[own_rule(self.machine).name]
+        own = by_rule[self.model.own_rule.name]
         figures = []
         for case in self.cases:
             if case.name in others:
@@ -174,7 +174,7 @@ class _CasePlayer:
         if whole:
             return _whole_figures(run)
         period = self.machine.controller.interpolation_period_s
-        cut_s = [_core.play_duration_s(self.blocks, period, own_rule(self.machine), at) for at in (case.override, 1.0)]
+        cut_s = [_core.play_duration_s(self.blocks, period, self.model.own_rule, at) for at in (case.override, 1.0)]
         return CaseFigures(run.residual_mm, None, None, own.duration_s + cut_s[0] - cut_s[1])
 
 

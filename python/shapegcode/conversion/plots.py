@@ -8,8 +8,7 @@ import numpy as np
 
 from shapegcode.conversion.convert import Conversion
 from shapegcode.machine import Machine
-from shapegcode.model.modes import region_offset
-from shapegcode.model.play import play_emitted, play_original
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.results.motion_pictures import RECORD_SAMPLES, part_of, trace_of, write_motion
 
 
@@ -28,10 +27,11 @@ def write_pictures(conversion: Conversion, machine: Machine, folder: str | Path)
     place = conversion.placed[int(np.argmax(residuals))]
     path = place.region.path
     blocks = conversion.emitted.core.cutting_path(place.first_line, place.last_line)
-    offset = region_offset(place.region, machine)
+    model = MachineModel(machine)
+    offset = model.offset(place.region)
     runs = {
-        "original": play_original(path, machine, record_samples=RECORD_SAMPLES, offset=offset),
-        "emitted": play_emitted(blocks, path, machine, record_samples=RECORD_SAMPLES, offset=offset),
+        "original": model.play_original(path, record_samples=RECORD_SAMPLES, offset=offset),
+        "emitted": model.play_emitted(blocks, path, record_samples=RECORD_SAMPLES, offset=offset),
     }
     traces = [trace_of(label, run, machine) for label, run in runs.items()]
     part = part_of(place.region.first_line, place.region.last_line, len(residuals), runs["original"], traces[0])

@@ -14,7 +14,7 @@ from shapegcode.demos.path import ideal_command, path_program
 from shapegcode.machine import Machine
 from shapegcode.metrology.measure import MeasuredRegion, Measurement, measure, measure_run
 from shapegcode.metrology.sections import section_report
-from shapegcode.model.play import playback_options
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 
 __all__ = ["MetrologyDemo", "metrology_demo"]
@@ -137,7 +137,7 @@ def _ideal(original: Program, machine: Machine, ratio: float) -> MeasuredRegion:
     samples, _ = ideal_command(region.path, machine, ratio)
     rest = np.repeat(samples[-1:], round(_REST_S / _FINE_PERIOD_S), axis=0)
     whole = np.asfortranarray(np.concatenate([samples, rest]))
-    options = playback_options(machine)
+    options = MachineModel(machine).options()
     options.period_s = _FINE_PERIOD_S
     options.measure_contour = False
     options.record_samples = len(whole)

@@ -12,7 +12,7 @@ from shapegcode import _core
 from shapegcode.conversion.convert import convert
 from shapegcode.machine import Machine
 from shapegcode.model.controller import motion_limits
-from shapegcode.model.play import playback_options
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.results.figures import largest_um
 from shapegcode.timing.cycle_time import cycle_time
@@ -49,7 +49,7 @@ def ideal_command(path: _core.Path, machine: Machine, arc_feed_ratio: float) -> 
     delays = [round(t / _FINE_PERIOD_S) for t in shaper.times_s]
     profile = _core.plan_speed(path, motion_limits(machine, arc_feed_ratio=arc_feed_ratio))
     samples = _core.Fir(delays, list(shaper.amplitudes)).apply(_core.interpolate(path, profile, _FINE_PERIOD_S))
-    options = playback_options(machine)
+    options = MachineModel(machine).options()
     options.period_s = _FINE_PERIOD_S
     return samples, _core.play_samples(np.asfortranarray(samples), path, options)
 

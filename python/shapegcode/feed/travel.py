@@ -11,8 +11,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.conversion.write import filter_tolerance
 from shapegcode.machine import Machine
-from shapegcode.model.controller import controller_model, motion_limits
-from shapegcode.model.play import own_rule, playback_options
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping.grid import Grid
 
 __all__ = ["Motion", "OrdinaryMotion", "ShapedMotion", "Travelled", "travel_emitted"]
@@ -53,25 +52,17 @@ class OrdinaryMotion:
     """The controller's own motion, as it plays an ordinary program."""
 
     def __init__(self, machine: Machine) -> None:
-        self._model = controller_model(machine)
-        self._filters = _core.acceleration_filters(self._model)
+        self._controller = MachineModel(machine).ordinary
 
     @property
     def reach_s(self) -> float:
         """Half of what the filters behind the interpolation last."""
-        return 0.5 * self._model.period_s * sum(filter_.duration_samples for filter_ in self._filters)
+        period_s = self._controller.model.period_s
+        return 0.5 * period_s * sum(filter_.duration_samples for filter_ in self._controller.filters)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
         """See `Motion`."""
-        model = self._model
-        if model.motion == _core.MotionKind.look_ahead:
-            profile = _core.plan_speed(path, model.limits)
-            return Travelled.of(
-                _core.travel_path(path, profile, along, stations_mm, model.period_s, self._filters, window_s)
-            )
-        return Travelled.of(
-            _core.travel_blocks(path, along, model.block_end, stations_mm, model.period_s, self._filters, window_s)
-        )
+        return Travelled.of(self._controller.travel(path, along, stations_mm, window_s))
 
 
 class ShapedMotion:
@@ -84,10 +75,11 @@ class ShapedMotion:
         period = machine.controller.interpolation_period_s
         ticks = round(grid.block_period_s / period)
         self._period_s = period
-        self._limits = motion_limits(machine)
+        model = MachineModel(machine)
+        self._limits = model.limits()
         self._tolerance = filter_tolerance(machine, grid, machine.tolerance.contour_um)
         shaper = _core.Fir([ticks * delay for delay in grid.fir.delays], list(grid.fir.taps))
-        own = playback_options(machine, time_constant_s=machine.controller.shaped_time_constant_s).axis_filters
+        own = model.options(time_constant_s=model.shaped_time_constant_s).axis_filters
         # The emitted blocks join samples of the shaped command by straight lines.
         self._filters = [shaper, _core.Fir.moving_average(ticks), *own]
 
@@ -108,9 +100,8 @@ def travel_emitted(
     blocks: _core.Path, path: _core.Path, machine: Machine, stations_mm: Vector, window_s: float
 ) -> Travelled:
     """Travel of shaped blocks as the controller plays them, along the programmed path; else as `Motion.travel`."""
-    options = playback_options(machine, time_constant_s=machine.controller.shaped_time_constant_s)
+    model = MachineModel(machine)
+    options = model.options(time_constant_s=model.shaped_time_constant_s)
     return Travelled.of(
-        _core.travel_blocks(
-            blocks, path, own_rule(machine), stations_mm, options.period_s, options.axis_filters, window_s
-        )
+        _core.travel_blocks(blocks, path, model.own_rule, stations_mm, options.period_s, options.axis_filters, window_s)
     )

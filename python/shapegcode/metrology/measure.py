@@ -18,9 +18,8 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.metrology.sections import MeasuredProgram, MeasuredRegion, Measurement, WallProfile
-from shapegcode.model.modes import machine_warnings, region_offset, region_range_warnings
-from shapegcode.model.play import vibration_memory_s
-from shapegcode.model.stream import plant_options, playing_controller
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.modes import machine_warnings, region_range_warnings
 from shapegcode.program import Program, given_program
 from shapegcode.program.program import written_by_shapegcode
 
@@ -255,18 +254,13 @@ def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
 
 def _samples(job: _Job, machine: Machine, plant: str, shaped: bool) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Command and response of a region, and what follows the stop until vibration and servo lag have decayed."""
-    memory_s = max(vibration_memory_s(machine), _LEAST_REST_S)
+    model = MachineModel(machine)
+    memory_s = max(model.vibration_memory_s, _LEAST_REST_S)
     if plant != "modal":
         # The position loop takes the lag off as exp(-gain t): to a millionth, as the vibration.
         memory_s = max(memory_s, _MILLIONTH / min(machine.controller.position_gain_per_s.as_tuple()))
     rest_s = min(memory_s, _LONGEST_REST_S)
-    model = playing_controller(machine, shaped=shaped)
-    options = plant_options(machine, plant, offset=region_offset(job.played, machine))
-    options.axis_filters = _core.acceleration_filters(model)
-    blocks = job.played.path
-    if model.motion == _core.MotionKind.look_ahead:
-        stream = _core.PlayedStream.of_path(blocks, _core.plan_speed(blocks, model.limits), options, rest_s)
-    else:
-        stream = _core.PlayedStream.of_blocks(blocks, model.block_end, 1.0, options, rest_s)
+    options = model.options(plant=plant, offset=model.offset(job.played))
+    stream = model.playing(shaped=shaped).stream(job.played.path, options, rest_s)
     while len(chunk := stream.read(_CHUNK_SAMPLES)) > 0:
         yield chunk.command_mm, chunk.response_mm

@@ -7,15 +7,11 @@ along the program. Positions in tables are the machine's: those of the program p
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shapegcode import _core
 from shapegcode.machine import Machine, Mode
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = [
     "NO_OFFSET",
@@ -56,22 +52,38 @@ def still_mode(mode: Mode, part_mass_kg: float | None) -> _core.Mode:
     return _core.ModeTable(0, over.mass_kg, over.frequency_hz, over.damping_ratio or ()).mode_at(nominal, part_mass_kg)
 
 
-def axis_modes(machine: Machine, shift: float = 0.0) -> list[list[_core.Mode]]:
+def axis_modes(machine: Machine, shift: float = 0.0, only: str | None = None) -> list[list[_core.Mode]]:
     """Modes of X, Y, Z for the core, each shifted by `shift` times its stated uncertainty, its damping at its low end.
 
     A table over the part's mass is looked up; of one over a position the nominal frequency is taken.
+
+    Args:
+        machine: whose modes.
+        shift: share of each mode's stated uncertainty by which its frequency is moved; see `damping_scale`.
+        only: the one mode that is moved, "x.1" for the first of the X axis; None: all of them.
     """
     return [
         [
             _core.Mode(
-                still.frequency_hz * (1.0 + shift * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
-                still.damping_ratio * damping_scale(mode, shift),
+                still.frequency_hz * (1.0 + moved * (mode.frequency_uncertainty_percent or 0.0) / 100.0),
+                still.damping_ratio * damping_scale(mode, moved),
                 still.participation,
             )
-            for mode in axis.modes
+            for mode, moved in modes
             for still in (still_mode(mode, machine.shaping.part_mass_kg),)
         ]
-        for axis in machine.axes.as_tuple()
+        for modes in _moved(machine, shift, only)
+    ]
+
+
+def _moved(machine: Machine, shift: float, only: str | None) -> list[list[tuple[Mode, float]]]:
+    """Per axis its modes, each with the share of its uncertainty by which it is moved."""
+    return [
+        [
+            (mode, shift if only in (None, f"{letter}.{number}") else 0.0)
+            for number, mode in enumerate(axis.modes, start=1)
+        ]
+        for letter, axis in zip(_AXES, machine.axes.as_tuple(), strict=True)
     ]
 
 
@@ -93,16 +105,19 @@ def damping_scale(mode: Mode, shift: float) -> float:
     return 1.0 - abs(shift) * (mode.damping_uncertainty_percent or 0.0) / 100.0
 
 
-def mode_tables(machine: Machine, shift: float = 0.0, offset: Offset = NO_OFFSET) -> list[list[_core.ModeTable]]:
+def mode_tables(
+    machine: Machine, shift: float = 0.0, offset: Offset = NO_OFFSET, only: str | None = None
+) -> list[list[_core.ModeTable]]:
     """How the modes of X, Y, Z vary with the position of the command: `PlaybackOptions.mode_tables`.
 
     Args:
         machine: whose modes.
-        shift: share of each mode's stated uncertainty by which its frequencies are moved; see `damping_scale`.
+        shift: see `axis_modes`.
         offset: from the command's positions to the machine's; where it is None for the axis of a table, the mode
             stays nominal.
+        only: see `axis_modes`.
     """
-    return [[_table(mode, shift, offset) for mode in axis.modes] for axis in machine.axes.as_tuple()]
+    return [[_table(mode, moved, offset) for mode, moved in modes] for modes in _moved(machine, shift, only)]
 
 
 def moving_axis(machine: Machine) -> int | None:

@@ -14,14 +14,11 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.controller import controller_model
-from shapegcode.model.modes import NO_OFFSET, Offset, axis_modes, mode_tables, region_offset
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.modes import Offset
 from shapegcode.program import Program, given_program
 
-__all__ = ["KINDS", "PLANTS", "Chunk", "plant_options", "playing_controller", "stream"]
-
-PLANTS = ("modal", "feed-drive")
-"""The plants that there are: modes behind an ideal servo, or motor, ball screw and table with their servo loops."""
+__all__ = ["KINDS", "Chunk", "stream"]
 
 KINDS = tuple(kind.name for kind in sorted(_core.BlockKind.__members__.values(), key=lambda kind: kind.value))
 """Names of what `Chunk.kind` numbers."""
@@ -134,56 +131,20 @@ def stream(
     program = given_program(program, machine)
     if lines is not None:
         _check_lines(program, lines)
-    model = playing_controller(machine, shaped=shaped)
-    offsets, known = _offsets(program, machine)
-    options = plant_options(machine, plant, offset=known)
-    played = _core.PlayedStream.of_program(program.core, model, options, offsets, REST_S)
+    model = MachineModel(machine)
+    offsets, known = _offsets(program, model)
+    options = model.options(plant=plant, offset=known)
+    controller = model.playing(shaped=shaped).model
+    played = _core.PlayedStream.of_program(program.core, controller, options, offsets, REST_S)
     return _chunks(played, model.period_s, lines, chunk_samples)
 
 
-def playing_controller(machine: Machine, *, shaped: bool) -> _core.ControllerModel:
-    """The controller that plays a program: as it is, or for shaped programs block by block without look-ahead."""
-    model = controller_model(machine)
-    if shaped:
-        model.motion = _core.MotionKind.after_interpolation
-        model.filter_shape = _core.FilterShape.linear
-        model.time_constant_s = machine.controller.shaped_time_constant_s
-        model.bell_time_s = 0.0
-    return model
-
-
-def plant_options(machine: Machine, plant: str, *, offset: Offset = NO_OFFSET) -> _core.PlaybackOptions:
-    """Interpolation period and plant of a machine.
-
-    Args:
-        machine: whose plant.
-        plant: "modal" or "feed-drive".
-        offset: from the command's positions to the machine's, for modes that vary with them.
-
-    Raises:
-        ArgumentError: there is no such plant.
-        MachineError: the machine has no feed drives.
-    """
-    if plant not in PLANTS:
-        raise _core.ArgumentError(f"plant = {plant!r}: must be one of {', '.join(PLANTS)}")
-    options = _core.PlaybackOptions()
-    options.period_s = machine.controller.interpolation_period_s
-    if plant == "modal":
-        options.modes = axis_modes(machine)
-        options.mode_tables = mode_tables(machine, offset=offset)
-    else:
-        from shapegcode.model.drives import drive_parameters
-
-        options.drives = list(drive_parameters(machine))
-    return options
-
-
-def _offsets(program: Program, machine: Machine) -> tuple[list[FloatArray], Offset]:
+def _offsets(program: Program, model: MachineModel) -> tuple[list[FloatArray], Offset]:
     """Of each region from the program's positions to the machine's, and None for axes where one of them is not known.
 
     A mode that varies over such an axis stays nominal throughout.
     """
-    found = [region_offset(region, machine) for region in program.regions]
+    found = [model.offset(region) for region in program.regions]
     x, y, z = (None if any(offset[axis] is None for offset in found) else 0.0 for axis in range(3))
     return [np.array([value or 0.0 for value in offset]) for offset in found], (x, y, z)
 

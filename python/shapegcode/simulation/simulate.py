@@ -13,9 +13,8 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import NO_OFFSET, Offset, machine_warnings, region_offset, region_range_warnings
-from shapegcode.model.play import other_time_s, vibration_memory_s
-from shapegcode.model.stream import plant_options, playing_controller
 from shapegcode.program import Program, given_program
 from shapegcode.results.figures import deviation_um, largest_um, xyz
 
@@ -131,7 +130,7 @@ def simulate(
     report = {
         "program": program.source,
         "machine": machine.name,
-        "cycle_time_s": cutting + other_time_s(program.core, machine),
+        "cycle_time_s": cutting + MachineModel(machine).other_time_s(program.core),
         "cutting_time_s": cutting,
         "plant": plant,
         "residual_vibration_um": largest_um(figures.residual_mm for figures in played),
@@ -162,22 +161,19 @@ def simulate(
 def _play(
     path: _core.Path, machine: Machine, shaped: bool, plant: str, record_samples: int, offset: Offset
 ) -> _core.PlaybackFigures:
-    model = playing_controller(machine, shaped=shaped)
-    options = plant_options(machine, plant, offset=offset)
-    options.axis_filters = _core.acceleration_filters(model)
+    model = MachineModel(machine)
+    options = model.options(plant=plant, offset=offset)
     options.record_samples = record_samples
     options.measure_response_orbit = True
     options.settling_band_mm = machine.tolerance.residual_floor_um * 1e-3
     options.settling_limit_s = _rest_s(machine, plant)
-    if model.motion == _core.MotionKind.look_ahead:
-        return _core.play_path(path, _core.plan_speed(path, model.limits), options)
-    return _core.play_blocks(path, path, model.block_end, 1.0, options)
+    return model.playing(shaped=shaped).play(path, options)
 
 
 def _rest_s(machine: Machine, plant: str) -> float:
     if plant != "modal":
         return _DRIVE_REST_S
-    return min(max(vibration_memory_s(machine), _SHORTEST_REST_S), _LONGEST_REST_S)
+    return min(max(MachineModel(machine).vibration_memory_s, _SHORTEST_REST_S), _LONGEST_REST_S)
 
 
 def _settling_s(played: Iterable[_core.PlaybackFigures], machine: Machine) -> dict[str, float | None]:

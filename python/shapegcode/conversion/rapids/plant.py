@@ -12,9 +12,8 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.conversion.rapids.candidates import Rapid
 from shapegcode.machine import Machine
-from shapegcode.model.controller import controller_model
-from shapegcode.model.modes import region_offset, slowest_mode
-from shapegcode.model.play import play_emitted, playback_options, vibration_memory_s
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.modes import NO_OFFSET
 
 __all__ = ["RapidPlant", "Timing", "settling_time_s"]
 
@@ -84,17 +83,12 @@ class RapidPlant:
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
-        self.model = controller_model(machine)
+        self._playing = MachineModel(machine)
+        self.model = self._playing.ordinary.model
         self.band_mm = machine.tolerance.residual_floor_um * 1e-3
-        rates = [
-            damping * 2.0 * math.pi * frequency
-            for axis in machine.axes.as_tuple()
-            for mode in axis.modes
-            for frequency, damping in (slowest_mode(mode),)
-        ]
-        self._slowest_per_s = min(rates, default=math.inf)
+        self._slowest_per_s = self._playing.slowest_decay_per_s
         self._moving = any(mode.frequency_over is not None for axis in machine.axes.as_tuple() for mode in axis.modes)
-        self.longest_memory_s = vibration_memory_s(machine) or math.inf
+        self.longest_memory_s = self._playing.vibration_memory_s or math.inf
         """What moved longer ago no longer counts, s."""
         self._known: dict[tuple[float, ...], Timing] = {}
 
@@ -125,12 +119,12 @@ class RapidPlant:
     def blocks(self, blocks: _core.Path, region: _core.Region, stops_s: float) -> Timing:
         """The replacement as the text has it: the slower of both rules of block end; `stops_s`: dwells before it."""
         period = self.model.period_s
-        offset = region_offset(region, self.machine)
+        offset = self._playing.offset(region)
         runs = []
         for rule in (_core.BlockEnd.ceil, _core.BlockEnd.carry):
             least = 2 + math.ceil(2.0 * blocks.programmed_time_s / period) + self._filter_periods()
-            figures = play_emitted(
-                blocks, region.path, self.machine, rule, contour=False, record_samples=least, offset=offset
+            figures = self._playing.play_emitted(
+                blocks, region.path, rule, contour=False, record_samples=least, offset=offset
             )
             count = round(figures.duration_s / period) + 1
             command = np.array(figures.recorded_command[:count])
@@ -181,9 +175,7 @@ class RapidPlant:
         return math.ceil(self.machine.controller.shaped_time_constant_s / self.model.period_s) + 1
 
     def _options(self, region: _core.Region | None) -> _core.PlaybackOptions:
-        if region is None:
-            return playback_options(self.machine)
-        return playback_options(self.machine, offset=region_offset(region, self.machine))
+        return self._playing.options(offset=NO_OFFSET if region is None else self._playing.offset(region))
 
     def _arrival_s(self, command: Vector) -> float:
         """Wait for in-position behind a command."""

@@ -1,0 +1,272 @@
+"""A machine as the core plays it: made once from the machine file, and asked by everything that plays.
+
+Whether the look-ahead plans the speed along a path or the path is played block by block is decided here and nowhere
+else (`PlayingController`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.model.controller import controller_model, motion_limits
+from shapegcode.model.drives import drive_parameters
+from shapegcode.model.modes import NO_OFFSET, Offset, axis_modes, mode_tables, region_offset, slowest_mode
+
+__all__ = ["PLANTS", "MachineModel", "PlayingController"]
+
+PLANTS = ("modal", "feed-drive")
+"""The plants that there are: modes behind an ideal servo, or motor, ball screw and table with their servo loops."""
+
+_LEAST_DECAY_PER_S = 0.01  # below it a mode has no damping to speak of
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class PlayingController:
+    """A controller that makes a motion of paths: planned by its look-ahead, or block by block.
+
+    Args:
+        model: the controller; `model.motion` says which of the two.
+    """
+
+    def __init__(self, model: _core.ControllerModel) -> None:
+        self.model = model
+        self.filters = _core.acceleration_filters(model)
+        """Acceleration filters behind the interpolation."""
+
+    def _planned(self, path: _core.Path) -> _core.SpeedProfile | None:
+        """The look-ahead's speed along a path; None where the controller plays block by block."""
+        look_ahead = self.model.motion == _core.MotionKind.look_ahead
+        return _core.plan_speed(path, self.model.limits) if look_ahead else None
+
+    def play(self, path: _core.Path, options: _core.PlaybackOptions) -> _core.PlaybackFigures:
+        """A path played from rest to rest and measured against itself.
+
+        Args:
+            path: the blocks.
+            options: plant and what is measured; the filters become the controller's.
+        """
+        options.axis_filters = self.filters
+        profile = self._planned(path)
+        if profile is not None:
+            return _core.play_path(path, profile, options)
+        return _core.play_blocks(path, path, self.model.block_end, 1.0, options)
+
+    def stream(self, path: _core.Path, options: _core.PlaybackOptions, rest_s: float) -> _core.PlayedStream:
+        """The same motion piece by piece, and what the plant does for a while behind its end.
+
+        Args:
+            path: the blocks.
+            options: plant; the filters become the controller's.
+            rest_s: how long the set-points rest behind the end, s.
+        """
+        options.axis_filters = self.filters
+        profile = self._planned(path)
+        if profile is not None:
+            return _core.PlayedStream.of_path(path, profile, options, rest_s)
+        return _core.PlayedStream.of_blocks(path, self.model.block_end, 1.0, options, rest_s)
+
+    def travel(self, path: _core.Path, along: _core.Path, stations_mm: FloatArray, window_s: float) -> _core.Travel:
+        """How fast a path is travelled.
+
+        Args:
+            path: the blocks.
+            along: the path to whose length the stations ascend.
+            stations_mm: where the travel is asked for, (n,).
+            window_s: over which a feed is a mean.
+        """
+        period_s, profile = self.model.period_s, self._planned(path)
+        if profile is not None:
+            return _core.travel_path(path, profile, along, stations_mm, period_s, self.filters, window_s)
+        return _core.travel_blocks(path, along, self.model.block_end, stations_mm, period_s, self.filters, window_s)
+
+
+class MachineModel:
+    """Controller, limits and plant of a machine for the core.
+
+    Args:
+        machine: what the machine file says.
+    """
+
+    def __init__(self, machine: Machine) -> None:
+        self._machine = machine
+        self.name = machine.name
+        """Of the machine."""
+        self.period_s = machine.controller.interpolation_period_s
+        """Interpolation period."""
+        self.own_rule: _core.BlockEnd = getattr(_core.BlockEnd, machine.controller.block_end)
+        """The controller's own rule of block timing."""
+        self.shaped_time_constant_s = machine.controller.shaped_time_constant_s
+        """Of the filter behind the interpolation while shaped blocks run."""
+        rates = [
+            damping * 2.0 * math.pi * frequency
+            for axis in machine.axes.as_tuple()
+            for mode in axis.modes
+            for frequency, damping in (slowest_mode(mode),)
+        ]
+        self.slowest_decay_per_s = min(rates, default=math.inf)
+        """Decay rate of the mode that rings longest: damping ratio times angular frequency; infinite without modes."""
+
+    @cached_property
+    def ordinary(self) -> PlayingController:
+        """The controller as it plays an ordinary program."""
+        return PlayingController(controller_model(self._machine))
+
+    @cached_property
+    def shaped(self) -> PlayingController:
+        """The controller as it plays shaped blocks: one by one, without look-ahead."""
+        model = controller_model(self._machine)
+        model.motion = _core.MotionKind.after_interpolation
+        model.filter_shape = _core.FilterShape.linear
+        model.time_constant_s = self.shaped_time_constant_s
+        model.bell_time_s = 0.0
+        return PlayingController(model)
+
+    def playing(self, *, shaped: bool) -> PlayingController:
+        """One of the two: `shaped` for a program that shapegcode wrote."""
+        return self.shaped if shaped else self.ordinary
+
+    @property
+    def vibration_memory_s(self) -> float:
+        """Time after which a vibration is a millionth of itself, s; 0 where a mode has no damping to speak of."""
+        slowest = self.slowest_decay_per_s
+        return math.log(1e6) / slowest if _LEAST_DECAY_PER_S < slowest < math.inf else 0.0
+
+    def limits(self, *, arc_feed_ratio: float = 1.0) -> _core.MotionLimits:
+        """Look-ahead limits, a copy of one's own.
+
+        Args:
+            arc_feed_ratio: feed on arcs relative to the programmed one.
+        """
+        return motion_limits(self._machine, arc_feed_ratio=arc_feed_ratio)
+
+    def offset(self, region: _core.Region) -> Offset:
+        """From the program's positions in a region to the machine's; see `region_offset`."""
+        return region_offset(region, self._machine)
+
+    def options(
+        self,
+        *,
+        plant: str = "modal",
+        time_constant_s: float = 0.0,
+        shift: float = 0.0,
+        only: str | None = None,
+        offset: Offset = NO_OFFSET,
+    ) -> _core.PlaybackOptions:
+        """Interpolation period and plant, with an acceleration filter after interpolation.
+
+        Args:
+            plant: "modal" for the modes behind an ideal servo, "feed-drive" for `axes.*.drive`.
+            time_constant_s: length of the filter; 0: none.
+            shift: share of each mode's stated uncertainty by which it is off; see `axis_modes`.
+            only: the one mode that is off, such as "x.1"; None: all of them.
+            offset: from the command's positions to the machine's, for modes that vary with them.
+
+        Raises:
+            ArgumentError: there is no such plant.
+            MachineError: the machine has no feed drives.
+        """
+        if plant not in PLANTS:
+            raise _core.ArgumentError(f"plant = {plant!r}: must be one of {', '.join(PLANTS)}")
+        options = _core.PlaybackOptions()
+        options.period_s = self.period_s
+        if plant == "modal":
+            options.modes = axis_modes(self._machine, shift, only)
+            options.mode_tables = mode_tables(self._machine, shift, offset, only)
+        else:
+            options.drives = drive_parameters(self._machine)
+        ticks = round(time_constant_s / self.period_s)
+        options.axis_filters = [_core.Fir.moving_average(ticks)] if ticks > 1 else []
+        return options
+
+    def play_original(
+        self, path: _core.Path, *, record_samples: int = 0, offset: Offset = NO_OFFSET
+    ) -> _core.PlaybackFigures:
+        """A programmed path as the controller plays an ordinary program.
+
+        Args:
+            path: of a region.
+            record_samples: samples kept for pictures.
+            offset: see `options`.
+        """
+        options = self.options(offset=offset)
+        options.record_samples = record_samples
+        return self.ordinary.play(path, options)
+
+    def play_emitted(
+        self,
+        blocks: _core.Path,
+        path: _core.Path,
+        block_end: _core.BlockEnd | None = None,
+        *,
+        override: float = 1.0,
+        contour: bool = True,
+        command_contour: bool = True,
+        last_seconds: float = 0.0,
+        shift: float = 0.0,
+        only: str | None = None,
+        record_samples: int = 0,
+        offset: Offset = NO_OFFSET,
+        starved_blocks: Sequence[int] = (),
+        memory_s: float = 0.0,
+        tracker: _core.ContourTracker | None = None,
+    ) -> _core.PlaybackFigures:
+        """Emitted blocks as the controller plays them, measured against the programmed path.
+
+        Args:
+            blocks: what was emitted.
+            path: what was programmed.
+            block_end: rule of block timing; None: the controller's own.
+            override: feed override, 1 = 100 %.
+            contour: measure the deviations too.
+            command_contour: that of the command among them.
+            last_seconds: play no more than the end; 0: all.
+            shift: see `options`.
+            only: likewise.
+            record_samples: samples kept for pictures.
+            offset: see `options`.
+            starved_blocks: behind each of these, tried one by one, the buffer is empty for `verdict.starved_s`.
+            memory_s: how long after that its vibration is looked at; 0: to the end.
+            tracker: of the programmed path, shared by several runs; None: one of its own.
+        """
+        own_s = self.shaped_time_constant_s
+        options = self.options(time_constant_s=own_s, shift=shift, only=only, offset=offset)
+        options.measure_contour = contour
+        if tracker is not None:
+            options.tracker = tracker
+        options.measure_command = command_contour
+        options.last_seconds = last_seconds
+        options.record_samples = record_samples
+        if starved_blocks:
+            options.starved_blocks = list(starved_blocks)
+            options.starved_s = self._machine.verdict.starved_s
+            options.starved_memory_s = memory_s + own_s if memory_s > 0.0 else 0.0
+        return _core.play_blocks(blocks, path, block_end or self.own_rule, override, options)
+
+    def play_planned(
+        self, blocks: _core.Path, path: _core.Path, *, offset: Offset = NO_OFFSET
+    ) -> _core.PlaybackFigures:
+        """Emitted blocks as the look-ahead plans them anew if it is left on, against the programmed path.
+
+        Args:
+            blocks: what was emitted.
+            path: what was programmed.
+            offset: see `options`.
+        """
+        filter_s = self._machine.controller.look_ahead_filter_time_constant_s
+        options = self.options(time_constant_s=filter_s, offset=offset)
+        return _core.play_path(blocks, _core.plan_speed(blocks, self.limits()), options, path)
+
+    def other_time_s(self, program: _core.ProgramText) -> float:
+        """Time of everything between the regions, s: rapids, waits for in-position, dwells, kept moves, functions.
+
+        Moves of which an axis' position is not known count with what is known of them.
+        """
+        return _core.time_program(program, self.ordinary.model).outside_regions_s
