@@ -11,7 +11,9 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 import pytest
+from matplotlib.axes import Axes
 from rich.console import Console
+from scipy.spatial import KDTree
 
 from effort import cpu_s
 from shapegcode.conversion import plots as pictures
@@ -19,16 +21,9 @@ from shapegcode.conversion.convert import convert
 from shapegcode.conversion.report import before_after_rows, before_after_table, next_step
 from shapegcode.machine import Machine
 from shapegcode.program import Program
-from shapegcode.results import motion_pictures
-from shapegcode.results.motion_plots import (
-    View,
-    _foot_points,
-    follow,
-    plot_feed,
-    plot_path,
-    plot_vibration,
-    thin_min_max,
-)
+from shapegcode.results import plot
+from shapegcode.results.follow import follow, polyline_of
+from shapegcode.results.motion_plots import View, plot_feed, plot_path, plot_vibration, thin_min_max
 from shapegcode.results.table import warning_table
 from shapegcode.results.trace import Trace
 
@@ -84,13 +79,13 @@ def traces(samples: int = 900) -> list[Trace]:
 @pytest.mark.parametrize("ending", ["png", "svg"])
 def test_pictures_are_complete_and_the_same_every_time(tmp_path: Path, ending: str) -> None:
     for name, draw in (
-        ("path", lambda f: plot_path(f, quarter(200), traces())),
-        ("feed", lambda f: plot_feed(f, [View(traces())])),
-        ("vibration", lambda f: plot_vibration(f, [View(traces())])),
+        ("path", lambda: plot_path(quarter(200), traces())),
+        ("feed", lambda: plot_feed([View(traces())])),
+        ("vibration", lambda: plot_vibration([View(traces())])),
     ):
         first, second = tmp_path / f"{name}1.{ending}", tmp_path / f"{name}2.{ending}"
-        draw(first)
-        draw(second)
+        plot.save(draw(), first)
+        plot.save(draw(), second)
         assert first.read_bytes() == second.read_bytes()
         if ending == "png":
             assert first.read_bytes().startswith(b"\x89PNG")
@@ -102,35 +97,35 @@ def svg_text(file: Path) -> str:
     return " ".join("".join(node.itertext()) for node in ElementTree.parse(file).iter() if node.tag.endswith("text"))
 
 
+def text_of(drawn: Axes, folder: Path) -> str:
+    plot.save(drawn, folder / "drawn.svg")
+    return svg_text(folder / "drawn.svg")
+
+
 def test_pictures_carry_units_and_figures(tmp_path: Path) -> None:
-    factor = plot_path(tmp_path / "path.svg", quarter(500), traces())
-    text = svg_text(tmp_path / "path.svg")
-    assert f"×{factor:g}" in text
+    text = text_of(plot_path(quarter(500), traces()), tmp_path)
+    # A tenth of the path, 20 by 40 mm, over the swing of .02 mm: 224, rounded down.
+    assert "drawn ×200" in text
     for part in ("X in mm", "Y in mm", "programmed path", "original, largest 20.0 µm in this picture", "of deviation"):
         assert part in text
-    plot_vibration(tmp_path / "v.svg", [View(traces())])
-    text = svg_text(tmp_path / "v.svg")
+    text = text_of(plot_vibration([View(traces())]), tmp_path)
     for part in ("in µm", "time in s", "original, residual 20.0 µm", "emitted, residual 2.0 µm"):
         assert part in text
-    plot_feed(tmp_path / "f.svg", [View(traces())])
-    text = svg_text(tmp_path / "f.svg")
+    text = text_of(plot_feed([View(traces())]), tmp_path)
     assert "in mm/min" in text and "Z speed" not in text
 
 
 def test_legends_have_the_figures_of_the_core(tmp_path: Path) -> None:
     measured = [replace(trace, largest_mm=0.0451, residual_mm=(0.0123, 0.0, 0.0)) for trace in traces()]
-    plot_path(tmp_path / "p.svg", quarter(500), measured)
-    assert "original, largest 45.1 µm" in svg_text(tmp_path / "p.svg")
-    plot_vibration(tmp_path / "v.svg", [View(measured)])
-    text = svg_text(tmp_path / "v.svg")
+    assert "original, largest 45.1 µm" in text_of(plot_path(quarter(500), measured), tmp_path)
+    text = text_of(plot_vibration([View(measured)]), tmp_path)
     assert "original, residual 12.3 µm" in text
     assert "Y: rigid" in text and "Y table" not in text
 
 
 def test_a_record_without_the_stop_claims_none(tmp_path: Path) -> None:
     cut = [replace(trace, stops=False) for trace in traces()]
-    plot_vibration(tmp_path / "v.svg", [View(cut)], part="first 1 s of 9 s")
-    text = svg_text(tmp_path / "v.svg")
+    text = text_of(plot_vibration([View(cut)], part="first 1 s of 9 s"), tmp_path)
     assert "come to rest" not in text and "residual" not in text
     assert "first 1 s of 9 s" in text
 
@@ -140,8 +135,30 @@ def test_a_straight_path_gets_a_note(tmp_path: Path) -> None:
     command = np.linspace(line[0], line[1], 500)
     swing = np.zeros_like(command)
     swing[:, 0] = 0.02 * np.sin(np.arange(500))
-    plot_path(tmp_path / "p.svg", line, [Trace("original", 1e-3, command, command + swing)])
-    assert "The path is straight" in svg_text(tmp_path / "p.svg")
+    drawn = plot_path(line, [Trace("original", 1e-3, command, command + swing)])
+    assert "The path is straight" in text_of(drawn, tmp_path)
+
+
+def test_pictures_go_into_the_callers_axes(tmp_path: Path) -> None:
+    """Several in one figure, each within the place it was given."""
+    figure = plot.figure(24, 16)
+    places = figure.subplots(2, 2)
+    long = View([trace.part(0.2, 0.5, 0.3) for trace in traces()], "the worst place", "time from there in s")
+    drawn = [
+        plot_path(quarter(500), traces(), places[0, 0]),
+        plot_path(quarter(500)[:200], traces(), places[0, 1], whole_mm=quarter(500)),
+        plot_feed([View(traces())], places[1, 0]),
+        plot_vibration([long, View(traces())], places[1, 1], part="lines 4 to 9"),
+    ]
+    figure.draw_without_rendering()
+    for place, panel in zip(places.flat, drawn, strict=True):
+        assert panel.get_figure(root=True) is figure
+        outer, inner = place.get_window_extent(), panel.get_window_extent()
+        assert outer.x0 <= inner.x0 < inner.x1 <= outer.x1
+        assert outer.y0 <= inner.y0 < inner.y1 <= outer.y1
+    text = text_of(drawn[0], tmp_path)
+    for part in ("drawn ×200", "on the whole path", "Feed of the command", "the worst place", "lines 4 to 9"):
+        assert part in text
 
 
 def test_following_keeps_to_its_own_pass() -> None:
@@ -184,43 +201,46 @@ def test_a_long_region_shows_its_worst_place_and_its_stop(tmp_path: Path, monkey
 def test_polyline_is_close_to_large_arcs() -> None:
     machine = Machine.load("vx500")
     text = "%\nO1\nG21G90G94G17\nG00X0Y0Z0\nG02X300.Y-300.I0.J-300.F3000\nM30\n%\n"
-    points = motion_pictures._polyline(Program.from_text(text.encode(), machine, source="arc").regions[0].path)
+    points = polyline_of(Program.from_text(text.encode(), machine, source="arc").regions[0].path)
     middles = (points[1:] + points[:-1]) / 2
     assert np.abs(np.linalg.norm(middles - [0, -300, 0], axis=1) - 300).max() < 1.01e-5
 
 
 def test_given_magnification_and_plane_are_used(tmp_path: Path) -> None:
-    assert plot_path(tmp_path / "p.svg", quarter(50), traces(), magnification=123, plane="ZX") == 123
-    assert "Z in mm" in svg_text(tmp_path / "p.svg")
+    text = text_of(plot_path(quarter(50), traces(), magnification=123, plane="ZX"), tmp_path)
+    assert "drawn ×123" in text and "Z in mm" in text
 
 
 @pytest.mark.parametrize("magnification", [0, -1, float("nan"), float("inf")])
-def test_bad_magnification(tmp_path: Path, magnification: float) -> None:
+def test_bad_magnification(magnification: float) -> None:
     with pytest.raises(ValueError, match="magnification"):
-        plot_path(tmp_path / "p.png", quarter(50), traces(), magnification=magnification)
+        plot_path(quarter(50), traces(), magnification=magnification)
 
 
 def test_bad_pictures_are_refused(tmp_path: Path) -> None:
+    drawn = plot_feed([View(traces())])
     with pytest.raises(ValueError, match=r"\.png, \.svg"):
-        plot_feed(tmp_path / "p.jpeg", [View(traces())])
-    with pytest.raises(ValueError, match="no trace"):
-        plot_feed(tmp_path / "p.png", [View([])])
-    with pytest.raises(ValueError, match="no view"):
-        plot_vibration(tmp_path / "p.png", [])
-    with pytest.raises(ValueError, match="whole_mm"):
-        plot_path(tmp_path / "p.png", quarter(20), traces(), whole_mm=np.zeros((1, 3)))
-    with pytest.raises(ValueError, match="programmed_mm"):
-        plot_path(tmp_path / "p.png", np.zeros((4, 2)), traces())
+        plot.save(drawn, tmp_path / "p.jpeg")
     with pytest.raises(FileNotFoundError):
-        plot_feed(tmp_path / "no" / "p.png", [View(traces())])
+        plot.save(drawn, tmp_path / "no" / "p.png")
+    with pytest.raises(ValueError, match="no trace"):
+        plot_feed([View([])])
+    with pytest.raises(ValueError, match="no view"):
+        plot_vibration([])
+    with pytest.raises(ValueError, match="whole_mm"):
+        plot_path(quarter(20), traces(), whole_mm=np.zeros((1, 3)))
+    with pytest.raises(ValueError, match="programmed_mm"):
+        plot_path(np.zeros((4, 2)), traces())
+    with pytest.raises(ValueError, match="no place in a grid"):
+        plot_feed([View(traces())], plot.figure(4, 4).add_axes((0, 0, 1, 1)))
     assert not list(tmp_path.iterdir())
 
 
 def test_machine_at_rest_gives_a_picture(tmp_path: Path) -> None:
     still = [Trace("original", 1e-3, np.zeros((5, 3)), np.zeros((5, 3)))]
-    assert plot_path(tmp_path / "p.png", np.zeros((2, 3)), still) == 1
-    plot_feed(tmp_path / "f.png", [View(still)])
-    plot_vibration(tmp_path / "v.png", [View(still)])
+    assert "drawn ×1 " in text_of(plot_path(np.zeros((2, 3)), still), tmp_path) + " "
+    plot.save(plot_feed([View(still)]), tmp_path / "f.png")
+    plot.save(plot_vibration([View(still)]), tmp_path / "v.png")
 
 
 def test_thinning_keeps_extremes_ends_and_order() -> None:
@@ -238,34 +258,34 @@ def test_thinning_keeps_extremes_ends_and_order() -> None:
     assert len(short_t) == len(short_v) == 10
 
 
-def test_foot_points_lie_on_the_polyline_and_nowhere_is_nearer() -> None:
-    rng = np.random.default_rng(2)
+def test_feet_lie_on_the_polyline_and_nowhere_is_nearer() -> None:
     polyline = quarter(40)
-    points = rng.uniform(-5, 45, size=(200, 3))
-    feet = _foot_points(points, polyline)
-    fine = np.concatenate([np.linspace(a, b, 200) for a, b in pairwise(polyline)])
-    nearest = np.linalg.norm(points[:, None] - fine, axis=2).min(axis=1)
+    command = np.concatenate([np.linspace(a, b, 20) for a, b in pairwise(polyline)])
+    points = command + np.random.default_rng(2).uniform(-0.1, 0.1, size=command.shape)
+    feet = follow(command, points, polyline, complete=True)[1]
+    fine = np.concatenate([np.linspace(a, b, 2000) for a, b in pairwise(polyline)])
+    nearest = KDTree(fine).query(points)[0]
     distance = np.linalg.norm(points - feet, axis=1)
     assert (distance <= nearest + 1e-6).all()
-    assert (distance >= nearest - 0.06).all()
-    on_path = _foot_points(polyline, polyline)
-    assert np.abs(on_path - polyline).max() < 1e-9
+    assert (distance >= nearest - 0.006).all()
+    on_path = follow(command, command, polyline, complete=True)[1]
+    assert np.abs(on_path - command).max() < 1e-9
 
 
-def test_foot_points_far_from_the_origin_keep_a_hundredth_of_a_micrometre() -> None:
+def test_feet_far_from_the_origin_keep_a_hundredth_of_a_micrometre() -> None:
     shift = np.array([90_000.0, -90_000.0, 500.0])
     polyline = quarter(40)
-    points = polyline[1:-1] + np.array([0, 0, 0.001])
-    feet = _foot_points(points + shift, polyline + shift)
+    points = polyline + np.array([0, 0, 0.001])
+    feet = follow(polyline + shift, points + shift, polyline + shift, complete=True)[1]
     assert np.abs(np.linalg.norm(points + shift - feet, axis=1) - 0.001).max() < 1e-5
 
 
 def test_long_programs_take_little_more_to_draw(tmp_path: Path) -> None:
     def draw(samples: int) -> None:
         long = traces(samples)
-        plot_path(tmp_path / "p.png", quarter(samples // 15), long)
-        plot_feed(tmp_path / "f.png", [View(long)])
-        plot_vibration(tmp_path / "v.svg", [View(long)])
+        plot.save(plot_path(quarter(samples // 15), long), tmp_path / "p.png")
+        plot.save(plot_feed([View(long)]), tmp_path / "f.png")
+        plot.save(plot_vibration([View(long)]), tmp_path / "v.svg")
 
     # What is drawn is thinned to the picture's pixels: ten times as long costs little more.
     short_s = cpu_s(lambda: draw(30_000), 1)

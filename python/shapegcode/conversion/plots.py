@@ -9,7 +9,8 @@ import numpy as np
 from shapegcode.conversion.convert import Conversion
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.results.motion_pictures import RECORD_SAMPLES, part_of, trace_of, write_motion
+from shapegcode.results import plot
+from shapegcode.results.motion_pictures import RECORD_SAMPLES, PlayedRegion, motion_pictures
 
 
 def write_pictures(conversion: Conversion, machine: Machine, folder: str | Path) -> list[str]:
@@ -25,14 +26,16 @@ def write_pictures(conversion: Conversion, machine: Machine, folder: str | Path)
         return []
     residuals = [max(region["residual_vibration_um"]["original"].values()) for region in conversion.report["regions"]]
     place = conversion.placed[int(np.argmax(residuals))]
-    path = place.region.path
-    blocks = conversion.emitted.core.cutting_path(place.first_line, place.last_line)
-    model = MachineModel(machine)
-    offset = model.offset(place.region)
-    runs = {
-        "original": model.play_original(path, record_samples=RECORD_SAMPLES, offset=offset),
-        "emitted": model.play_emitted(blocks, path, record_samples=RECORD_SAMPLES, offset=offset),
-    }
-    traces = [trace_of(label, run, machine) for label, run in runs.items()]
-    part = part_of(place.region.first_line, place.region.last_line, len(residuals), runs["original"], traces[0])
-    return write_motion(traces, path, part, Path(folder))
+
+    def played() -> PlayedRegion:
+        model, path = MachineModel(machine), place.region.path
+        offset = model.offset(place.region)
+        blocks = conversion.emitted.core.cutting_path(place.first_line, place.last_line)
+        runs = {
+            "original": model.play_original(path, record_samples=RECORD_SAMPLES, offset=offset),
+            "emitted": model.play_emitted(blocks, path, record_samples=RECORD_SAMPLES, offset=offset),
+        }
+        lines = (place.region.first_line, place.region.last_line)
+        return PlayedRegion.of_runs(runs, path, model.period_s, lines=lines, regions=len(residuals))
+
+    return plot.save_all(motion_pictures(played), folder)

@@ -1,71 +1,166 @@
-"""The pictures of a played region: its path, feed and vibration, whole or at its worst place and its stop."""
+"""The pictures of a played region: its path, feed and vibration, whole or at its worst place and its stop.
+
+What was played is asked for when the first of them is drawn.
+"""
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.machine import Machine
 from shapegcode.results import motion_plots
+from shapegcode.results.follow import COARSE_STEP_RAD, follow, piece_of, polyline_of
 from shapegcode.results.motion_plots import View
+from shapegcode.results.result import Plot
 from shapegcode.results.trace import Trace
 
-__all__ = ["RECORD_SAMPLES", "part_of", "trace_of", "write_motion"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
-_FORMATS = ("png", "svg")
-
-
-RECORD_SAMPLES = 1_000_000
-
-
-# A longer region shows its worst place and its stop.
-_WHOLE_S = 10.0
-
-
-_AROUND_S = 1.5
-
-
-_BEFORE_STOP_S = 2.0
-
-
-_SAGITTA_MM = 1e-5
-
-
-_COARSE_STEP_RAD = 0.05
-
+__all__ = ["RECORD_SAMPLES", "PlayedRegion", "motion_pictures"]
 
 FloatArray = npt.NDArray[np.float64]
 
+RECORD_SAMPLES = 1_000_000
+"""That a playback keeps for pictures, at most."""
 
-def trace_of(label: str, run: _core.PlaybackFigures, machine: Machine) -> Trace:
-    """A playback as a trace of the pictures."""
-    period = machine.controller.interpolation_period_s
+# A longer region shows its worst place and its stop.
+_WHOLE_S = 10.0
+_AROUND_S = 1.5
+_BEFORE_STOP_S = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class PlayedRegion:
+    """What the pictures of a region draw.
+
+    Attributes:
+        traces: one or more, for example of the original and of the emitted program.
+        path: as programmed.
+        part: which part of the program it is, for titles; empty where it is all of it.
+    """
+
+    traces: tuple[Trace, ...]
+    path: _core.Path
+    part: str = ""
+
+    @classmethod
+    def of_runs(
+        cls,
+        runs: Mapping[str, _core.PlaybackFigures],
+        path: _core.Path,
+        period_s: float,
+        *,
+        lines: tuple[int, int],
+        regions: int,
+    ) -> PlayedRegion:
+        """The region that vibrates most, as the core played it.
+
+        Args:
+            runs: by what their legends say; they hold recorded samples.
+            path: as programmed.
+            period_s: time between two samples.
+            lines: first and last of the region.
+            regions: how many the program has.
+
+        Raises:
+            ValueError: a run without recorded samples.
+        """
+        traces = tuple(_trace(label, run, period_s) for label, run in runs.items())
+        said = [f"lines {lines[0]} to {lines[1]}, the region that vibrates most after its stop"] if regions > 1 else []
+        if not traces[0].stops:
+            said.append(f"first {traces[0].times_s[-1]:.0f} s of {next(iter(runs.values())).duration_s:.0f} s")
+        return cls(traces, path, "; ".join(said))
+
+
+def _trace(label: str, run: _core.PlaybackFigures, period_s: float) -> Trace:
     x, y, z = (float(value) for value in run.residual_mm)
     return Trace(
         label,
-        period,
+        period_s,
         run.recorded_command,
         run.recorded_response,
-        stops=len(run.recorded_command) * period > run.duration_s,
+        stops=len(run.recorded_command) * period_s > run.duration_s,
         largest_mm=run.response.max_abs_mm,
         residual_mm=(x, y, z),
     )
 
 
-def part_of(first_line: int, last_line: int, regions: int, run: _core.PlaybackFigures, trace: Trace) -> str:
-    """Which part of the program a picture is of; empty where it is all of it."""
-    parts = [f"lines {first_line} to {last_line}, the region that vibrates most after its stop"] if regions > 1 else []
-    if not trace.stops:
-        parts.append(f"first {trace.times_s[-1]:.0f} s of {run.duration_s:.0f} s")
-    return "; ".join(parts)
+def motion_pictures(played: Callable[[], PlayedRegion]) -> dict[str, Plot]:
+    """Path, feed and vibration of a region, by name.
+
+    Args:
+        played: gives what is drawn; called once, when the first of them is drawn.
+
+    Returns:
+        What draws each: `plot(ax=None) -> Axes`.
+    """
+    once = functools.cache(lambda: _Scene.of(played()))
+    return {"path": partial(_path, once), "feed": partial(_feed, once), "vibration": partial(_vibration, once)}
 
 
-@dataclass(frozen=True)
+def _path(scene: Callable[[], _Scene], ax: Axes | None = None) -> Axes:
+    s = scene()
+    return motion_plots.plot_path(
+        s.programmed_mm, s.near, ax, plane=_widest_plane(s.programmed_mm), part=s.near_part, whole_mm=s.whole_mm
+    )
+
+
+def _feed(scene: Callable[[], _Scene], ax: Axes | None = None) -> Axes:
+    return motion_plots.plot_feed(scene().views, ax, part=scene().part)
+
+
+def _vibration(scene: Callable[[], _Scene], ax: Axes | None = None) -> Axes:
+    return motion_plots.plot_vibration(scene().views, ax, part=scene().part)
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """What of a region is drawn.
+
+    Attributes:
+        views: stretches of time: the whole, or the worst place and the stop.
+        part: which part of the program they are of.
+        near: the traces, or of a long region their stretches around the worst place.
+        near_part: which part of the program these are of.
+        programmed_mm: the path beside them, (m, 3).
+        whole_mm: the whole path where that is a piece of it, (k, 3).
+    """
+
+    views: tuple[View, ...]
+    part: str
+    near: tuple[Trace, ...]
+    near_part: str
+    programmed_mm: FloatArray
+    whole_mm: FloatArray | None = None
+
+    @classmethod
+    def of(cls, played: PlayedRegion) -> _Scene:
+        """All of a short region; of a long one the worst place and, if it is there, the stop."""
+        traces, programmed = played.traces, polyline_of(played.path)
+        if max(len(trace.command_mm) * trace.period_s for trace in traces) <= _WHOLE_S:
+            return cls((View(traces),), played.part, traces, played.part, programmed)
+        worst = _worst_place(traces, programmed)
+        at = f"at {worst.time_s:.2f} s"
+        around = f"{2 * _AROUND_S:g} s around the worst place of the {traces[0].label} ({at})"
+        views = [View(worst.traces, f"the worst place, {at}", "time from the worst place in s")]
+        if all(trace.stops for trace in traces):
+            stop = tuple(trace.part(trace.rest_s - _BEFORE_STOP_S, math.inf, trace.rest_s) for trace in traces)
+            views.append(View(stop, f"the stop, at {traces[0].rest_s:.2f} s", "time from the stop in s"))
+        near_part = "; ".join(filter(None, (played.part, around)))
+        whole = played.path.polyline(COARSE_STEP_RAD)
+        return cls(tuple(views), played.part, worst.traces, near_part, worst.piece, whole)
+
+
+@dataclass(frozen=True, eq=False)
 class _Worst:
     """The neighbourhood of the place where the first trace is furthest from the path.
 
@@ -75,91 +170,30 @@ class _Worst:
         time_s: instant of the first trace.
     """
 
-    traces: list[Trace]
+    traces: tuple[Trace, ...]
     piece: FloatArray
     time_s: float
 
 
-def write_motion(traces: list[Trace], path: _core.Path, part: str, folder: Path) -> list[str]:
-    """Path, feed and vibration of the traces into a folder, as PNG and SVG; returns the files."""
-    folder.mkdir(parents=True, exist_ok=True)
-    programmed = _polyline(path)
-    whole = None
-    views = [View(traces)]
-    near, path_part = traces, part
-    if max(len(trace.command_mm) * trace.period_s for trace in traces) > _WHOLE_S:
-        worst = _worst_place(traces, programmed)
-        whole, programmed, near = path.polyline(_COARSE_STEP_RAD), worst.piece, worst.traces
-        path_part = "; ".join(
-            text
-            for text in (
-                part,
-                f"{2 * _AROUND_S:g} s around the worst place of the {traces[0].label} (at {worst.time_s:.2f} s)",
-            )
-            if text
-        )
-        views = [View(worst.traces, f"the worst place, at {worst.time_s:.2f} s", "time from the worst place in s")]
-        if all(trace.stops for trace in traces):
-            stop = [trace.part(trace.rest_s - _BEFORE_STOP_S, math.inf, trace.rest_s) for trace in traces]
-            views.append(View(stop, f"the stop, at {traces[0].rest_s:.2f} s", "time from the stop in s"))
-    plane = _widest_plane(programmed)
-    files = []
-    for suffix in _FORMATS:
-        for name in ("path", "feed", "vibration"):
-            file = folder / f"{name}.{suffix}"
-            if name == "path":
-                motion_plots.plot_path(file, programmed, near, plane=plane, part=path_part, whole_mm=whole)
-            elif name == "feed":
-                motion_plots.plot_feed(file, views, part=part)
-            else:
-                motion_plots.plot_vibration(file, views, part=part)
-            files.append(str(file))
-    return files
-
-
-def _worst_place(traces: list[Trace], programmed: FloatArray) -> _Worst:
+def _worst_place(traces: tuple[Trace, ...], programmed: FloatArray) -> _Worst:
     first = traces[0]
-    _, feet = motion_plots.follow(first.command_mm, first.response_mm, programmed, complete=first.stops)
+    _, feet = follow(first.command_mm, first.response_mm, programmed, complete=first.stops)
     at = int(np.argmax(np.linalg.norm(first.response_mm - feet, axis=1)))
     around = round(_AROUND_S / first.period_s)
-    begin, end = max(at - around, 0), min(at + around, len(feet) - 1)
+    ranks = np.array([max(at - around, 0), at, min(at + around, len(feet) - 1)])
+    limits: FloatArray | None = None
     near: list[Trace] = []
-    limits = (0.0, 0.0)
-    place = 0.0
     for trace in traces:
-        progress, _ = motion_plots.follow(trace.command_mm, trace.command_mm, programmed, complete=trace.stops)
+        progress, _ = follow(trace.command_mm, trace.command_mm, programmed, complete=trace.stops)
         progress = np.maximum.accumulate(progress)
-        if trace is first:
-            limits, place = (float(progress[begin]), float(progress[end])), float(progress[at])
-            times = trace.times_s[[begin, at, end]]
+        if limits is None:
+            limits = progress[ranks]
         else:
-            ranks = np.searchsorted(progress, [limits[0], place, limits[1]])
-            times = trace.times_s[np.minimum(ranks, len(progress) - 1)]
-        near.append(trace.part(float(times[0]), float(times[2]), float(times[1])))
-    return _Worst(near, _piece(programmed, *limits), float(first.times_s[at]))
-
-
-def _piece(polyline: FloatArray, begin_mm: float, end_mm: float) -> FloatArray:
-    """What lies between two distances along a polyline."""
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(polyline, axis=0), axis=1))])
-    inside = (along > begin_mm) & (along < end_mm)
-    ends = [[np.interp(s, along, polyline[:, axis]) for axis in range(3)] for s in (begin_mm, end_mm)]
-    return np.concatenate([ends[:1], polyline[inside], ends[1:]])
-
-
-def _polyline(path: _core.Path) -> FloatArray:
-    """The path as a polyline that is nowhere further than a hundredth of a micrometre from its arcs."""
-    if path.largest_sweep_rad == 0.0:
-        return path.polyline()
-    parts = [path.start_mm[None, :]]
-    for index in range(len(path)):
-        segment = path[index]
-        if segment.kind == _core.SegmentKind.arc:
-            step = math.sqrt(8.0 * _SAGITTA_MM / segment.radius_mm)
-            parts.append(_core.Path([segment]).polyline(min(step, _COARSE_STEP_RAD))[1:])
-        else:
-            parts.append(segment.end_mm[None, :])
-    return np.concatenate(parts)
+            ranks = np.minimum(np.searchsorted(progress, limits), len(progress) - 1)
+        begin, place, end = (float(time) for time in trace.times_s[ranks])
+        near.append(trace.part(begin, end, place))
+    assert limits is not None
+    return _Worst(tuple(near), piece_of(programmed, float(limits[0]), float(limits[2])), float(first.times_s[at]))
 
 
 def _widest_plane(programmed: FloatArray) -> motion_plots.Plane:

@@ -1,9 +1,7 @@
-"""Pictures of a conversion, one per question: how far off the path, how fast, how much vibration.
+"""Played motion, one plot per question: how far off the path, how fast, how much vibration.
 
-Matplotlib is imported when the first picture is drawn and draws to files only (PNG or SVG, by the file's
-ending); no window system and no global state are touched. Colours are those of Okabe and Ito, which
-colour-blind readers can tell apart; the original program is also the wider line, so that it shows
-beneath the emitted one.
+They are functions of data: of traces of any motion, measured ones too. The first trace, usually the original program,
+is the wider line, so that it shows beneath the others.
 """
 
 from __future__ import annotations
@@ -11,20 +9,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.results import plot as canvas
+from shapegcode.results import plot
+from shapegcode.results.follow import follow
 from shapegcode.results.trace import Trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-__all__ = ["View", "follow", "plot_feed", "plot_path", "plot_vibration", "thin_min_max"]
+__all__ = ["Plane", "View", "plot_feed", "plot_path", "plot_vibration", "thin_min_max"]
 
 FloatArray = npt.NDArray[np.float64]
 Plane = Literal["XY", "ZX", "YZ"]
@@ -35,13 +32,11 @@ _MAX_POINTS = 4000
 _MOVES_MM = 1e-9
 # A deflection below this is none.
 _SHOWN_MM = 5e-5
+_STRAIGHT = (
+    "The path is straight: the table deviates along it only,\nwhich no drawing of the path shows. "
+    "See the picture of the vibration."
+)
 _FLAT = 0.06  # of an axis in µm or mm/min
-# Pieces of the programmed path among which the nearest one is looked for.
-_PATH_PIECES = 20_000
-_SHORTEST_PIECE_MM = 0.01
-# A millimetre between two places along the path counts as this many mm between a sample and the path.
-_PROGRESS_WEIGHT = 0.03
-_SEGMENTS_ASKED = 3  # on either side of the nearest vertex
 
 
 def thin_min_max(
@@ -92,25 +87,26 @@ class View:
 
 
 def plot_path(
-    file: str | Path,
     programmed_mm: npt.ArrayLike,
     traces: Sequence[Trace],
+    ax: Axes | None = None,
     *,
     quantity: Literal["response", "command"] = "response",
     plane: Plane = "XY",
     magnification: float | None = None,
     part: str = "",
     whole_mm: npt.ArrayLike | None = None,
-) -> float:
+) -> Axes:
     """How far, and to which side, does the table leave the programmed path?
 
-    Each curve is the programmed path plus the deviation times the magnification, every sample of it. The legend
-    has the figure that the core measured over the whole run; where a trace has none, that of the samples drawn.
+    Each curve is the programmed path plus the deviation times the magnification, every sample of it; the title says the
+    magnification. The legend has the figure that the core measured over the whole run; where a trace has none, that of
+    the samples drawn.
 
     Args:
-        file: ``.png`` or ``.svg``.
         programmed_mm: the programmed path as a polyline, shape (m, 3), fine enough for its arcs.
         traces: usually the original and the emitted program.
+        ax: where to draw; None: a new figure.
         quantity: deviation of the table ("response") or of the set-points ("command").
         plane: plane of the picture.
         magnification: factor of the deviation; None: chosen so that the largest one is easy to see.
@@ -119,11 +115,10 @@ def plot_path(
             the piece lies.
 
     Returns:
-        The magnification that was used.
+        The panel of the path.
 
     Raises:
-        ValueError: a wrong shape, ending or magnification.
-        OSError: the file cannot be written.
+        ValueError: a wrong shape or magnification, or no trace.
     """
     polyline = _checked_polyline("programmed_mm", programmed_mm)
     whole = None if whole_mm is None else _checked_polyline("whole_mm", whole_mm)
@@ -131,63 +126,58 @@ def plot_path(
     if magnification is not None and not (math.isfinite(magnification) and magnification > 0):
         raise ValueError(f"magnification = {magnification}: must be finite and greater than 0")
 
-    drawn = []
-    for trace in traces:
-        points = trace.response_mm if quantity == "response" else trace.command_mm
-        _, feet = follow(trace.command_mm, points, polyline, complete=trace.stops and whole is None)
-        drawn.append((trace, feet, points - feet))
+    drawn = [(trace, *_deviation(trace, polyline, quantity, whole is None)) for trace in traces]
     largest_mm = max(float(np.linalg.norm(deviation, axis=1).max()) for _, _, deviation in drawn)
     size_mm = float(np.linalg.norm(np.ptp(polyline, axis=0)))
     factor = magnification or _round_factor(0.1 * size_mm / largest_mm if largest_mm > 0 else 1.0)
 
-    straight = _only_along(polyline, [deviation for _, _, deviation in drawn])
-    figure = canvas.figure(7.2 if whole is None else 10.4, 6.4)
-    axes, locator = _path_axes(figure, with_locator=whole is not None)
-    across, up = (_AXIS_NAMES.index(name) for name in plane)
-    axes.plot(polyline[:, across], polyline[:, up], color=canvas.GREY, linewidth=3, alpha=0.55, label="programmed path")
-    for number, (trace, feet, deviation) in enumerate(drawn):
-        curve = feet + factor * deviation
-        label = _path_label(trace, deviation, quantity, is_part=whole is not None)
-        if straight:
-            curve = curve[:0]  # the label alone
-        axes.plot(curve[:, across], curve[:, up], color=_colour(number), linewidth=_width(number), label=label)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.08)
-    axes.set_xlabel(f"{plane[0]} in mm")
-    axes.set_ylabel(f"{plane[1]} in mm")
     what = "table" if quantity == "response" else "command"
-    canvas.heading(figure, f"Deviation of the {what} from the path, drawn ×{factor:g}", part)
+    widths = [1.0] if whole is None else [2.4, 1.0]
+    panels = plot.grid(
+        ax, 1, len(widths), size_inch=(7.2 if whole is None else 10.4, 6.4), width_ratios=widths,
+        title=f"Deviation of the {what} from the path, drawn ×{factor:g}", part=part,
+    )[0]  # fmt: skip
+    panel, shown = panels[0], [_AXIS_NAMES.index(name) for name in plane]
+    panel.plot(*polyline[:, shown].T, color=plot.GREY, linewidth=3, alpha=0.55, label="programmed path")
+    straight = _only_along(polyline, [deviation for _, _, deviation in drawn])
+    for number, (trace, feet, deviation) in enumerate(drawn):
+        curve = (feet + factor * deviation)[:, shown]
+        label = _path_label(trace, deviation, quantity, is_part=whole is not None)
+        # Of a straight path the label alone.
+        panel.plot(*curve[: 0 if straight else None].T, color=_colour(number), linewidth=_width(number), label=label)
+    panel.set_aspect("equal", adjustable="datalim")
+    panel.margins(0.08)
+    panel.set_xlabel(f"{plane[0]} in mm")
+    panel.set_ylabel(f"{plane[1]} in mm")
     if straight:
-        axes.text(
-            0.5, 0.3, "The path is straight: the table deviates along it only,\nwhich no drawing of the path shows. "
-            "See the picture of the vibration.", transform=axes.transAxes, ha="center", va="center",
-        )  # fmt: skip
+        panel.text(0.5, 0.3, _STRAIGHT, transform=panel.transAxes, ha="center", va="center")
     else:
-        _deviation_scale(axes, factor, largest_mm)
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1, frameon=False, borderaxespad=0.2, fontsize=9)
-    if whole is not None and locator is not None:
-        _locate(locator, whole[:, [across, up]], polyline[:, [across, up]])
-    canvas.save(figure, file)
-    return factor
+        _deviation_scale(panel, factor, largest_mm)
+    plot.legend_above(panel, columns=1)
+    if whole is not None:
+        _locate(panels[1], whole[:, shown], polyline[:, shown])
+    return panel
 
 
-def plot_feed(file: str | Path, views: Sequence[View], *, part: str = "") -> None:
+def plot_feed(views: Sequence[View], ax: Axes | None = None, *, part: str = "") -> Axes:
     """How fast does the command go, along the path and per axis?
 
     Args:
-        file: ``.png`` or ``.svg``.
         views: stretches of time, side by side.
+        ax: where to draw; None: a new figure.
         part: which part of the program this is, for the title.
 
+    Returns:
+        The first panel.
+
     Raises:
-        ValueError: a wrong ending, or no trace.
-        OSError: the file cannot be written.
+        ValueError: no view, or no trace.
     """
     _check_views(views)
     moving = _moving_axes([trace for view in views for trace in view.traces])
-    figure = canvas.figure(8.0 + 4.0 * (len(views) - 1), 1.8 + 1.7 * (1 + len(moving)))
-    grid = canvas.panels(figure, 1 + len(moving), len(views))
-    for view, panels in zip(views, grid, strict=True):
+    names = ["path feed\nin mm/min", *(f"{_AXIS_NAMES[axis]} speed\nin mm/min" for axis in moving)]
+    columns = _columns(ax, views, names, 1.7, "Feed of the command", part)
+    for view, panels in zip(views, columns, strict=True):
         for number, trace in enumerate(view.traces):
             speeds = np.diff(trace.command_mm, axis=0) / trace.period_s * 60
             # A difference belongs to the middle of its period.
@@ -197,66 +187,73 @@ def plot_feed(file: str | Path, views: Sequence[View], *, part: str = "") -> Non
                 _curve(panel, number, trace.label, middles, values)
         for panel in panels:
             _spread_flat(panel)
-        _column_heading(panels[0], view)
-        canvas.legend_above(panels[0])
+        plot.legend_above(panels[0])
         # Standstill before and after says nothing about feed.
         begin = min(trace.departure_s for trace in view.traces)
         end = max(trace.rest_s if trace.stops else float(trace.times_s[-1]) for trace in view.traces)
         margin = 0.03 * (end - begin) or view.traces[0].period_s
         panels[-1].set_xlim(begin - margin, end + margin)
-        panels[-1].set_xlabel(view.time_label)
-    grid[0][0].set_ylabel("path feed\nin mm/min")
-    for panel, axis in zip(grid[0][1:], moving, strict=True):
-        panel.set_ylabel(f"{_AXIS_NAMES[axis]} speed\nin mm/min")
-    canvas.heading(figure, "Feed of the command", part)
-    figure.align_ylabels(grid[0])
-    canvas.save(figure, file)
+    return columns[0][0]
 
 
-def plot_vibration(file: str | Path, views: Sequence[View], *, part: str = "") -> None:
+def plot_vibration(views: Sequence[View], ax: Axes | None = None, *, part: str = "") -> Axes:
     """How much does each axis swing about its command, and how much of it remains after the stop?
 
     Axes that do not swing are named, not drawn.
 
     Args:
-        file: ``.png`` or ``.svg``.
         views: stretches of time, side by side.
+        ax: where to draw; None: a new figure.
         part: which part of the program this is, for the title.
 
+    Returns:
+        The first panel.
+
     Raises:
-        ValueError: a wrong ending, or no trace.
-        OSError: the file cannot be written.
+        ValueError: no view, or no trace.
     """
     _check_views(views)
     traces = [trace for view in views for trace in view.traces]
     moving = _moving_axes(traces)
     swing_mm = np.max([np.abs(trace.deflection_mm).max(axis=0) for trace in traces], axis=0)
     swinging = [axis for axis in moving if swing_mm[axis] >= _SHOWN_MM]
-    still = [axis for axis in moving if axis not in swinging]
-    shown = swinging or still[:1]
-    figure = canvas.figure(8.0 + 4.0 * (len(views) - 1), 1.8 + 2.2 * len(shown))
-    grid = canvas.panels(figure, len(shown), len(views))
-    for view, panels in zip(views, grid, strict=True):
+    still = [_AXIS_NAMES[axis] for axis in moving if axis not in swinging]
+    shown = swinging or moving[:1]
+    said = ["Vibration"]
+    said += ["dashed: the command has come to rest"] if any(trace.stops for trace in traces) else []
+    said += [f"{', '.join(still)}: rigid (below {_SHOWN_MM * 1e3:g} µm)"] if still else []
+    names = [f"{_AXIS_NAMES[axis]} table − command\nin µm" for axis in shown]
+    columns = _columns(ax, views, names, 2.2, "; ".join(said), part)
+    for view, panels in zip(views, columns, strict=True):
         for panel, axis in zip(panels, shown, strict=True):
             for number, trace in enumerate(view.traces):
                 label = _vibration_label(trace, axis)
                 _curve(panel, number, label, trace.times_s, trace.deflection_mm[:, axis] * 1e3, fine=len(views) > 1)
                 if trace.stops:
                     panel.axvline(trace.rest_s, color=_colour(number), linewidth=1, linestyle=(0, (4, 3)))
-            panel.axhline(0, color=canvas.GREY, linewidth=0.6, zorder=0)
-            canvas.legend_above(panel)
+            panel.axhline(0, color=plot.GREY, linewidth=0.6, zorder=0)
+            plot.legend_above(panel)
             _spread_flat(panel)
-        _column_heading(panels[0], view)
-        panels[-1].set_xlabel(view.time_label)
-    for panel, axis in zip(grid[0], shown, strict=True):
-        panel.set_ylabel(f"{_AXIS_NAMES[axis]} table − command\nin µm")
-    notes = ["dashed: the command has come to rest"] if any(trace.stops for trace in traces) else []
-    notes += (
-        [f"{', '.join(_AXIS_NAMES[axis] for axis in still)}: rigid (below {_SHOWN_MM * 1e3:g} µm)"] if still else []
-    )
-    canvas.heading(figure, "; ".join(["Vibration", *notes]), part)
-    figure.align_ylabels(grid[0])
-    canvas.save(figure, file)
+    return columns[0][0]
+
+
+def _columns(
+    ax: Axes | None, views: Sequence[View], names: Sequence[str], row_inch: float, title: str, part: str
+) -> list[list[Axes]]:
+    """One column of panels per view, each with its own time axis; `names` are those of the rows."""
+    size_inch = (8.0 + 4.0 * (len(views) - 1), 1.8 + row_inch * len(names))
+    rows = plot.grid(ax, len(names), len(views), size_inch=size_inch, title=title, part=part, sharex="col")
+    for row, name in zip(rows, names, strict=True):
+        row[0].set_ylabel(name)
+        for panel in row:
+            panel.margins(x=0.01)
+    for view, top, lowest in zip(views, rows[0], rows[-1], strict=True):
+        lowest.set_xlabel(view.time_label)
+        if view.heading:
+            top.set_title(view.heading, loc="left", fontsize=10, pad=22)
+    columns = [list(column) for column in zip(*rows, strict=True)]
+    columns[0][0].figure.align_ylabels(columns[0])
+    return columns
 
 
 def _checked_polyline(name: str, points: npt.ArrayLike) -> FloatArray:
@@ -276,6 +273,13 @@ def _check_views(views: Sequence[View]) -> None:
         raise ValueError("no view: must be one or more")
     for view in views:
         _check_traces(view.traces)
+
+
+def _deviation(trace: Trace, polyline: FloatArray, quantity: str, is_whole: bool) -> tuple[FloatArray, FloatArray]:
+    """Where each sample belongs on the path, and how far it is from there."""
+    points = trace.response_mm if quantity == "response" else trace.command_mm
+    _, feet = follow(trace.command_mm, points, polyline, complete=trace.stops and is_whole)
+    return feet, points - feet
 
 
 def _path_label(trace: Trace, deviation: FloatArray, quantity: str, *, is_part: bool) -> str:
@@ -311,7 +315,7 @@ def _only_along(polyline: FloatArray, deviations: Sequence[FloatArray]) -> bool:
 
 
 def _colour(number: int) -> str:
-    return canvas.COLOURS[number % len(canvas.COLOURS)]
+    return plot.COLOURS[number % len(plot.COLOURS)]
 
 
 def _width(number: int) -> float:
@@ -324,77 +328,6 @@ def _moving_axes(traces: Sequence[Trace]) -> list[int]:
     return [axis for axis in range(3) if travel[axis] > _MOVES_MM] or [0]
 
 
-def follow(
-    command_mm: FloatArray, points_mm: FloatArray, polyline_mm: FloatArray, *, complete: bool
-) -> tuple[FloatArray, FloatArray]:
-    """Where on a polyline are samples that follow it? For drawing; figures come from the core's metrology.
-
-    Where the polyline passes a place twice, the distance that the command has gone decides.
-
-    Args:
-        command_mm: set-points, shape (n, 3).
-        points_mm: the samples asked for at the same instants, shape (n, 3).
-        polyline_mm: shape (m, 3).
-        complete: the command ends where the polyline ends; where it begins, it begins in any case.
-
-    Returns:
-        Distance of each foot along the polyline, shape (n,), and the foot itself, shape (n, 3).
-    """
-    vertices = _refine(polyline_mm)
-    lengths = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(lengths)])
-    steps = np.linalg.norm(np.diff(command_mm, axis=0), axis=1)
-    gone = np.concatenate([[0.0], np.cumsum(steps)])
-    if complete and gone[-1] > 0:
-        gone *= along[-1] / gone[-1]
-    return _feet(points_mm, vertices, gone, _PROGRESS_WEIGHT)
-
-
-def _foot_points(points: FloatArray, polyline: FloatArray) -> FloatArray:
-    """Nearest point of the polyline to each point, wherever on it."""
-    return _feet(points, _refine(polyline), np.zeros(len(points)), 0.0)[1]
-
-
-def _feet(points: FloatArray, vertices: FloatArray, gone: FloatArray, weight: float) -> tuple[FloatArray, FloatArray]:
-    """Nearest points of the polyline, as distances along it and places."""
-    from scipy.spatial import KDTree
-
-    if len(vertices) < 2:
-        return np.zeros(len(points)), np.broadcast_to(vertices[0], points.shape).copy()
-    lengths = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
-    distance = np.concatenate([[0.0], np.cumsum(lengths)])
-    tree = KDTree(np.column_stack([vertices, weight * distance]))
-    nearest = tree.query(np.column_stack([points, weight * gone]), workers=-1)[1]
-    feet, best = np.empty_like(points), np.full(len(points), np.inf)
-    progress = np.zeros(len(points))
-    # The foot lies on a segment near the nearest vertex.
-    for shift in range(-_SEGMENTS_ASKED, _SEGMENTS_ASKED):
-        first = np.clip(nearest + shift, 0, len(vertices) - 2)
-        start, chord = vertices[first], vertices[first + 1] - vertices[first]
-        dot = np.einsum("ij,ij->i", points - start, chord)
-        share = np.clip(dot / np.einsum("ij,ij->i", chord, chord), 0, 1)
-        candidate = start + share[:, None] * chord
-        distance2 = np.einsum("ij,ij->i", points - candidate, points - candidate)
-        closer = distance2 < best
-        feet[closer], best[closer] = candidate[closer], distance2[closer]
-        progress[closer] = (distance[first] + share * lengths[first])[closer]
-    return progress, feet
-
-
-def _refine(polyline: FloatArray) -> FloatArray:
-    """The polyline without repeated points, its long segments split, so that vertices stand for the path."""
-    lengths = np.linalg.norm(np.diff(polyline, axis=0), axis=1)
-    polyline = polyline[np.concatenate([[True], lengths > 0])]
-    lengths = lengths[lengths > 0]
-    if not len(lengths):
-        return polyline
-    pieces = np.ceil(lengths / max(lengths.sum() / _PATH_PIECES, _SHORTEST_PIECE_MM)).astype(np.intp)
-    segment = np.repeat(np.arange(len(pieces)), pieces)
-    share = (np.arange(len(segment)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[segment]
-    split = polyline[segment] + share[:, None] * (polyline[segment + 1] - polyline[segment])
-    return np.concatenate([split, polyline[-1:]])
-
-
 def _round_factor(factor: float) -> float:
     """The largest of 1, 2, 5, 10, 20, ... that is not above the factor; at least 1."""
     if factor <= 1:
@@ -403,16 +336,9 @@ def _round_factor(factor: float) -> float:
     return max(step * decade for step in (1, 2, 5) if step * decade <= factor * (1 + 1e-9))
 
 
-def _path_axes(figure: Figure, *, with_locator: bool) -> tuple[Axes, Axes | None]:
-    if not with_locator:
-        return figure.add_subplot(), None
-    grid: Any = figure.subplots(1, 2, width_ratios=[2.4, 1])
-    return grid[0], grid[1]
-
-
 def _locate(axes: Axes, whole: FloatArray, piece: FloatArray) -> None:
     """The whole path, small, and where the piece lies on it."""
-    axes.plot(whole[:, 0], whole[:, 1], color=canvas.GREY, linewidth=0.8)
+    axes.plot(whole[:, 0], whole[:, 1], color=plot.GREY, linewidth=0.8)
     axes.plot(piece[:, 0], piece[:, 1], color="black", linewidth=2)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(piece, axis=0), axis=1))])
     middle = [float(np.interp(along[-1] / 2, along, piece[:, axis])) for axis in range(2)]
@@ -432,11 +358,6 @@ def _spread_flat(panel: Axes) -> None:
     """A curve at zero is a line in the middle, not rounding writ large."""
     if max(map(abs, panel.get_ylim())) < _FLAT:
         panel.set_ylim(-1, 1)
-
-
-def _column_heading(panel: Axes, view: View) -> None:
-    if view.heading:
-        panel.set_title(view.heading, loc="left", fontsize=10, pad=22)
 
 
 def _deviation_scale(axes: Axes, factor: float, largest_mm: float) -> None:

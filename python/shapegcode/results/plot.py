@@ -85,21 +85,19 @@ def grid(
         part: which part of the program it shows.
         subplots: what matplotlib's `subplots` knows beside them: sharex, sharey, height_ratios, width_ratios.
     """
+    whole: Any
     if ax is None:
-        new = figure(*size_inch)
-        heading(new, title, part)
-        found = new.subplots(rows, columns, squeeze=False, **subplots)
+        whole = figure(*size_inch)
     else:
-        ratios = {name: subplots.pop(name) for name in ("height_ratios", "width_ratios") if name in subplots}
-        ax.set_axis_off()
-        ax.set_title(title + (f"\n{part}" if part else ""), loc="left", fontsize=11)
         place = ax.get_subplotspec()
         if place is None:
             raise ValueError("ax has no place in a grid of panels: make it with figure.subplots() or plt.subplots()")
         parent: Any = ax.get_figure()
-        spec: Any = place.subgridspec(rows, columns, **ratios)
-        found = spec.subplots(squeeze=False, **subplots)
+        whole = parent.add_subfigure(place)
+        ax.set_axis_off()
         parent.sca(ax)
+    heading(whole, title, part)
+    found = whole.subplots(rows, columns, squeeze=False, **subplots)
     for panel in found.flat:
         _style(panel)
     return [list(row) for row in found]
@@ -127,9 +125,11 @@ def heading(figure: Figure, text: str, part: str) -> None:
     figure.suptitle(text + (f"\n{part}" if part else ""), x=0.01, ha="left", fontsize=11)
 
 
-def legend_above(panel: Axes) -> None:
+def legend_above(panel: Axes, *, columns: int = 4) -> None:
     """Legend between the panel and what is above it, where it hides no curve."""
-    panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.2, fontsize=9)
+    panel.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, frameon=False, borderaxespad=0.2, fontsize=9
+    )
 
 
 def legend_below(panel: Axes, *, of: Axes | None = None, columns: int = 4) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.results import plot as canvas
-from shapegcode.results.motion_pictures import RECORD_SAMPLES, part_of, trace_of, write_motion
+from shapegcode.results.motion_pictures import RECORD_SAMPLES, PlayedRegion, motion_pictures
 from shapegcode.simulation.motion import MotionTraces
 from shapegcode.simulation.simulate import Simulation
 
@@ -112,7 +112,10 @@ def write_simulation_pictures(simulation: Simulation, folder: str | Path) -> lis
     if not simulation.regions:
         return []
     run = max(simulation.regions, key=lambda each: float(each.figures.residual_mm.max()))
-    figures = simulation.play(run, record_samples=RECORD_SAMPLES)
-    trace = trace_of("program", figures, simulation.machine)
-    part = part_of(run.first_line, run.last_line, len(simulation.regions), figures, trace)
-    return write_motion([trace], run.path, part, Path(folder))
+
+    def played() -> PlayedRegion:
+        runs = {"program": simulation.play(run, record_samples=RECORD_SAMPLES)}
+        lines = (run.first_line, run.last_line)
+        return PlayedRegion.of_runs(runs, run.path, run.period_s, lines=lines, regions=len(simulation.regions))
+
+    return canvas.save_all(motion_pictures(played), folder)
