@@ -1,6 +1,6 @@
 """Figures of the package's import graph: `python tests/tools/import_graph.py [FOLDER OF THE PACKAGE]`.
 
-Every import counts, also one inside a function or for types only. A floor is a set of folders (or of modules at the root)
+Every import counts, also one inside a function or for types only. A floor is a set of folders (or modules at the root)
 none of which imports another of it; an arrow leads upwards if its head stands on a higher floor than its tail.
 """
 
