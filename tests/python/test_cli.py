@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import importlib
 import json
 import os
 import re
@@ -14,6 +16,9 @@ import pytest
 import shapegcode as sg
 from acceptance import PROGRAMS
 from command import run, run_process
+from shapegcode.cli import COMMANDS, convert
+from shapegcode.cli.options import load_machine
+from shapegcode.cli.overrides import overridden
 
 GOOD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\nG1X20.F6000\nG3X40.Y20.R20.\nG1Y40.\nG0Z50.\nM30\n%\n"
 PAIR = {"original", "emitted"}
@@ -165,6 +170,49 @@ def test_options_change_the_result(folder: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "key", "value"),
+    [
+        ("--contour-tolerance 5um", "tolerance.contour_um", 5.0),
+        ("--contour-tolerance 0.03mm", "tolerance.contour_um", 30.0),
+        ("--contour off", "shaping.contour", "off"),
+        ("--shaper zvd", "shaping.family", "zvd"),
+        ("--per-axis", "shaping.per_axis", True),
+        ("--set shaping.rapids=true --no-shape-rapids", "shaping.rapids", False),
+        ("--part-mass 120", "shaping.part_mass_kg", 120.0),
+        ("--compensation expand", "input.compensation", "expand"),
+    ],
+)
+def test_options_that_stand_for_a_key_of_the_machine(words: str, key: str, value: object) -> None:
+    parser = argparse.ArgumentParser()
+    convert.add_arguments(parser)
+    args = parser.parse_args(["in.nc", "-m", "vx500", "-o", "out.nc", *words.split()])
+    machine = sg.Machine.load("vx500")
+    assert overridden(load_machine(args), args, convert.MACHINE_KEYS) == machine.with_values(key, value)
+    assert key in {word for action in parser._actions for word in (action.help or "").split()}
+
+
+def test_an_option_has_one_name_and_one_unit_on_every_command() -> None:
+    """What the same option takes, as its metavar and type say."""
+    found: dict[str, set[tuple[object, object]]] = {}
+
+    def look(parser: argparse.ArgumentParser) -> None:
+        for action in parser._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                for each in action.choices.values():
+                    look(each)
+            elif action.option_strings and action.nargs != 0 and not action.choices:
+                found.setdefault(action.option_strings[-1], set()).add((action.metavar, action.type))
+
+    for command in COMMANDS:
+        parser = argparse.ArgumentParser()
+        importlib.import_module(command.module).add_arguments(parser)
+        look(parser)
+    # What is written has the name of what it is.
+    several = {option: rules for option, rules in found.items() if len(rules) > 1 and option != "--output"}
+    assert set(several) <= {"--band", "--feed", "--period"}, several
+
+
 def test_sample_with_a_setting_it_needs(folder: Path) -> None:
     bottle = PROGRAMS / "BOTTLE.NC"
     refused = run(folder, "convert", bottle, "-m", "vx500", "-o", "out.nc")

@@ -15,15 +15,14 @@ from shapegcode.cli.options import (
     add_plots_argument,
     add_program_argument,
     load_machine,
-    micrometres,
     output_file,
     positive,
     ratio,
     refuse_same_file,
     seconds,
     size,
-    with_values,
 )
+from shapegcode.cli.overrides import add_override_arguments, overridden
 
 if TYPE_CHECKING:
     from shapegcode.cli.console import ProgressBar
@@ -32,7 +31,18 @@ if TYPE_CHECKING:
     from shapegcode.machine import Machine
     from shapegcode.program import Program
 
-__all__ = ["add_arguments", "run"]
+__all__ = ["MACHINE_KEYS", "add_arguments", "run"]
+
+MACHINE_KEYS = {
+    "--contour-tolerance": "tolerance.contour_um",
+    "--contour": "shaping.contour",
+    "--shaper": "shaping.family",
+    "--per-axis": "shaping.per_axis",
+    "--part-mass": "shaping.part_mass_kg",
+    "--shape-rapids": "shaping.rapids",
+    "--compensation": "input.compensation",
+}
+"""Options that stand for a key of the machine file."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,59 +62,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="feed on arcs relative to the programmed feed, for example 60%%",
     )
-    parser.add_argument(
-        "--contour-tolerance",
-        metavar="LENGTH",
-        type=micrometres,
-        default=None,
-        help="largest deviation from the programmed path, for example 5um: the feed is the highest that keeps it "
-        "(default: tolerance.contour_um of the machine file)",
-    )
-    parser.add_argument(
-        "--contour",
-        choices=("response", "command", "off"),
-        default=None,
-        help="what is brought back to the programmed path: see shaping.contour (default: the machine file's)",
-    )
-    parser.add_argument(
-        "--shaper",
-        metavar="FAMILY",
-        default=None,
-        help="family of the shaper, for example zvd: see shaping.family, and `shapegcode shaper` to compare them",
-    )
-    parser.add_argument(
-        "--per-axis",
-        action="store_true",
-        default=None,
-        help="a shaper for each axis, shorter than one for all: see shaping.per_axis",
-    )
-    parser.add_argument(
-        "--part-mass",
-        metavar="KG",
-        type=positive,
-        default=None,
-        help="mass of the part, for modes with a table over it: see shaping.part_mass_kg",
-    )
+    add_override_arguments(parser, MACHINE_KEYS)
     parser.add_argument(
         "--block-period",
         metavar="TIME",
         type=seconds,
         default=None,
         help="duration of the shortest block, for example 5ms (default: chosen for the modes)",
-    )
-    parser.add_argument(
-        "--shape-rapids",
-        action="store_const",
-        const=True,
-        default=None,
-        help="write rapids as shaped cutting moves where the table is settled for the next cut sooner (default: "
-        "shaping.rapids of the machine file); rapid override does not act on them",
-    )
-    parser.add_argument(
-        "--compensation",
-        choices=("refuse", "expand", "keep"),
-        default=None,
-        help="what becomes of cutter compensation G41/G42: see input.compensation (default: the machine file's)",
     )
     parser.add_argument(
         "--max-bytes",
@@ -158,17 +122,7 @@ def run(args: argparse.Namespace) -> int:
     output = output_file(args.output)
     limits = (args.max_bytes, args.baud, args.max_blocks_per_second)
     budget = None if limits == (None, None, None) else Budget(*limits)
-    machine = load_machine(args)
-    machine = with_values(
-        machine,
-        ("input.compensation", args.compensation),
-        ("tolerance.contour_um", args.contour_tolerance),
-        ("shaping.contour", args.contour),
-        ("shaping.rapids", args.shape_rapids),
-        ("shaping.family", args.shaper),
-        ("shaping.per_axis", args.per_axis),
-        ("shaping.part_mass_kg", args.part_mass),
-    )
+    machine = overridden(load_machine(args), args, MACHINE_KEYS)
     failed = output.with_name(output.name + machine.emission.failed_suffix)
     cutting = [Path(name) for name in (*(args.tool or ()), *([args.stock] if args.stock else ()))]
     if args.feed_schedule != bool(args.tool and args.stock) or bool(args.tool) != bool(args.stock):

@@ -95,20 +95,6 @@ def load_machine(args: argparse.Namespace) -> Machine:
     return machine.with_values(values, source=f"{args.machine} with --set") if values else machine
 
 
-def with_values(machine: Machine, *values: tuple[str, object]) -> Machine:
-    """The machine with values of options, checked as those of a file; None leaves the machine's own.
-
-    Args:
-        machine: what `load_machine` gave.
-        values: pairs of a key of the machine file, "table.key", and its value.
-
-    Raises:
-        MachineError: a value that a machine file could not have.
-    """
-    stated = {key: value for key, value in values if value is not None}
-    return machine.with_values(stated, source="options") if stated else machine
-
-
 def _toml_value(text: str) -> Any:
     # A bare word is a string: quotes would have to be escaped from the shell.
     try:
@@ -180,7 +166,7 @@ def count(text: str) -> int:
 
 def ratio(text: str) -> float:
     """A share such as ``60%`` or ``0.6``, above 0 and at most 1."""
-    value = _number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
     if not 0.0 < value <= 1.0:
         raise argparse.ArgumentTypeError(f"{text!r}: must be above 0 and at most 100%")
     return value
@@ -188,7 +174,7 @@ def ratio(text: str) -> float:
 
 def share(text: str) -> float:
     """A share such as ``3%`` or ``0.03``, at least 0 and below 1."""
-    value = _number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
     if not 0.0 <= value < 1.0:
         raise argparse.ArgumentTypeError(f"{text!r}: must be at least 0 and below 100%")
     return value
@@ -196,7 +182,7 @@ def share(text: str) -> float:
 
 def override(text: str) -> float:
     """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control takes)."""
-    value = _number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
     if not 0.0 < value <= _LARGEST_OVERRIDE:
         raise argparse.ArgumentTypeError(f"{text!r}: must be above 0 and at most {_LARGEST_OVERRIDE:.0%}")
     return value
@@ -238,13 +224,14 @@ def size(text: str) -> int:
 
 def positive(text: str) -> float:
     """A number above 0."""
-    value = _number(text)
+    value = number(text)
     if not (math.isfinite(value) and value > 0.0):
         raise argparse.ArgumentTypeError(f"{text!r}: must be above 0")
     return value
 
 
-def _number(text: str) -> float:
+def number(text: str) -> float:
+    """A number."""
     try:
         return float(text)
     except ValueError:
