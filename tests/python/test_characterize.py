@@ -270,17 +270,17 @@ GOOD_ROWS = "".join(f"{k},{k * 0.01:.3f}\n" for k in range(200))
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "no header"),
+        ("", "no rows of numbers"),
         ("a,b\n1,2\n", "no header"),
         ("time_ms,X_act\n" + GOOD_ROWS, "only actual positions"),
         ("time_ms,X\n" + GOOD_ROWS.replace("50,0.500", "49,0.500"), ":52: time 49 does not come after 49"),
-        ("time_ms,X\n" + GOOD_ROWS.replace("50,0.500", "50,abc"), ":52: column 2: 'abc' is not a finite number"),
-        ("time_ms,X\n" + GOOD_ROWS.replace("50,0.500", "50"), ":52: column 2: '' is not a finite number"),
+        ("time_ms,X\n" + GOOD_ROWS.replace("50,0.500", "50,abc"), ":52: column 2 (X) 'abc' is not a finite number"),
+        ("time_ms,X\n" + GOOD_ROWS.replace("50,0.500", "50"), ":52: 1 cells, column 2 (X) is missing"),
         (
             "time_ms,X\n" + GOOD_ROWS.replace("50,0.500\n", "").replace("51,0.510\n", "").replace("52,0.520\n", ""),
             "rows are missing",
         ),
-        ("time_ms,X\n1,0\n2,0\n", "a test has at least 100"),
+        ("time_ms,X\n1,0\n2,0\n", "2 rows of numbers: too short; needed are at least 100"),
         ("time_s,X\n" + GOOD_ROWS, "from 0.02 to 50 ms"),
         ("time_ms,X\n" + GOOD_ROWS, "no commanded position of Y"),
     ],
@@ -306,6 +306,8 @@ def test_the_log_of_another_test_is_refused(folder: Path) -> None:
         ("t_s\tX_command_mm\tXa", "\t", (0.001, 1.0), None),
         ("TIME,X,X_FB", ",", (1.0, 1.0), None),
         ("time x xact", " ", (1.0, 1000.0), parse_units("ms,um")),
+        ("Logger 7\n\nZeit;X_soll;X_ist\n[ms];[µm];[µm]", ";", (1.0, 1000.0), None),
+        ("t_s,X_in,X_act_in", ",", (0.001, 1.0 / 25.4), None),
     ],
 )
 def test_logs_are_read_whatever_their_columns_are_called(

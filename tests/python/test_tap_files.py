@@ -17,11 +17,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.io import wavfile
 
+from shapegcode.characterization.log import read_log
 from shapegcode.errors import RecordError
+from shapegcode.io.columns import tap_label
 from shapegcode.io.read import ReadOptions, read_records
 from shapegcode.io.record import FloatArray, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
-from shapegcode.io.units import find_unit, read_label
+from shapegcode.io.units import find_unit
+from shapegcode.testcut.record import read_forces
 
 COUNT = 24
 PERIOD_S = 0.0005
@@ -140,21 +143,21 @@ def test_a_preamble_is_counted(tmp_path: Path) -> None:
     ],
 )
 def test_labels(text: str, measures: str | None, axis: str | None, factor: float | None) -> None:
-    label = read_label(text)
+    label = tap_label(text)
     assert (label.measures, label.axis) == (measures, axis)
     assert (label.unit.factor if label.unit else None) == (None if factor is None else pytest.approx(factor, rel=1e-12))
 
 
 def test_unknown_units_stay_unknown() -> None:
     assert [find_unit(text) for text in ("V", "mN", "furlong", "", "m/s³", "Hz")] == [None] * 6
-    assert read_label("force [V]").unknown_unit == "V"
+    assert tap_label("force [V]").unknown_unit == "V"
 
 
-@pytest.mark.parametrize("unit", ["V", "mV", "pC", "lb", "kgf", "counts", "%FS", "% FS"])
+@pytest.mark.parametrize("unit", ["V", "mV", "pC", "lb", "daN", "counts", "%FS", "% FS"])
 def test_a_unit_that_is_not_converted_is_no_part_of_a_name(unit: str, tmp_path: Path) -> None:
     for name in ("force", "acc_x", "Hammer"):
         for sign in ("_", " ", "/"):
-            assert read_label(f"{name}{sign}{unit}").unknown_unit == unit
+            assert tap_label(f"{name}{sign}{unit}").unknown_unit == unit
     with pytest.raises(RecordError, match=rf"the unit '{unit}' is not known.*--force-scale, --response-scale"):
         read(tmp_path, f"time_s,force_{unit},acc_x_m/s^2\n" + rows())
     record = only(read(tmp_path, f"time_s,force_{unit},acc_x_m/s^2\n" + rows(), force_scale=2.0))
@@ -162,11 +165,38 @@ def test_a_unit_that_is_not_converted_is_no_part_of_a_name(unit: str, tmp_path: 
     assert not record.warnings
 
 
+@pytest.mark.parametrize(("unit", "newton"), [("N", 1.0), ("kN", 1e3), ("kgf", 9.80665), ("lbf", 0.45359237 * 9.80665)])
+@pytest.mark.parametrize("form", ["{}_{}", "{} [{}]", "{} ({})", "{}/{}"])
+def test_a_unit_is_the_same_in_every_kind_of_file(tmp_path: Path, unit: str, newton: float, form: str) -> None:
+    head = ",".join(["time_s", *(form.format(name, unit) for name in ("fx", "fy"))])
+    (tmp_path / "cut.csv").write_text(f"{head}\n" + rows(), encoding="utf-8")
+    cut = read_forces(tmp_path / "cut.csv", on="tool")
+    np.testing.assert_allclose(cut.force_n[:, 0], FORCE * newton, rtol=1e-12)
+    record = only(read(tmp_path, f"time_s,{form.format('force', unit)},acc_x_m/s^2\n" + rows()))
+    assert record.force_n is not None
+    np.testing.assert_allclose(record.force_n, FORCE * newton, rtol=1e-12)
+    with pytest.raises(RecordError, match="the unit 'V' is not known; needed is one of N, kN, kgf, lbf"):
+        (tmp_path / "cut.csv").write_text(f"{head}\n".replace(unit, "V") + rows(), encoding="utf-8")
+        read_forces(tmp_path / "cut.csv")
+
+
+@pytest.mark.parametrize(("unit", "millimetre"), [("mm", 1.0), ("um", 1e-3), ("m", 1e3), ("inch", 25.4), ("in", 25.4)])
+def test_ways_in_logs_forces_and_taps(tmp_path: Path, unit: str, millimetre: float) -> None:
+    count = 120
+    body = "".join(f"{k},{k / 8},0.5\n" for k in range(count))
+    (tmp_path / "log.csv").write_text(f"time_ms,X_{unit},X_act_{unit}\n{body}", encoding="utf-8")
+    (tmp_path / "cut.csv").write_text(f"position_{unit},fx_n,fy_n\n{body}", encoding="utf-8")
+    np.testing.assert_allclose(read_log(tmp_path / "log.csv").command_mm[:, 0], np.arange(count) / 8 * millimetre)
+    np.testing.assert_allclose(read_forces(tmp_path / "cut.csv").position_mm, np.arange(count) * millimetre)
+    record = only(read(tmp_path, f"time_ms,disp_{unit},constant\n" + body))
+    np.testing.assert_allclose(record.response, np.arange(count) / 8 * millimetre * 1e-3)
+
+
 def test_names_that_look_like_units_stay_names(tmp_path: Path) -> None:
-    for name in ("x_v", "acc_a", "force hammer", "acc 2", "sensor a", "acc_x", "v"):
-        assert not read_label(name).unknown_unit
-    assert read_label("x_v").measures == "velocity"
-    assert (read_label("x_V").measures, read_label("x_V").unknown_unit) == ("response", "V")
+    for name in ("x_v", "acc_a", "force_in", "force hammer", "acc 2", "sensor a", "acc_x", "v"):
+        assert not tap_label(name).unknown_unit
+    assert tap_label("x_v").measures == "velocity"
+    assert (tap_label("x_V").measures, tap_label("x_V").unknown_unit) == ("response", "V")
     assert only(read(tmp_path, "time_s,force_N,acc_x_m/s^2\n" + rows())).axis == "x"
 
 

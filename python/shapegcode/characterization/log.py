@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,17 +9,18 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode._core import ArgumentError
+from shapegcode.errors import ArgumentError
+from shapegcode.io.columns import Label, Meaning, read_label, unit_of, words_of
+from shapegcode.io.table import TextTable
+from shapegcode.io.units import factor_between, find_unit, units_of
 
 __all__ = ["ServoLog", "parse_units", "read_log"]
 
 Array = npt.NDArray[np.float64]
 _ACTUAL = {"act", "actual", "fb", "feedback", "fbk", "measured", "meas", "ist", "real"}
 _TIME = {"time", "t", "timestamp", "zeit"}
-_TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6}
-_LENGTH_UNITS = {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "m": 1000.0, "inch": 25.4, "in": 25.4}
-_HEAD_LINES = 50
-_MAX_ROWS = 20_000_000
+_EXAMPLE = "time_ms,X,Y,Z or time_ms,X,Y,Z,X_act,Y_act,Z_act"
+_FEWEST_ROWS, _MAX_ROWS = 100, 20_000_000
 _SHORTEST_S, _LONGEST_S = 2e-5, 0.05
 
 
@@ -52,83 +52,90 @@ def parse_units(text: str) -> tuple[float, float]:
     Raises:
         ArgumentError: a unit is not known.
     """
-    words = [word.strip().lower() for word in text.split(",")]
-    if len(words) != 2 or words[0] not in _TIME_UNITS or words[1] not in _LENGTH_UNITS:
+    units = [find_unit(word) for word in text.split(",")]
+    if [unit and unit.measures for unit in units] != ["time", "displacement"]:
         raise ArgumentError(
-            f"--units {text}: must be TIME,LENGTH with TIME of {', '.join(_TIME_UNITS)} and LENGTH of "
-            f"{', '.join(_LENGTH_UNITS)}"
+            f"--units {text}: must be TIME,LENGTH with TIME of {units_of('time')} and LENGTH of "
+            f"{units_of('displacement')}"
         )
-    return _TIME_UNITS[words[0]], _LENGTH_UNITS[words[1]]
+    seconds, millimetres = (factor_between(unit, to) for unit, to in zip(units, ("s", "mm"), strict=True) if unit)
+    return seconds, millimetres
 
 
-def _split(line: str, delimiter: str) -> list[str]:
-    cells = line.split() if delimiter == " " else line.split(delimiter)
-    return [cell.strip().strip('"') for cell in cells]
+def _names(name: str) -> Meaning | None:
+    """The time; or the commanded or actual position of an axis."""
+    words = set(words_of(name))
+    if words & _TIME:
+        return Meaning("time", "time")
+    axes = words & {"x", "y", "z"}
+    actual = bool(words & _ACTUAL)
+    if joined := re.fullmatch(r"([xyz])(a|act|c|cmd|com)", name.lower().strip()):
+        axes, actual = {joined[1]}, joined[2].startswith("a")
+    return Meaning("actual" if actual else "command", "displacement", axes.pop()) if len(axes) == 1 else None
 
 
-def _tokens(cell: str) -> set[str]:
-    return set(re.findall(r"[a-zµ]+", cell.lower().replace("μ", "µ")))
-
-
-@dataclass
+@dataclass(frozen=True)
 class _Columns:
+    """Index of each column that is used, and by `kind` and axis those of the positions."""
+
+    labels: list[Label]
     time: int
-    time_unit: float | None
-    command: dict[int, int]
-    actual: dict[int, int]
-    length_unit: float | None
+    command: dict[str, int]
+    actual: dict[str, int]
+
+    @property
+    def used(self) -> list[int]:
+        return [self.time, *self.command.values(), *self.actual.values()]
 
 
-def _columns(cells: list[str]) -> _Columns | None:
-    """What the cells of a header mean; None if they are no header."""
-    found = _Columns(-1, None, {}, {}, None)
-    for index, cell in enumerate(cells):
-        tokens = _tokens(cell)
-        if tokens & _TIME:
-            found.time = index
-            found.time_unit = next((_TIME_UNITS[unit] for unit in tokens if unit in _TIME_UNITS), None)
-            continue
-        axes = tokens & {"x", "y", "z"}
-        joined = re.fullmatch(r"([xyz])(a|act|c|cmd|com)", cell.lower().strip())
-        if joined:
-            axes, tokens = {joined[1]}, tokens | ({"act"} if joined[2].startswith("a") else set())
-        if len(axes) != 1:
-            continue
-        target = found.actual if tokens & _ACTUAL else found.command
-        target.setdefault("xyz".index(axes.pop()), index)
-        unit = next((_LENGTH_UNITS[each] for each in tokens if each in _LENGTH_UNITS), None)
-        found.length_unit = found.length_unit or unit
-    return found if found.time >= 0 and (found.command or found.actual) else None
+def _columns(table: TextTable) -> _Columns:
+    labels = table.labels(lambda text, unit: read_label(text, unit, _names))
+    time = next((index for index, label in enumerate(labels) if label.measures == "time"), -1)
+    found = _Columns(labels, time, {}, {})
+    for index, label in enumerate(labels):
+        if label.meaning is not None and label.axis is not None:
+            target = found.actual if label.meaning.what == "actual" else found.command
+            target.setdefault(label.axis, index)
+    if time < 0 or not (found.command or found.actual):
+        raise ArgumentError(
+            f"{table.where}: no header with a time and an axis; wanted for example {_EXAMPLE}; the header is "
+            f"{', '.join(table.layout.header)[:60]!r}"
+        )
+    if not found.command:
+        raise ArgumentError(
+            f"{table.where}: only actual positions; the commanded ones are needed (columns X, Y, Z or X_cmd, ...)"
+        )
+    return found
 
 
-def _header(path: Path, lines: list[str]) -> tuple[int, str, _Columns]:
-    for number, line in enumerate(lines[:_HEAD_LINES]):
-        for delimiter in (";", "\t", ",", " "):
-            if delimiter in line and (columns := _columns(_split(line, delimiter))):
-                return number, delimiter, columns
-    shown = lines[0][:60] if lines else ""
-    raise ArgumentError(
-        f"{path}:1: no header with a time and an axis among the first {_HEAD_LINES} lines; wanted for example "
-        f"time_ms,X,Y,Z or time_ms,X,Y,Z,X_act,Y_act,Z_act; the first line is {shown!r}"
-    )
-
-
-def _time_unit(path: Path, columns: _Columns, units: tuple[float, float] | None, step: float) -> float:
-    if units is not None:
-        return units[0]
-    if columns.time_unit is not None:
-        return columns.time_unit
+def _time_unit(table: TextTable, label: Label, step: float) -> float:
+    unit = unit_of(table.where, label, ("time",), "say it with --units")
+    if unit is not None:
+        return unit.factor
     as_seconds, as_ms = (_SHORTEST_S <= step * unit <= _LONGEST_S for unit in (1.0, 1e-3))
     if as_seconds == as_ms:
-        raise ArgumentError(f"{path}: a time step of {step:g} may be s or ms: say it with --units, for example ms,mm")
+        raise ArgumentError(
+            f"{table.path}: a time step of {step:g} may be s or ms: say it with --units, for example ms,mm"
+        )
     return 1.0 if as_seconds else 1e-3
+
+
+def _length_units(table: TextTable, columns: _Columns) -> list[float]:
+    """Factors to mm of the columns behind the time; one without a unit has that of the others, else mm."""
+    units = [
+        unit_of(table.where, columns.labels[index], ("displacement",), "say it with --units")
+        for index in columns.used[1:]
+    ]
+    factors = [None if unit is None else factor_between(unit, "mm") for unit in units]
+    usual = next((each for each in factors if each is not None), 1.0)
+    return [usual if each is None else each for each in factors]
 
 
 def read_log(path: Path, units: tuple[float, float] | None = None) -> ServoLog:
     """Read a servo log.
 
     Args:
-        path: CSV with a header; the delimiter is found out, a decimal comma is read where it does not delimit.
+        path: CSV with a header; delimiter, decimal comma, lines above the header and a row of units are found out.
         units: factors to s and mm; None: from the header (``time_ms``, ``X [um]``), else a time step from 0.02 to 50 ms
             and mm.
 
@@ -136,62 +143,45 @@ def read_log(path: Path, units: tuple[float, float] | None = None) -> ServoLog:
         ArgumentError: what is wrong, with file, line, value and limit.
         OSError: the file cannot be read.
     """
-    try:
-        lines = path.read_bytes().decode("utf-8-sig").splitlines()
-    except UnicodeDecodeError as error:
-        raise ArgumentError(f"{path}: not UTF-8 text (byte 0x{error.object[error.start]:02x})") from error
-    at, delimiter, columns = _header(path, lines)
-    if not columns.command:
+    table = TextTable(path)
+    columns = _columns(table)
+    values = table.numbers(columns.used, _FEWEST_ROWS)
+    if len(values) > _MAX_ROWS:
+        raise ArgumentError(f"{path}: more than {_MAX_ROWS} rows")
+    _refuse_descending(table, values[:, 0])
+    step = float(np.median(np.diff(values[:, 0])))
+    values[:, 0] *= units[0] if units else _time_unit(table, columns.labels[columns.time], step)
+    values[:, 1:] *= units[1] if units else _length_units(table, columns)
+    times = values[:, 0] - values[0, 0]
+    _refuse_gaps(table, times)
+    command = np.full((len(times), 3), np.nan)
+    actual = np.full((len(times), 3), np.nan)
+    for k, axis in enumerate(columns.command, start=1):
+        command[:, "xyz".index(axis)] = values[:, k]
+    for k, axis in enumerate(columns.actual, start=1 + len(columns.command)):
+        actual[:, "xyz".index(axis)] = values[:, k]
+    return ServoLog(str(path), times, command, actual if columns.actual else None)
+
+
+def _refuse_descending(table: TextTable, times: Array) -> None:
+    bad = np.flatnonzero(np.diff(times) <= 0.0)
+    if bad.size:
+        row = int(bad[0]) + 1
         raise ArgumentError(
-            f"{path}:{at + 1}: only actual positions; the commanded ones are needed (columns X, Y, Z or X_cmd, ...)"
+            f"{table.path}:{table.line_of(row)}: time {times[row]:g} does not come after {times[row - 1]:g}"
         )
-    wanted = [columns.time, *columns.command.values(), *columns.actual.values()]
-    rows: list[list[float]] = []
-    numbers: list[int] = []
-    for number, line in enumerate(lines[at + 1 :], start=at + 2):
-        if not line.strip():
-            continue
-        cells = _split(line, delimiter)
-        row = []
-        for index in wanted:
-            cell = cells[index] if index < len(cells) else ""
-            if delimiter != ",":
-                cell = cell.replace(",", ".")
-            try:
-                value = float(cell)
-            except ValueError:
-                value = math.nan
-            if not math.isfinite(value):
-                raise ArgumentError(f"{path}:{number}: column {index + 1}: {cell!r} is not a finite number")
-            row.append(value)
-        if rows and row[0] <= rows[-1][0]:
-            raise ArgumentError(f"{path}:{number}: time {row[0]:g} does not come after {rows[-1][0]:g}")
-        rows.append(row)
-        numbers.append(number)
-        if len(rows) > _MAX_ROWS:
-            raise ArgumentError(f"{path}: more than {_MAX_ROWS} rows")
-    if len(rows) < 100:
-        raise ArgumentError(f"{path}: {len(rows)} rows; a test has at least 100")
-    table = np.array(rows)
-    table[:, 0] *= _time_unit(path, columns, units, float(np.median(np.diff(table[:, 0]))))
-    table[:, 1:] *= units[1] if units else (columns.length_unit or 1.0)
-    times = table[:, 0] - table[0, 0]
+
+
+def _refuse_gaps(table: TextTable, times: Array) -> None:
     steps = np.diff(times)
     step = float(np.median(steps))
     if not _SHORTEST_S <= step <= _LONGEST_S:
-        raise ArgumentError(f"{path}: a row every {step * 1e3:g} ms; from 0.02 to 50 ms can be used (see --units)")
+        raise ArgumentError(
+            f"{table.path}: a row every {step * 1e3:g} ms; from 0.02 to 50 ms can be used (see --units)"
+        )
     gap = int(np.argmax(steps))
     if steps[gap] > 2.5 * step:
         raise ArgumentError(
-            f"{path}:{numbers[gap + 1]}: {steps[gap] * 1e3:g} ms since the row before, usually {step * 1e3:g} ms: "
-            "rows are missing"
+            f"{table.path}:{table.line_of(gap + 1)}: {steps[gap] * 1e3:g} ms since the row before, usually "
+            f"{step * 1e3:g} ms: rows are missing"
         )
-    command = np.full((len(times), 3), np.nan)
-    for k, axis in enumerate(columns.command, start=1):
-        command[:, axis] = table[:, k]
-    actual: Array | None = None
-    if columns.actual:
-        actual = np.full((len(times), 3), np.nan)
-        for k, axis in enumerate(columns.actual, start=1 + len(columns.command)):
-            actual[:, axis] = table[:, k]
-    return ServoLog(str(path), times, command, actual)

@@ -89,7 +89,7 @@ def _add_file_arguments(parser: argparse.ArgumentParser) -> None:
         "--response-column", metavar="NAME", action="append", default=[], help="of a response; may be repeated"
     )
     group.add_argument("--time-unit", metavar="UNIT", default=None, help="s, ms or us")
-    group.add_argument("--force-unit", metavar="UNIT", default=None, help="N, kN or lbf")
+    group.add_argument("--force-unit", metavar="UNIT", default=None, help="N, kN, kgf or lbf")
     group.add_argument("--response-unit", metavar="UNIT", default=None, help="for example m/s^2, g, mm/s or um")
     group.add_argument(
         "--period", metavar="TIME", type=seconds, default=None, help="time between two samples, for example 0.1ms"

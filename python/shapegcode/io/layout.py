@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from shapegcode.errors import RecordError
-from shapegcode.io.units import find_unit, read_label
+from shapegcode.io.columns import tap_label
+from shapegcode.io.units import find_unit
 
 __all__ = [
     "Layout",
@@ -210,7 +211,7 @@ def _uncommented(line: str) -> str:
 
 
 def _labels_known(cells: list[str]) -> int:
-    return sum(read_label(cell).measures is not None for cell in cells)
+    return sum(tap_label(cell).measures is not None for cell in cells)
 
 
 def find_layout(path: Path, head: bytes, by_number: bool) -> Layout:

@@ -54,17 +54,17 @@ class ReadOptions:
                 raise RecordError(f"{name} = {value:g}: must be a number other than 0")
         if self.period_s is not None and self.period_s < 0.0:
             raise RecordError(f"period_s = {self.period_s:g}: must be above 0")
-        for option, text, allowed in (
+        stated: tuple[tuple[str, str | None, tuple[Measured, ...]], ...] = (
             ("time_unit", self.time_unit, ("time",)),
             ("force_unit", self.force_unit, ("force",)),
             ("response_unit", self.response_unit, ("acceleration", "velocity", "displacement")),
-        ):
+        )
+        for option, text, allowed in stated:
             if text is not None and stated_unit(text, allowed) is None:
-                known = "; ".join(units_of(measures) for measures in allowed)  # type: ignore[arg-type]
-                raise RecordError(f"{option} {text!r} is not known: must be one of {known}")
+                raise RecordError(f"{option} {text!r} is not known: must be one of {units_of(*allowed)}")
 
 
-def stated_unit(text: str | None, allowed: tuple[str, ...] | tuple[Measured, ...]) -> Unit | None:
+def stated_unit(text: str | None, allowed: tuple[Measured, ...]) -> Unit | None:
     """The unit of an option, if it is one of the quantities allowed."""
     unit = find_unit(text) if text else None
     return unit if unit is not None and unit.measures in allowed else None

@@ -46,6 +46,6 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
                 f"{path}: not a {kind} file: it begins with {head[:16]!r} instead of {begins}; rename it if it is text "
                 "with columns"
             )
-    from shapegcode.io.table import read_csv
+    from shapegcode.io.taps import read_csv
 
     return read_csv(path, options)

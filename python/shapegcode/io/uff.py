@@ -9,10 +9,11 @@ from typing import Any, Literal
 import numpy as np
 
 from shapegcode.errors import RecordError
+from shapegcode.io.columns import tap_label
 from shapegcode.io.options import ReadOptions, stated_unit
 from shapegcode.io.record import FloatArray, Quantity, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
-from shapegcode.io.units import find_unit, read_label, units_of
+from shapegcode.io.units import find_unit, units_of
 
 __all__ = ["read_uff"]
 
@@ -26,7 +27,8 @@ _FUNCTIONS = {
     12: "spectra",
 }
 _TIME_TYPE = 17
-_MEASURED: dict[int, Literal["force"] | Quantity] = {
+_Measured = Literal["force"] | Quantity
+_MEASURED: dict[int, _Measured] = {
     8: "displacement",
     9: "force",
     11: "velocity",
@@ -43,7 +45,7 @@ class _Channel:
 
     number: int
     header: dict[str, Any]
-    measures: Literal["force"] | Quantity
+    measures: _Measured
     axis: str | None
     period_s: float
     start_s: float
@@ -147,7 +149,7 @@ class _File:
             values=np.asarray(values * (factor if direction >= 0 else -factor), dtype=np.float64),
         )
 
-    def _measures(self, where: str, data: dict[str, Any]) -> Literal["force"] | Quantity:
+    def _measures(self, where: str, data: dict[str, Any]) -> _Measured:
         code = int(data["ordinate_spec_data_type"])
         unit = find_unit(str(data.get("ordinate_axis_units_lab", "")))
         by_unit = unit.measures if unit is not None and unit.measures != "time" else None
@@ -158,10 +160,10 @@ class _File:
                     f"{by_unit}: must agree"
                 )
             return _MEASURED[code]
-        if by_unit is not None:
+        if by_unit is not None and by_unit != "torque":
             return by_unit
         for text in (data.get("ordinate_axis_lab", ""), data.get("id1", ""), data.get("id2", "")):
-            measures = read_label(str(text)).measures
+            measures = tap_label(str(text)).measures
             if measures in ("force", "acceleration", "velocity", "displacement"):
                 return measures
             if measures == "response" and self.options.quantity:
@@ -174,7 +176,7 @@ class _File:
             "(force), 12 (acceleration), 11 (velocity) or 8 (displacement), or a unit"
         )
 
-    def _factor(self, where: str, data: dict[str, Any], measures: str, units: dict[str, Any]) -> float:
+    def _factor(self, where: str, data: dict[str, Any], measures: _Measured, units: dict[str, Any]) -> float:
         options = self.options
         force = measures == "force"
         scale = options.force_scale if force else options.response_scale
@@ -197,7 +199,7 @@ class _File:
         if system is not None:
             return system
         if text.upper() not in {"", "NONE"}:
-            known = units_of(measures)  # type: ignore[arg-type]
+            known = units_of(measures)
             raise RecordError(
                 f"{where}: the unit {text!r} of the {measures} is not known and there is no dataset 164; needed is one "
                 f"of {known}, or a scale (--force-scale, --response-scale)"

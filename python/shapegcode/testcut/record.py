@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,16 +9,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode._core import ArgumentError
-from shapegcode.io.layout import (
-    Layout,
-    cells_of,
-    find_layout,
-    is_number,
-    utf8_text,
-    without_thousands,
-)
+from shapegcode.errors import ArgumentError
+from shapegcode.io.columns import Meaning, read_label, unit_of
 from shapegcode.io.sampling import UnevenTimeError, even_period
+from shapegcode.io.table import TextTable
+from shapegcode.io.units import Measured, factor_between
 
 __all__ = ["FORCES_ON", "ForceRecord", "read_forces"]
 
@@ -28,20 +21,14 @@ Array = npt.NDArray[np.float64]
 
 FORCES_ON = ("workpiece", "tool")
 _EXAMPLE = "time_s,fx_n,fy_n"
-_UNITS = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
-    "position": {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "m": 1000.0},
-    "depth": {"mm": 1.0, "um": 1e-3, "µm": 1e-3},
-    "feed": {"mm/min": 1.0, "mm_per_min": 1.0, "mm/s": 60.0, "mm_per_s": 60.0},
-    "force": {"n": 1.0, "kn": 1000.0, "kgf": 9.80665, "lbf": 4.4482216152605},
-    "torque": {"nm": 1.0, "n·m": 1.0, "n m": 1.0, "n_m": 1.0, "ncm": 0.01},
-}
-#: Quantity, and the names under which its column goes (without the unit).
-_NAMES = (
+#: Unit of `ForceRecord`, and of a column that states none.
+_UNITS = {"time": "s", "displacement": "mm", "velocity": "mm/min", "force": "N", "torque": "N·m"}
+#: Quantity, its kind, and the names under which its column goes (without the unit).
+_NAMES: tuple[tuple[str, Measured, str], ...] = (
     ("time", "time", r"time|t|zeit|timestamp"),
-    ("position", "position", r"position|pos|x|s|distance|way"),
-    ("radial_depth", "depth", r"radial[ _]?depth|rd|ae|a_e"),
-    ("feed", "feed", r"feed|f|vf|v_f|feed[ _]?rate"),
+    ("position", "displacement", r"position|pos|x|s|distance|way"),
+    ("radial_depth", "displacement", r"radial[ _]?depth|rd|ae|a_e"),
+    ("feed", "velocity", r"feed|f|vf|v_f|feed[ _]?rate"),
     ("fx", "force", r"f_?x|force[ _]?x|x[ _]?force"),
     ("fy", "force", r"f_?y|force[ _]?y|y[ _]?force"),
     ("torque", "torque", r"torque|m_?z|moment"),
@@ -75,41 +62,34 @@ class ForceRecord:
         return len(self.force_n)
 
 
-def _quantity(cell: str) -> tuple[str, float | None, str] | None:
-    """Name of the quantity, factor of its unit (None: none is stated), kind of unit; None for another column."""
-    text = cell.strip().lower().replace("μ", "µ")
-    for name, kind, pattern in _NAMES:
-        found = re.fullmatch(rf"(?:{pattern})(?:[\s_]*[\[(]?\s*([^\[\]()]*?)\s*[\])]?)?", text)
-        if found is None:
-            continue
-        unit = (found[1] or "").strip(" _")
-        if not unit:
-            return name, None, kind
-        if unit in _UNITS[kind]:
-            return name, _UNITS[kind][unit], kind
-    return None
+def _names(name: str) -> Meaning | None:
+    """What a name stands for; None: another column."""
+    plain = name.strip(" _").lower()
+    return next((Meaning(what, kind) for what, kind, pattern in _NAMES if re.fullmatch(pattern, plain)), None)
 
 
-def _columns(path: Path, layout: Layout) -> dict[str, tuple[int, float]]:
-    units = [*layout.units, *[""] * layout.columns]
+def _columns(table: TextTable) -> dict[str, tuple[int, float]]:
+    """Index of each quantity's column, and the factor to the unit of `ForceRecord`."""
     found: dict[str, tuple[int, float]] = {}
-    for index, cell in enumerate(layout.header):
-        meant = _quantity(cell) or _quantity(f"{cell} {units[index]}")
-        if meant is None:
+    for index, label in enumerate(table.labels(lambda text, unit: read_label(text, unit, _names))):
+        if label.meaning is None:
             continue
-        name, factor, kind = meant
-        if name in found:
-            raise ArgumentError(f"{path}:{layout.header_line}: two columns of {name}: {cell!r} is one too many")
-        stated = _UNITS[kind].get(units[index].strip(" []()").lower()) if factor is None else factor
-        found[name] = (index, 1.0 if stated is None else stated)
+        what = label.meaning.what
+        kind = next(kind for name, kind, _ in _NAMES if name == what)
+        if kind != "force" and (label.unknown_unit or (label.unit is not None and label.unit.measures != kind)):
+            continue  # a signal of something else under a short name: "x [V]"
+        unit = unit_of(table.where, label, (kind,))
+        if what in found:
+            raise ArgumentError(f"{table.where}: two columns of {what}: {label.text!r} is one too many")
+        found[what] = (index, 1.0 if unit is None else factor_between(unit, _UNITS[kind]))
     missing = [name for name in ("fx", "fy") if name not in found]
     if not missing and not {"time", "position", "radial_depth"} & set(found):
         missing = ["time, position or radial_depth"]
     if missing:
         raise ArgumentError(
-            f"{path}:{layout.header_line or 1}: no column of {' and '.join(missing)}; the header is "
-            f"{', '.join(layout.header)[:80] or 'missing'!r}; wanted for example {_EXAMPLE}, position_mm,fx_n,fy_n or "
-            "radial_depth_mm,fx_n,fy_n"
+            f"{table.where}: no column of {' and '.join(missing)}; the header is "
+            f"{', '.join(table.layout.header)[:80] or 'missing'!r}; wanted for example {_EXAMPLE}, "
+            "position_mm,fx_n,fy_n or radial_depth_mm,fx_n,fy_n"
         )
     return found
 
@@ -126,26 +106,22 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
         OSError: the file cannot be read.
     """
     path = Path(path)
-    data = utf8_text(path)
-    layout = find_layout(path, data, False)
-    columns = _columns(path, layout)
-    body = data.split(b"\n", layout.first_row - 1)[-1]
-    table = _numbers(path, body, layout, [index for index, _ in columns.values()])
-    values = {name: table[:, k] * factor for k, (name, (_, factor)) in enumerate(columns.items())}
-    if len(table) < _FEWEST_ROWS:
-        raise ArgumentError(f"{path}: {len(table)} rows: too few; needed are at least {_FEWEST_ROWS}")
+    table = TextTable(path)
+    columns = _columns(table)
+    numbers = table.numbers([index for index, _ in columns.values()], _FEWEST_ROWS)
+    values = {name: numbers[:, k] * factor for k, (name, (_, factor)) in enumerate(columns.items())}
     sign = -1.0 if on == "workpiece" else 1.0
     time = values.get("time")
     if time is not None:
         try:
             period, _ = even_period(time)
         except UnevenTimeError as error:
-            raise ArgumentError(f"{path}:{layout.first_row + error.row}: {error}") from error
+            raise ArgumentError(f"{path}:{table.line_of(error.row)}: {error}") from error
         time = time[0] + period * np.arange(len(time))
     position = values.get("position")
     if position is not None and "radial_depth" not in values and np.any(np.diff(position) < 0.0):
         row = int(np.argmax(np.diff(position) < 0.0)) + 1
-        raise ArgumentError(f"{path}:{layout.first_row + row}: the position goes back: one pass per file, along +X")
+        raise ArgumentError(f"{path}:{table.line_of(row)}: the position goes back: one pass per file, along +X")
     return ForceRecord(
         str(path),
         sign * np.column_stack([values["fx"], values["fy"]]),
@@ -155,34 +131,3 @@ def read_forces(path: str | Path, *, on: str = "workpiece") -> ForceRecord:
         values.get("radial_depth"),
         values.get("feed"),
     )
-
-
-def _numbers(path: Path, body: bytes, layout: Layout, used: list[int]) -> Array:
-    text = without_thousands(body).replace(b",", b".") if layout.decimal_comma else body
-    try:
-        table = np.loadtxt(
-            io.BytesIO(text),
-            delimiter=None if layout.delimiter == " " else layout.delimiter,
-            usecols=used,
-            comments="#",
-            quotechar='"' if b'"' in text else None,
-            ndmin=2,
-            encoding="latin-1",
-        )
-    except (ValueError, IndexError) as error:
-        raise ArgumentError(_bad_cell(path, body, layout, used) or f"{path}: {error}") from error
-    if not np.isfinite(table).all():
-        raise ArgumentError(_bad_cell(path, body, layout, used))
-    return np.asarray(table, dtype=np.float64)
-
-
-def _bad_cell(path: Path, body: bytes, layout: Layout, used: list[int]) -> str:
-    for number, raw in enumerate(body.split(b"\n"), start=layout.first_row):
-        line = raw.decode("latin-1").partition("#")[0]
-        cells = cells_of(line.strip(), layout.delimiter)
-        for index in used if line.strip() else ():
-            cell = cells[index] if index < len(cells) else ""
-            plain = cell.replace(",", ".") if layout.decimal_comma else cell
-            if not (is_number(cell, layout.decimal_comma) and math.isfinite(float(plain))):
-                return f"{path}:{number}: column {index + 1} ({layout.header[index]}): {cell!r} is not a finite number"
-    return ""

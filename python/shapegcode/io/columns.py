@@ -1,0 +1,209 @@
+"""What the label of a column or channel says: its unit, and by the names of the kind of file, what it measures.
+
+`read_label` divides every label in the same way: ``Acc_X [m/s^2]``, ``time_ms``, ``Kraft / N``, or a name with its unit
+in the row below. What the names mean differs: ``x`` is an acceleration along X in a tap file, a position in a record of
+forces. So each kind of file brings its own `meaning`; that of tap files is here, since universal files share it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from shapegcode.errors import RecordError
+from shapegcode.io.units import Measured, Unit, find_unit, is_foreign_unit, units_of
+
+__all__ = ["Label", "Meaning", "Names", "read_label", "tap_label", "unit_of", "words_of"]
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a name stands for.
+
+    Attributes:
+        what: the quantity under the name that the reader of the file gives it, such as "fx".
+        measures: its kind; "response" for a response of unknown kind.
+        axis: "x", "y" or "z"; None: no axis.
+    """
+
+    what: str
+    measures: Measured | Literal["response"]
+    axis: str | None = None
+
+
+Names = Callable[[str], Meaning | None]
+"""The names of one kind of file: a name without its unit to what it stands for; None: another column."""
+
+
+@dataclass(frozen=True)
+class Label:
+    """What a column's or a channel's label says.
+
+    Attributes:
+        text: the label.
+        meaning: None where it says nothing.
+        unit: where it is known.
+        unknown_unit: text where a unit stands that is not known.
+    """
+
+    text: str
+    meaning: Meaning | None
+    unit: Unit | None
+    unknown_unit: str = ""
+
+    @property
+    def measures(self) -> Measured | Literal["response"] | None:
+        """Kind of the quantity; None where the label says nothing."""
+        return None if self.meaning is None else self.meaning.measures
+
+    @property
+    def axis(self) -> str | None:
+        """ "x", "y" or "z"; None: no axis."""
+        return None if self.meaning is None else self.meaning.axis
+
+
+def words_of(name: str) -> list[str]:
+    """The words of a name, in lower case."""
+    return re.findall(r"[^\W\d_]+", name.lower())
+
+
+def read_label(text: str, unit_text: str, names: Names) -> Label:
+    """Read a label.
+
+    Args:
+        text: the label.
+        unit_text: what a row of units below it says; empty: there is none.
+        names: of the kind of file.
+    """
+    if text.strip().lower() in {"x_value", "x value"}:  # LabVIEW's name of the time, which it writes in seconds
+        return Label(text, Meaning("time", "time"), find_unit(unit_text or "s"))
+    name, unit, unknown = _split_unit(text, names)
+    if unit_text.strip(" []()-"):
+        unit = find_unit(unit_text)
+        unknown = "" if unit else unit_text.strip()
+    return Label(text.strip(), names(name), unit, unknown)
+
+
+def _split_unit(text: str, names: Names) -> tuple[str, Unit | None, str]:
+    """(name, unit, text of an unknown unit) of a label."""
+    if names(text) is None and not _is_in(text) and (unit := find_unit(text)):
+        return "", unit, ""
+    unknown = ""
+    name = text
+    for match in re.finditer(r"[\[({<]([^\[\](){}<>]*)[\])}>]", text):
+        inner = match[1].strip()
+        if inner.lower() in {"x", "y", "z"} or inner.isdigit() or (len(inner) > 1 and _is_name(inner, names)):
+            continue
+        name = name.replace(match[0], " ")
+        if unit := find_unit(inner):
+            return name.rstrip(" /"), unit, ""
+        unknown = inner or unknown
+    if unknown:
+        return name, None, unknown
+    for split in re.finditer(r"[_ ,/]+", text):
+        head, tail = text[: split.start()], text[split.end() :]
+        if head and (unit := find_unit(tail)) and not (_is_in(tail) and _kind(head, names) != unit.measures):
+            return re.sub(r" in$", "", head), unit, ""
+    for split in re.finditer(r"[_ ,/.:-]+", text):
+        head, tail = text[: split.start()], text[split.end() :].strip()
+        kind = _kind(head, names)
+        # "x_v" is the velocity along X, "x_V" a response in V.
+        named = kind == "response" and _is_name(tail, names) and tail != "V"
+        if kind is not None and is_foreign_unit(tail, kind) and not named:
+            return head, None, tail
+    head, found, tail = text.partition("/")
+    if found and head and words_of(tail) != [tail.strip().lower()]:
+        return head, None, tail.strip()
+    return text, None, ""
+
+
+def _is_in(text: str) -> bool:
+    """Whether it is "in": inches behind a way, else a word."""
+    return text.strip().lower() == "in"
+
+
+def _kind(name: str, names: Names) -> str | None:
+    found = names(name)
+    return None if found is None else found.measures
+
+
+def _is_name(text: str, names: Names) -> bool:
+    """Whether it is one word, and a name."""
+    return words_of(text) == [text.lower()] and names(text) is not None and find_unit(text) is None
+
+
+def unit_of(where: str, label: Label, allowed: tuple[Measured, ...], remedy: str = "") -> Unit | None:
+    """The unit that a label states for a quantity; None: it states none.
+
+    Args:
+        where: file and line, for messages.
+        label: of the column.
+        allowed: kinds of quantity that the column may hold.
+        remedy: what else the user can do, for messages.
+
+    Raises:
+        RecordError: a unit that is not known, or one of another quantity.
+    """
+    needed = f"needed is one of {units_of(*allowed)}"
+    if label.unit is None and label.unknown_unit:
+        raise RecordError(
+            f"{where}: {label.text!r}: the unit {label.unknown_unit!r} is not known; {needed}"
+            + (f"; {remedy}" if remedy else "")
+        )
+    if label.unit is not None and label.unit.measures not in allowed:
+        raise RecordError(
+            f"{where}: {label.text!r} has the unit {label.unit.name} of {label.unit.measures}, it should be "
+            f"{' or '.join(allowed)}: name and unit must agree; {needed}"
+        )
+    return label.unit
+
+
+# --- the names in records of taps and decays --------------------------------------------------------------------------
+
+_NAMES: dict[str, Measured] = {}
+for _measures, _words in {
+    "time": "t time zeit timestamp",
+    "force": "f force kraft hammer",
+    "acceleration": "a acc accel acceleration accelerometer beschleunigung",
+    "velocity": "v vel velocity geschwindigkeit",
+    "displacement": "d u disp displacement weg deflection auslenkung",
+}.items():
+    _NAMES |= dict.fromkeys(_words.split(), _measures)  # type: ignore[arg-type]
+_ORDER: tuple[Measured, ...] = ("time", "force", "acceleration", "velocity", "displacement")
+_WEAK_FORCE = {"impact", "excitation", "anregung"}
+_RESPONSE = {"response", "antwort"}
+_WITH_AXIS = re.compile(r"(a|acc|accel|acceleration|v|vel|velocity|d|u|disp|displacement|f|force)([xyz])")
+
+
+def tap_label(text: str, unit_text: str = "") -> Label:
+    """Read a label of a tap file: where its name says nothing, or "response" only, its unit says what it is.
+
+    Args:
+        text: the label.
+        unit_text: what a row of units below it says; empty: there is none.
+    """
+    label = read_label(text, unit_text, _tap_names)
+    if label.unit is None or label.measures not in {None, "response"}:
+        return label
+    return replace(label, meaning=Meaning(label.unit.measures, label.unit.measures, label.axis))
+
+
+def _tap_names(name: str) -> Meaning | None:
+    """The names of time, force and responses in English and German, alone or among other words."""
+    words = words_of(name)
+    axis = next((word for word in words if word in {"x", "y", "z"}), None)
+    found: list[Measured] = []
+    for word in words:
+        if word in _NAMES:
+            found.append(_NAMES[word])
+        elif joined := _WITH_AXIS.fullmatch(word):
+            found.append(_NAMES[joined[1]])
+            axis = axis or joined[2]
+    measures: Measured | Literal["response"] | None = next((each for each in _ORDER if each in found), None)
+    if measures is None:
+        strong = bool(_RESPONSE & set(words))
+        weak = bool(_WEAK_FORCE & set(words))
+        measures = "response" if strong else "force" if weak else "response" if axis else None
+    return None if measures is None else Meaning(measures, measures, axis)

@@ -1,0 +1,247 @@
+"""Reads records of taps and decays from text files with columns: which column is the time, the force, the response."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from shapegcode.errors import RecordError
+from shapegcode.io.columns import Label, tap_label, unit_of
+from shapegcode.io.layout import is_clock_time
+from shapegcode.io.options import ReadOptions, stated_unit
+from shapegcode.io.record import UNITS, Quantity, Record
+from shapegcode.io.sampling import UnevenTimeError, even_period
+from shapegcode.io.table import TextTable
+from shapegcode.io.units import Measured, Unit
+
+__all__ = ["read_csv"]
+
+_EXAMPLE = "time_s,force_N,acc_m/s^2"
+_RESPONSES: tuple[Quantity, ...] = ("acceleration", "velocity", "displacement")
+_REMEDY = "state the unit, or the scale of a signal in volts (--force-scale, --response-scale)"
+#: Fewer samples are no record of a vibration.
+_FEWEST_ROWS = 16
+
+
+@dataclass(frozen=True)
+class _Column:
+    index: int
+    label: Label
+    factor: float
+    quantity: Quantity = "acceleration"
+
+
+class _Chooser:
+    """Chooses the columns of one file."""
+
+    def __init__(self, table: TextTable, options: ReadOptions) -> None:
+        self.table, self.options = table, options
+        self.labels = table.labels(tap_label)
+        self.where = table.where
+        self.warnings: list[str] = []
+
+    def _named(self, wanted: str, option: str) -> int:
+        """Index of the column that an option names."""
+        path, columns = self.table.path, self.table.layout.columns
+        if wanted.strip().isdigit():
+            number = int(wanted)
+            if not 1 <= number <= columns:
+                raise RecordError(f"{path}: {option} {number}: the file has columns 1 to {columns}")
+            return number - 1
+        plain = wanted.strip().lower()
+        found = [index for index, label in enumerate(self.labels) if label.text.lower() == plain]
+        found = found or [index for index, label in enumerate(self.labels) if label.text.lower().startswith(plain)]
+        if len(found) != 1:
+            what = "no column has" if not found else f"{len(found)} columns have"
+            line = self.table.layout.header_line
+            raise RecordError(f"{path}:{line}: {option} {wanted!r}: {what} this name; {self._listed()}")
+        return found[0]
+
+    def _listed(self) -> str:
+        return "the header names " + ", ".join(repr(label.text) for label in self.labels if label.text)
+
+    def _name(self, index: int) -> str:
+        text = self.labels[index].text
+        return repr(text) if text else f"column {index + 1}"
+
+    def _factor(self, index: int, measures: Literal["time", "force"], option_unit: str | None) -> float:
+        """To s or N."""
+        unit = self._unit(index, (measures,), option_unit)
+        if unit is None and measures == "force":
+            self.warnings.append(f"{self._name(index)} has no unit: N is taken")
+        return 1.0 if unit is None else unit.factor
+
+    def _unit(self, index: int, allowed: tuple[Measured, ...], option_unit: str | None) -> Unit | None:
+        label = self.labels[index]
+        if option_unit is not None:
+            label = replace(label, unit=stated_unit(option_unit, allowed))
+        return unit_of(self.where, replace(label, text=label.text or f"column {index + 1}"), allowed, _REMEDY)
+
+    def _response(self, index: int) -> _Column:
+        """A column of a response, its quantity by option, name or unit."""
+        options, label = self.options, self.labels[index]
+        said = next((each for each in _RESPONSES if each == label.measures), None)
+        quantity = options.quantity or said
+        if options.response_scale is not None:
+            return _Column(index, label, options.response_scale, quantity or "acceleration")
+        bound = options.quantity or (None if options.response_unit else said)
+        unit = self._unit(index, _RESPONSES if bound is None else (bound,), options.response_unit)
+        if unit is None:
+            quantity = quantity or "acceleration"
+            self.warnings.append(f"{self._name(index)} has no unit: {UNITS[quantity]} is taken")
+            return _Column(index, label, 1.0, quantity)
+        return _Column(index, label, unit.factor, next(each for each in _RESPONSES if each == unit.measures))
+
+    def time(self) -> _Column | None:
+        """The column of the time; None: there is none, and a period is stated."""
+        options = self.options
+        if options.time_column is not None:
+            index = self._named(options.time_column, "--time-column")
+        else:
+            found = [k for k, label in enumerate(self.labels) if label.measures == "time"]
+            if not found:
+                if options.period_s is not None or self.table.layout.period_s is not None:
+                    return None
+                raise RecordError(
+                    f"{self.where}: no column of time; {self._listed()}; needed is one called time (or t, Zeit), "
+                    "--time-column, or the period (--period)"
+                )
+            index = found[0]
+            if len(found) > 1:
+                self.warnings.append(f"{len(found)} columns of time: {self.labels[index].text!r} is used")
+        return _Column(index, self.labels[index], self._factor(index, "time", options.time_unit))
+
+    def force(self) -> _Column | None:
+        """The column of the force; None: there is none, a free decay."""
+        options = self.options
+        if options.ignore_force:
+            return None
+        if options.force_column is not None:
+            index = self._named(options.force_column, "--force-column")
+        else:
+            found = [k for k, label in enumerate(self.labels) if label.measures == "force"]
+            if len(found) > 1 and options.axis:
+                found = [k for k in found if self.labels[k].axis in {options.axis, None}]
+            if not found:
+                return None
+            if len(found) > 1:
+                names = ", ".join(repr(self.labels[k].text) for k in found)
+                raise RecordError(f"{self.where}: {len(found)} columns of force, {names}: choose with --force-column")
+            index = found[0]
+        scale = options.force_scale
+        return _Column(
+            index, self.labels[index], self._factor(index, "force", options.force_unit) if scale is None else scale
+        )
+
+    def responses(self, taken: set[int]) -> list[_Column]:
+        """The columns of the response, one per axis."""
+        options = self.options
+        if options.response_columns:
+            found = [self._named(name, "--response-column") for name in options.response_columns]
+        else:
+            kinds = {"response", *_RESPONSES}
+            found = [k for k, label in enumerate(self.labels) if label.measures in kinds and k not in taken]
+            if options.axis is not None:
+                named = [k for k in found if self.labels[k].axis is not None]
+                chosen = [k for k in named if self.labels[k].axis == options.axis]
+                if named and not chosen:
+                    axes = ", ".join(sorted({self.labels[k].axis or "" for k in named}))
+                    raise RecordError(
+                        f"{self.where}: --axis {options.axis}: the responses are along {axes}; {self._listed()}"
+                    )
+                found = chosen or found
+        if not found:
+            raise RecordError(
+                f"{self.where}: no column of a response; {self._listed()}; needed is an acceleration, velocity "
+                f"or displacement, as in {_EXAMPLE!r}, or --response-column"
+            )
+        columns = [self._response(k) for k in found]
+        self._refuse_mixed(columns)
+        return columns
+
+    def _refuse_mixed(self, columns: list[_Column]) -> None:
+        quantities = sorted({column.quantity for column in columns})
+        names = ", ".join(repr(column.label.text or f"column {column.index + 1}") for column in columns)
+        if len(quantities) > 1:
+            raise RecordError(
+                f"{self.where}: the responses {names} are {' and '.join(quantities)}: must be one quantity; choose "
+                "with --response-column or --axis"
+            )
+        axes = [column.label.axis for column in columns]
+        if len(set(axes)) < len(axes) and not self.options.response_columns:
+            raise RecordError(
+                f"{self.where}: {len(columns)} responses, {names}, and not one for each of the axes x, y, z: choose "
+                "with --response-column or --axis"
+            )
+
+
+def read_csv(path: Path, options: ReadOptions) -> list[Record]:
+    """Read a text file with columns.
+
+    Returns:
+        One record per response column.
+
+    Raises:
+        RecordError: what was found and what is needed, with line and text of the cell.
+        OSError: the file cannot be read.
+    """
+    named = (options.time_column, *options.response_columns)
+    by_number = bool(options.response_columns) and all(name is None or name.strip().isdigit() for name in named)
+    table = TextTable(path, by_number=by_number)
+    layout, reader = table.layout, _Chooser(table, options)
+    if layout.skipped:
+        lines = "line" if layout.skipped == 1 else "lines"
+        reader.warnings.append(
+            f"note: {path}: {layout.skipped} {lines} before the header in line {layout.header_line} left out"
+        )
+    time = reader.time()
+    force = reader.force()
+    taken = {column.index for column in (time, force) if column is not None}
+    responses = reader.responses(taken)
+    if time is not None and options.period_s is not None and is_clock_time(table.first_cell(time.index)):
+        reader.warnings.append(
+            f"note: {path}: {time.label.text!r} holds times of the day, which are not read: the stated period of "
+            f"{options.period_s:.6g} s is taken"
+        )
+        time = None
+    columns = [column for column in (time, force, *responses) if column is not None]
+    values = table.numbers([column.index for column in columns], _FEWEST_ROWS)
+    stated = options.period_s if options.period_s is not None else layout.period_s
+    start_s = 0.0
+    if time is None:
+        assert stated is not None
+        period = stated
+        if options.period_s is None:
+            reader.warnings.append(f"no column of time: the preamble's {1.0 / period:.9g} samples per second are taken")
+    else:
+        times = values[:, 0] * time.factor
+        try:
+            period, notes = even_period(times, stated)
+        except UnevenTimeError as error:
+            raise RecordError(f"{path}:{table.line_of(error.row)}: {error}") from error
+        reader.warnings += notes
+        start_s = float(times[0])
+        if time.label.unit is None and options.time_unit is None:
+            reader.warnings.append(f"the time has no unit: s is taken, {1.0 / period:.6g} samples per second")
+    at = 0 if time is None else 1
+    force_n = None
+    if force is not None:
+        force_n = np.ascontiguousarray(values[:, at] * force.factor)
+        at += 1
+    several = len(responses) > 1
+    return [
+        Record(
+            source=f"{path} {column.label.text}" if several else str(path),
+            period_s=period,
+            response=np.ascontiguousarray(values[:, at + k] * column.factor),
+            quantity=column.quantity,
+            force_n=force_n,
+            axis=column.label.axis or (options.axis if not several else None),
+            start_s=start_s,
+            warnings=tuple(reader.warnings),
+        )
+        for k, column in enumerate(responses)
+    ]
