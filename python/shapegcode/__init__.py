@@ -78,7 +78,7 @@ if TYPE_CHECKING:
     from shapegcode.errors import RoundTripError as RoundTripError
     from shapegcode.errors import StockError as StockError
     from shapegcode.errors import ToolError as ToolError
-    from shapegcode.feed.schedule import FeedSchedule as FeedSchedule
+    from shapegcode.feed.result import FeedSchedule as FeedSchedule
     from shapegcode.feed.schedule import schedule_feed as schedule_feed
     from shapegcode.feed.shaped import ScheduledConversion as ScheduledConversion
     from shapegcode.feed.shaped import convert_scheduled as convert_scheduled
@@ -134,7 +134,8 @@ _HOME = {
     "ReadOptions": "io.read",
     "Record": "io.record",
     "identify": "identification.identify",
-    **dict.fromkeys(("FeedSchedule", "schedule_feed"), "feed.schedule"),
+    "FeedSchedule": "feed.result",
+    "schedule_feed": "feed.schedule",
     **dict.fromkeys(("ScheduledConversion", "convert_scheduled"), "feed.shaped"),
     "Stock": "cutting.stock",
     "Tool": "cutting.tool",

@@ -25,7 +25,8 @@ from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
 from shapegcode.demos.corner_study import CASES, CornerCase, CornerStudy, study_corner
 from shapegcode.feed.plan import limits_of, milling_force
-from shapegcode.feed.schedule import MARGIN, FeedSchedule, schedule_feed
+from shapegcode.feed.result import FeedSchedule
+from shapegcode.feed.schedule import MARGIN, schedule_feed
 from shapegcode.feed.survey import SurveyedRegion, survey
 from shapegcode.feed.travel import OrdinaryMotion
 from shapegcode.machine import Machine
@@ -47,7 +48,7 @@ def corner(case: CornerCase, machine: Machine) -> dict[str, Any]:
     scheduled, target = study.scheduled, float(study.programmed.peak_n[0])
     return {
         "limit_n": target,
-        "peak_n": float(scheduled.result.report["resultant_force_n"]["after"]["max"]),
+        "peak_n": float(scheduled.result.resultant_force_n.emitted.max),
         "finer_peak_n": float(scheduled.along.peak_n.max()),
         "share_within_5_percent": study.share_within(),
         "share_possible": _share_possible(study),
@@ -103,18 +104,18 @@ def pocket(machine: Machine, samples: int) -> dict[str, Any]:
     times = [cycle_time(each, machine).cycle_time_s for each in (written, Program.from_text(text, machine))]
     return {
         "limit_n": limit,
-        "peak_n": float(result.report["resultant_force_n"]["after"]["max"]),
-        "programmed_peak_n": float(result.report["resultant_force_n"]["before"]["max"]),
+        "peak_n": float(result.resultant_force_n.emitted.max),
+        "programmed_peak_n": float(result.resultant_force_n.original.max),
         **_finer(written, machine, tool, stock),
         **_brute_force(written, machine, tool, stock, samples),
         **_shares(result, limit),
         "time_s": times[0],
         "constant_feed_mm_per_min": constant,
         "constant_time_s": times[1],
-        "programmed_time_s": result.report["cycle_time_s"]["before"],
-        "air_time_s": result.report["air_time_s"]["after"],
+        "programmed_time_s": result.cycle_time_s.original,
+        "air_time_s": result.air_time_s.emitted,
         "gain_percent": 100.0 * (1.0 - times[0] / times[1]),
-        "warnings": result.report["warnings"],
+        "warnings": result.warnings,
     }
 
 
@@ -144,8 +145,8 @@ def _shares(result: FeedSchedule, limit: float) -> dict[str, float]:
         assert load is not None
         assert part.track is not None
         length = np.diff(load.s_mm, prepend=0.0)
-        material = load.after.peak_resultant_n > 0.0
-        close = load.after.peak_resultant_n >= 0.95 * limit
+        material = load.emitted.peak_resultant_n > 0.0
+        close = load.emitted.peak_resultant_n >= 0.95 * limit
         total += float(length[material].sum())
         near += float(length[material & close].sum())
         otherwise += float(length[material & ~close & (plan.holds != "resultant")].sum())

@@ -21,7 +21,8 @@ from judge.interpreter import interpret
 from judge.milling_programs import Case, limits_toml, random_case
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
-from shapegcode.feed.schedule import FeedSchedule, schedule_feed
+from shapegcode.feed.result import FeedSchedule
+from shapegcode.feed.schedule import schedule_feed
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 
@@ -86,12 +87,12 @@ def judged(
         Program.from_text(case.program, machine), machine, Tool.from_toml(tool), Stock.from_toml(case.stock_toml)
     )
     verdict = judge(
-        case, result.text.decode(), result.report, met, forces, control, mean=mean, most_feed=raised or math.inf,
+        case, result.text.decode(), result.to_dict(), met, forces, control, mean=mean, most_feed=raised or math.inf,
         raised=raised > 0.0,
     )  # fmt: skip
     ceiling = min(raised, control.most_feed) if raised else feed
     constant = constant_feed_time(met, forces, case.limits, mean, ceiling)
-    return Judged(case, result, verdict, met, forces, constant / verdict.after["time"])
+    return Judged(case, result, verdict, met, forces, constant / verdict.emitted["time"])
 
 
 def assert_good(of: Judged, *, near: float) -> None:
@@ -103,15 +104,15 @@ def assert_good(of: Judged, *, near: float) -> None:
     if of.verdict.limited_share > 0.05:
         assert of.verdict.near_share >= near
     assert of.gain >= 1.0 - 1e-3
-    for when in ("before", "after"):
-        reported, own = of.result.report["resultant_force_n"][when], getattr(of.verdict, when)
-        assert reported["mean"] == pytest.approx(own["mean"], rel=0.02)
+    for when in ("original", "emitted"):
+        reported, own = getattr(of.result.resultant_force_n, when), getattr(of.verdict, when)
+        assert reported.mean == pytest.approx(own["mean"], rel=0.02)
         # A bound from above where the feed changes within a step of the engagement; of a look-ahead the judge takes the
         # F word at once, without acceleration.
-        assert -0.03 <= reported["max"] / own["max"] - 1.0 <= 0.12
-    blocks = of.result.report["blocks"]
-    assert blocks["before"] == sum(1 for move in interpret(of.case.program).moves if move.is_cut and move.length > 0.0)
-    assert blocks["after"] == sum(
+        assert -0.03 <= reported.max / own["max"] - 1.0 <= 0.12
+    blocks = of.result.blocks
+    assert blocks.original == sum(1 for move in interpret(of.case.program).moves if move.is_cut and move.length > 0.0)
+    assert blocks.emitted == sum(
         1 for move in interpret(of.result.text.decode()).moves if move.is_cut and move.length > 0.0
     )
 

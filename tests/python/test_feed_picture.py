@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -12,11 +13,18 @@ import pytest
 from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
-from shapegcode.feed.plots import write_feed_pictures
-from shapegcode.feed.schedule import FeedSchedule, schedule_feed
-from shapegcode.feed.traces import LOADS, envelope, feed_traces, groups, wall_maps
+from shapegcode.feed.load import LOADS
+from shapegcode.feed.plots import plot_along_path, plot_path, plot_walls, plots_of
+from shapegcode.feed.result import FeedSchedule
+from shapegcode.feed.schedule import schedule_feed
+from shapegcode.feed.traces import envelope, groups
 from shapegcode.machine import Machine
-from shapegcode.results import plot as canvas
+from shapegcode.results import plot
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.axes import Axes
 
 FEED = Path(__file__).parents[1] / "golden" / "feed"
 
@@ -47,42 +55,43 @@ def test_groups_hold_every_station_once_and_envelopes_lose_nothing() -> None:
 
 
 def test_traces_are_those_of_the_regions_in_a_row(pocket: FeedSchedule) -> None:
-    traces = feed_traces(pocket)
+    traces = pocket.traces
+    assert traces is not None
     regions = [part for part in pocket.survey.regions if part.track is not None]
     assert traces.distance_mm[-1] == pytest.approx(sum(part.region.path.length_mm for part in regions), rel=1e-9)
     assert traces.length_mm.sum() == pytest.approx(traces.distance_mm[-1], rel=1e-12)
     assert len(traces.begins) == len(regions) == 3
     assert traces.xy_mm[traces.begins[1]] == pytest.approx([22.3, 22.3], abs=0.5)
-    feeds = traces.feed_mm_per_min
-    assert set(np.round(feeds["programmed"], 6)) == {300.0, 1500.0, 2000.0}
+    assert set(np.round(traces.programmed_mm_per_min, 6)) == {300.0, 1500.0, 2000.0}
     # What is written stands in the text.
     words = {float(word) for word in re.findall(rb"F([0-9.]+)", pocket.text)}
-    assert set(np.round(feeds["written"], 6)) <= words
-    assert (feeds["after"] <= feeds["written"].max() * (1.0 + 1e-9)).all()
-    assert set(traces.before) == set(traces.after) == set(LOADS)
+    assert set(np.round(traces.written_mm_per_min, 6)) <= words
+    assert (traces.load.emitted.feed_mm_per_min <= traces.written_mm_per_min.max() * (1.0 + 1e-9)).all()
+    assert {len(getattr(traces.load.original, name)) for name in LOADS} == {len(traces)}
     assert (traces.limit["peak_resultant_n"] == 100.0).all()
     assert np.isinf(traces.limit["mean_power_w"]).all()
-    assert traces.before["peak_resultant_n"].max() > 100.0 >= traces.after["peak_resultant_n"].max()
+    assert traces.load.original.peak_resultant_n.max() > 100.0 >= traces.load.emitted.peak_resultant_n.max()
 
 
 def test_walls_are_those_of_the_core(pocket: FeedSchedule) -> None:
-    traces = feed_traces(pocket)
-    walls = wall_maps(pocket, traces)
+    traces, walls = pocket.traces, pocket.walls
+    assert traces is not None
     assert walls is not None
-    assert walls.before.shape == walls.after.shape == (len(walls.edges_mm) - 1, len(walls.height_mm))
+    before, after = walls.error_um.original, walls.error_um.emitted
+    assert before.shape == after.shape == (len(walls.edges_mm) - 1, len(walls.height_mm))
     assert walls.height_mm[-1] == pytest.approx(8.0)
     assert walls.edges_mm[[0, -1]] == pytest.approx([0.0, traces.distance_mm[-1]])
     # The finishing pass at the end makes its wall over its whole depth, roughing only over a level's.
-    assert np.isfinite(walls.before[-20]).all()
-    assert np.isnan(walls.before[100]).any()
-    assert np.isfinite(walls.before[100]).any()
+    assert np.isfinite(before[-20]).all()
+    assert np.isnan(before[100]).any()
+    assert np.isfinite(before[100]).any()
     # Never more than the tip is deflected by at most.
-    assert np.nanmax(np.abs(walls.after)) <= traces.after["peak_deflection_um"].max() * (1.0 + 1e-9)
+    assert np.nanmax(np.abs(after)) <= traces.load.emitted.peak_deflection_um.max() * (1.0 + 1e-9)
 
 
 def test_the_files(pocket: FeedSchedule, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(canvas, "FORMATS", (".svg",))
-    files = [Path(name) for name in write_feed_pictures(pocket, tmp_path / "plots")]
+    monkeypatch.setattr(plot, "FORMATS", (".svg",))
+    files = [Path(name) for name in pocket.save_plots(tmp_path / "plots")]
     assert [file.name for file in files] == ["feed-along-path.svg", "feed-path.svg", "feed-surface.svg"]
     along, path, surface = (file.read_text(encoding="utf-8") for file in files)
     for words in ("POCKET.NC", "really run", "limit 100 N", "distance along the cutting path in mm"):
@@ -92,9 +101,21 @@ def test_the_files(pocket: FeedSchedule, tmp_path: Path, monkeypatch: pytest.Mon
     assert "Form error of the wall" in surface
 
 
+@pytest.mark.parametrize("draw", [plot_along_path, plot_path, plot_walls])
+def test_plots_draw_into_the_axes_of_the_caller(pocket: FeedSchedule, draw: Callable[..., Axes]) -> None:
+    whole = plot.figure(12.0, 8.0)
+    mine, other = whole.subplots(1, 2)
+    drawn = draw(pocket, mine)
+    assert drawn.figure is whole
+    assert not other.has_data()
+    assert drawn.get_position().x1 <= other.get_position().x0
+    assert set(plots_of(pocket)) == {"feed-along-path", "feed-path", "feed-surface"}
+
+
 def test_without_known_forces_there_are_no_pictures(pocket: FeedSchedule, tmp_path: Path) -> None:
     unknown = replace(pocket, loads=(None,) * len(pocket.loads))
-    assert write_feed_pictures(unknown, tmp_path / "plots") == []
+    assert unknown.save_plots(tmp_path / "plots") == []
     assert not (tmp_path / "plots").exists()
-    with pytest.raises(_core.ArgumentError, match="nothing to draw"):
-        feed_traces(unknown)
+    for draw in (plot_along_path, plot_path, plot_walls):
+        with pytest.raises(_core.ArgumentError, match="nothing to draw"):
+            draw(unknown)

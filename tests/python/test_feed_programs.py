@@ -38,7 +38,7 @@ def scheduled(body: str, *, head: str = HEAD, flutes: float = 20.0, overhang: fl
 
 
 def said(result: sg.FeedSchedule, words: str) -> bool:
-    return any(words in warning for warning in result.report["warnings"])
+    return any(words in warning for warning in result.warnings)
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_blocks_that_stop_exactly_are_not_divided() -> None:
     result = scheduled(body)
     cuts = interpret(result.text.decode()).cuts
     assert [tuple(move.end[:2]) for move in cuts[-3:]] == [(70.0, 2.0), (90.0, 10.0), (110.0, 10.0)]
-    assert result.within_limits
+    assert result.ok
 
 
 def test_the_feed_is_given_back_only_where_something_needs_it() -> None:
@@ -75,15 +75,15 @@ def test_the_feed_is_given_back_only_where_something_needs_it() -> None:
 def test_a_first_move_without_length_keeps_its_feed() -> None:
     result = scheduled("G01 X-10. F5000.\nX110.\n")
     assert interpret(result.text.decode()).cuts
-    assert result.within_limits
+    assert result.ok
 
 
 def test_cuts_that_share_their_block_count_though_their_feed_stays() -> None:
     result = scheduled("G01 X50. F5000.\nX110. M08\n")
-    assert not result.within_limits
-    (move,) = result.report["moves"]
-    assert move["place"] == "part.nc:6"
-    assert "limit 200 N" in move["misses"][0]
+    assert not result.ok
+    (move,) = result.moves
+    assert move.place == "part.nc:6"
+    assert "limit 200 N" in move.misses[0]
 
 
 @pytest.mark.parametrize(
@@ -136,6 +136,6 @@ def test_a_schedule_of_its_own_output_changes_little() -> None:
     first = scheduled(body)
     text = first.text.decode()
     again = scheduled(text[len(HEAD) : -len(TAIL)])
-    times = [result.report["cycle_time_s"]["after"] for result in (first, again)]
+    times = [result.cycle_time_s.emitted for result in (first, again)]
     assert times[1] == pytest.approx(times[0], rel=0.01)
-    assert again.within_limits
+    assert again.ok

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from judge.interpreter import interpret
 from judge.player import moving_average, play
 from shapegcode import _core
 from shapegcode.cli import main
+from shapegcode.results.json import schema
 
 TOOL = """
 [tool]
@@ -74,28 +77,28 @@ def corner() -> sg.FeedSchedule:
 
 
 def test_the_corner_is_cut_at_the_force_of_the_straight(corner: sg.FeedSchedule) -> None:
-    resultant = corner.report["resultant_force_n"]
-    assert resultant["before"]["max"] == pytest.approx(78.8, rel=0.01)
-    assert 0.98 * STRAIGHT_N < resultant["after"]["max"] <= STRAIGHT_N
+    resultant = corner.resultant_force_n
+    assert resultant.original.max == pytest.approx(78.8, rel=0.01)
+    assert 0.98 * STRAIGHT_N < resultant.emitted.max <= STRAIGHT_N
     load = corner.loads[0]
     assert load is not None
-    inside = load.after.peak_resultant_n > 1.0
-    near = load.after.peak_resultant_n[inside] > 0.95 * STRAIGHT_N
+    inside = load.emitted.peak_resultant_n > 1.0
+    near = load.emitted.peak_resultant_n[inside] > 0.95 * STRAIGHT_N
     lengths = np.diff(np.concatenate(([0.0], load.s_mm)))[inside]
     assert lengths[near].sum() / lengths.sum() > 0.8
     # The constant feed at which the worst point of the corner is within the limit: 81.3 mm/min.
     constant_s = corner.survey.regions[0].region.path.length_mm / 81.3 * 60.0
-    assert corner.report["cycle_time_s"]["after"] < 0.85 * constant_s
-    assert corner.within_limits
+    assert corner.cycle_time_s.emitted < 0.85 * constant_s
+    assert corner.ok
 
 
 def test_the_text_says_the_feeds_of_the_report(corner: sg.FeedSchedule) -> None:
     cuts = [move for move in interpret(corner.text.decode()).cuts if move.start[2] < -14.0 and move.end[2] < -14.0]
-    assert min(move.feed for move in cuts) == corner.report["feed_mm_per_min"]["min"]
+    assert min(move.feed for move in cuts) == corner.feed_mm_per_min.min
     assert all(move.length >= 0.6 - 0.002 for move in cuts)
     assert "(ALONG THE WALL)" in corner.text.decode()
-    assert corner.report["blocks"]["before"] == 4
-    assert corner.report["blocks"]["after"] == len(cuts) + 1
+    assert corner.blocks.original == 4
+    assert corner.blocks.emitted == len(cuts) + 1
 
 
 @pytest.mark.parametrize("time_constant_s", [0.0, 0.1])
@@ -105,7 +108,7 @@ def test_the_feed_that_the_machine_runs_keeps_the_limit(time_constant_s: float) 
     machine = sg.Machine.from_data(values)
     text = CORNER.replace("S1800", "S12000").replace("F216.", "F1440.")
     result = scheduled(text, machine=machine)
-    assert result.within_limits
+    assert result.ok
     # Played by the judge: blocks at their feed, then the moving average; speed over the time between two teeth.
     period = 0.001
     moves = [move for move in interpret(result.text.decode()).cuts if move.end[2] < -14.0 and move.start[2] < -14.0]
@@ -121,7 +124,7 @@ def test_the_feed_that_the_machine_runs_keeps_the_limit(time_constant_s: float) 
     down = float(track.s_mm[np.flatnonzero(np.asarray(track.segment) > 0)[0] - 1])
     stations = np.asarray(track.s_mm) - down
     at = np.clip(np.searchsorted(stations, travelled[window:]), 0, len(stations) - 1)
-    assert (speed <= plan.limit_mm_per_min[at] / (1.0 - result.report["margin"]) ** (1.0 / 0.85)).mean() > 0.995
+    assert (speed <= plan.limit_mm_per_min[at] / (1.0 - result.margin) ** (1.0 / 0.85)).mean() > 0.995
 
 
 def test_air_is_crossed_faster_but_not_up_to_the_material() -> None:
@@ -134,7 +137,7 @@ def test_air_is_crossed_faster_but_not_up_to_the_material() -> None:
     assert [move.feed for move in cuts] == [3000.0, 300.0, 3000.0]
     assert contact - 4.0 < cuts[0].end[0] <= contact - 2.0
     assert 29.8 < cuts[1].end[0] < 31.0  # the last contact is beside the axis, at the end of the block
-    assert result.report["air_time_s"]["after"] < 0.5 * result.report["air_time_s"]["before"]
+    assert result.air_time_s.emitted < 0.5 * result.air_time_s.original
 
 
 def test_feeds_change_by_no_more_than_the_machine_says() -> None:
@@ -143,7 +146,7 @@ def test_feeds_change_by_no_more_than_the_machine_says() -> None:
     result = scheduled(CORNER, machine=sg.Machine.from_data(values))
     feeds = [move.feed for move in interpret(result.text.decode()).cuts if move.start[2] < -14.0]
     assert np.abs(np.diff(feeds)).max() <= 25.0 + 1e-9
-    assert result.within_limits
+    assert result.ok
 
 
 @pytest.mark.parametrize(
@@ -163,7 +166,7 @@ def test_what_cannot_be_scheduled_is_said_and_left(old: str, new: str, said: str
             scheduled(text, tool(limits))
         return
     result = scheduled(text, tool(limits))
-    assert any(said in warning for warning in result.report["warnings"])
+    assert any(said in warning for warning in result.warnings)
     if "least" not in said:
         assert result.text.decode() == text
 
@@ -173,16 +176,16 @@ def test_a_plunge_into_material_keeps_its_feed() -> None:
     result = scheduled(text, tool("resultant_n = 60"), BOX)
     lines = result.text.decode().splitlines()
     assert "G01 Z-5. F120." in lines
-    assert any("left as it was: plunges into material" in warning for warning in result.report["warnings"])
-    kept = [entry for entry in result.report["limits"] if entry["limit"] == "kept"]
-    assert kept[0]["lines"] == [6, 6]
+    assert any("left as it was: plunges into material" in warning for warning in result.warnings)
+    kept = [entry for entry in result.limits if entry.limit == "kept"]
+    assert kept[0].lines == (6, 6)
 
 
 def test_a_limit_below_the_least_feed_is_not_within_limits() -> None:
     result = scheduled(CORNER, tool("resultant_n = 20\nfeed_per_tooth_min_mm = 0.012"))
-    assert not result.within_limits
-    assert result.report["feed_mm_per_min"]["min"] == pytest.approx(0.012 * 6 * 1800, abs=0.1)
-    assert any("less than the least feed" in warning for warning in result.report["warnings"])
+    assert not result.ok
+    assert result.feed_mm_per_min.min == pytest.approx(0.012 * 6 * 1800, abs=0.1)
+    assert any("less than the least feed" in warning for warning in result.warnings)
 
 
 def test_other_limits_bind_by_their_names() -> None:
@@ -192,9 +195,9 @@ def test_other_limits_bind_by_their_names() -> None:
         ("power_w = 20.0", "power", "mean_power_w", 20.0),
         ('resultant_n = 31.0\nresultant = "mean"', "resultant", "mean_resultant_n", 31.0),
     ):
-        report = scheduled(CORNER, tool(limits)).report
-        assert name in {entry["limit"] for entry in report["limits"]}, limits
-        assert 0.95 * most < report["peak"][column]["after"] <= most, limits
+        result = scheduled(CORNER, tool(limits))
+        assert name in {entry.limit for entry in result.limits}, limits
+        assert 0.95 * most < getattr(result.peak, column).emitted <= most, limits
 
 
 def write_files(folder: Path, limits: str = f"resultant_n = {STRAIGHT_N}") -> list[str]:
@@ -212,10 +215,11 @@ def test_the_command_writes_program_report_and_table(
     out, report = tmp_path / "out.nc", tmp_path / "r.json"
     assert main(["feed", *write_files(tmp_path), "-o", str(out), "--json", str(report)]) == 0
     result = json.loads(report.read_text())
-    assert set(result["feed_mm_per_min"]) == {"min", "max"}
-    assert set(result["resultant_force_n"]["after"]) == {"mean", "max"}
-    assert set(result["cycle_time_s"]) == set(result["blocks"]) == {"before", "after"}
-    assert all({"lines", "feed_mm_per_min", "limit"} <= set(entry) for entry in result["limits"])
+    jsonschema.validate(result, schema(sg.FeedSchedule))
+    assert result["output"] == str(out)
+    # The figures of the JSON are those of the program that stands there.
+    words = {float(word) for word in re.findall(r"F([0-9.]+)", out.read_text())}
+    assert result["feed_mm_per_min"]["min"] == min(words)
     shown = capsys.readouterr().out
     assert "resultant, peak" in shown
     assert "what holds the feed" in shown
@@ -245,16 +249,16 @@ def test_feeds_and_shaping_in_one_go_keep_the_limit_of_the_shaped_motion(tmp_pat
     assert main(arguments) == 0
     result = json.loads(report.read_text())
     feed = result["feed_schedule"]
-    assert feed["within_limits"]
-    assert 0.9 * STRAIGHT_N < feed["resultant_force_n"]["after"]["max"] <= STRAIGHT_N
+    assert feed["ok"]
+    assert 0.9 * STRAIGHT_N < feed["resultant_force_n"]["emitted"]["max"] <= STRAIGHT_N
     assert result["within_tolerance"]
-    assert feed["blocks"]["after"] == result["blocks"]["emitted"]
+    assert feed["blocks"]["emitted"] == result["blocks"]["emitted"]
     assert b"SHAPEGCODE" in out.read_bytes()
 
 
 def test_a_tool_without_limits_is_told_so() -> None:
     result = scheduled(CORNER, tool(""))
-    assert any("no limit of force" in warning for warning in result.report["warnings"])
+    assert any("no limit of force" in warning for warning in result.warnings)
     assert result.text.decode() == CORNER
 
 

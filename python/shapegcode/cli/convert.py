@@ -156,9 +156,7 @@ def run(args: argparse.Namespace) -> int:
 
             report["plots"] = write_pictures(conversion, machine, args.plots)
             if args.feed_schedule:
-                from shapegcode.feed.plots import write_feed_pictures
-
-                report["plots"] += write_feed_pictures(scheduled.schedule, args.plots)
+                report["plots"] += scheduled.schedule.save_plots(args.plots)
         if args.json not in (None, "-"):
             write_json(report, args.json)
         # Last of all, so that no program stands there when something else could not be written.
@@ -167,11 +165,9 @@ def run(args: argparse.Namespace) -> int:
         write_json(report, args.json)
     console = output_console(args.json)
     if args.feed_schedule:
-        from shapegcode.feed.tables import feed_tables, verdict
-
-        for table in feed_tables(report["feed_schedule"]):
+        for table in scheduled.schedule.tables():
             console.print(table)
-        console.print(verdict(report["feed_schedule"]), markup=False, soft_wrap=True)
+        console.print(scheduled.schedule.answer, markup=False, soft_wrap=True)
         console.print("original, below: the program with these feeds, not yet shaped", markup=False)
     print_before_after(report, args.json)
     console.print(f"wrote {target}", markup=False, soft_wrap=True)
@@ -184,18 +180,13 @@ def _convert_scheduled(
     args: argparse.Namespace, program: Program, machine: Machine, budget: Budget | None, bar: ProgressBar
 ) -> ScheduledConversion:
     """Feeds and shaping in one go."""
-    from shapegcode.cutting.stock import Stock
-    from shapegcode.cutting.tool import Tool
-    from shapegcode.feed.schedule import MARGIN
+    from shapegcode.cli.feed import read_cutting_arguments
     from shapegcode.feed.shaped import convert_scheduled
 
     return convert_scheduled(
         program,
         machine,
-        [Tool.load(name) for name in args.tool],
-        Stock.load(args.stock),
-        margin=MARGIN if args.margin is None else args.margin,
-        resolution_mm=None if args.resolution is None else args.resolution * 1e-3,
+        **read_cutting_arguments(args),
         arc_feed_ratio=args.arc_feed,
         block_period_s=args.block_period,
         budget=budget,

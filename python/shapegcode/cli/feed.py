@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from typing import Any
 
 from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.options import (
@@ -12,11 +12,10 @@ from shapegcode.cli.options import (
     load_machine,
     micrometres,
     output_file,
-    refuse_same_file,
     share,
 )
 
-__all__ = ["add_arguments", "add_cutting_arguments", "run"]
+__all__ = ["add_arguments", "add_cutting_arguments", "read_cutting_arguments", "run"]
 
 
 def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) -> None:
@@ -51,6 +50,25 @@ def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) ->
     )
 
 
+def read_cutting_arguments(args: argparse.Namespace) -> dict[str, Any]:
+    """What `add_cutting_arguments` declared, as `schedule_feed` and `convert_scheduled` take it.
+
+    Raises:
+        ToolError, StockError: a bad file.
+        OSError: a file cannot be read.
+    """
+    from shapegcode.cutting.stock import Stock
+    from shapegcode.cutting.tool import Tool
+    from shapegcode.feed.schedule import MARGIN
+
+    return {
+        "tools": [Tool.load(name) for name in args.tool],
+        "stock": Stock.load(args.stock),
+        "margin": MARGIN if args.margin is None else args.margin,
+        "resolution_mm": None if args.resolution is None else args.resolution * 1e-3,
+    }
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
@@ -78,52 +96,15 @@ def run(args: argparse.Namespace) -> int:
         ProgramError, MachineError, ToolError, StockError, ArgumentError: bad input.
         OSError: a file cannot be read or written.
     """
-    from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.cutting.stock import Stock
-    from shapegcode.cutting.tool import Tool
-    from shapegcode.feed.schedule import MARGIN, schedule_feed
-    from shapegcode.feed.tables import feed_tables, next_step, verdict
-    from shapegcode.io.atomic import write_bytes
+    from shapegcode.cli import runner
+    from shapegcode.feed.schedule import schedule_feed
     from shapegcode.program.compensation import read_for_conversion
-    from shapegcode.results.table import warning_table
 
     output = output_file(args.output)
     machine = load_machine(args)
-    read = [Path(name) for name in (args.input, args.machine, args.stock, *args.tool)]
-    refuse_same_file([output], read)
-    if args.json not in (None, "-"):
-        refuse_same_file([Path(args.json)], [*read, output])
-    tools = [Tool.load(name) for name in args.tool]
-    stock = Stock.load(args.stock)
-    with progress(f"scheduling {args.input}", args.json) as bar:
+    runner.check_files(args)
+    cutting = read_cutting_arguments(args)
+    with runner.progress(f"scheduling {args.input}", args) as bar:
         program = read_for_conversion(args.input, machine, program_number=args.program)
-        result = schedule_feed(
-            program,
-            machine,
-            tools,
-            stock,
-            margin=MARGIN if args.margin is None else args.margin,
-            resolution_mm=None if args.resolution is None else args.resolution * 1e-3,
-            on_progress=bar.update,
-        )
-        report = {**result.report, "output": str(output)}
-        if args.plots is not None:
-            from shapegcode.feed.plots import write_feed_pictures
-
-            report["plots"] = write_feed_pictures(result, args.plots)
-        if args.json not in (None, "-"):
-            write_json(report, args.json)
-        # Last of all, so that no program stands there when something else could not be written.
-        write_bytes(output, result.text)
-    if args.json == "-":
-        write_json(report, args.json)
-    console = output_console(args.json)
-    for table in feed_tables(report):
-        console.print(table)
-    if report["warnings"]:
-        console.print(warning_table(report["warnings"]))
-    console.print(f"wrote {output}", markup=False, soft_wrap=True)
-    console.print(verdict(report), markup=False, soft_wrap=True)
-    console.print(f"next: {next_step(report)}", markup=False)
-    return ExitCode.OK if result.within_limits else ExitCode.OUT_OF_TOLERANCE
+        schedule = schedule_feed(program, machine, **cutting, on_progress=bar.update)
+    return runner.finish(schedule, args, output=(output, schedule.text))

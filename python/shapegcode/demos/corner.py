@@ -112,14 +112,14 @@ def _figures(study: CornerStudy) -> dict[str, Any]:
         "constant_force_mm_per_min": study.constant_force_mm_per_min,
         "scheduled": {
             "target_n": target,
-            "feed_mm_per_min": scheduled.result.report["feed_mm_per_min"],
+            "feed_mm_per_min": vars(scheduled.result.feed_mm_per_min),
             "resultant_force_n": {"before": programmed.figures(length), "after": scheduled.along.figures(length)},
             "share_within_5_percent": study.share_within(),
-            "blocks": scheduled.result.report["blocks"],
+            "blocks": {"before": scheduled.result.blocks.original, "after": scheduled.result.blocks.emitted},
             "cutting_time_s": {"scheduled": scheduled.time_s, "constant": scheduled.constant_time_s},
             "constant_feed_mm_per_min": scheduled.constant_feed_mm_per_min,
             "gain_percent": 100.0 * scheduled.gain,
-            "warnings": scheduled.result.report["warnings"],
+            "warnings": list(scheduled.result.warnings),
         },
         "wall_error_um": {
             name: _largest_wall_um(study, along)

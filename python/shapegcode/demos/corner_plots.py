@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from shapegcode.demos.corner import CornerDemo
 from shapegcode.demos.corner_study import AXIAL_DEPTH_MM, STRAIGHT_MM, TOOL_RADIUS_MM, AlongCorner, CornerStudy
-from shapegcode.feed.plots import wall_figure
+from shapegcode.feed.plots import draw_walls
 from shapegcode.results import plot as canvas
 
 if TYPE_CHECKING:
@@ -191,10 +191,11 @@ def plot_surface(file: str | Path, study: CornerStudy) -> None:
     maps = {name: study.wall_error_um(along, _EVERY, height)[inside] for name, along in study.feeds}
     drawn = place[inside]
     edges = np.append(drawn, 2.0 * drawn[-1] - drawn[-2])
-    figure, last = wall_figure(edges, height, maps, _COLOURS)
-    last.set_xlabel(_DISTANCE)
-    canvas.heading(figure, "Form error of the wall (figures 11 and 12); +: material is left standing", _title(study))
-    canvas.save(figure, file)
+    drawn_walls = draw_walls(
+        None, edges, height, maps, _COLOURS, along=_DISTANCE, part=_title(study),
+        title="Form error of the wall (figures 11 and 12); +: material is left standing",
+    )  # fmt: skip
+    canvas.save(drawn_walls, file)
 
 
 def plot_scheduled(file: str | Path, studies: tuple[CornerStudy, ...]) -> None:

@@ -15,7 +15,8 @@ from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
 from shapegcode.feed.plan import tool_beam
-from shapegcode.feed.schedule import FeedSchedule, schedule_feed
+from shapegcode.feed.result import FeedSchedule
+from shapegcode.feed.schedule import schedule_feed
 from shapegcode.feed.travel import OrdinaryMotion
 from shapegcode.machine import Machine
 from shapegcode.program import Program

@@ -1,8 +1,9 @@
-"""The pictures of ``shapegcode feed``: the curves along the path, the path coloured by force, and the wall."""
+"""The pictures of a feed schedule: the curves along the path, the path coloured by force, and the wall."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,21 +11,21 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.feed.schedule import FeedSchedule
-from shapegcode.feed.traces import FeedTraces, WallMaps, envelope, feed_traces, groups, wall_maps
-from shapegcode.results import plot as canvas
+from shapegcode.feed.result import FeedSchedule
+from shapegcode.feed.traces import FeedTraces, envelope, groups
+from shapegcode.results import plot
+from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-__all__ = ["plot_along_path", "plot_path", "plot_surface", "wall_figure", "write_feed_pictures"]
+__all__ = ["draw_walls", "plot_along_path", "plot_path", "plot_walls", "plots_of"]
 
 Vector = npt.NDArray[np.float64]
 
-_BEFORE, _AFTER = canvas.COLOURS[0], canvas.COLOURS[1]
+_BEFORE, _AFTER = plot.COLOURS[0], plot.COLOURS[1]
 _LIMIT = "#000000"
-_BEYOND = canvas.COLOURS[0]
+_BEYOND = plot.COLOURS[0]
 _BANDS = 1500
 _PIECES = 20000
 _LOGARITHMIC = 8.0  # ratio of the largest feed to the least in material from which on the axis is logarithmic
@@ -43,73 +44,66 @@ _LOADS = (
 _ALWAYS = ("peak_resultant_n", "mean_resultant_n")
 
 
-def write_feed_pictures(result: FeedSchedule, folder: str | Path) -> list[str]:
-    """Write the pictures of a schedule as PNG and SVG into a folder, which is made where it is missing.
-
-    `feed-along-path`: engagement, feed and loads over the distance along the cutting path; `feed-path`: the path
-    coloured by the peak resultant before and after; `feed-surface`: the form error of the walls, where walls are made.
-
-    Returns:
-        The files written; none where no cutting force is known.
-
-    Raises:
-        OSError: the folder cannot be made or a file not be written.
-    """
-    if all(load is None for load in result.loads):
-        return []
-    traces = feed_traces(result)
-    part = _summary(result)
-    pictures: dict[str, Callable[[Path], None]] = {
-        "along-path": lambda file: plot_along_path(file, traces, part),
-        "path": lambda file: plot_path(file, traces, result.survey.material, part),
+def plots_of(schedule: FeedSchedule) -> dict[str, Plot]:
+    """Its pictures by name; none where no cutting force is known."""
+    if schedule.traces is None:
+        return {}
+    found: dict[str, Plot] = {
+        "feed-along-path": partial(plot_along_path, schedule),
+        "feed-path": partial(plot_path, schedule),
     }
-    walls = wall_maps(result, traces)
-    if walls is not None:
-        pictures["surface"] = lambda file: plot_surface(file, walls, part)
-    return canvas.write_pictures(folder, "feed", pictures)
+    return found | ({} if schedule.walls is None else {"feed-surface": partial(plot_walls, schedule)})
 
 
-def _summary(result: FeedSchedule) -> str:
-    report = result.report
-    peak, time = report["resultant_force_n"], report["cycle_time_s"]
+def _traces(schedule: FeedSchedule) -> FeedTraces:
+    if schedule.traces is None:
+        raise _core.ArgumentError("no region whose cutting force is known: there is nothing to draw")
+    return schedule.traces
+
+
+def _summary(schedule: FeedSchedule) -> str:
+    force, time = schedule.resultant_force_n, schedule.cycle_time_s
     return (
-        f"{Path(report['program']).name}, {', '.join(report['tools'])}: peak resultant {peak['before']['max']:.3g} → "
-        f"{peak['after']['max']:.3g} N, cycle time {time['before']:.4g} → {time['after']:.4g} s"
+        f"{Path(schedule.program).name}, {', '.join(schedule.tools)}: peak resultant {force.original.max:.3g} → "
+        f"{force.emitted.max:.3g} N, cycle time {time.original:.4g} → {time.emitted:.4g} s"
     )
 
 
-def plot_along_path(file: str | Path, traces: FeedTraces, part: str) -> None:
+def plot_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     """What does the tool meet, how fast does it go, and what does it bear, before and after?
 
     Long programs are drawn as bands between the least and the largest value of each stretch, so that no peak is lost.
 
     Args:
-        file: ``.png`` or ``.svg``.
-        traces: the curves.
-        part: second line of the title.
+        schedule: what was scheduled.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The uppermost panel.
 
     Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+        ArgumentError: no cutting force is known.
     """
+    traces = _traces(schedule)
     loads = [row for row in _LOADS if row[0] in _ALWAYS or np.isfinite(traces.limit[row[0]]).any()]
-    figure = canvas.figure(11.0, 1.2 + 1.55 * (3 + len(loads)))
-    (grid,) = canvas.panels(figure, 3 + len(loads), 1)
-    starts = groups(traces.distance_mm, _BANDS)
-    along = _Along(traces, starts)
-    along.draw(grid[0], traces.radial_depth_mm, canvas.COLOURS[2], "radial depth", filled=True)
-    along.draw(grid[1], traces.section_mm2, canvas.COLOURS[2], "section of the cut", filled=True)
-    grid[0].set_ylabel("radial depth\nin mm")
-    grid[1].set_ylabel("section of the\ncut in mm²")
-    feeds = traces.feed_mm_per_min
-    along.draw(grid[2], feeds["programmed"], canvas.GREY, "programmed")
-    along.draw(grid[2], feeds["after"], _AFTER, "really run", width=2.2)
-    along.draw(grid[2], feeds["written"], canvas.COLOURS[4], "written")
-    _feed_axis(grid[2], np.concatenate([feeds["programmed"], feeds["written"]]))
-    canvas.legend_above(grid[2])
-    for panel, (name, label, unit) in zip(grid[3:], loads, strict=True):
-        along.draw(panel, traces.before[name], _BEFORE, "before")
-        along.draw(panel, traces.after[name], _AFTER, "after")
+    rows = plot.grid(
+        ax, 3 + len(loads), 1, size_inch=(11.0, 1.2 + 1.55 * (3 + len(loads))), sharex=True,
+        title="Feed and force along the cutting path", part=_summary(schedule),
+    )  # fmt: skip
+    panels = [row[0] for row in rows]
+    along = _Along(traces, groups(traces.distance_mm, _BANDS))
+    along.draw(panels[0], traces.radial_depth_mm, plot.COLOURS[2], "radial depth", filled=True)
+    along.draw(panels[1], traces.section_mm2, plot.COLOURS[2], "section of the cut", filled=True)
+    panels[0].set_ylabel("radial depth\nin mm")
+    panels[1].set_ylabel("section of the\ncut in mm²")
+    along.draw(panels[2], traces.programmed_mm_per_min, plot.GREY, "programmed")
+    along.draw(panels[2], traces.load.emitted.feed_mm_per_min, _AFTER, "really run", width=2.2)
+    along.draw(panels[2], traces.written_mm_per_min, plot.COLOURS[4], "written")
+    _feed_axis(panels[2], np.concatenate([traces.programmed_mm_per_min, traces.written_mm_per_min]))
+    plot.legend_above(panels[2])
+    for panel, (name, label, unit) in zip(panels[3:], loads, strict=True):
+        along.draw(panel, getattr(traces.load.original, name), _BEFORE, "before")
+        along.draw(panel, getattr(traces.load.emitted, name), _AFTER, "after")
         limit = traces.limit[name]
         if np.isfinite(limit).any():
             along.draw(
@@ -117,11 +111,18 @@ def plot_along_path(file: str | Path, traces: FeedTraces, part: str) -> None:
             )
         panel.set_ylim(bottom=0.0)
         panel.set_ylabel(label)
-        canvas.legend_above(panel)
-    grid[-1].set_xlabel("distance along the cutting path in mm")
-    canvas.heading(figure, "Feed and force along the cutting path", part)
-    figure.align_ylabels(grid)
-    canvas.save(figure, file)
+        plot.legend_above(panel)
+    panels[-1].set_xlabel("distance along the cutting path in mm")
+    for panel in panels:
+        panel.margins(x=0.01)
+    _align(panels)
+    return panels[0]
+
+
+def _align(panels: Sequence[Axes]) -> None:
+    """Names of the axes in one line."""
+    whole: Any = panels[0].figure
+    whole.align_ylabels(panels)
 
 
 def _limit_label(limit: Vector, unit: str) -> str:
@@ -168,26 +169,24 @@ class _Along:
         panel.stairs(high, self._edges, baseline=None, color=colour, linewidth=width, linestyle=style, label=name)
 
 
-def plot_path(file: str | Path, traces: FeedTraces, material: _core.Material, part: str) -> None:
+def plot_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     """Where is the force large? The path from above, before and after in one scale; behind it what is left standing.
 
     Pieces with the largest force are drawn last, so that passes below them do not hide them.
 
     Args:
-        file: ``.png`` or ``.svg``.
-        traces: the curves.
-        material: what is left of the stock.
-        part: second line of the title.
+        schedule: what was scheduled.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The panel of before.
 
     Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+        ArgumentError: no cutting force is known.
     """
-    from matplotlib import colormaps
-    from matplotlib.collections import LineCollection
     from matplotlib.colors import Normalize
 
-    lines, first = _pieces(traces)
+    traces, material = _traces(schedule), schedule.survey.material
     low, high = (each(traces.xy_mm, axis=0) for each in (np.min, np.max))
     low, high = np.minimum(low, material.low_mm), np.maximum(high, material.high_mm)
     margin = _MARGIN * max(float((high - low).max()), 1e-3)
@@ -195,38 +194,48 @@ def plot_path(file: str | Path, traces: FeedTraces, material: _core.Material, pa
     size = high - low
     wide = bool(size[0] > _STACKED * size[1])
     ratio = float(np.clip(size[1] / size[0], 0.25, 3.0))
-    figure = canvas.figure(9.5, 2.0 + 2 * 8.0 * ratio) if wide else canvas.figure(12.0, 1.2 + 4.9 * ratio)
-    grid: Any = figure.subplots(2 if wide else 1, 1 if wide else 2, sharex=True, sharey=True, squeeze=False)
-    panels = list(grid.flat)
-    largest = float(max(traces.before["peak_resultant_n"].max(), traces.after["peak_resultant_n"].max(), 1e-9))
+    rows = plot.grid(
+        ax, 2 if wide else 1, 1 if wide else 2, sharex=True, sharey=True,
+        size_inch=(9.5, 2.0 + 2 * 8.0 * ratio) if wide else (12.0, 1.2 + 4.9 * ratio),
+        title="Peak resultant along the path; grey: without material", part=_summary(schedule),
+    )  # fmt: skip
+    panels = [panel for row in rows for panel in row]
+    forces = (traces.load.original.peak_resultant_n, traces.load.emitted.peak_resultant_n)
+    largest = max(float(forces[0].max()), float(forces[1].max()), 1e-9)
     limits = np.unique(traces.limit["peak_resultant_n"])
     limited = len(limits) == 1 and float(limits[0]) < largest
     norm = Normalize(0.0, float(limits[0]) if limited else largest)
-    shades = colormaps["YlGnBu"].with_extremes(over=_BEYOND)
-    air = traces.section_mm2 <= _AIR_MM2
-    for panel, (when, values) in zip(panels, (("before", traces.before), ("after", traces.after)), strict=True):
+    for panel, name, force in zip(panels, ("before", "after"), forces, strict=True):
         _ground(panel, material, low, high)
-        force = np.maximum.reduceat(np.where(air, -1.0, values["peak_resultant_n"]), first)
-        order = np.argsort(force, kind="stable")
-        order, empty = order[force[order] >= 0.0], order[force[order] < 0.0]
-        panel.add_collection(LineCollection(list(lines[empty]), colors=canvas.GREY, linewidths=0.7, rasterized=True))
-        coloured = LineCollection(
-            list(lines[order]), array=force[order], cmap=shades, norm=norm, linewidths=2.2, rasterized=True,
-            capstyle="round",
-        )  # fmt: skip
-        panel.add_collection(coloured)
+        coloured = _coloured_path(panel, traces, force, norm)
         panel.set_xlim(low[0], high[0])
         panel.set_ylim(low[1], high[1])
         panel.set_aspect("equal")
-        panel.set_title(
-            f"{when}: up to {max(float(values['peak_resultant_n'].max()), 0.0):.3g} N", loc="left", fontsize=10
-        )
+        panel.set_title(f"{name}: up to {max(float(force.max()), 0.0):.3g} N", loc="left", fontsize=10)
         panel.set_xlabel("X in mm")
         panel.set_ylabel("Y in mm")
-    bar = figure.colorbar(coloured, ax=panels, shrink=0.85, pad=0.02, extend="max" if limited else "neither")
+    whole: Any = panels[0].figure
+    bar = whole.colorbar(coloured, ax=panels, shrink=0.85, pad=0.02, extend="max" if limited else "neither")
     bar.set_label("peak resultant in N" + (f"; red: above the limit, {limits[0]:.4g} N" if limited else ""))
-    canvas.heading(figure, "Peak resultant along the path; grey: without material", part)
-    canvas.save(figure, file)
+    return panels[0]
+
+
+def _coloured_path(panel: Axes, traces: FeedTraces, force_n: Vector, norm: Any) -> Any:
+    """Draw the pieces of the path, those with the largest force last; what a colour bar needs."""
+    from matplotlib import colormaps
+    from matplotlib.collections import LineCollection
+
+    lines, first = _pieces(traces)
+    force = np.maximum.reduceat(np.where(traces.section_mm2 <= _AIR_MM2, -1.0, force_n), first)
+    order = np.argsort(force, kind="stable")
+    order, empty = order[force[order] >= 0.0], order[force[order] < 0.0]
+    panel.add_collection(LineCollection(list(lines[empty]), colors=plot.GREY, linewidths=0.7, rasterized=True))
+    coloured = LineCollection(
+        list(lines[order]), array=force[order], cmap=colormaps["YlGnBu"].with_extremes(over=_BEYOND), norm=norm,
+        linewidths=2.2, rasterized=True, capstyle="round",
+    )  # fmt: skip
+    panel.add_collection(coloured)
+    return coloured
 
 
 def _pieces(traces: FeedTraces) -> tuple[Vector, npt.NDArray[np.intp]]:
@@ -253,49 +262,60 @@ def _ground(panel: Axes, material: _core.Material, low: Vector, high: Vector) ->
     )  # fmt: skip
 
 
-def plot_surface(file: str | Path, walls: WallMaps, part: str) -> None:
+def plot_walls(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     """How far off is the wall? Error over distance and axial height before and after, in one scale.
 
     Args:
-        file: ``.png`` or ``.svg``.
-        walls: the maps.
-        part: second line of the title.
+        schedule: what was scheduled.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The panel of before.
 
     Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+        ArgumentError: no wall is made.
     """
-    figure, last = wall_figure(
-        walls.edges_mm, walls.height_mm, {"before": walls.before, "after": walls.after}, (_BEFORE, _AFTER)
-    )
-    last.set_xlabel("distance along the cutting path in mm")
-    canvas.heading(figure, "Form error of the wall; +: material is left standing", part)
-    canvas.save(figure, file)
+    walls = schedule.walls
+    if walls is None:
+        raise _core.ArgumentError("no wall is made whose cutting force is known: there is nothing to draw")
+    return draw_walls(
+        ax, walls.edges_mm, walls.height_mm, {"before": walls.error_um.original, "after": walls.error_um.emitted},
+        (_BEFORE, _AFTER), along="distance along the cutting path in mm",
+        title="Form error of the wall; +: material is left standing", part=_summary(schedule),
+    )  # fmt: skip
 
 
-def wall_figure(
-    edges_mm: Vector, height_mm: Vector, maps: Mapping[str, Vector], colours: Sequence[str]
-) -> tuple[Figure, Axes]:
+def draw_walls(
+    ax: Axes | None, edges_mm: Vector, height_mm: Vector, maps: Mapping[str, Vector], colours: Sequence[str], *,
+    along: str, title: str, part: str,
+) -> Axes:  # fmt: skip
     """Maps of the wall's error below each other in one scale, and in the last panel the largest of each column.
 
     Args:
+        ax: where to draw; None: a new figure.
         edges_mm: of the columns, (m + 1,).
         height_mm: above the tip, evenly spaced, (h,).
         maps: error in µm by name, (m, h); NaN: no wall.
         colours: of their curves in the last panel.
+        along: name of the axis along the wall.
+        title: of the whole picture.
+        part: which part of the program it shows.
 
     Returns:
-        The picture without its title, and its last panel.
+        The uppermost panel.
     """
     everything = np.concatenate([each[np.isfinite(each)] for each in maps.values()])
     low, high = min(float(everything.min()), 0.0), max(float(everything.max()), 0.0)
     high = high if high > low else low + 1e-3
-    figure = canvas.figure(11.0, 1.3 + 1.9 * (len(maps) + 1))
-    rows: Any = figure.subplots(len(maps) + 1, 1, sharex=True)
-    grid: list[Axes] = list(rows)
+    rows = plot.grid(
+        ax, len(maps) + 1, 1, size_inch=(11.0, 1.3 + 1.9 * (len(maps) + 1)), sharex=True, title=title, part=part,
+    )  # fmt: skip
+    panels = [row[0] for row in rows]
     step = height_mm[1] - height_mm[0]
     levels = np.concatenate([height_mm - 0.5 * step, height_mm[-1:] + 0.5 * step])
-    for panel, (name, values) in zip(grid, maps.items(), strict=False):
+    for panel, (name, values) in zip(panels, maps.items(), strict=False):
+        panel.grid(False)
+        panel.spines[["top", "right"]].set_visible(True)
         panel.set_facecolor("#efefef")
         mesh = panel.pcolormesh(
             edges_mm, levels, np.ma.masked_invalid(values.T), cmap="viridis", vmin=low, vmax=high, rasterized=True,
@@ -304,19 +324,18 @@ def wall_figure(
         panel.set_ylabel("height above\nthe tip in mm")
         worst = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0
         panel.set_title(f"{name}: up to {worst:.3g} µm", loc="left", fontsize=10)
-    figure.colorbar(mesh, ax=grid[:-1], pad=0.01, label="error of the wall in µm")
-    last = grid[-1]
+    whole: Any = panels[0].figure
+    whole.colorbar(mesh, ax=panels[:-1], pad=0.01, label="error of the wall in µm")
+    last = panels[-1]
     for (name, values), colour in zip(maps.items(), colours, strict=True):
         made = np.isfinite(values).any(axis=1)
         largest = np.full(len(values), np.nan)
         largest[made] = np.nanmax(np.abs(values[made]), axis=1)
         last.stairs(largest, edges_mm, baseline=None, color=colour, linewidth=1.1, label=name)
     last.set_ylim(bottom=0.0)
-    last.grid(True, color="#e4e4e4", linewidth=0.6)
-    last.set_axisbelow(True)
-    last.spines[["top", "right"]].set_visible(False)
     last.margins(x=0.0)
     last.set_ylabel("largest over\nthe height in µm")
-    canvas.legend_above(last)
-    figure.align_ylabels(grid)
-    return figure, last
+    last.set_xlabel(along)
+    plot.legend_above(last)
+    _align(panels)
+    return panels[0]

@@ -4,26 +4,27 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
 from shapegcode.errors import RoundTripError
+from shapegcode.feed.figures import feed_figures
+from shapegcode.feed.load import PathLoad, region_load
 from shapegcode.feed.plan import FeedPlan, plan_region
-from shapegcode.feed.report import RegionLoad, feed_report, region_load
+from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.survey import Survey, survey
 from shapegcode.feed.travel import Motion, OrdinaryMotion
 from shapegcode.machine import Machine
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.program.compensation import read_for_conversion, require_decision
+from shapegcode.results.result import Pair
 from shapegcode.timing.cycle_time import cycle_time
 
-__all__ = ["MARGIN", "FeedSchedule", "schedule_feed", "schedule_survey"]
+__all__ = ["MARGIN", "schedule_feed", "schedule_survey"]
 
 MARGIN = 0.015
 """Share of each limit that a schedule leaves free: for what model and position of the load are off by."""
@@ -35,37 +36,6 @@ _COMMENT = re.compile(rb"\([^)]*\)")
 _NEEDS_FEED = re.compile(rb"F|G0*[123](?!\d)|G\s*[78]\d|G\s*6[56]|M\s*\d*9[789]|[#<]")  # cuts, cycles, calls
 
 Progress = Callable[[float], None]
-
-
-@dataclass(frozen=True, repr=False)
-class FeedSchedule:
-    """What a feed schedule made.
-
-    Attributes:
-        text: the program with its new feeds.
-        written: the same, as read back.
-        survey: what the tool meets.
-        plans: the feeds of each region that may change; None for the others.
-        loads: force, torque and deflection along each region before and after; None where nothing is known.
-        report: the figures (see docs/feed.md).
-    """
-
-    text: bytes
-    written: Program
-    survey: Survey
-    plans: tuple[FeedPlan | None, ...]
-    loads: tuple[RegionLoad | None, ...]
-    report: Mapping[str, Any]
-
-    @property
-    def within_limits(self) -> bool:
-        """Whether every limit is kept wherever feeds may change."""
-        return bool(self.report["within_limits"])
-
-    def __repr__(self) -> str:
-        """Size and verdict, not the text."""
-        verdict = "within limits" if self.within_limits else "beyond limits"
-        return f"<FeedSchedule of {self.report['program']}: {len(self.text)} bytes, {verdict}>"
 
 
 def schedule_feed(
@@ -144,18 +114,16 @@ def schedule_survey(
     plans = _plan_all(surveyed, machine, own, margin, lambda done: on_progress(_PLANNING * done / total))
     text, places, blocks = _write(program, plans, machine)
     written = _read_back(text, program, places, machine)
-    loads: list[RegionLoad | None] = []
+    loads: list[PathLoad | None] = []
     for index, (plan, part) in enumerate(zip(plans, surveyed.regions, strict=True)):
         path = written.regions[index].path
         loads.append(region_load(part, plan, path, machine, before=ordinary, after=own))
         on_progress(_PLANNING + (1.0 - _PLANNING) * (index + 1) / total)
-    report = feed_report(surveyed, plans, loads, machine, margin)
-    report["cycle_time_s"] = {
-        "before": cycle_time(program, machine).cycle_time_s,
-        "after": cycle_time(written, machine).cycle_time_s,
-    }
-    report["blocks"] = {"before": sum(region.blocks for region in program.regions), "after": blocks}
-    return FeedSchedule(text, written, surveyed, tuple(plans), tuple(loads), report)
+    return feed_figures(
+        surveyed, plans, loads, machine, margin=margin, text=text, written=written,
+        cycle_time_s=Pair(cycle_time(program, machine).cycle_time_s, cycle_time(written, machine).cycle_time_s),
+        blocks=Pair(sum(region.blocks for region in program.regions), blocks),
+    )  # fmt: skip
 
 
 def _plan_all(

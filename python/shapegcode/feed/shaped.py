@@ -11,8 +11,10 @@ from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.convert import Conversion, convert, marked_out_of_tolerance
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
-from shapegcode.feed.report import RegionLoad, feed_report, load_of
-from shapegcode.feed.schedule import MARGIN, FeedSchedule, schedule_survey
+from shapegcode.feed.figures import feed_figures
+from shapegcode.feed.load import PathLoad, load_of
+from shapegcode.feed.result import FeedSchedule
+from shapegcode.feed.schedule import MARGIN, schedule_survey
 from shapegcode.feed.survey import survey
 from shapegcode.feed.travel import OrdinaryMotion, ShapedMotion, travel_emitted
 from shapegcode.machine import Machine
@@ -43,7 +45,7 @@ class ScheduledConversion:
     @property
     def within_tolerance(self) -> bool:
         """Whether the shaped program keeps the machine's tolerances and the tool's limits."""
-        return self.conversion.within_tolerance and self.schedule.within_limits
+        return self.conversion.within_tolerance and self.schedule.ok
 
 
 def convert_scheduled(
@@ -94,13 +96,13 @@ def convert_scheduled(
         )
         on_progress(0.2 + 0.8 * (attempt + 1) / _ROUNDS)
         emitted = _measured(planned, conversion, machine, wanted)
-        excess = emitted.report["excess_ratio"]
+        excess = emitted.excess_ratio
         if excess <= 0.0:
             break
         margin += excess + _MORE_MARGIN
-    report: dict[str, Any] = {**conversion.report, "feed_schedule": emitted.report}
-    report["warnings"] = list(dict.fromkeys([*emitted.report["warnings"], *conversion.report["warnings"]]))
-    text = conversion.text if emitted.within_limits else marked_out_of_tolerance(conversion.text)
+    report: dict[str, Any] = {**conversion.report, "feed_schedule": emitted.to_dict()}
+    report["warnings"] = list(dict.fromkeys([*emitted.warnings, *conversion.report["warnings"]]))
+    text = conversion.text if emitted.ok else marked_out_of_tolerance(conversion.text)
     return ScheduledConversion(replace(conversion, text=text, report=report), emitted)
 
 
@@ -108,7 +110,7 @@ def _measured(planned: FeedSchedule, conversion: Conversion, machine: Machine, m
     """The schedule with the loads of the emitted program."""
     placed = {id(place.region): place for place in conversion.placed}
     ordinary = OrdinaryMotion(machine)
-    loads: list[RegionLoad | None] = []
+    loads: list[PathLoad | None] = []
     for part, region, load in zip(planned.survey.regions, planned.written.regions, planned.loads, strict=True):
         if load is None or part.tool is None:
             loads.append(load)
@@ -121,9 +123,10 @@ def _measured(planned: FeedSchedule, conversion: Conversion, machine: Machine, m
         else:
             blocks = conversion.emitted.core.cutting_path(place.first_line, place.last_line)
             travelled = travel_emitted(blocks, along, machine, load.s_mm, window_s)
-        loads.append(replace(load, after=load_of(part, travelled)))
-    report = feed_report(planned.survey, planned.plans, loads, machine, margin)
-    times = conversion.report["cycle_time_s"]
-    report["cycle_time_s"] = {**planned.report["cycle_time_s"], "after": times["emitted"]}
-    report["blocks"] = {**planned.report["blocks"], "after": conversion.report["blocks"]["emitted"]}
-    return replace(planned, loads=tuple(loads), report=report)
+        loads.append(replace(load, emitted=load_of(part, travelled)))
+    times, blocks = conversion.report["cycle_time_s"], conversion.report["blocks"]
+    return feed_figures(
+        planned.survey, planned.plans, loads, machine, margin=margin, text=planned.text, written=planned.written,
+        cycle_time_s=replace(planned.cycle_time_s, emitted=times["emitted"]),
+        blocks=replace(planned.blocks, emitted=blocks["emitted"]),
+    )  # fmt: skip

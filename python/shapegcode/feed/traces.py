@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,17 +11,14 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.cutting.tool import Limits
+from shapegcode.feed.load import LOADS, Load, PathLoad
 from shapegcode.feed.plan import FeedPlan, milling_force, tool_beam
-from shapegcode.feed.report import RegionLoad
-from shapegcode.feed.schedule import FeedSchedule
-from shapegcode.feed.survey import SurveyedRegion
+from shapegcode.feed.survey import Survey, SurveyedRegion
+from shapegcode.results.result import Pair
 
-__all__ = ["LOADS", "FeedTraces", "WallMaps", "envelope", "feed_traces", "groups", "wall_maps"]
+__all__ = ["FeedTraces", "WallMaps", "envelope", "feed_traces", "groups", "wall_maps"]
 
 Vector = npt.NDArray[np.float64]
-
-LOADS = ("peak_resultant_n", "mean_resultant_n", "peak_deflection_um", "peak_torque_nm", "mean_power_w")
-"""Columns of the load, as `feed_report.Load` names them."""
 
 _COLUMNS = 400
 _ROWS = 31
@@ -33,15 +30,15 @@ class FeedTraces:
 
     Attributes:
         distance_mm: where each stretch ends, (n,).
-        length_mm: of each stretch.
+        length_mm: of each stretch, (n,).
         xy_mm: place of each station, (n, 2).
         begins: index of the first station of each region.
-        radial_depth_mm: what the tool meets.
-        section_mm2: area of the cut, in the plane across the feed.
-        feed_mm_per_min: `programmed`, `written` (F words), `before` and `after` (as the machine runs them).
-        before: load by name (`LOADS`) with the original feeds.
-        after: the same with the new ones.
-        limit: limit of the tool file by name, inf where there is none.
+        radial_depth_mm: what the tool meets, (n,).
+        section_mm2: area of the cut, in the plane across the feed, (n,).
+        programmed_mm_per_min: F words of the original, (n,).
+        written_mm_per_min: the new ones, (n,).
+        load: with the original feeds and with the new ones, as the machine runs them.
+        limit: of the tool file by the name of the load (`LOADS`), (n,); inf where there is none.
     """
 
     distance_mm: Vector
@@ -50,9 +47,9 @@ class FeedTraces:
     begins: npt.NDArray[np.intp]
     radial_depth_mm: Vector
     section_mm2: Vector
-    feed_mm_per_min: Mapping[str, Vector]
-    before: Mapping[str, Vector]
-    after: Mapping[str, Vector]
+    programmed_mm_per_min: Vector
+    written_mm_per_min: Vector
+    load: Pair[Load]
     limit: Mapping[str, Vector]
 
     def __len__(self) -> int:
@@ -60,60 +57,59 @@ class FeedTraces:
         return len(self.distance_mm)
 
 
-def feed_traces(result: FeedSchedule) -> FeedTraces:
-    """The curves of all regions whose load is known.
+def feed_traces(
+    survey: Survey, plans: Sequence[FeedPlan | None], loads: Sequence[PathLoad | None]
+) -> FeedTraces | None:
+    """The curves of all regions whose load is known; None: there is none.
 
-    Raises:
-        ArgumentError: there is none.
+    Args:
+        survey: what the tool meets.
+        plans: the feeds of each region that may change; None for the others.
+        loads: along each region; None where nothing is known.
     """
-    parts = list(_known(result))
+    parts = [
+        (part, part.track, plan, load)
+        for part, plan, load in zip(survey.regions, plans, loads, strict=True)
+        if part.track is not None and load is not None
+    ]
     if not parts:
-        raise _core.ArgumentError("no region whose cutting force is known: there is nothing to draw")
-    lengths = [np.diff(load.s_mm, prepend=0.0) for _, _, load in parts]
+        return None
+    lengths = [np.diff(load.s_mm, prepend=0.0) for *_, load in parts]
     length = np.concatenate(lengths)
     counts = np.array([len(each) for each in lengths])
-    feeds = [_feeds(part, plan, load) for part, plan, load in parts]
-    limits = [_limits(part) for part, _, _ in parts]
+    limits = [_limits(part) for part, *_ in parts]
+    programmed = [_programmed(part, track) for part, track, *_ in parts]
+    written = [
+        was if plan is None else _written(plan, load) for was, (*_, plan, load) in zip(programmed, parts, strict=True)
+    ]
     return FeedTraces(
         distance_mm=np.cumsum(length),
         length_mm=length,
-        xy_mm=np.concatenate(
-            [np.column_stack((part.track.x_mm, part.track.y_mm)) for part, _, _ in parts if part.track]
-        ),
+        xy_mm=np.concatenate([np.column_stack((track.x_mm, track.y_mm)) for _, track, *_ in parts]),
         begins=np.concatenate(([0], np.cumsum(counts)[:-1])),
-        radial_depth_mm=np.concatenate([part.track.radial_depth_mm for part, _, _ in parts if part.track]),
-        section_mm2=np.concatenate([part.track.section_mm2 for part, _, _ in parts if part.track]),
-        feed_mm_per_min={name: np.concatenate([each[name] for each in feeds]) for name in feeds[0]},
-        before={name: np.concatenate([getattr(load.before, name) for _, _, load in parts]) for name in LOADS},
-        after={name: np.concatenate([getattr(load.after, name) for _, _, load in parts]) for name in LOADS},
+        radial_depth_mm=np.concatenate([track.radial_depth_mm for _, track, *_ in parts]),
+        section_mm2=np.concatenate([track.section_mm2 for _, track, *_ in parts]),
+        programmed_mm_per_min=np.concatenate(programmed),
+        written_mm_per_min=np.concatenate(written),
+        load=Pair(
+            Load.in_a_row([load.original for *_, load in parts]), Load.in_a_row([load.emitted for *_, load in parts])
+        ),
         limit={name: np.repeat([each[name] for each in limits], counts) for name in LOADS},
     )
 
 
-def _known(result: FeedSchedule) -> Iterator[tuple[SurveyedRegion, FeedPlan | None, RegionLoad]]:
-    for part, plan, load in zip(result.survey.regions, result.plans, result.loads, strict=True):
-        if load is not None:
-            yield part, plan, load
+def _programmed(part: SurveyedRegion, track: _core.EngagementTrack) -> Vector:
+    feeds: Vector = (part.region.path.segment_feeds_mm_per_s * 60.0)[np.asarray(track.segment)]
+    return feeds
 
 
-def _feeds(part: SurveyedRegion, plan: FeedPlan | None, load: RegionLoad) -> dict[str, Vector]:
-    path = part.region.path
-    assert part.track is not None
-    words = np.array([path[i].feed_mm_per_s * 60.0 for i in range(len(path))])
-    programmed = words[np.asarray(part.track.segment)]
-    written = programmed
-    if plan is not None:
-        ends = np.array([stretch.end_mm for stretch in plan.stretches])
-        # The middle of a stretch: its end may be the place where the feed changes.
-        middles = load.s_mm - 0.5 * np.diff(load.s_mm, prepend=0.0)
-        inside = np.minimum(np.searchsorted(ends, middles), len(ends) - 1)
-        written = np.array([stretch.feed_mm_per_min for stretch in plan.stretches])[inside]
-    return {
-        "programmed": programmed,
-        "written": written,
-        "before": load.before.feed_mm_per_min,
-        "after": load.after.feed_mm_per_min,
-    }
+def _written(plan: FeedPlan, load: PathLoad) -> Vector:
+    ends = np.array([stretch.end_mm for stretch in plan.stretches])
+    # The middle of a stretch: its end may be the place where the feed changes.
+    middles = load.s_mm - 0.5 * np.diff(load.s_mm, prepend=0.0)
+    inside = np.minimum(np.searchsorted(ends, middles), len(ends) - 1)
+    feeds: Vector = np.array([stretch.feed_mm_per_min for stretch in plan.stretches])[inside]
+    return feeds
 
 
 def _limits(part: SurveyedRegion) -> dict[str, float]:
@@ -151,52 +147,52 @@ class WallMaps:
     Attributes:
         edges_mm: of the columns, along the cutting path, (m + 1,).
         height_mm: above the tip, (h,).
-        before: with the original feeds, (m, h); NaN: no wall is made there.
-        after: with the new ones.
+        error_um: with the original feeds and with the new ones, (m, h) each; NaN: no wall is made there.
     """
 
     edges_mm: Vector
     height_mm: Vector
-    before: Vector
-    after: Vector
+    error_um: Pair[Vector]
 
 
-def wall_maps(result: FeedSchedule, traces: FeedTraces) -> WallMaps | None:
+def wall_maps(survey: Survey, loads: Sequence[PathLoad | None], traces: FeedTraces) -> WallMaps | None:
     """The walls along the cutting path; None: none are made.
 
     A column speaks for a stretch of the path, taken where the peak resultant was largest before.
+
+    Args:
+        survey: what the tool meets.
+        loads: along each region; None where nothing is known.
+        traces: the curves of them.
     """
     starts = groups(traces.distance_mm, _COLUMNS)
     ends = np.append(starts[1:], len(traces))
-    load = traces.before["peak_resultant_n"]
+    load = traces.load.original.peak_resultant_n
     chosen = np.array([a + int(np.argmax(load[a:b])) for a, b in zip(starts, ends, strict=True)])
-    parts = list(_known(result))
-    bottom, top = _reach(parts)
-    height = np.linspace(bottom, top, _ROWS)
-    maps = {"before": np.full((len(chosen), _ROWS), np.nan), "after": np.full((len(chosen), _ROWS), np.nan)}
+    parts = [part for part, known in zip(survey.regions, loads, strict=True) if known is not None]
+    height = np.linspace(*_reach(parts), _ROWS)
+    maps = [(each, np.full((len(chosen), _ROWS), np.nan)) for each in (traces.load.original, traces.load.emitted)]
     owner = np.searchsorted(traces.begins, chosen, side="right") - 1
-    for number, (part, _, _) in enumerate(parts):
-        rows = np.flatnonzero(owner == number)
-        assert part.tool is not None
-        assert part.track is not None
+    for number, part in enumerate(parts):
+        assert part.tool is not None and part.track is not None
         force, beam = milling_force(part.tool, part), tool_beam(part.tool)
         inside = height <= part.tool.tool.overhang_mm
-        for row in rows:
+        for row in np.flatnonzero(owner == number):
             arcs = part.track.arcs_of(int(chosen[row] - traces.begins[number]))
             if len(arcs) == 0:
                 continue
-            for when, table in maps.items():
-                feed = float(traces.feed_mm_per_min[when][chosen[row]])
-                table[row, inside] = _wall(force, beam, arcs, feed, height[inside])
-    if not np.isfinite(maps["before"]).any():
+            for each, table in maps:
+                table[row, inside] = _wall(force, beam, arcs, float(each.feed_mm_per_min[chosen[row]]), height[inside])
+    (_, original), (_, emitted) = maps
+    if not np.isfinite(original).any():
         return None
     edges = np.append(traces.distance_mm[starts] - traces.length_mm[starts], traces.distance_mm[-1])
-    return WallMaps(edges, height, maps["before"], maps["after"])
+    return WallMaps(edges, height, Pair(original, emitted))
 
 
-def _reach(parts: list[tuple[SurveyedRegion, FeedPlan | None, RegionLoad]]) -> tuple[float, float]:
+def _reach(parts: Sequence[SurveyedRegion]) -> tuple[float, float]:
     """Lowest and highest engagement above the tip, mm."""
-    bands = [np.asarray(part.track.arcs)[:, 2:] for part, _, _ in parts if part.track is not None]
+    bands = [np.asarray(part.track.arcs)[:, 2:] for part in parts if part.track is not None]
     cut = np.concatenate([*bands, np.empty((0, 2))])
     return (float(cut[:, 0].min()), float(cut[:, 1].max())) if len(cut) else (0.0, 1.0)
 

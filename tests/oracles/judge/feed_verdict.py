@@ -50,8 +50,8 @@ class Verdict:
     place: dict[str, str] = field(default_factory=dict)
     near_share: float = math.nan  # of the limited path, within 5 % of a limit
     limited_share: float = math.nan
-    after: dict[str, float] = field(default_factory=dict)
-    before: dict[str, float] = field(default_factory=dict)
+    emitted: dict[str, float] = field(default_factory=dict)
+    original: dict[str, float] = field(default_factory=dict)
     gain: float = math.nan  # time of the constant feed over that of the schedule, both in material
 
 
@@ -141,7 +141,7 @@ def judge(
         near += float(step[~held & (share >= 0.95)].sum())
     verdict.near_share = near / limited if limited else math.nan
     verdict.limited_share = limited / total if total else 0.0
-    verdict.after, verdict.before = _sums(after), _sums(before)
+    verdict.emitted, verdict.original = _sums(after), _sums(before)
     return verdict
 
 

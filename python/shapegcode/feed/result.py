@@ -1,0 +1,301 @@
+"""What a feed schedule gains: force, torque, power and deflection before and after, and what limits each block."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from shapegcode.feed.load import PathLoad
+from shapegcode.feed.plan import FeedPlan
+from shapegcode.feed.survey import Survey
+from shapegcode.feed.traces import FeedTraces, WallMaps, feed_traces, wall_maps
+from shapegcode.program import Program
+from shapegcode.results.json import hidden
+from shapegcode.results.result import Pair, Plot, Result
+from shapegcode.results.table import Column, Table
+
+__all__ = [
+    "FeedRange", "FeedSchedule", "HeldLines", "KeptMove", "PeakLoad", "PeakLoads", "ResultantForce", "ScheduledRegion",
+]  # fmt: skip
+
+_PEAKS = (
+    ("peak_resultant_n", "resultant, peak", "N", 1),
+    ("mean_resultant_n", "resultant, mean of a revolution", "N", 1),
+    ("peak_deflection_um", "deflection of the tip, peak", "µm", 1),
+    ("peak_torque_nm", "torque, peak", "N m", 3),
+    ("mean_power_w", "power, mean of a revolution", "W", 1),
+)
+_SHOWN_RANGES = 24
+_SHOWN_MISSES = 3
+_LIMIT_WORDS = {
+    "resultant": "resultant force",
+    "chip_load": "feed per tooth",
+    "programmed": "feed as programmed",
+    "max_feed": "largest feed of tool or axes",
+    "air": "nothing to cut",
+    "minimum": "least feed",
+    "kept": "left as it was",
+}
+
+
+@dataclass(frozen=True)
+class FeedRange:
+    """Feeds from the lowest to the highest.
+
+    Attributes:
+        min: lowest.
+        max: highest.
+    """
+
+    min: float
+    max: float
+
+
+@dataclass(frozen=True)
+class ResultantForce:
+    """The resultant in the XY plane over a stretch.
+
+    Attributes:
+        mean: over the time in material, of the mean over a revolution.
+        max: largest of the peak in a revolution.
+    """
+
+    mean: float
+    max: float
+
+
+@dataclass(frozen=True)
+class PeakLoad:
+    """The largest value along the program.
+
+    Attributes:
+        original: with the original feeds.
+        emitted: with the new ones.
+        place: file and line of the latter; empty where there is none.
+    """
+
+    original: float
+    emitted: float
+    place: str
+
+
+@dataclass(frozen=True)
+class PeakLoads:
+    """Largest loads along the program.
+
+    Attributes:
+        peak_resultant_n: largest resultant in a revolution.
+        mean_resultant_n: mean of the resultant over a revolution.
+        peak_deflection_um: largest deflection of the tip in a revolution.
+        peak_torque_nm: largest torque in a revolution.
+        mean_power_w: mean power over a revolution.
+    """
+
+    peak_resultant_n: PeakLoad
+    mean_resultant_n: PeakLoad
+    peak_deflection_um: PeakLoad
+    peak_torque_nm: PeakLoad
+    mean_power_w: PeakLoad
+
+
+@dataclass(frozen=True)
+class HeldLines:
+    """Lines whose feed is held by one thing.
+
+    Attributes:
+        lines: first and last, from 1.
+        feed_mm_per_min: the feeds that stand there.
+        limit: what holds them: "resultant", "deflection", "torque", "power" or "chip_load"; "programmed": the feed of
+            the program; "max_feed": the largest feed of tool file or axes; "air": nothing to cut; "minimum": the least
+            feed; "kept": left as it was.
+        reason: why they are left as they were; else empty.
+    """
+
+    lines: tuple[int, int]
+    feed_mm_per_min: FeedRange
+    limit: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class ScheduledRegion:
+    """A run of cutting moves between two stops.
+
+    Attributes:
+        lines: first and last, from 1.
+        kept: why its feeds stay; empty if they may change.
+        spindle_rev_per_min: speed of the spindle; 0: not known.
+        radial_depth_mm: largest; None: not known.
+        removal_mm3: volume that is cut; None: not known.
+        misses: limits that are not kept, in words.
+        resultant_force_n: before and after; None: not known.
+    """
+
+    lines: tuple[int, int]
+    kept: str
+    spindle_rev_per_min: float
+    radial_depth_mm: float | None
+    removal_mm3: float | None
+    misses: tuple[str, ...]
+    resultant_force_n: Pair[ResultantForce] | None
+
+
+@dataclass(frozen=True)
+class KeptMove:
+    """A cutting move outside of the regions that meets material: its feed stays.
+
+    Attributes:
+        place: file and line.
+        feed_mm_per_min: as programmed.
+        misses: limits that are not kept, in words.
+        load: its force; None: not known.
+    """
+
+    place: str
+    feed_mm_per_min: float
+    misses: tuple[str, ...]
+    load: PathLoad | None = field(metadata=hidden())
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class FeedSchedule(Result):
+    """A program with the highest feeds that keep the limits of the cut; `original` is before, `emitted` after.
+
+    Attributes:
+        program: name of the program.
+        machine: name of the machine.
+        tools: names of the tools that cut.
+        margin: share of each limit that was left free.
+        feed_mm_per_min: of what is written.
+        resultant_force_n: along the whole program, cutting moves only.
+        peak: largest loads along the program.
+        cycle_time_s: of the whole program.
+        air_time_s: of cutting moves that meet nothing.
+        blocks: with a cutting move of a region.
+        limits: what holds the feed of which lines, in order.
+        regions: runs of cutting moves between two stops.
+        moves: cutting moves outside of them that meet material.
+        excess_ratio: by how much the worst limit is exceeded where a lower feed could help; 0: nowhere.
+        warnings: what was noticed, each with its place.
+        text: the program with its new feeds.
+        written: the same, as read back.
+        survey: what the tool meets.
+        plans: the feeds of each region that may change; None for the others.
+        loads: along each region; None where nothing is known.
+    """
+
+    program: str
+    machine: str
+    tools: tuple[str, ...]
+    margin: float
+    feed_mm_per_min: FeedRange
+    resultant_force_n: Pair[ResultantForce]
+    peak: PeakLoads
+    cycle_time_s: Pair[float]
+    air_time_s: Pair[float]
+    blocks: Pair[int]
+    limits: tuple[HeldLines, ...]
+    regions: tuple[ScheduledRegion, ...]
+    moves: tuple[KeptMove, ...]
+    excess_ratio: float
+    warnings: tuple[str, ...]
+    text: bytes = field(metadata=hidden())
+    written: Program = field(metadata=hidden())
+    survey: Survey = field(metadata=hidden())
+    plans: tuple[FeedPlan | None, ...] = field(metadata=hidden())
+    loads: tuple[PathLoad | None, ...] = field(metadata=hidden())
+
+    @property
+    def misses(self) -> tuple[str, ...]:
+        """Limits that are not kept, of regions and moves, in words."""
+        groups = [*(region.misses for region in self.regions), *(move.misses for move in self.moves)]
+        return tuple(miss for misses in groups for miss in misses)
+
+    @property
+    def ok(self) -> bool:
+        """Whether every limit is kept."""
+        return not self.misses
+
+    @property
+    def answer(self) -> str:
+        """Whether every limit is kept and what that takes, or where not."""
+        name, misses = Path(self.program).name, self.misses
+        if not misses:
+            force, time = self.resultant_force_n, self.cycle_time_s
+            return (
+                f"{name}: every limit is kept; peak resultant {force.original.max:.1f} → {force.emitted.max:.1f} N, "
+                f"cycle time {time.original:.2f} → {time.emitted:.2f} s"
+            )
+        more = f"; and {len(misses) - _SHOWN_MISSES} more" if len(misses) > _SHOWN_MISSES else ""
+        return f"{name}: NOT within limits: {'; '.join(misses[:_SHOWN_MISSES])}{more}"
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        if self.ok:
+            return "shapegcode convert shapes this program too; or both in one go: convert --feed-schedule"
+        unknown = [region for region in self.regions if region.misses and region.resultant_force_n is None]
+        if unknown or any(move.load is None for move in self.moves):
+            return "say what is not known: S in the program or feed.spindle_rev_per_min in the tool file"
+        return "take less material at once there, lower the feed of what stays as it was, or choose another limit"
+
+    @cached_property
+    def traces(self) -> FeedTraces | None:
+        """The curves along the cutting path; None where no force is known."""
+        return feed_traces(self.survey, self.plans, self.loads)
+
+    @cached_property
+    def walls(self) -> WallMaps | None:
+        """The form error of the walls along the cutting path; None where none are made."""
+        return None if self.traces is None else wall_maps(self.survey, self.loads, self.traces)
+
+    def tables(self) -> list[Table]:
+        """Before and after; what holds the feed of which lines."""
+        return [self._gain_table(), self._limit_table()]
+
+    def plots(self) -> Mapping[str, Plot]:
+        """Curves along the path, the path coloured by force, the walls; none where no force is known."""
+        return self._drawn_beside()
+
+    def _gain_table(self) -> Table:
+        rows: list[tuple[str, str, str, str, str]] = []
+
+        def row(name: str, pair: Pair[float] | Pair[int] | PeakLoad, digits: int, unit: str) -> None:
+            place = pair.place.rpartition(":")[2] if isinstance(pair, PeakLoad) else ""
+            rows.append((name, f"{pair.original:.{digits}f}", f"{pair.emitted:.{digits}f}", unit, place))
+
+        for key, name, unit, digits in _PEAKS:
+            row(name, getattr(self.peak, key), digits, unit)
+        force = self.resultant_force_n
+        row("resultant, mean of the time in material", Pair(force.original.mean, force.emitted.mean), 1, "N")
+        row("cycle time", self.cycle_time_s, 2, "s")
+        row("of it cutting moves in air", self.air_time_s, 2, "s")
+        row("cutting blocks", self.blocks, 0, "")
+        columns = (
+            Column("largest along the program", value=lambda row: row[0], text=True),
+            Column("before", value=lambda row: row[1]),
+            Column("after", value=lambda row: row[2]),
+            Column("unit", value=lambda row: row[3], text=True),
+            Column("line", value=lambda row: row[4]),
+        )
+        title = f"{self.program} on {self.machine}, tool {', '.join(self.tools) or '-'}"
+        return Table(title, columns, rows, sections=(len(_PEAKS) + 1,))
+
+    def _limit_table(self) -> Table:
+        """The ranges of lines with the lowest feeds, in order."""
+        slowest = sorted(self.limits, key=lambda entry: entry.feed_mm_per_min.min)[:_SHOWN_RANGES]
+        title = "what holds the feed"
+        if len(self.limits) > len(slowest):
+            title += f" (the {len(slowest)} slowest of {len(self.limits)} ranges; --json has all)"
+        columns = (
+            Column("lines", value=lambda entry: _from_to(*map(str, entry.lines)), text=True),
+            Column("feed", "mm/min", lambda entry: _from_to(*map("{:g}".format, astuple(entry.feed_mm_per_min)))),
+            Column("held by", value=lambda entry: _LIMIT_WORDS.get(entry.limit, entry.limit), text=True),
+        )
+        return Table(title, columns, sorted(slowest, key=lambda entry: entry.lines[0]))
+
+
+def _from_to(first: str, last: str) -> str:
+    return first if first == last else f"{first} to {last}"
