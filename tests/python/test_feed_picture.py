@@ -106,9 +106,9 @@ def test_plots_draw_into_the_axes_of_the_caller(pocket: FeedSchedule, draw: Call
     whole = plot.figure(12.0, 8.0)
     mine, other = whole.subplots(1, 2)
     drawn = draw(pocket, mine)
-    assert drawn.figure is whole
+    assert drawn.figure.figure is whole
     assert not other.has_data()
-    assert drawn.get_position().x1 <= other.get_position().x0
+    assert drawn.get_window_extent().x1 <= other.get_window_extent().x0
     assert set(plots_of(pocket)) == {"feed-along-path", "feed-path", "feed-surface"}
 
 

@@ -157,7 +157,7 @@ def _resultant(loads: Sequence[Load]) -> ResultantForce:
 
 
 def _peak(column: str, loads: Sequence[tuple[Callable[[int], str], PathLoad]]) -> PeakLoad:
-    """The largest value of a column, and the place of that after; beside a load what tells its places."""
+    """Largest value of a column before and after, and the place of the latter; beside a load what tells its places."""
     original, emitted, place = 0.0, 0.0, ""
     for place_of, load in loads:
         was, now = getattr(load.original, column), getattr(load.emitted, column)
