@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import shapegcode as sg
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper, convolved_zv, minimal_two_mode

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import pyuff
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.io import wavfile
 
 from shapegcode.characterization.log import read_log

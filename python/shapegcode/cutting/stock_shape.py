@@ -17,8 +17,7 @@ from shapegcode.errors import StockError
 from shapegcode.settings.keys import toml
 
 if TYPE_CHECKING:
-    from shapely import MultiPolygon
-    from shapely import Polygon as Area
+    from shapely import MultiPolygon, Polygon as Area
 
 __all__ = ["StockPiece", "stock_polygons"]
 

@@ -1,0 +1,72 @@
+"""The public names of shapegcode and their homes: the one list, which type checkers and `__init__.py` read."""
+
+from shapegcode._core import (
+    Fir as Fir,
+    FirStream as FirStream,
+    LinearPlant as LinearPlant,
+    Mode as Mode,
+    Path as Path,
+    Segment as Segment,
+    Shaper as Shaper,
+    __version__ as __version__,
+    convolved_zv as convolved_zv,
+    grid_polynomial as grid_polynomial,
+    minimal_two_mode as minimal_two_mode,
+    zv as zv,
+)
+from shapegcode.checking.check import (
+    Check as Check,
+    Finding as Finding,
+    check as check,
+)
+from shapegcode.conversion.budget import Budget as Budget
+from shapegcode.conversion.convert import (
+    Conversion as Conversion,
+    convert as convert,
+)
+from shapegcode.cutting.stock import Stock as Stock
+from shapegcode.cutting.tool import Tool as Tool
+from shapegcode.errors import (
+    ArgumentError as ArgumentError,
+    DesignError as DesignError,
+    MachineError as MachineError,
+    NumericError as NumericError,
+    ProgramError as ProgramError,
+    RecordError as RecordError,
+    RoundTripError as RoundTripError,
+    ShapegcodeError as ShapegcodeError,
+    StockError as StockError,
+    ToolError as ToolError,
+)
+from shapegcode.feed.result import FeedSchedule as FeedSchedule
+from shapegcode.feed.schedule import schedule_feed as schedule_feed
+from shapegcode.feed.shaped import (
+    ScheduledConversion as ScheduledConversion,
+    convert_scheduled as convert_scheduled,
+)
+from shapegcode.identification.identify import identify as identify
+from shapegcode.identification.result import Identification as Identification
+from shapegcode.io.read import ReadOptions as ReadOptions
+from shapegcode.io.record import Record as Record
+from shapegcode.machine import Machine as Machine
+from shapegcode.metrology.measure import (
+    Measurement as Measurement,
+    measure as measure,
+)
+from shapegcode.model.response import plant_response as plant_response
+from shapegcode.model.stream import stream as stream
+from shapegcode.program import Program as Program
+from shapegcode.shaping import (
+    ModeBand as ModeBand,
+    Recommendation as Recommendation,
+    choose_block_period as choose_block_period,
+    choose_shaper as choose_shaper,
+    shortest_non_negative as shortest_non_negative,
+)
+from shapegcode.shaping.grid import choose_grid as choose_grid
+from shapegcode.simulation.simulate import (
+    Simulation as Simulation,
+    simulate as simulate,
+)
+from shapegcode.timing.cycle_time import cycle_time as cycle_time
+from shapegcode.timing.result import CycleTime as CycleTime

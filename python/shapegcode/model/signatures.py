@@ -1,0 +1,86 @@
+"""Signatures of what the core offers, so that `inspect.signature`, `help` and editors show them."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+__all__ = ["with_signature"]
+
+T = TypeVar("T")
+
+# What the core calls a type, and what a reader does; the first that fits counts.
+_WORDS = (
+    ("typing.SupportsFloat | typing.SupportsIndex", "float"),
+    ("typing.SupportsInt | typing.SupportsIndex", "int"),
+    ("collections.abc.", ""),
+    ("shapegcode._core.", ""),
+)
+_ARRAY = "typing.Annotated[numpy.typing.ArrayLike"
+
+
+def with_signature(value: T) -> T:
+    """A function or class of the core, with the signature that stands in its docstring.
+
+    Args:
+        value: what the core exports.
+
+    Returns:
+        The class itself; in place of a function one of Python that calls it; everything else as it is, errors and
+        classes without a constructor too.
+    """
+    if isinstance(value, type):
+        if not issubclass(value, BaseException) and (found := _signature(value.__init__.__doc__)):
+            taken = list(found.parameters.values())[1:]  # without self
+            shown = found.replace(parameters=taken, return_annotation=inspect.Signature.empty)
+            setattr(value, "__signature__", shown)  # noqa: B010
+        return value
+    if inspect.isbuiltin(value) and (found := _signature(value.__doc__)):
+        called: Any = _called(value)
+        called.__signature__ = found
+        return called  # type: ignore[no-any-return]
+    return value
+
+
+def _called(function: Callable[..., Any]) -> Callable[..., Any]:
+    @functools.wraps(function)
+    def called(*args: Any, **kwargs: Any) -> Any:
+        return function(*args, **kwargs)
+
+    called.__module__ = "shapegcode"
+    called.__doc__ = (function.__doc__ or "").partition("\n\n")[2].strip()
+    return called
+
+
+def _signature(doc: str | None) -> inspect.Signature | None:
+    """Of the first line of a docstring, ``name(first: type, second: type = 1) -> type``; None where there is none."""
+    try:
+        (found,) = ast.parse(f"def {(doc or '').partition(chr(10))[0]}: ...").body
+    except SyntaxError:
+        return None
+    if not isinstance(found, ast.FunctionDef):
+        return None
+    arguments = found.args.args
+    defaults = [inspect.Parameter.empty] * (len(arguments) - len(found.args.defaults))
+    defaults += [ast.literal_eval(default) for default in found.args.defaults]
+    parameters = [
+        inspect.Parameter(
+            each.arg, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=default, annotation=_words(each.annotation)
+        )
+        for each, default in zip(arguments, defaults, strict=True)
+    ]
+    return inspect.Signature(parameters, return_annotation=_words(found.returns))
+
+
+def _words(annotation: ast.expr | None) -> Any:
+    if annotation is None:
+        return inspect.Parameter.empty
+    text = ast.unparse(annotation)
+    if text.startswith(_ARRAY):
+        return "ArrayLike"
+    for core, word in _WORDS:
+        text = text.replace(core, word)
+    return text
