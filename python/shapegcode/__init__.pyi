@@ -15,9 +15,12 @@ from shapegcode._core import (
     zv as zv,
 )
 from shapegcode.checking.check import (
+    check as check,
+    check_text as check_text,
+)
+from shapegcode.checking.result import (
     Check as Check,
     Finding as Finding,
-    check as check,
 )
 from shapegcode.conversion.budget import Budget as Budget
 from shapegcode.conversion.convert import (

@@ -7,19 +7,18 @@ import random
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import pytest
 
 import shapegcode as sg
 from effort import cpu_s
-from shapegcode.checking import runs as checked_runs
-from shapegcode.checking.check import MOST_FINDINGS, check_text
+from shapegcode.checking.check import MOST_FINDINGS
+from shapegcode.checking.runs import block_table
 from shapegcode.cli import main
+from shapegcode.results.json import schema
 
 HEAD = "%\nO1\nG21G17G90G94G54G64\nG0X0Y0Z0\n"  # 4 lines
 END = "M30\n%\n"
-KEYS = {
-    "program", "machine", "findings", "counts", "counts_by_code", "size_bytes", "memory_bytes", "short_blocks", "dnc",
-}  # fmt: skip
 
 
 def machine(**controller: Any) -> sg.Machine:
@@ -29,7 +28,7 @@ def machine(**controller: Any) -> sg.Machine:
 
 
 def checked(body: str, end: str = END, **controller: Any) -> sg.Check:
-    return check_text(HEAD + body + end, machine(**controller), source="part.nc")
+    return sg.check_text(HEAD + body + end, machine(**controller), source="part.nc")
 
 
 def told(check: sg.Check, code: str) -> list[tuple[int, str, int]]:
@@ -43,7 +42,7 @@ def told(check: sg.Check, code: str) -> list[tuple[int, str, int]]:
 def test_several_alarms_in_one_run() -> None:
     check = checked("G1X10.F1000.\nG99.9\nX20.Q\nX25.\nG2X30.R1.\nG1X40.\nM98P77\n")
     assert told(check, "alarm") == [(6, "alarm", 10), (7, "alarm", 5), (9, "alarm", 20), (11, "alarm", 78)]
-    assert check.counts["alarm"] == check.counts_by_code["alarm"] == 4
+    assert check.counts.alarm == check.counts_by_code["alarm"] == 4
     assert check.refused
     for finding in check.findings:
         # The number has a field of its own and the place too.
@@ -58,7 +57,7 @@ def test_several_alarms_in_one_run() -> None:
 def test_a_good_program_has_nothing() -> None:
     check = checked("G1X10.F1000.\nY20.\nG0Z5.\n")
     assert check.findings == ()
-    assert check.counts == {"alarm": 0, "warning": 0, "note": 0}
+    assert (check.counts.alarm, check.counts.warning, check.counts.note) == (0, 0, 0)
     assert not check.refused
     assert check.size_bytes == len(HEAD + "G1X10.F1000.\nY20.\nG0Z5.\n" + END)
 
@@ -82,10 +81,10 @@ def test_calls_are_told_with_their_callers(tmp_path: Path) -> None:
 
 def test_another_program_of_the_file() -> None:
     text = "%\nO1\nG21\nM30\nO2\nG99.9\nM30\n%\n"
-    assert not check_text(text, machine()).refused
-    second = check_text(text, machine(), program_number=2)
+    assert not sg.check_text(text, machine()).refused
+    second = sg.check_text(text, machine(), program_number=2)
     assert told(second, "alarm") == [(6, "alarm", 10)]
-    missing = check_text(text, machine(), program_number=3)
+    missing = sg.check_text(text, machine(), program_number=3)
     assert [each.alarm for each in missing.findings if each.severity == "alarm"] == [78]
 
 
@@ -100,7 +99,7 @@ def test_macro_control_cannot_run_from_dnc() -> None:
 def test_the_end_of_the_reading_is_told() -> None:
     few, many = (checked("G1F1000.\n" + "X1.Q\n" * count) for count in (199, 500))
     assert not any("not checked" in each.message for each in few.findings)
-    assert (few.counts["alarm"], many.counts["alarm"]) == (199, 200)
+    assert (few.counts.alarm, many.counts.alarm) == (199, 200)
     assert [each.line for each in many.findings if "what follows is not checked" in each.message] == [205]
 
 
@@ -156,7 +155,7 @@ def test_in_a_look_ahead_mode_every_function_stops() -> None:
 def test_long_lists_are_capped_and_counted() -> None:
     count = MOST_FINDINGS + 500
     check = checked("G1F1000.\n" + "".join(f"X{k % 2 * 10}.\nM8\n" for k in range(1, count + 1)) + "X5.\n")
-    assert check.counts_by_code["look_ahead_breaker"] == check.counts["note"] == count
+    assert check.counts_by_code["look_ahead_breaker"] == check.counts.note == count
     assert len(told(check, "look_ahead_breaker")) == MOST_FINDINGS
 
 
@@ -169,15 +168,15 @@ def test_short_blocks_by_hand() -> None:
     assert told(check, "short_block") == [(6, "warning", 0)]
     short = check.short_blocks
     assert short is not None
-    assert (short["count"], short["blocks"], short["region_count"]) == (2, 5, 1)
-    assert short["share"] == pytest.approx(0.4)
-    assert short["shortest_s"] == pytest.approx(0.001, abs=1e-8)
-    assert short["programmed_s"] == pytest.approx(0.210, abs=1e-8)
-    assert short["taken_s"] == pytest.approx(0.215, abs=1e-8)
-    assert short["first_places"] == ["part.nc:6", "part.nc:7"]
-    (region,) = short["regions"]
-    assert region["lines"] == [5, 9]
-    assert (region["count"], region["blocks"]) == (2, 5)
+    assert (short.count, short.blocks, short.region_count) == (2, 5, 1)
+    assert short.share == pytest.approx(0.4)
+    assert short.shortest_s == pytest.approx(0.001, abs=1e-8)
+    assert short.programmed_s == pytest.approx(0.210, abs=1e-8)
+    assert short.taken_s == pytest.approx(0.215, abs=1e-8)
+    assert short.first_places == ("part.nc:6", "part.nc:7")
+    (region,) = short.regions
+    assert region.lines == (5, 9)
+    assert (region.count, region.blocks) == (2, 5)
     assert checked("G1X10.F6000.\nX10.4\n", block_time_s=0.004).counts_by_code == {}
 
 
@@ -185,17 +184,17 @@ def test_short_blocks_of_each_region_and_its_lines_in_the_source() -> None:
     """A subprogram called twice: two runs, both told at its own lines."""
     sub = "O2\nG91G1X10.F6000.\nX0.1\nG90\nM99\n"
     text = HEAD + "M98P2\nG0Z5.\nM98P2\nM30\n" + sub + "%\n"
-    check = check_text(text, machine(block_time_s=0.005), source="part.nc")
+    check = sg.check_text(text, machine(block_time_s=0.005), source="part.nc")
     assert told(check, "short_block") == [(11, "warning", 0)] * 2
     assert check.short_blocks is not None
-    assert [row["lines"] for row in check.short_blocks["regions"]] == [[10, 11]] * 2
+    assert [row.lines for row in check.short_blocks.regions] == [(10, 11)] * 2
 
 
 def test_moves_of_rotary_axes_alone_have_no_length_to_judge() -> None:
     check = checked("G1X10.F6000.\nA90.\nX20.\n", block_time_s=0.005)
-    assert check.counts["warning"] == 0
+    assert check.counts.warning == 0
     assert check.short_blocks is not None
-    assert check.short_blocks["blocks"] == 2
+    assert check.short_blocks.blocks == 2
 
 
 def test_short_blocks_in_a_called_file_stand_at_its_lines(tmp_path: Path) -> None:
@@ -214,7 +213,7 @@ def test_every_line_runs_once_and_in_order() -> None:
     assert len(paths) > 20
     for path in paths:
         program = sg.Program.read(path, machine(), collect_alarms=True)
-        table = checked_runs.block_table(program, machine())
+        table = block_table(program, machine())
         for lines in (table.cutting_lines, table.rapid_lines, table.dwell_lines):
             assert lines.tolist() == sorted(lines.tolist()), path.name
 
@@ -226,7 +225,7 @@ def test_against_the_segments_one_by_one() -> None:
         kind = chance.choices(kinds, (8, 1, 1, 4))[0]
         lines.append(kind.format(chance.uniform(0, 2), chance.uniform(0, 2), chance.randint(200, 14_000)))
     program = sg.Program.from_text(HEAD + "\n".join(lines) + "\n" + END, machine())
-    table = checked_runs.block_table(program, machine(block_time_s=0.007))
+    table = block_table(program, machine(block_time_s=0.007))
     runs = [run for run in table.runs if run.blocks]
     by_lines = {(run.first_line, run.last_line): run for run in runs}
     assert len(program.regions) > 100
@@ -271,14 +270,17 @@ def test_serial_line_by_hand() -> None:
     for baud, starves in ((19_200, True), (38_400, False)):
         check = checked(body, dnc_baud=baud, block_time_s=0.004)
         assert check.dnc is not None
-        assert check.dnc["characters_per_s"] == pytest.approx(baud / 11)
-        assert check.dnc["needed_characters_per_s"] == pytest.approx(rate, rel=1e-6)
-        assert check.dnc["factor"] == pytest.approx(rate * 11 / baud, rel=1e-6)
+        assert check.dnc.characters_per_s == pytest.approx(baud / 11)
+        assert check.dnc.needed_characters_per_s == pytest.approx(rate, rel=1e-6)
+        assert check.dnc.factor == pytest.approx(rate * 11 / baud, rel=1e-6)
         assert told(check, "dnc_rate") == ([(6, "warning", 0)] if starves else [])
-        assert check.dnc["region_count"] == len(check.dnc["regions"]) == int(starves)
-    row = checked(body, dnc_baud=19_200).dnc["regions"][0]  # type: ignore[index]
-    assert (row["lines"], row["bytes"]) == ([6, 13], 80)
-    assert row["blocks_per_s"] == pytest.approx(200.0, rel=1e-6)
+        assert check.dnc.region_count == len(check.dnc.regions) == int(starves)
+    starving = checked(body, dnc_baud=19_200)
+    assert starving.dnc is not None
+    (row,) = starving.dnc.regions
+    assert (row.lines, row.bytes) == ((6, 13), 80)
+    assert row.programmed_s == pytest.approx(0.040, abs=1e-8)
+    assert row.blocks_per_s == pytest.approx(200.0, rel=1e-6)
     assert checked(body, dnc_bits_per_character=10).dnc is None
 
 
@@ -290,7 +292,7 @@ def test_a_long_program_quickly(mode: str) -> None:
     body = f"{mode}G1F3000.\n" + "".join(f"X{k % 1000 * 0.1:.1f}Y{k % 2}.\n" for k in range(1, 40_001))
     check = checked(body)
     assert check.short_blocks is not None
-    assert check.short_blocks["blocks"] == 40_000
+    assert check.short_blocks.blocks == 40_000
     # Ten times as long takes about ten times as long, not a hundred times.
     tenth = "".join(body.splitlines(keepends=True)[:-36_000])
     assert cpu_s(lambda: checked(body), 1) < 30.0 * cpu_s(lambda: checked(tenth))
@@ -317,11 +319,13 @@ def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]
 def test_exit_codes_and_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, "good.nc", "-m", "vx500")
     assert (code, err) == (0, "")
-    assert "0 alarms, 0 warnings, 0 notes" in out
+    assert out.startswith("good.nc on VX500: 0 alarms, 0 warnings, 0 notes; ")
     assert "next: " in out
     code, out, err = run(capsys, "short.nc", "-m", "vx500")
     assert (code, err) == (1, "")
     assert "short.nc:6" in out
+    # The table says it, and nothing says it again.
+    assert " ".join(out.split()).count("without blocks in store") == 1
     code, out, err = run(capsys, "bad.nc", "-m", "vx500")
     assert (code, err) == (2, "")
     for said in ("bad.nc:6:1", "0010", "bad.nc:8:4", "0005", "2 alarms", "next: correct bad.nc:6:1 first"):
@@ -333,13 +337,20 @@ def test_json(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, "bad.nc", "-m", "vx500", "--json", "-")
     assert (code, err) == (2, "")
     data = json.loads(out)
-    assert set(data) == KEYS
+    jsonschema.validate(data, schema(sg.Check))
     assert data["counts"] == {"alarm": 2, "warning": 0, "note": 0}
-    assert set(data["findings"][0]) == {"severity", "code", "alarm", "file", "line", "column", "message"}
+    assert (data["ok"], data["refused"], data["warnings"]) == (False, True, [])
     assert [(each["line"], each["column"], each["alarm"]) for each in data["findings"]] == [(6, 1, 10), (8, 4, 5)]
     assert data["dnc"] is None
     assert run(capsys, "good.nc", "-m", "vx500", "--json", "c.json")[0] == 0
-    assert set(json.loads((folder / "c.json").read_text())) == KEYS
+    data = json.loads((folder / "c.json").read_text())
+    jsonschema.validate(data, schema(sg.Check))
+    assert (data["ok"], data["refused"]) == (True, False)
+    assert run(capsys, "short.nc", "-m", "vx500", "--set", "controller.dnc_baud=1200", "--json", "c.json")[0] == 1
+    data = json.loads((folder / "c.json").read_text())
+    jsonschema.validate(data, schema(sg.Check))
+    assert data["dnc"]["regions"][0]["lines"] == [5, 6]
+    assert [each.partition(": ")[0] for each in data["warnings"]] == ["short.nc:5", "short.nc:6"]
 
 
 def test_table_of_many_alike_is_short(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

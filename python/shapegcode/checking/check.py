@@ -8,17 +8,25 @@ from __future__ import annotations
 
 import errno
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from shapegcode._core import ProgramError
-from shapegcode.checking.runs import BlockTable, Breaker, Run, block_table, look_ahead_breakers
+from shapegcode.checking.result import (
+    Check,
+    Finding,
+    FindingCounts,
+    SerialLine,
+    ShortBlocks,
+    ShortRun,
+    StarvedRun,
+)
+from shapegcode.checking.runs import BlockTable, Breaker, CuttingRun, block_table, look_ahead_breakers
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 
-__all__ = ["MOST_FINDINGS", "Check", "Finding", "check", "check_text"]
+__all__ = ["MOST_FINDINGS", "check", "check_text"]
 
 MOST_FINDINGS = 1000
 """Findings of one code that are listed; the counts hold them all."""
@@ -33,72 +41,16 @@ _NO_ROOM = 70
 _MOST_ALARMS = 200
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One thing to tell about one place of a program.
-
-    Attributes:
-        severity: "alarm": the control refuses it; "warning": it will not run as programmed; "note": worth knowing.
-        code: short stable name of the kind of finding.
-        alarm: the control's number; 0: none.
-        file: file of the place.
-        line: from 1; 0: the file as a whole.
-        column: from 1; 0: the line as a whole.
-        message: in words.
-    """
-
-    severity: str
-    code: str
-    alarm: int
-    file: str
-    line: int
-    column: int
-    message: str
-
-
-@dataclass(frozen=True)
-class Check:
-    """What was found in a program.
-
-    Attributes:
-        program: name of the program.
-        machine: name of the machine.
-        findings: sorted by place, at most `MOST_FINDINGS` of each code.
-        counts: of all findings by severity.
-        counts_by_code: of all findings by code.
-        size_bytes: of the file.
-        memory_bytes: of the control.
-        short_blocks: blocks that last less than the block time, and what they cost; None: the program was not read.
-        dnc: what the serial line carries and what the program asks for; None: not drip fed, or not read.
-    """
-
-    program: str
-    machine: str
-    findings: tuple[Finding, ...]
-    counts: dict[str, int]
-    counts_by_code: dict[str, int]
-    size_bytes: int
-    memory_bytes: int
-    short_blocks: dict[str, Any] | None
-    dnc: dict[str, Any] | None
-
-    @property
-    def refused(self) -> bool:
-        """Whether the control refuses anything."""
-        return self.counts["alarm"] > 0
-
-    def report(self) -> dict[str, Any]:
-        """The plain dictionary that ``--json`` writes."""
-        return asdict(self)
-
-
 def check(path: str | Path, machine: Machine, *, program_number: int | None = None) -> Check:
-    """Check a program file.
+    """Check a program file: what the control would refuse, and what it would not run as programmed.
 
     Args:
-        path: the file.
+        path: the file; no `Program`, as what the control refuses is none.
         machine: whose controller would run it.
         program_number: O number to play of a file that holds several; None: the first.
+
+    Returns:
+        The findings, and what short blocks and a serial line cost.
 
     Raises:
         ProgramError: not to be read at all, without a place to point to.
@@ -119,15 +71,25 @@ def check_text(
     program_number: int | None = None,
     folder: Path | None = None,
 ) -> Check:
-    """Check a program text; `source` names it, programs that it calls are looked for in `folder` too.
+    """Check a program text, as `check` does a file.
+
+    Args:
+        text: of the program.
+        machine: whose controller would run it.
+        source: its name in findings.
+        program_number: O number to play of a text that holds several; None: the first.
+        folder: where programs that it calls are looked for too.
+
+    Returns:
+        The findings, and what short blocks and a serial line cost.
 
     Raises:
         ProgramError: not to be read at all, without a place to point to.
     """
     data = text.encode() if isinstance(text, str) else text
     found = list(_whole_file(data, source, machine))
-    short: dict[str, Any] | None = None
-    dnc: dict[str, Any] | None = None
+    short: ShortBlocks | None = None
+    dnc: SerialLine | None = None
     try:
         program = Program.from_text(
             data, machine, source=source, program_number=program_number, collect_alarms=True, folder=folder
@@ -145,14 +107,15 @@ def check_text(
         short = _short_blocks(program, machine, table)
         found += _short_findings(program, machine, table.runs)
         if machine.controller.dnc_baud > 0:
-            dnc = _dnc(program, machine, table.runs)
-            found += _dnc_findings(program, dnc["characters_per_s"], table.runs)
+            dnc = _serial_line(program, machine, table.runs)
+            found += _dnc_findings(program, dnc.characters_per_s, table.runs)
+    severities = Counter(finding.severity for finding in found)
     return Check(
         source,
         machine.name,
         _listed(found, source),
-        {name: sum(finding.severity == name for finding in found) for name in _SEVERITIES},
-        {code: sum(finding.code == code for finding in found) for code in sorted({each.code for each in found})},
+        FindingCounts(*(severities[name] for name in _SEVERITIES)),
+        dict(sorted(Counter(finding.code for finding in found).items())),
         len(data),
         machine.controller.program_memory_bytes,
         short,
@@ -237,7 +200,7 @@ def _feed_findings(program: Program, table: BlockTable) -> Iterator[Finding]:
         yield _at(program, "warning", "axis_feed", clamped.first_line, message)
 
 
-def _short_findings(program: Program, machine: Machine, runs: Iterable[Run]) -> Iterator[Finding]:
+def _short_findings(program: Program, machine: Machine, runs: Iterable[CuttingRun]) -> Iterator[Finding]:
     block_time_s = machine.controller.block_time_s
     for run in runs:
         if run.short_blocks:
@@ -249,61 +212,54 @@ def _short_findings(program: Program, machine: Machine, runs: Iterable[Run]) -> 
             yield _at(program, "warning", "short_block", run.first_short_line, message)
 
 
-def _short_blocks(program: Program, machine: Machine, table: BlockTable) -> dict[str, Any]:
+def _short_blocks(program: Program, machine: Machine, table: BlockTable) -> ShortBlocks:
     count, blocks = sum(run.short_blocks for run in table.runs), sum(run.blocks for run in table.runs)
     short = [run for run in table.runs if run.short_blocks]
-    return {
-        "block_time_s": machine.controller.block_time_s,
-        "count": count,
-        "blocks": blocks,
-        "share": count / blocks if blocks else 0.0,
-        "shortest_s": min((run.shortest_s for run in short), default=None),
-        "programmed_s": sum(run.time_s for run in table.runs),
-        "taken_s": sum(run.taken_s for run in table.runs),
-        "region_count": len(short),
-        "first_places": [program.place(line) for line in table.first_short_lines],
-        "regions": [
-            {
-                "lines": _lines(program, run),
-                "count": run.short_blocks,
-                "blocks": run.blocks,
-                "shortest_s": run.shortest_s,
-                "programmed_s": run.time_s,
-                "taken_s": run.taken_s,
-            }
+    return ShortBlocks(
+        block_time_s=machine.controller.block_time_s,
+        count=count,
+        blocks=blocks,
+        share=count / blocks if blocks else 0.0,
+        shortest_s=min((run.shortest_s for run in short), default=None),
+        programmed_s=sum(run.time_s for run in table.runs),
+        taken_s=sum(run.taken_s for run in table.runs),
+        first_places=tuple(program.place(line) for line in table.first_short_lines),
+        region_count=len(short),
+        regions=tuple(
+            ShortRun(_lines(program, run), run.short_blocks, run.blocks, run.shortest_s, run.time_s, run.taken_s)
             for run in short[:MOST_FINDINGS]
-        ],
-    }
+        ),
+    )
 
 
-def _dnc(program: Program, machine: Machine, runs: Iterable[Run]) -> dict[str, Any]:
+def _serial_line(program: Program, machine: Machine, runs: Iterable[CuttingRun]) -> SerialLine:
     controller = machine.controller
     carried = controller.dnc_baud / controller.dnc_bits_per_character
     timed = [run for run in runs if run.time_s > 0.0]
     needed = max((run.bytes / run.time_s for run in timed), default=0.0)
     starved = [run for run in timed if run.bytes > run.time_s * carried]
-    return {
-        "baud": controller.dnc_baud,
-        "bits_per_character": controller.dnc_bits_per_character,
-        "characters_per_s": carried,
-        "needed_characters_per_s": needed,
-        "factor": needed / carried,
-        "region_count": len(starved),
-        "regions": [
-            {
-                "lines": _lines(program, run),
-                "bytes": run.bytes,
-                "time_s": run.time_s,
-                "blocks_per_s": run.blocks / run.time_s,
-                "needed_characters_per_s": run.bytes / run.time_s,
-                "factor": run.bytes / run.time_s / carried,
-            }
+    return SerialLine(
+        baud=controller.dnc_baud,
+        bits_per_character=controller.dnc_bits_per_character,
+        characters_per_s=carried,
+        needed_characters_per_s=needed,
+        factor=needed / carried,
+        region_count=len(starved),
+        regions=tuple(
+            StarvedRun(
+                lines=_lines(program, run),
+                bytes=run.bytes,
+                programmed_s=run.time_s,
+                blocks_per_s=run.blocks / run.time_s,
+                needed_characters_per_s=run.bytes / run.time_s,
+                factor=run.bytes / run.time_s / carried,
+            )
             for run in starved[:MOST_FINDINGS]
-        ],
-    }
+        ),
+    )
 
 
-def _dnc_findings(program: Program, carried: float, runs: Iterable[Run]) -> Iterator[Finding]:
+def _dnc_findings(program: Program, carried: float, runs: Iterable[CuttingRun]) -> Iterator[Finding]:
     for run in runs:
         if run.bytes > run.time_s * carried > 0.0:
             needed = run.bytes / run.time_s
@@ -315,11 +271,11 @@ def _dnc_findings(program: Program, carried: float, runs: Iterable[Run]) -> Iter
             yield _at(program, "warning", "dnc_rate", run.first_line, message)
 
 
-def _end(program: Program, run: Run) -> str:
+def _end(program: Program, run: CuttingRun) -> str:
     """The last line of a run, with its file if it is another one than that of the first line."""
     (number, file), (_, begun) = program.core.origin(run.last_line), program.core.origin(run.first_line)
     return f"line {number}" if file == begun else f"line {number} of {file or program.source}"
 
 
-def _lines(program: Program, run: Run) -> list[int]:
-    return [program.core.origin(run.first_line)[0], program.core.origin(run.last_line)[0]]
+def _lines(program: Program, run: CuttingRun) -> tuple[int, int]:
+    return program.core.origin(run.first_line)[0], program.core.origin(run.last_line)[0]

@@ -20,7 +20,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.controller import controller_model
 from shapegcode.program import Program
 
-__all__ = ["BlockTable", "Breaker", "ClampedFeed", "Run", "block_table", "look_ahead_breakers"]
+__all__ = ["BlockTable", "Breaker", "ClampedFeed", "CuttingRun", "block_table", "look_ahead_breakers"]
 
 _CUTTING, _RAPID, _DWELL = (
     kind.value for kind in (_core.BlockKind.cutting, _core.BlockKind.rapid, _core.BlockKind.dwell)
@@ -46,7 +46,7 @@ _COMMENT = re.compile(rb"\([^()\r\n]*\)?")
 
 
 @dataclass(frozen=True)
-class Run:
+class CuttingRun:
     """Cutting blocks with nothing between them.
 
     Attributes:
@@ -102,7 +102,7 @@ class BlockTable:
         clamped_feeds: by feed, ascending.
     """
 
-    runs: tuple[Run, ...]
+    runs: tuple[CuttingRun, ...]
     cutting_lines: npt.NDArray[np.int64]
     rapid_lines: npt.NDArray[np.int64]
     dwell_lines: npt.NDArray[np.int64]
@@ -159,7 +159,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
         first_short = int(np.searchsorted(short_at, begin))
         shorts = int(np.searchsorted(short_at, end)) - first_short
         runs.append(
-            Run(
+            CuttingRun(
                 first,
                 last,
                 int(line_bytes[last] - line_bytes[first - 1]),

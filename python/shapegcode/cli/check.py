@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_input_arguments, load_machine, refuse_json_over_input
+from shapegcode.cli.options import add_input_arguments, load_machine
 
 __all__ = ["add_arguments", "run"]
 
@@ -30,22 +30,11 @@ def run(args: argparse.Namespace) -> int:
         OSError: a file cannot be read or written.
     """
     from shapegcode.checking.check import check
-    from shapegcode.checking.tables import findings_table, next_step, summary
-    from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.cli import runner
 
     machine = load_machine(args)
-    refuse_json_over_input(args)
-    with progress(f"checking {args.input}", args.json) as bar:
-        bar.wait()
+    runner.check_files(args)
+    with runner.progress(f"checking {args.input}", args, endless=True):
         result = check(args.input, machine, program_number=args.program)
-    if args.json is not None:
-        write_json(result.report(), args.json)
-    console = output_console(args.json)
-    if result.findings:
-        console.print(findings_table(result))
-    console.print(summary(result), markup=False)
-    console.print(f"next: {next_step(result)}", markup=False)
-    if result.refused:
-        return ExitCode.BAD_INPUT
-    return ExitCode.OUT_OF_TOLERANCE if result.counts["warning"] else ExitCode.OK
+    # The table says the warnings.
+    return runner.finish(result, args, warnings=())

@@ -137,16 +137,6 @@ def refuse_same_file(targets: Iterable[Path], others: Iterable[Path]) -> None:
                 )
 
 
-def refuse_json_over_input(args: argparse.Namespace) -> None:
-    """Refuse to write the report of ``--json`` over the program or the machine file.
-
-    Raises:
-        ArgumentError: ``--json`` names one of them.
-    """
-    if args.json not in (None, "-"):
-        refuse_same_file([Path(args.json)], [Path(args.input), Path(args.machine)])
-
-
 def line_range(text: str) -> tuple[int, int]:
     """Lines such as ``120-180`` or ``120``, first and last, from 1."""
     match = re.fullmatch(r"0*([1-9][0-9]{0,9})(?:-0*([1-9][0-9]{0,9}))?", text)

@@ -87,6 +87,7 @@ def finish(
     args: argparse.Namespace,
     *,
     tables: Sequence[Table] | None = None,
+    warnings: Sequence[str] | None = None,
     notes: Sequence[str] = (),
     wrote: Sequence[str | Path] = (),
     output: tuple[str | Path, bytes] | None = None,
@@ -97,6 +98,7 @@ def finish(
         result: what was found.
         args: of the command; `json` and `plots` are looked at where they are there.
         tables: to show; None: those of the result.
+        warnings: to show; None: those of the result.
         notes: further lines, below the warnings.
         wrote: files that the command has written already.
         output: name and content of a program to write.
@@ -134,9 +136,9 @@ def finish(
     for table in result.tables() if tables is None else tables:
         console.print()
         console.print(table)
-    if result.warnings:
+    if said := result.warnings if warnings is None else warnings:
         console.print()
-        console.print(warning_table(result.warnings))
+        console.print(warning_table(said))
     for note in notes:
         say(note)
     for file in (*wrote, *([output[0]] if output is not None else [])):

@@ -1,0 +1,263 @@
+"""What a control would refuse, and what it would not run as programmed: findings, figures, the next step."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from shapegcode.results.result import Result
+from shapegcode.results.table import Column, Table
+
+__all__ = ["Check", "Finding", "FindingCounts", "SerialLine", "ShortBlocks", "ShortRun", "StarvedRun"]
+
+_SHOWN_ALIKE = 5
+_STYLES = {"alarm": "bold red", "warning": "yellow", "note": "dim"}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing to tell about one place of a program.
+
+    Attributes:
+        severity: "alarm": the control refuses it; "warning": it will not run as programmed; "note": worth knowing.
+        code: short stable name of the kind of finding.
+        alarm: the control's number; 0: none.
+        file: file of the place.
+        line: from 1; 0: the file as a whole.
+        column: from 1; 0: the line as a whole.
+        message: in words.
+    """
+
+    severity: str
+    code: str
+    alarm: int
+    file: str
+    line: int
+    column: int
+    message: str
+
+    @property
+    def place(self) -> str:
+        """``file:line:column`` as far as it is known."""
+        known = [
+            self.file,
+            *([self.line] if self.line > 0 else []),
+            *([self.column] if self.line * self.column else []),
+        ]
+        return ":".join(map(str, known))
+
+
+@dataclass(frozen=True)
+class FindingCounts:
+    """How many findings there are of each severity, listed or not.
+
+    Attributes:
+        alarm: what the control refuses.
+        warning: what it would not run as programmed.
+        note: what is worth knowing.
+    """
+
+    alarm: int
+    warning: int
+    note: int
+
+
+@dataclass(frozen=True)
+class ShortRun:
+    """Cutting blocks with nothing between them, some of which are short.
+
+    Attributes:
+        lines: first and last line of the source, from 1.
+        count: of short blocks.
+        blocks: of all that move.
+        shortest_s: the shortest block.
+        programmed_s: all of them at their feed, without acceleration.
+        taken_s: the same if no block takes less than the block time.
+    """
+
+    lines: tuple[int, int]
+    count: int
+    blocks: int
+    shortest_s: float
+    programmed_s: float
+    taken_s: float
+
+
+@dataclass(frozen=True)
+class ShortBlocks:
+    """Blocks that last less than the block time, and what they cost.
+
+    Attributes:
+        block_time_s: what the control needs for a block.
+        count: of short blocks.
+        blocks: of all cutting blocks that move.
+        share: of the short among them.
+        shortest_s: the shortest block; None: none is short.
+        programmed_s: all of them at their feed, without acceleration.
+        taken_s: the same if no block takes less than the block time.
+        first_places: `file:line` of the first short blocks.
+        region_count: runs with short blocks, listed or not.
+        regions: these runs, at most `MOST_FINDINGS`.
+    """
+
+    block_time_s: float
+    count: int
+    blocks: int
+    share: float
+    shortest_s: float | None
+    programmed_s: float
+    taken_s: float
+    first_places: tuple[str, ...]
+    region_count: int
+    regions: tuple[ShortRun, ...]
+
+
+@dataclass(frozen=True)
+class StarvedRun:
+    """Cutting blocks that ask for more than the serial line carries.
+
+    Attributes:
+        lines: first and last line of the source, from 1.
+        bytes: of these lines, line ends included.
+        programmed_s: all of them at their feed, without acceleration.
+        blocks_per_s: that the run asks for.
+        needed_characters_per_s: likewise.
+        factor: times as long as programmed that the run takes.
+    """
+
+    lines: tuple[int, int]
+    bytes: int
+    programmed_s: float
+    blocks_per_s: float
+    needed_characters_per_s: float
+    factor: float
+
+
+@dataclass(frozen=True)
+class SerialLine:
+    """What the serial line carries, and what the program asks for.
+
+    Attributes:
+        baud: bits per second.
+        bits_per_character: start, stop and parity bits included.
+        characters_per_s: that it carries.
+        needed_characters_per_s: that the worst run asks for.
+        factor: their ratio; above 1 that run takes so many times as long.
+        region_count: runs that starve, listed or not.
+        regions: these runs, at most `MOST_FINDINGS`.
+    """
+
+    baud: int
+    bits_per_character: int
+    characters_per_s: float
+    needed_characters_per_s: float
+    factor: float
+    region_count: int
+    regions: tuple[StarvedRun, ...]
+
+
+@dataclass(frozen=True, repr=False)
+class Check(Result):
+    """What was found in a program.
+
+    Attributes:
+        program: name of the program.
+        machine: name of the machine.
+        findings: sorted by place, at most `MOST_FINDINGS` of each code.
+        counts: of all findings by severity.
+        counts_by_code: of all findings by code.
+        size_bytes: of the file.
+        memory_bytes: of the control.
+        short_blocks: blocks that last less than the block time; None: the program was not read.
+        dnc: the serial line; None: not drip fed, or not read.
+    """
+
+    json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "refused": bool}
+
+    program: str
+    machine: str
+    findings: tuple[Finding, ...]
+    counts: FindingCounts
+    counts_by_code: dict[str, int]
+    size_bytes: int
+    memory_bytes: int
+    short_blocks: ShortBlocks | None
+    dnc: SerialLine | None
+
+    @property
+    def refused(self) -> bool:
+        """The control refuses something."""
+        return self.counts.alarm > 0
+
+    @property
+    def ok(self) -> bool:
+        """Nothing is refused, and all would run as programmed."""
+        return not self.refused and self.counts.warning == 0
+
+    @property
+    def exit_code(self) -> int:
+        """0: nothing of both; 1: warnings; 2: at least one alarm."""
+        return 2 if self.refused else super().exit_code
+
+    @property
+    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The listed findings that are warnings, each with its place."""
+        return tuple(f"{each.place}: {each.message}" for each in self.findings if each.severity == "warning")
+
+    @property
+    def answer(self) -> str:
+        """What was found, in one line."""
+        counted = ", ".join(f"{count} {name}{'' if count == 1 else 's'}" for name, count in vars(self.counts).items())
+        memory = f"{self.size_bytes} of {self.memory_bytes} bytes of program memory"
+        return f"{self.program} on {self.machine}: {counted}; {memory}"
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        if self.refused:
+            first = next(finding for finding in self.findings if finding.severity == "alarm")
+            return f"correct {first.place} first: alarms behind it may come from it."
+        worst = {finding.code for finding in self.findings if finding.severity == "warning"}
+        if "dnc_rate" in worst:
+            return "raise the baud rate or lower the feed where the serial line starves (controller.dnc_baud)."
+        if "program_memory" in worst:
+            return "drip feed the program (controller.dnc_baud), or split it."
+        if "short_block" in worst:
+            count = self.counts_by_code["short_block"]
+            stretches = "the stretch" if count == 1 else f"the {count} stretches"
+            return f"post longer blocks, or lower the feed, in {stretches} with short blocks (controller.block_time_s)."
+        if "axis_feed" in worst:
+            return "lower F to what the axes allow: the control does so anyway."
+        if worst:
+            return "move what stops the control out of the cut."
+        return "shapegcode time tells how long it takes, shapegcode simulate how it vibrates."
+
+    def tables(self) -> list[Table]:
+        """The findings in the order of places; of many alike the first ones and how many more there are."""
+        if not self.findings:
+            return []
+        columns = (
+            Column("place", text=True),
+            Column("", value="severity", text=True, style=lambda finding: _STYLES[finding.severity]),
+            Column("alarm", value=lambda finding: f"{finding.alarm:04d}" if finding.alarm else ""),
+            Column("what", value="message", text=True),
+        )
+        shown = list(self._first_of_each())
+        listed = Counter(finding.code for finding in shown)
+        more = [
+            f"... and {count - listed[code]} more of {code}: --json lists them"
+            for code, count in self.counts_by_code.items()
+            if count > listed[code]
+        ]
+        return [Table("", columns, shown, caption="\n".join(more))]
+
+    def _first_of_each(self) -> Iterator[Finding]:
+        seen: Counter[tuple[str, str]] = Counter()
+        for finding in self.findings:
+            kind = (finding.severity, finding.code)
+            seen[kind] += 1
+            # What the control refuses is what the user came for.
+            if finding.severity == "alarm" or seen[kind] <= _SHOWN_ALIKE:
+                yield finding
