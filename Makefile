@@ -38,7 +38,7 @@ CONFIGURE_RELEASE = cmake --preset release -D SHAPEGCODE_BUILD_PYTHON=ON -D Pyth
   -D pybind11_DIR="$$($(BIN)/python -m pybind11 --cmakedir)"
 PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
-.PHONY: help demo test test-all lint bench coverage fuzz stubs schemas format clean \
+.PHONY: help demo test test-all lint bench coverage fuzz stubs schemas docs format clean \
         build-packages test-packages package dev tidy tidy-all release plain sanitize stub-check \
         test-all-core test-all-python fuzz-parameters fuzz-merge
 
@@ -52,6 +52,7 @@ help:
 	@echo 'make fuzz    FUZZ_SECONDS (600) of coverage-guided fuzzing of the program reader; findings in build/fuzz/findings/'
 	@echo 'make stubs   write python/shapegcode/_core.pyi anew from the built module'
 	@echo 'make schemas  write docs/schema/ anew from the classes of the results'
+	@echo 'make docs    write the pages of docs/ that come from the code, docs/schema/ too'
 	@echo 'make format  lay out the C++ and Python sources as lint wants them'
 	@echo 'make clean   remove everything that was built or downloaded'
 
@@ -134,6 +135,9 @@ stubs: package dev
 
 schemas: package dev
 	$(BIN)/python tests/tools/write_schemas.py
+
+docs: schemas
+	$(BIN)/python tests/tools/write_docs.py
 
 format: test-packages dev
 	clang-format -i $(CPP_FILES)

@@ -12,6 +12,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import write_docs
 
 ROOT = Path(__file__).resolve().parents[2]
 CPP = ROOT / "cpp"
@@ -279,6 +280,11 @@ def test_the_command_line_starts_light(statement: str) -> None:
 
 def test_plotting_is_loaded_only_when_used() -> None:
     assert "matplotlib" not in loaded_after("import shapegcode")
+
+
+@pytest.mark.parametrize("page", write_docs.PAGES)
+def test_generated_pages_are_up_to_date(page: str) -> None:
+    assert (ROOT / "docs" / page).read_text(encoding="utf-8") == write_docs.PAGES[page](), "run `make docs`"
 
 
 def test_versions_agree() -> None:

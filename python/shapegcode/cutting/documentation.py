@@ -1,7 +1,4 @@
-"""The reference of tool and stock files as Markdown: what ``docs/tool_files.md`` holds, word for word.
-
-Regenerate with ``python -m shapegcode.cutting.documentation > docs/tool_files.md``.
-"""
+"""The reference of tool and stock files as Markdown: what ``docs/tool_files.md`` holds; ``make docs`` writes it."""
 
 from __future__ import annotations
 
@@ -78,7 +75,7 @@ z_mm = [-25, 0]
 _INTRODUCTION = """\
 # Tool and stock files
 
-<!-- Generated: python -m shapegcode.cutting.documentation > docs/tool_files.md -->
+<!-- Generated: make docs -->
 
 A tool file says what cuts, how large the forces are and what must not be exceeded; a stock file says what material is
 there before the first block. `shapegcode feed` reads both; what the machine allows stands in its own file
@@ -174,7 +171,3 @@ def _library() -> list[str]:
         assumed = f" Assumed: {entry.assumed}." if entry.assumed else ""
         lines.append(f"* `{entry.name}`: {entry.source}.{assumed}")
     return lines
-
-
-if __name__ == "__main__":
-    print(file_documentation(), end="")

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, Strict, model_validator
 
 from shapegcode.errors import FileError
-from shapegcode.settings.keys import Float, NonNegative, Positive, Table, Text, key
+from shapegcode.settings.keys import Float, NonNegative, Positive, Text, TomlTable, key
 from shapegcode.settings.load import parsed, validated
 from shapegcode.settings.problems import KeyProblem
 
@@ -21,7 +21,7 @@ Exponent = Annotated[Float, Field(gt=-1, lt=1)]
 Name = Annotated[str, Strict(), Field(min_length=1, max_length=60, pattern=r"^[!-$&-'*-~]([ !-$&-'*-~]*[!-$&-'*-~])?$")]
 
 
-class Material(Table):
+class Material(TomlTable):
     """A work material with the forces that one cutter was measured to need in it."""
 
     name: Annotated[str, Strict(), Field(pattern=r"^[a-z0-9][a-z0-9-]*$")] = key(
@@ -49,7 +49,7 @@ class Material(Table):
         return self
 
 
-class _Library(Table):
+class _Library(TomlTable):
     """The materials that come with shapegcode."""
 
     material: tuple[Material, ...] = key("the materials")

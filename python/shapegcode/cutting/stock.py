@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 from pydantic import Field, PrivateAttr, model_validator
 
 from shapegcode.errors import Problem, StockError
-from shapegcode.settings.keys import Float, NonNegative, Positive, Table, Text, key
+from shapegcode.settings.keys import Float, NonNegative, Positive, Text, TomlTable, key
 from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem, line_of
 
@@ -24,14 +24,14 @@ Point = tuple[Float, Float]
 Ring = Annotated[tuple[Point, ...], Field(min_length=3)]
 
 
-def _ascends(table: Table, *names: str) -> None:
+def _ascends(table: TomlTable, *names: str) -> None:
     for name in names:
         low, high = getattr(table, name)
         if low >= high:
             raise KeyProblem(name, (low, high), "the smaller number comes first, and the two must differ")
 
 
-class Box(Table):
+class Box(TomlTable):
     """A block."""
 
     x_mm: Range = key("from ... to along X", unit="mm")
@@ -44,7 +44,7 @@ class Box(Table):
         return self
 
 
-class Polygon(Table):
+class Polygon(TomlTable):
     """A prism over a polygon."""
 
     points_mm: Ring = key("corners [x, y] in order, three or more; the last is joined to the first", unit="mm")
@@ -57,7 +57,7 @@ class Polygon(Table):
         return self
 
 
-class Allowance(Table):
+class Allowance(TomlTable):
     """What roughing left on the walls that this program finishes."""
 
     allowance_mm: Positive = key("thickness that is left on the walls", unit="mm")
@@ -90,7 +90,7 @@ class Allowance(Table):
         return self
 
 
-class Solid(Table):
+class Solid(TomlTable):
     """A plain shape: one of the two."""
 
     box: Box | None = key("a block", default=None)
@@ -102,7 +102,7 @@ class Solid(Table):
         return self
 
 
-class Rough(Table):
+class Rough(TomlTable):
     """What a program that ran before has left."""
 
     file: Text = key("the program that ran before; the name is relative to the folder of the stock file")
@@ -110,7 +110,7 @@ class Rough(Table):
     on: Solid = key("what was there before that program: [program.on.box] or [program.on.polygon]")
 
 
-class Stock(Table):
+class Stock(TomlTable):
     """The material before the first block, in the work coordinates of the program: one of four kinds."""
 
     box: Box | None = key("a block", default=None)
@@ -175,7 +175,7 @@ class Stock(Table):
         return StockError(self._source, (Problem(key, value, limit, line_of(key, self._text)),))
 
 
-def _exactly_one(table: Table, *names: str) -> None:
+def _exactly_one(table: TomlTable, *names: str) -> None:
     given = [name for name in names if getattr(table, name) is not None]
     if len(given) != 1:
         tables = ", ".join(names)

@@ -15,14 +15,14 @@ from pydantic import Field, Strict, field_validator, model_validator
 from shapegcode import _core
 from shapegcode.cutting.materials import Exponent, Material, Name, materials
 from shapegcode.errors import ToolError
-from shapegcode.settings.keys import Float, NonNegative, Positive, Table, Text, key, toml
+from shapegcode.settings.keys import Float, NonNegative, Positive, Text, TomlTable, key, toml
 from shapegcode.settings.load import loaded, parsed, validated
 from shapegcode.settings.problems import KeyProblem
 
 __all__ = ["Cutter", "Cutting", "Feed", "Limits", "Tool"]
 
 
-class Cutter(Table):
+class Cutter(TomlTable):
     """The end mill: flat end, cylindrical."""
 
     name: Name = key("short name, in plain ASCII because it goes into comments of programs")
@@ -93,7 +93,7 @@ class Cutter(Table):
         return self
 
 
-class Cutting(Table):
+class Cutting(TomlTable):
     """The cutting force: a material of the library, values of your own, or a material with some of them changed.
 
     With the chip thickness t in mm: tangential force per length of edge k1 t + tangential_edge, radial force
@@ -183,7 +183,7 @@ class Cutting(Table):
         return otherwise if entry is None else float(getattr(entry, name))
 
 
-class Limits(Table):
+class Limits(TomlTable):
     """What must not be exceeded; a limit that is left out does not act."""
 
     resultant_n: Positive | None = key("resultant of the force in the XY plane", unit="N", default=None)
@@ -208,7 +208,7 @@ class Limits(Table):
         return self
 
 
-class Feed(Table):
+class Feed(TomlTable):
     """How the feed may be set."""
 
     air_feed_mm_per_min: Positive | None = key(
@@ -237,7 +237,7 @@ class Feed(Table):
         return self
 
 
-class Tool(Table):
+class Tool(TomlTable):
     """An end mill with its cutting force, its limits and its feed, as a tool file describes them."""
 
     tool: Cutter = key("the end mill: flat end, cylindrical")

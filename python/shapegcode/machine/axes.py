@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from shapegcode.machine.drive import Drive
-from shapegcode.settings.keys import Float, InlineTable, NonNegative, Positive, Table, Text, key, toml
+from shapegcode.settings.keys import Float, InlineTable, NonNegative, Positive, Text, TomlTable, key, toml
 
 
 class FrequencyOver(InlineTable):
@@ -57,7 +57,7 @@ class FrequencyOver(InlineTable):
         return (self.position_mm if self.mass_kg is None else self.mass_kg) or ()
 
 
-class Mode(Table):
+class AxisMode(TomlTable):
     """One vibration mode of an axis, excited by the motion of that axis."""
 
     frequency_hz: Annotated[Positive, Field(le=10_000)] = key(
@@ -101,13 +101,13 @@ class Mode(Table):
     )
 
     @model_validator(mode="after")
-    def _uncertainty_of_a_mass(self) -> Mode:
+    def _uncertainty_of_a_mass(self) -> AxisMode:
         if self.mass_uncertainty_percent is not None and self.mass_kg is None:
             raise ValueError("mass_uncertainty_percent is given, mass_kg is not")
         return self
 
     @model_validator(mode="after")
-    def _nominal_in_table(self) -> Mode:
+    def _nominal_in_table(self) -> AxisMode:
         if self.frequency_over is not None:
             low, high = min(self.frequency_over.frequency_hz), max(self.frequency_over.frequency_hz)
             if not low <= self.frequency_hz <= high:
@@ -118,7 +118,7 @@ class Mode(Table):
         return self
 
 
-class Axis(Table):
+class Axis(TomlTable):
     """Limits of one axis; all three tables are required."""
 
     max_feed_mm_per_min: Positive = key("largest cutting feed of this axis", unit="mm/min", fanuc="1430")
@@ -127,13 +127,13 @@ class Axis(Table):
     max_jerk_mm_s3: Positive | None = key(
         "largest jerk while cutting; left out: not limited", unit="mm/s³", default=None
     )
-    modes: tuple[Mode, ...] = key("vibration modes, one table each; none: the axis is taken as rigid", default=())
+    modes: tuple[AxisMode, ...] = key("vibration modes, one table each; none: the axis is taken as rigid", default=())
     drive: Drive | None = key(
         "feed drive, for the simulation with friction; left out: the axis follows its set-points exactly", default=None
     )
 
 
-class Axes(Table):
+class Axes(TomlTable):
     """The three linear axes."""
 
     x: Axis = key("the X axis")

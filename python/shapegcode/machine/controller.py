@@ -15,12 +15,12 @@ from shapegcode.settings.keys import (
     NonNegative,
     Positive,
     PositiveAxisValues,
-    Table,
+    TomlTable,
     key,
 )
 
 
-class Controller(Table):
+class Controller(TomlTable):
     """How the controller turns blocks into set-points, and what it accepts."""
 
     interpolation_period_s: Annotated[Positive, Field(le=0.1)] = key(
@@ -223,14 +223,14 @@ class Controller(Table):
     )
 
 
-class Times(Table):
+class Times(TomlTable):
     """What takes time beside the motion."""
 
     tool_change_s: Annotated[NonNegative, Field(le=3600)] = key("an M06", unit="s", default=0.0, assumed=True)
     m_function_s: Annotated[NonNegative, Field(le=3600)] = key("any other M code", unit="s", default=0.0, assumed=True)
 
 
-class PowerOn(Table):
+class PowerOn(TomlTable):
     """Modal state before the first block of a program."""
 
     motion: Literal["G00", "G01", "G02", "G03"] = key("kind of motion", fanuc="3402#0", default="G00", assumed=True)

@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from shapegcode.settings.keys import NonNegative, Positive, Table, key, toml
+from shapegcode.settings.keys import NonNegative, Positive, TomlTable, key, toml
 
 
-class Drive(Table):
+class Drive(TomlTable):
     """Feed drive of an axis, for the simulation with friction."""
 
     motor_inertia_kg_m2: Positive = key(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from shapegcode.settings.keys import Positive, Table, key
+from shapegcode.settings.keys import Positive, TomlTable, key
 
 
-class FeedControl(Table):
+class FeedControl(TomlTable):
     """How the controller follows changes of the feed."""
 
     interval_mm: Positive = key(

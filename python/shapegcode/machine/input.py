@@ -8,14 +8,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, field_validator
 
-from shapegcode.settings.keys import Float, NonNegative, Positive, Table, Text, key
+from shapegcode.settings.keys import Float, NonNegative, Positive, Text, TomlTable, key
 
 _OFFSET_NAME = re.compile(r"G5[4-9]|G54\.1P[1-9][0-9]{0,2}")
 _NUMBER_NAME = re.compile(r"[1-9][0-9]{0,7}")
 _G_NAME = re.compile(r"[1-9][0-9]{0,3}(\.[1-9])?")
 
 
-class Input(Table):
+class Input(TomlTable):
     """How programs are read."""
 
     arc_centre: Literal["incremental", "absolute"] = key(

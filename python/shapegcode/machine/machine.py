@@ -1,9 +1,8 @@
 """The machine file: what shapegcode knows about a machine tool and its controller.
 
-A machine file is TOML. :class:`Machine` is its model; it and its tables (machine_axes, machine_drive,
-machine_controller, machine_input, machine_feed, machine_output) are the only place that holds defaults for it: every
-other module takes the values from here. Each key carries its unit, its meaning and, where the number is
-not known for real machines, the remark *assumed*; :func:`key_documentation` turns that into
+A machine file is TOML. :class:`Machine` is its model; it and its tables, one file each, are the only place that holds
+defaults for it: every other module takes the values from here. Each key carries its unit, its meaning and, where the
+number is not known for real machines, the remark *assumed*; :func:`key_documentation` turns that into
 ``docs/machine.md``.
 """
 
@@ -18,7 +17,7 @@ from typing import Annotated, Any, overload
 from pydantic import Field, Strict, model_validator
 
 from shapegcode.errors import MachineError, Problem
-from shapegcode.machine.axes import Axes, Axis, Mode
+from shapegcode.machine.axes import Axes, Axis, AxisMode
 from shapegcode.machine.controller import Controller, PowerOn, Times
 from shapegcode.machine.drive import Drive
 from shapegcode.machine.feed import FeedControl
@@ -26,13 +25,14 @@ from shapegcode.machine.input import Input
 from shapegcode.machine.output import Emission, Shaping, Tolerance, Verdict
 from shapegcode.settings import change
 from shapegcode.settings.describe import documentation, values_of, write_toml
-from shapegcode.settings.keys import KeyInfo, KeyValue, PerAxis, Table, Text, key, toml
+from shapegcode.settings.keys import KeyInfo, KeyValue, PerAxis, Text, TomlTable, key, toml
 from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem
 
 __all__ = [
     "Axes",
     "Axis",
+    "AxisMode",
     "Controller",
     "Drive",
     "Emission",
@@ -41,7 +41,6 @@ __all__ = [
     "KeyInfo",
     "KeyValue",
     "Machine",
-    "Mode",
     "PerAxis",
     "PowerOn",
     "Shaping",
@@ -52,7 +51,7 @@ __all__ = [
 ]
 
 
-class Machine(Table):
+class Machine(TomlTable):
     """A machine tool and its controller, as a machine file describes them."""
 
     name: Annotated[str, Strict(), Field(min_length=1, max_length=60, pattern=r"^[\x20-\x7e]+$")] = key(
@@ -192,10 +191,7 @@ class Machine(Table):
 def key_documentation() -> str:
     """The reference of the machine file's keys as Markdown: what ``docs/machine.md`` holds, word for word.
 
-    Regenerate with ``python -m shapegcode.machine > docs/machine.md``.
+    Returns:
+        The page; ``make docs`` writes it.
     """
     return documentation(Machine, Machine.builtin_names())
-
-
-if __name__ == "__main__":
-    print(key_documentation(), end="")

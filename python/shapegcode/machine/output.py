@@ -8,12 +8,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict, field_validator, model_validator
 
-from shapegcode.settings.keys import Bool, NonNegative, Positive, Table, Text, key, toml
+from shapegcode.settings.keys import Bool, NonNegative, Positive, Text, TomlTable, key, toml
 
 _BLOCK_CHARACTERS = re.compile(r"[A-Z0-9 .,+\-*/=#\[\]()<>_:;&]*")
 
 
-class Emission(Table):
+class Emission(TomlTable):
     """How shaped programs are written."""
 
     block_period_s: Annotated[Positive, Field(le=1)] | None = key(
@@ -86,7 +86,7 @@ class Emission(Table):
         return self
 
 
-class Shaping(Table):
+class Shaping(TomlTable):
     """What is shaped, and how."""
 
     max_duration_s: Annotated[Positive, Field(le=10)] = key("longest shaper that is accepted", unit="s", default=0.25)
@@ -152,7 +152,7 @@ class Shaping(Table):
 _Override = Annotated[Positive, Field(le=254)]
 
 
-class Tolerance(Table):
+class Tolerance(TomlTable):
     """When an emitted program is good: outside these limits the conversion says so and exits with 1."""
 
     contour_um: Positive = key(
@@ -175,7 +175,7 @@ class Tolerance(Table):
     )
 
 
-class Verdict(Table):
+class Verdict(TomlTable):
     """The stated band: which of the cases that are played decide. All are shown; 100 % override always counts."""
 
     override_percent: tuple[_Override, _Override] = key(

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from shapegcode import _core
-from shapegcode.machine import Machine, Mode
+from shapegcode.machine import AxisMode, Machine
 
 __all__ = [
     "NO_OFFSET",
@@ -37,7 +37,7 @@ NO_OFFSET: Offset = (0.0, 0.0, 0.0)
 _AXES = "xyz"
 
 
-def still_mode(mode: Mode, part_mass_kg: float | None) -> _core.Mode:
+def still_mode(mode: AxisMode, part_mass_kg: float | None) -> _core.Mode:
     """The mode that holds where no axis position counts: nominal, or as a stated mass of the part makes it.
 
     Args:
@@ -76,7 +76,7 @@ def axis_modes(machine: Machine, shift: float = 0.0, only: str | None = None) ->
     ]
 
 
-def _moved(machine: Machine, shift: float, only: str | None) -> list[list[tuple[Mode, float]]]:
+def _moved(machine: Machine, shift: float, only: str | None) -> list[list[tuple[AxisMode, float]]]:
     """Per axis its modes, each with the share of its uncertainty by which it is moved."""
     return [
         [
@@ -87,7 +87,7 @@ def _moved(machine: Machine, shift: float, only: str | None) -> list[list[tuple[
     ]
 
 
-def slowest_mode(mode: Mode) -> tuple[float, float]:
+def slowest_mode(mode: AxisMode) -> tuple[float, float]:
     """Lowest frequency (Hz) by a mode's tables, and least damping ratio by them and by its stated uncertainty."""
     over = mode.frequency_over
     least = damping_scale(mode, 1.0)
@@ -96,7 +96,7 @@ def slowest_mode(mode: Mode) -> tuple[float, float]:
     return min(over.frequency_hz), min(over.damping_ratio or (mode.damping_ratio,)) * least
 
 
-def damping_scale(mode: Mode, shift: float) -> float:
+def damping_scale(mode: AxisMode, shift: float) -> float:
     """What a mode's damping ratio is multiplied by where its frequency is moved by `shift` of its uncertainty.
 
     Both ways it is the lower end of the stated damping that counts. To first order a shaper leaves the same at either
@@ -208,7 +208,7 @@ def region_range_warnings(regions: Sequence[_core.Region], machine: Machine) -> 
     return warnings
 
 
-def _table(mode: Mode, shift: float, offset: Offset) -> _core.ModeTable:
+def _table(mode: AxisMode, shift: float, offset: Offset) -> _core.ModeTable:
     over = mode.frequency_over
     if over is None or over.axis is None:
         return _core.ModeTable()
@@ -225,7 +225,7 @@ def _table(mode: Mode, shift: float, offset: Offset) -> _core.ModeTable:
     )
 
 
-def numbered_modes(machine: Machine) -> Iterator[tuple[str, int, Mode]]:
+def numbered_modes(machine: Machine) -> Iterator[tuple[str, int, AxisMode]]:
     """Key, axis and mode of every mode."""
     for axis, (letter, table) in enumerate(zip(_AXES, machine.axes.as_tuple(), strict=True)):
         for number, mode in enumerate(table.modes, start=1):

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.machine import Machine, Mode
+from shapegcode.machine import AxisMode, Machine
 from shapegcode.model.modes import axis_modes, still_mode
 
 __all__ = ["plant_response"]
@@ -20,7 +20,7 @@ _WANTED = (
 
 
 def plant_response(
-    command_mm: npt.ArrayLike, modes: Machine | Sequence[Sequence[Mode | _core.Mode]], period_s: float
+    command_mm: npt.ArrayLike, modes: Machine | Sequence[Sequence[AxisMode | _core.Mode]], period_s: float
 ) -> npt.NDArray[np.float64]:
     """Response of base-excited modes to a whole record of set-points, exact for set-points linear in between.
 
@@ -49,12 +49,12 @@ def plant_response(
     return _core.plant_response(command_mm, [_axis(axis) for axis in modes], period_s)
 
 
-def _axis(modes: Sequence[Mode | _core.Mode]) -> list[_core.Mode]:
+def _axis(modes: Sequence[AxisMode | _core.Mode]) -> list[_core.Mode]:
     """The modes of one axis for the core.
 
     Raises:
         ArgumentError: something else.
     """
-    if not isinstance(modes, Sequence) or not all(isinstance(mode, Mode | _core.Mode) for mode in modes):
+    if not isinstance(modes, Sequence) or not all(isinstance(mode, AxisMode | _core.Mode) for mode in modes):
         raise _core.ArgumentError(f"the modes of an axis are {str(modes)[:80]!r}: {_WANTED}")
-    return [still_mode(mode, None) if isinstance(mode, Mode) else mode for mode in modes]
+    return [still_mode(mode, None) if isinstance(mode, AxisMode) else mode for mode in modes]

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from typing import Any, TypeVar
 
 from shapegcode.errors import FileError, Problem
-from shapegcode.settings.keys import InlineTable, Table, toml
+from shapegcode.settings.keys import InlineTable, TomlTable, toml
 from shapegcode.settings.load import validated
 
 __all__ = ["with_values"]
 
-_Model = TypeVar("_Model", bound=Table)
+_Model = TypeVar("_Model", bound=TomlTable)
 # A part of a dotted key: in quotes where it holds a dot itself.
 _PART = re.compile(r'"([^"]*)"|([^."]+)')
 
@@ -55,7 +55,7 @@ def with_values(settings: _Model, values: Mapping[str, object], source: str, err
 
 def _plain(value: Any) -> Any:
     """What a file says of a value, in the dictionaries and lists of a TOML file."""
-    if isinstance(value, Table):
+    if isinstance(value, TomlTable):
         fields = {name: getattr(value, name) for name in value.model_fields_set}
         return {name: _plain(held) for name, held in fields.items() if held is not None}
     if isinstance(value, Mapping):
@@ -73,13 +73,13 @@ def _below(held: Any, name: str) -> Any:
         return held.get(name)
     if isinstance(held, list | tuple):
         return held[int(name) - 1] if _is_row(name, held) else None
-    return getattr(held, name, None) if isinstance(held, Table) else None
+    return getattr(held, name, None) if isinstance(held, TomlTable) else None
 
 
 def _entry(place: Any, name: str, held: Any) -> Any:
     """A table of the file by its name, made where the file leaves it out; None where there can be none."""
     if isinstance(place, dict):
         # A value that is a table goes as a whole: its other keys must not be lost.
-        whole = held is not None and (isinstance(held, InlineTable) or not isinstance(held, Table))
+        whole = held is not None and (isinstance(held, InlineTable) or not isinstance(held, TomlTable))
         return place.setdefault(name, _plain(held) if whole else {})
     return place[int(name) - 1] if isinstance(place, list) and _is_row(name, place) else None

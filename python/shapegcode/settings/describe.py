@@ -8,12 +8,12 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from shapegcode.settings.keys import InlineTable, KeyInfo, KeyValue, Table, item_type, key_info, table_type, toml
+from shapegcode.settings.keys import InlineTable, KeyInfo, KeyValue, TomlTable, item_type, key_info, table_type, toml
 
 _LINE_WIDTH = 110
 
 
-def values_of(table: Table, prefix: str = "", given: bool = True) -> Iterator[KeyValue]:
+def values_of(table: TomlTable, prefix: str = "", given: bool = True) -> Iterator[KeyValue]:
     """Every key below a table with its value and origin, in the order of the file.
 
     Args:
@@ -24,7 +24,7 @@ def values_of(table: Table, prefix: str = "", given: bool = True) -> Iterator[Ke
     for name, field in type(table).model_fields.items():
         value, key = getattr(table, name), f"{prefix}{name}"
         from_file = given and name in table.model_fields_set
-        if isinstance(value, Table) and not isinstance(value, InlineTable):
+        if isinstance(value, TomlTable) and not isinstance(value, InlineTable):
             yield from values_of(value, f"{key}.", from_file)
         elif item_type(field) and value:
             for number, item in enumerate(value, start=1):
@@ -37,7 +37,7 @@ def values_of(table: Table, prefix: str = "", given: bool = True) -> Iterator[Ke
             )
 
 
-def write_toml(machine: Table, remarks: Mapping[str, str]) -> str:
+def write_toml(machine: TomlTable, remarks: Mapping[str, str]) -> str:
     """A machine as a commented machine file.
 
     Args:
@@ -57,7 +57,7 @@ class _TomlWriter:
         self._remarks = remarks
         self._lines: list[str] = []
 
-    def write(self, machine: Table) -> str:
+    def write(self, machine: TomlTable) -> str:
         self._lines = []
         self._comment(
             "Machine file of shapegcode. Keys and defaults: docs/machine.md. A key that is left "
@@ -79,12 +79,12 @@ class _TomlWriter:
             break_on_hyphens=False,
         )
 
-    def _table(self, table: Table, prefix: str) -> None:
+    def _table(self, table: TomlTable, prefix: str) -> None:
         """Plain keys first, then the tables below, as TOML asks."""
         below: list[tuple[str, FieldInfo, Any]] = []
         for name, field in type(table).model_fields.items():
             value = getattr(table, name)
-            if (isinstance(value, Table) and not isinstance(value, InlineTable)) or item_type(field):
+            if (isinstance(value, TomlTable) and not isinstance(value, InlineTable)) or item_type(field):
                 below.append((name, field, value))
             else:
                 self._plain(f"{prefix}{name}", name, field, value)
@@ -113,7 +113,7 @@ class _TomlWriter:
         line = f"# {name} = ..." if value is None else f"{name} = {toml(value)}"
         self._lines.append(f"{line}  # {remark}" if remark else line)
 
-    def _list(self, key: str, field: FieldInfo, item: type[Table], tables: tuple[Table, ...]) -> None:
+    def _list(self, key: str, field: FieldInfo, item: type[TomlTable], tables: tuple[TomlTable, ...]) -> None:
         if not tables:
             self._lines.append("")
             self._comment(f"{key}: {field.description}.")
@@ -125,7 +125,7 @@ class _TomlWriter:
             self._table(table, f"{key}.{number}.")
 
 
-def documentation(model: type[Table], builtin_names: Sequence[str]) -> str:
+def documentation(model: type[TomlTable], builtin_names: Sequence[str]) -> str:
     """The reference of a machine file's keys as Markdown.
 
     Args:
@@ -136,7 +136,7 @@ def documentation(model: type[Table], builtin_names: Sequence[str]) -> str:
     lines = [
         "# The machine file",
         "",
-        "<!-- Generated: python -m shapegcode.machine > docs/machine.md -->",
+        "<!-- Generated: make docs -->",
         "",
         "A machine file is TOML. `shapegcode machine init` writes a commented one to start from,",
         "`shapegcode machine show FILE` prints every value with its origin. An unknown key, a number that is",
@@ -151,7 +151,7 @@ def documentation(model: type[Table], builtin_names: Sequence[str]) -> str:
     return "\n".join([*lines, *key_tables(model)]) + "\n"
 
 
-def key_tables(model: type[Table], *, fanuc: bool = True, heading: str = "##") -> list[str]:
+def key_tables(model: type[TomlTable], *, fanuc: bool = True, heading: str = "##") -> list[str]:
     """The keys of a file as Markdown: a heading and a table for each of its tables, a line each.
 
     Args:
@@ -180,10 +180,10 @@ def key_tables(model: type[Table], *, fanuc: bool = True, heading: str = "##") -
     return lines
 
 
-def _documented(model: type[Table], prefix: str) -> Iterator[tuple[str, str, list[KeyInfo]]]:
+def _documented(model: type[TomlTable], prefix: str) -> Iterator[tuple[str, str, list[KeyInfo]]]:
     """Per table of the file: its name, its meaning, its keys."""
     keys: list[KeyInfo] = []
-    below: list[tuple[str, str, type[Table]]] = []
+    below: list[tuple[str, str, type[TomlTable]]] = []
     for name, field in model.model_fields.items():
         sub, key = table_type(field), f"{prefix}{name}"
         if sub is None or issubclass(sub, InlineTable):

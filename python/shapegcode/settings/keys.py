@@ -30,13 +30,13 @@ def key(meaning: str, *, unit: str = "", fanuc: str = "", assumed: bool = False,
     return Field(description=meaning, json_schema_extra=noted, **field)
 
 
-class Table(BaseModel):
+class TomlTable(BaseModel):
     """Base of every table of the file: unknown keys are errors and values never change after loading."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
 
 
-class InlineTable(Table):
+class InlineTable(TomlTable):
     """A table that is written in one line, as the value of a key."""
 
 
@@ -137,23 +137,23 @@ def facts(field: FieldInfo | None) -> dict[str, Any]:
     return dict(extra) if isinstance(extra, dict) else {}
 
 
-def table_type(field: FieldInfo) -> type[Table] | None:
+def table_type(field: FieldInfo) -> type[TomlTable] | None:
     """The table type of a field: a table itself or the items of a list of tables; None for a plain value."""
     return _as_table(field.annotation) or item_type(field)
 
 
-def item_type(field: FieldInfo) -> type[Table] | None:
+def item_type(field: FieldInfo) -> type[TomlTable] | None:
     """The table type of the items of a field that holds a list of tables; None for every other field."""
     arguments = get_args(field.annotation)
     is_list = len(arguments) == 2 and arguments[1] is Ellipsis
     return _as_table(arguments[0]) if is_list else None
 
 
-def _as_table(annotation: Any) -> type[Table] | None:
+def _as_table(annotation: Any) -> type[TomlTable] | None:
     arguments = get_args(annotation)
     if isinstance(annotation, UnionType) and len(arguments) == 2 and arguments[1] is NoneType:
         annotation = arguments[0]  # an optional table
-    return annotation if isinstance(annotation, type) and issubclass(annotation, Table) else None
+    return annotation if isinstance(annotation, type) and issubclass(annotation, TomlTable) else None
 
 
 def key_info(field: FieldInfo, key: str) -> KeyInfo:

@@ -9,10 +9,10 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from shapegcode.errors import FileError, Problem
-from shapegcode.settings.keys import Table
+from shapegcode.settings.keys import TomlTable
 from shapegcode.settings.problems import problems_of, syntax_problem
 
-_Model = TypeVar("_Model", bound=Table)
+_Model = TypeVar("_Model", bound=TomlTable)
 
 
 def read_text(path: Path, error: type[FileError]) -> str:

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from shapegcode.errors import Problem
-from shapegcode.settings.keys import Table, facts, table_type, toml, toml_key
+from shapegcode.settings.keys import TomlTable, facts, table_type, toml, toml_key
 
 
 class KeyProblem(ValueError):
@@ -34,7 +34,7 @@ def syntax_problem(message: str, text: str) -> Problem:
     return Problem("", "", message.replace(" (at end of document)", " (end of file)"), last)
 
 
-def problems_of(error: ValidationError, model: type[Table], data: dict[str, Any], text: str) -> tuple[Problem, ...]:
+def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, Any], text: str) -> tuple[Problem, ...]:
     """Pydantic's errors as problems of the file: dotted keys, TOML values, limits with units.
 
     Args:
@@ -135,7 +135,7 @@ def _locate(location: tuple[int | str, ...], data: object, kind: str) -> tuple[t
     return location, value
 
 
-def _field(root: type[Table], location: tuple[int | str, ...]) -> FieldInfo | None:
+def _field(root: type[TomlTable], location: tuple[int | str, ...]) -> FieldInfo | None:
     """The field of a model at a location, None if there is none."""
     model: type[BaseModel] | None = root
     field: FieldInfo | None = None
@@ -149,13 +149,13 @@ def _field(root: type[Table], location: tuple[int | str, ...]) -> FieldInfo | No
     return field
 
 
-def _unit_remark(root: type[Table], location: tuple[int | str, ...]) -> str:
+def _unit_remark(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
     # The keys x, y, z of a PerAxis have the unit of the key above them.
     unit = facts(_field(root, location)).get("unit") or facts(_field(root, location[:-1])).get("unit")
     return f" (unit: {unit})" if unit and unit != "1" else ""
 
 
-def _suggestion(root: type[Table], location: tuple[int | str, ...]) -> str:
+def _suggestion(root: type[TomlTable], location: tuple[int | str, ...]) -> str:
     """The known key that an unknown one most likely stands for."""
     parent = [part for part in location[:-1] if not isinstance(part, int)]
     model: type[BaseModel] | None = root

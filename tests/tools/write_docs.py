@@ -1,0 +1,63 @@
+"""Write the pages of docs/ that come from the code: keys of files, public names. `make docs` calls this."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import shapegcode as sg
+from shapegcode.cutting.documentation import file_documentation
+from shapegcode.machine import key_documentation
+
+FOLDER = Path(__file__).resolve().parents[2] / "docs"
+
+_HEAD = """\
+# The Python API
+
+<!-- Generated: make docs -->
+
+`import shapegcode as sg` offers these names. `help(sg.convert)` says what each takes, with shapes and units, what it
+returns and raises, and where the method comes from. Every function that takes a program takes a `Program` or its path.
+Every result is a frozen dataclass with `ok`, `warnings`, `next_step`, `to_dict()`, `tables()`, `plots()`; the keys of
+its JSON are in [schema](schema).
+
+    machine = sg.Machine.load("vx500").with_values("tolerance.contour_um", 10)
+    conversion = sg.convert("part.nc", machine)
+    print(conversion.answer, conversion.next_step)
+
+| name | home | what it is |
+|---|---|---|
+"""
+
+
+def api_documentation() -> str:
+    """Every public name with the first sentence of its docstring, by home in the order of the stub."""
+    rows = []
+    for name, home in sg._home().items():
+        value = getattr(sg, name)
+        called = "()" if callable(value) and not inspect.isclass(value) else ""
+        said = first_sentence(inspect.getdoc(value) or "") if callable(value) else "The version of the package."
+        folder = home.split(".")[1].lstrip("_")
+        rows.append(f"| `{name}{called}` | {folder} | {said} |")
+    return _HEAD + "\n".join(rows) + "\n"
+
+
+def first_sentence(doc: str) -> str:
+    """The first sentence of a docstring on one line."""
+    text = " ".join(doc.partition("\n\n")[0].split())
+    found = re.match(r".*?\.(?=\s|$)", text)
+    return (found[0] if found else text).rstrip(":.").replace("|", "\\|") + "."
+
+
+PAGES: dict[str, Callable[[], str]] = {
+    "machine.md": key_documentation,
+    "tool_files.md": file_documentation,
+    "api.md": api_documentation,
+}
+"""What writes each page, by its name."""
+
+if __name__ == "__main__":
+    for name, text in PAGES.items():
+        (FOLDER / name).write_text(text(), encoding="utf-8")
