@@ -14,6 +14,12 @@ from shapegcode._core import (
     minimal_two_mode as minimal_two_mode,
     zv as zv,
 )
+from shapegcode.characterization.characterize import characterize as characterize
+from shapegcode.characterization.programs import write_characterization_tests as write_characterization_tests
+from shapegcode.characterization.result import (
+    Characterisation as Characterisation,
+    CharacterisationTests as CharacterisationTests,
+)
 from shapegcode.checking.check import (
     check as check,
     check_text as check_text,

@@ -12,9 +12,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
 
 import shapegcode as sg
 from judge.characterization import Deviation, controllers, fill_in_logs, fill_in_times, truth_of
-from shapegcode.characterization.fit import fit
-from shapegcode.characterization.plan import Box
-from shapegcode.characterization.programs import write_tests
 
 SEEDS = range(24)
 
@@ -28,7 +25,7 @@ def deviations(
     wrong: list[str] = []
     with tempfile.TemporaryDirectory() as scratch:
         master = Path(scratch) / "tests"
-        write_tests(master, machine, Box())
+        sg.write_characterization_tests(master, machine)
         for seed, hidden, rng in controllers(seeds):
             folder = Path(scratch) / f"{seed}"
             shutil.copytree(master, folder)
@@ -36,8 +33,8 @@ def deviations(
                 fill_in_logs(folder, hidden, rng, hold=hold)
             else:
                 fill_in_times(folder, hidden, rng, jitter_s=jitter_s)
-            result = fit(folder)
-            wrong += [f"seed {seed}: {each}" for each in result.contradictions]
+            result = sg.characterize(folder, machine)
+            wrong += [f"seed {seed}: {each}" for each in result.warnings]
             truth = truth_of(hidden)
             for each in result.findings:
                 real = truth.get(each.quantity)

@@ -6,9 +6,11 @@ import json
 import math
 import re
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from subprocess import CompletedProcess
 
+import jsonschema
 import numpy as np
 import pytest
 from characterization_figures import deviations
@@ -17,14 +19,15 @@ import shapegcode as sg
 from command import run
 from judge.characterization import controllers, fill_in_logs, fill_in_times, write_csv
 from judge.controller_simulator import Hidden, play, servo_log
-from shapegcode.characterization.findings import Finding
-from shapegcode.characterization.fit import applied, fit
+from shapegcode.characterization.facts import ControllerFact
 from shapegcode.characterization.log import parse_units, read_log
-from shapegcode.characterization.plan import Box, Part
-from shapegcode.characterization.programs import make_tests, program_text, write_tests
-from shapegcode.characterization.results import read_results
-from shapegcode.characterization.timing import Timing, part_time_s, program_time_s
+from shapegcode.characterization.plan import AirBox, Part
+from shapegcode.characterization.programs import program_text
+from shapegcode.characterization.sheet import read_sheet
+from shapegcode.characterization.tests import make_tests
+from shapegcode.characterization.timing import ControllerTiming, part_time_s, program_time_s
 from shapegcode.model.controller import controller_model
+from shapegcode.results.json import schema
 
 MACHINE = sg.Machine.load("vx500")
 BOXES = ["0:100,0:100,0:20", "-50:50,-80:0,-5:30", "0:40,-40:0,0:10", "-300:0,0:250,0:200"]
@@ -33,7 +36,7 @@ BOXES = ["0:100,0:100,0:20", "-50:50,-80:0,-5:30", "0:40,-40:0,0:10", "-300:0,0:
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("characterize") / "tests"
-    write_tests(folder, MACHINE, Box())
+    sg.write_characterization_tests(folder, MACHINE)
     return folder
 
 
@@ -46,7 +49,7 @@ def shell(*words: str | Path) -> CompletedProcess[str]:
     return run(Path.cwd(), *words)
 
 
-def by_name(findings: list[Finding]) -> dict[str, Finding]:
+def by_name(findings: Sequence[ControllerFact]) -> dict[str, ControllerFact]:
     return {each.quantity: each for each in findings}
 
 
@@ -66,7 +69,7 @@ def extremes(text: str) -> tuple[list[float], list[float], list[float]]:
 
 @pytest.mark.parametrize("text", BOXES)
 def test_every_program_stays_in_its_box_and_comes_back(text: str) -> None:
-    box = Box.parse(text)
+    box = AirBox.parse(text)
     for test in make_tests(MACHINE, box):
         program = program_text(test, box, MACHINE)
         low, high, end = extremes(program)
@@ -95,8 +98,8 @@ def test_programs_are_plain_fanuc_that_shapegcode_reads(written: Path) -> None:
 
 
 def test_stopwatch_tests_are_short_enough_and_long_enough() -> None:
-    tests = [test for test in make_tests(MACHINE, Box()) if test.kind == "stopwatch"]
-    assert sum(program_time_s(test, Timing.of(MACHINE)) for test in tests) < 15 * 60
+    tests = [test for test in make_tests(MACHINE, AirBox()) if test.kind == "stopwatch"]
+    assert sum(program_time_s(test, ControllerTiming.of(MACHINE)) for test in tests) < 15 * 60
     # 5 % of the shortest time constant that is claimed, 20 ms, is ten times the rounding of 0.1 s over the moves
     stops = next(test for test in tests if test.name == "stop_below").parts[0].count
     assert 0.05 * 0.020 * stops >= 2 * 0.05
@@ -106,14 +109,14 @@ def test_feeds_stay_below_the_limits_of_a_slow_machine(tmp_path: Path) -> None:
     data = MACHINE.model_dump(exclude_none=True)
     data["axes"]["y"]["max_feed_mm_per_min"] = 900.0
     slow = sg.Machine.from_data(data)
-    feeds = [part.feed_mm_per_min for t in make_tests(slow, Box()) for part in t.parts if part.pattern != "rapid"]
+    feeds = [part.feed_mm_per_min for t in make_tests(slow, AirBox()) for part in t.parts if part.pattern != "rapid"]
     assert max(feeds) <= 450.0
 
 
 @pytest.mark.parametrize(("block_end", "override"), [("ceil", 1.0), ("ceil", 0.5), ("carry", 1.0), ("carry", 1.2)])
 def test_expected_times_are_those_of_an_independent_controller(block_end: str, override: float) -> None:
     hidden = Hidden(period_s=0.002, block_end=block_end, block_time_s=0.006, in_position_s=(0.03, 0.04, 0.1))  # type: ignore[arg-type]
-    timing = Timing(
+    timing = ControllerTiming(
         0.002,
         block_end,  # type: ignore[arg-type]
         0.006,
@@ -122,8 +125,8 @@ def test_expected_times_are_those_of_an_independent_controller(block_end: str, o
         dict.fromkeys("XYZ", 0.0),
         {"X": 0.03, "Y": 0.04, "Z": 0.1},
     )
-    for test in make_tests(MACHINE, Box()):
-        _, seconds = play(program_text(test, Box(), MACHINE), hidden, override, positions=False)
+    for test in make_tests(MACHINE, AirBox()):
+        _, seconds = play(program_text(test, AirBox(), MACHINE), hidden, override, positions=False)
         mine = sum(part_time_s(part, timing, override) for part in test.parts)
         # each run ends on a tick
         assert mine == pytest.approx(seconds, abs=0.002 * (1 + len(test.parts))), test.name
@@ -131,7 +134,7 @@ def test_expected_times_are_those_of_an_independent_controller(block_end: str, o
 
 @pytest.mark.parametrize("length", [1.0, 7.3, 20.0, 95.0])
 def test_rapids_and_runs_agree_with_the_core(length: float) -> None:
-    timing, model = Timing.of(MACHINE), controller_model(MACHINE)
+    timing, model = ControllerTiming.of(MACHINE), controller_model(MACHINE)
     part = Part("rapid", "X", 1, length, MACHINE.axes.x.rapid_mm_per_min)
     moving = part_time_s(part, timing) - timing.in_position_s["X"]
     assert moving == pytest.approx(sg._core.rapid_time_s([length, 0.0, 0.0], model), abs=1e-9)
@@ -175,16 +178,15 @@ def test_one_log_and_one_stopwatch_fit(folder: Path) -> None:
     ((_, hidden, rng),) = controllers([7])
     fill_in_times(folder, hidden, rng)
     fill_in_logs(folder, hidden, rng)
-    result = fit(folder)
-    assert result.contradictions == []
+    result = sg.characterize(folder, MACHINE)
+    assert result.warnings == ()
     found = by_name(result.findings)
     assert found["interpolation period"].value == hidden.period_s
     assert found["block end"].value == hidden.block_end
     assert found["cutting time constant"].value == pytest.approx(hidden.time_constant_s, rel=0.02)
     assert not any("contradicts" in each.note for each in result.findings)
-    machine, remarks = applied(MACHINE, result.findings)
-    again = sg.Machine.from_toml(machine.to_toml(remarks))
-    assert again == machine
+    machine = result.fitted
+    assert sg.Machine.from_toml(result.to_toml()) == machine
     assert machine.controller.bell_time_s == pytest.approx(hidden.bell_s, rel=0.02)
     assert machine.controller.in_position_s.z == pytest.approx(hidden.in_position_s[2], rel=0.02)
     assert machine.controller.motion == MACHINE.controller.motion
@@ -193,9 +195,9 @@ def test_one_log_and_one_stopwatch_fit(folder: Path) -> None:
 def test_feed_control_interval_is_that_of_a_brute_force_filter(folder: Path) -> None:
     hidden = Hidden(time_constant_s=0.08)
     rng = np.random.default_rng(3)
-    test = read_results(folder / "RESULTS.toml").tests["log_feed_steps"]
+    test = read_sheet(folder / "RESULTS.toml").tests["log_feed_steps"]
     write_csv(folder / "log_feed_steps.csv", servo_log((folder / test.program).read_text(), hidden, rng))
-    found = by_name(fit(folder / "log_feed_steps.csv").findings)["feed-control interval at F3000"]
+    found = by_name(sg.characterize(folder / "log_feed_steps.csv", MACHINE).findings)["feed-control interval at F3000"]
     followed = []
     for part in test.parts:
         if part.pattern != "feed_steps":
@@ -212,7 +214,7 @@ def test_feed_control_interval_is_that_of_a_brute_force_filter(folder: Path) -> 
 def test_a_control_that_waits_before_a_dwell_is_noticed(folder: Path) -> None:
     hidden = Hidden(dwell_waits_in_position=True)
     fill_in_logs(folder, hidden, np.random.default_rng(5), actual=False)
-    found = by_name(fit(folder).findings)
+    found = by_name(sg.characterize(folder, MACHINE).findings)
     assert str(found["in-position wait before a dwell"].value).startswith("yes")
     assert found["in-position time X"].value == pytest.approx(0.025, rel=0.02)
     assert found["position gain"].value is None
@@ -226,33 +228,38 @@ def test_few_times_leave_the_rest_unknown(folder: Path) -> None:
     for name, value in (("overhead", 10.3), ("blocks_tiny", 10.4)):
         text = re.sub(rf"(\[tests\.{name}\][^\[]*times_s = )\[\]", rf"\g<1>[{value}]", text)
     (folder / "RESULTS.toml").write_text(text)
-    found = by_name(fit(folder).findings)
+    found = by_name(sg.characterize(folder, MACHINE).findings)
     for quantity in ("interpolation period", "in-position time X", "rapid time constant X"):
         assert found[quantity].value is None and found[quantity].note
     assert found["block time"].value == pytest.approx(0.005, rel=0.15)
 
 
-def test_a_time_that_contradicts_the_others_is_named(folder: Path) -> None:
+def test_a_time_that_contradicts_the_others_is_named(folder: Path, tmp_path: Path) -> None:
     fill_in_times(folder, Hidden(), np.random.default_rng(1))
     text = (folder / "RESULTS.toml").read_text()
     text = re.sub(r"(\[tests\.run_above\][^\[]*times_s = \[)([\d.]+)", r"\g<1>60.0", text)
     (folder / "RESULTS.toml").write_text(text)
-    done = shell("characterize", "--fit", folder, "-m", "vx500")
+    done = shell("characterize", "--fit", folder, "-m", "vx500", "--json", tmp_path / "fit.json")
     line = next(n for n, each in enumerate(text.splitlines(), 1) if each.startswith("[tests.run_above]"))
     assert done.returncode == 1
-    assert f"RESULTS.toml:{line}: run_above: 60.00 s" in done.stdout
+    assert "CONTRADICTIONS" in done.stdout and "next: repeat the tests" in done.stdout
+    report = json.loads((tmp_path / "fit.json").read_text())
+    assert report["ok"] is False
+    assert any(f"RESULTS.toml:{line}: run_above: 60.00 s" in each for each in report["warnings"])
 
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("times_s = []", "times_s = [-3.0]", "-3.0 must be a time in s above 0"),
-        ("times_s = []", 'times_s = "34"', "must be a list of times in s"),
-        ("times_s = []", "time_s = [34]", "unknown key; known here"),
-        ("resolution_s = 0.1", "resolution_s = 0", "must be a number from 1e-06"),
-        ('pattern = "dwell"', 'pattern = "dwel"', "must be one of pause"),
-        ('log = ""', 'log = "gone.csv"', "no such file"),
-        ("[tests.overhead]", "[tests.overhead", "line"),
+        ("times_s = []", "times_s = [-3.0]", ":11: tests.overhead.times_s.1 = -3.0: must be greater than 0"),
+        ("times_s = []", 'times_s = "34"', ':11: tests.overhead.times_s = "34": must be a list'),
+        ("times_s = []", "time_s = [34]", ":11: tests.overhead.time_s = [34]: unknown key"),
+        ("resolution_s = 0.1", "resolution_s = 0", ":5: resolution_s = 0: must be 1e-06 or more (unit: s)"),
+        ('pattern = "dwell"', 'pattern = "dwel"', 'tests.stop_below.parts.1.pattern = "dwel": must be "pause", '),
+        ("feed_mm_per_min = 3000.0", "feed_mm_per_min = 0.0", "feed_mm_per_min = 0.0: must not be 0 where something"),
+        ('"O7001.nc"', '"7001.nc"', ':9: tests.overhead.program = "7001.nc": malformed; as'),
+        ('log = ""', 'log = "gone.csv"', "tests.log_cutting.log = gone.csv: no such file"),
+        ("[tests.overhead]", "[tests.overhead", "RESULTS.toml:8: "),
         ("", "", "nothing was measured"),
     ],
 )
@@ -296,7 +303,7 @@ def test_the_log_of_another_test_is_refused(folder: Path) -> None:
     fill_in_logs(folder, Hidden(), np.random.default_rng(2), actual=False)
     shutil.copy(folder / "log_exact.csv", folder / "log_cutting.csv")
     with pytest.raises(sg.ShapegcodeError, match=r"log_cutting\.csv"):
-        fit(folder)
+        sg.characterize(folder, MACHINE)
 
 
 @pytest.mark.parametrize(
@@ -333,19 +340,39 @@ def test_the_command_writes_once_and_fits(tmp_path: Path) -> None:
     done = shell("characterize", "--write", tmp_path / "t", "-m", "vx500", "--json", tmp_path / "w.json")
     assert (done.returncode, done.stderr) == (0, "")
     assert "next: read" in done.stdout
-    assert len(json.loads((tmp_path / "w.json").read_text())["tests"]) > 30
+    report = json.loads((tmp_path / "w.json").read_text())
+    jsonschema.validate(report, schema(sg.CharacterisationTests))
+    assert len(report["tests"]) > 30
+    assert report["tests"][0] == {
+        "name": "overhead", "program": "O7001.nc", "kind": "stopwatch", "override_percent": 100, "expected_s": 10.0,
+        "purpose": "TIME OF START AND END OF A PROGRAM",
+    }  # fmt: skip
     again = shell("characterize", "--write", tmp_path / "t", "-m", "vx500")
     assert again.returncode == 2 and "may hold results" in again.stderr
     fill_in_times(tmp_path / "t", Hidden(), np.random.default_rng(4))
     done = shell("characterize", "--fit", tmp_path / "t", "-m", "vx500", "-o", tmp_path / "m.toml", "--json", "-")
     assert (done.returncode, done.stderr) == (0, "")
     report = json.loads(done.stdout)
-    assert report["contradictions"] == []
-    keys = {"quantity", "value", "low", "high", "unit", "assumed", "key", "source", "note"}
-    assert all(set(each) == keys for each in report["findings"])
+    jsonschema.validate(report, schema(sg.Characterisation))
+    assert report["warnings"] == []
+    assert report["output"] == str(tmp_path / "m.toml")
+    assert report["files"] == [str(tmp_path / "t" / "RESULTS.toml")]
+    sum_of_both = next(each for each in report["findings"] if each["quantity"] == "cutting time constant + bell time")
+    assert sum_of_both["key"] == "controller.time_constant_s"
+    assert sum_of_both["assumed"] == MACHINE.controller.time_constant_s
+    assert sum_of_both["low"] < sum_of_both["value"] < sum_of_both["high"]
     machine = sg.Machine.load(tmp_path / "m.toml")
     assert machine.controller.time_constant_s == pytest.approx(0.05, rel=0.05)
     assert "measured (stopwatch)" in (tmp_path / "m.toml").read_text()
+
+
+def test_the_tables_fit_a_terminal(folder: Path) -> None:
+    fill_in_times(folder, Hidden(), np.random.default_rng(4))
+    found = sg.characterize(folder / "RESULTS.toml", MACHINE)
+    assert repr(found).startswith("<Characterisation: ") and " of VX500 are known" in found.answer
+    text = str(found.tables()[0])
+    assert max(map(len, text.splitlines())) <= 80
+    assert re.search(r"^block time +[\d.]+\sms +[\d.]+\s\.\.\.\s[\d.]+ +5  stopwatch", text, re.MULTILINE)
 
 
 @pytest.mark.parametrize("box", ["0:100", "10:100,0:100,0:20", "0:0,0:100,0:20", "a:b,0:1,0:1", "0:0.1,0:100,0:20"])

@@ -14,16 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode._core import ArgumentError
+from shapegcode.characterization.hold import ticks
 from shapegcode.characterization.log import ServoLog
-from shapegcode.characterization.plan import AXES, Part, Test
+from shapegcode.characterization.plan import AXES, AirTest, Part
+from shapegcode.errors import ArgumentError
 
 __all__ = [
     "PartLog",
     "ShapeFit",
-    "bend_samples",
     "fit_shape",
-    "held_samples",
     "lagged_share",
     "line_slope",
     "parts_of",
@@ -33,9 +32,6 @@ __all__ = [
 Array = npt.NDArray[np.float64]
 _PAUSE_S = 0.3  # a rest of a part is shorter, the pause between two parts is 0.5 s
 _SHORTEST_BOX_S = 2e-5
-_HOLD_SHARE = 0.9
-_BEND_SHARE = 0.85
-_LONGEST_HOLD = 64
 _STAMP = 0.03
 _MOST_SAMPLES = 1500
 
@@ -49,135 +45,39 @@ class PartLog:
         times_s: time of the samples.
         way_mm: way of the part's axis from its start, in the direction of the first move.
         noise_mm: standard deviation of a sample at rest.
-        rows: first and last row in the log.
     """
 
     part: Part
     times_s: Array
     way_mm: Array
     noise_mm: float
-    rows: tuple[int, int]
 
     def middles_s(self) -> Array:
-        """The times at which a there-and-back part passes the middle of its way.
-
-        Raises:
-            ArgumentError: there are not as many as moves.
-        """
-        length = abs(self.part.length_mm)
-        if self.part.stride != 1:
-            length *= self.part.stride
+        """The times at which a there-and-back part passes the middle of its way, (n,)."""
+        length = abs(self.part.length_mm) * self.part.stride
         u = self.way_mm / length - 0.5
         # hysteresis, so that noise at the middle does not count twice
         state = np.where(u > 0.2, 1, np.where(u < -0.2, -1, 0))
         known = np.flatnonzero(state)
         turns = np.flatnonzero(np.diff(state[known])) if len(known) else np.array([], dtype=int)
         middles = []
-        for k in turns:
-            i, j = known[k], known[k + 1]
-            window = slice(i, j + 1)
-            slope, offset = (
-                np.polyfit(self.times_s[window] - self.times_s[i], u[window], 1)
-                if j - i > 1
-                else (
-                    (u[j] - u[i]) / (self.times_s[j] - self.times_s[i]),
-                    u[i],
-                )
-            )
-            middles.append(self.times_s[i] - offset / slope)
+        for i, j in zip(known[turns], known[turns + 1], strict=True):
+            times, places = self.times_s[i : j + 1], u[i : j + 1]
+            if j - i > 1:
+                slope, offset = np.polyfit(times - times[0], places, 1)
+            else:
+                slope, offset = (places[1] - places[0]) / (times[1] - times[0]), places[0]
+            middles.append(times[0] - offset / slope)
         return np.array(middles)
 
-
-def held_samples(log: ServoLog) -> tuple[int, int]:
-    """Over how many samples the command is held, and the index of a first sample; 1 if it is not held.
-
-    A command that changes only once per interpolation period has all its increments there.
-    """
-    command = np.nan_to_num(log.command_mm)
-    increments = np.diff(command, axis=0)
-    noise = np.maximum(command[: max(3, round(0.1 / log.sampling_s))].std(axis=0), 5e-4)
-    increments = np.where(np.abs(increments) > 8.0 * noise, increments, 0.0)
-    energy = (increments**2).sum(axis=1)
-    total = float(energy.sum())
-    best = (1, 0)
-    if total > 0.0:
-        for count in range(2, _LONGEST_HOLD + 1):
-            sums = np.array([energy[first::count].sum() for first in range(count)])
-            first = int(sums.argmax())
-            if sums[first] > _HOLD_SHARE * total:
-                best = (count, (first + 1) % count)
-    return best
+    def pitch_s(self) -> tuple[float, float]:
+        """Mean time from one move to the next, and its 95 % half-width."""
+        steps = np.diff(self.middles_s())
+        spread = float(steps.std(ddof=1)) if len(steps) > 1 else 0.001
+        return float(steps.mean()), 1.96 * max(spread, 2e-5) / math.sqrt(len(steps))
 
 
-@dataclass(frozen=True)
-class _Bends:
-    """How much of the bending of a command lies at every count-th sample and its successor.
-
-    Attributes:
-        share: of all bending.
-        first: index of such a sample.
-        place: of the bend between the two samples, 0 to 1.
-        energy: all bending above the noise.
-    """
-
-    share: float
-    first: int
-    place: float
-    energy: float
-
-
-def _bends(log: ServoLog, count: int) -> _Bends:
-    command = np.nan_to_num(log.command_mm)
-    bend = np.diff(command, 2, axis=0)
-    energy = (bend**2).sum(axis=1)
-    rest = max(3, round(0.1 / log.sampling_s))
-    energy = energy - energy[:rest].mean()
-    sums = np.array([energy[k::count].sum() for k in range(count)])
-    pairs = sums + np.roll(sums, -1)
-    k = int(pairs.argmax())
-    total = float(sums.sum())
-    one, two = (math.sqrt(max(float(each), 0.0)) for each in (sums[k], np.roll(sums, -1)[k]))
-    share = float(pairs[k]) / total if total > 0.0 else 0.0
-    return _Bends(share, (k + 1) % count, two / (one + two) if one + two > 0.0 else 0.0, max(total, 0.0))
-
-
-def bend_samples(logs: Sequence[ServoLog]) -> int:
-    """After how many samples the speed of a command changes that is interpolated between periods; 1: not seen.
-
-    Only periods of three samples or more can be told, and only where the command is not held.
-    """
-    best = 1
-    for count in range(3, _LONGEST_HOLD // 2):
-        every = [_bends(log, count) for log in logs]
-        total = sum(each.energy for each in every)
-        # A divisor of the true count shows all bends too: the largest counts.
-        if total > 0.0 and sum(each.share * each.energy for each in every) > _BEND_SHARE * total:
-            best = count
-    return best
-
-
-def _ticks(log: ServoLog, bend: int) -> tuple[Array, Array, int]:
-    """Times and positions, one for each interpolation period where that shows; and how many samples that is."""
-    count, first = held_samples(log)
-    if count == 1 and bend > 1:
-        found = _bends(log, bend)
-        before = np.arange(found.first, len(log.times_s) - 2, bend)
-        before = before[before > 0]
-        times = log.times_s[before] + found.place * log.sampling_s
-        x = log.command_mm
-        # The straight pieces on both sides meet at the bend.
-        left = x[before] + found.place * (x[before] - x[before - 1])
-        right = x[before + 1] - (1.0 - found.place) * (x[before + 2] - x[before + 1])
-        return times, (left + right) / 2.0, bend
-    if count == 1:
-        return log.times_s, log.command_mm, 1
-    n = (len(log.times_s) - first) // count
-    times = log.times_s[first : first + n * count : count]
-    held = log.command_mm[first : first + n * count].reshape(n, count, 3)
-    return times, held.mean(axis=1), count
-
-
-def parts_of(log: ServoLog, test: Test, bend: int = 1) -> list[PartLog]:
+def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
     """Cut a log into the parts of its test.
 
     Args:
@@ -192,7 +92,7 @@ def parts_of(log: ServoLog, test: Test, bend: int = 1) -> list[PartLog]:
     for part in wanted:
         if np.isnan(log.command_mm[0, AXES.index(part.axis)]):
             raise ArgumentError(f"{log.file}: no commanded position of {part.axis}, which test {test.name} needs")
-    times, positions, _ = _ticks(log, bend)
+    times, positions = ticks(log, bend)
     used = sorted({AXES.index(part.axis) for part in wanted})
     points = positions[:, used]
     start = points[: max(3, int(0.1 / (times[1] - times[0])))]
@@ -217,7 +117,7 @@ def parts_of(log: ServoLog, test: Test, bend: int = 1) -> list[PartLog]:
         rest = positions[low : max(low + 2, first), axis]
         way = (positions[low:high, axis] - rest.mean()) * math.copysign(1.0, part.length_mm)
         spread = float(noise[used.index(axis)])
-        out.append(PartLog(part, times[low:high], way, spread, (low, high)))
+        out.append(PartLog(part, times[low:high], way, spread))
         expected = abs(part.length_mm) * part.stride
         # A turn without a stop is cut short by the smoothing.
         least = 0.98 if part.pattern in ("dwell", "exact", "rapid") else 0.5

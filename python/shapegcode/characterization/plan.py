@@ -12,18 +12,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from shapegcode._core import ArgumentError
+from shapegcode.errors import ArgumentError
 
-__all__ = ["AXES", "PATTERNS", "Box", "Part", "Pattern", "Step", "Test", "steps"]
+__all__ = ["AXES", "AirBox", "AirTest", "BlockEnd", "Kind", "Part", "Pattern", "Step", "check", "steps"]
 
 AXES = ("X", "Y", "Z")
+BlockEnd = Literal["ceil", "carry"]
+"""What becomes of the rest of a period at the end of a block."""
+Kind = Literal["stopwatch", "log"]
 Pattern = Literal["pause", "continuous", "dwell", "exact", "rapid", "feed_steps"]
-PATTERNS: tuple[Pattern, ...] = ("pause", "continuous", "dwell", "exact", "rapid", "feed_steps")
 _LARGEST_BOX_MM = 10_000.0
 
 
 @dataclass(frozen=True)
-class Box:
+class AirBox:
     """Where the tests may move, relative to the point at which the operator starts them.
 
     Attributes:
@@ -35,7 +37,7 @@ class Box:
     high: tuple[float, float, float] = (100.0, 100.0, 20.0)
 
     @classmethod
-    def parse(cls, text: str) -> Box:
+    def parse(cls, text: str) -> AirBox:
         """Read ``X0:X1,Y0:Y1,Z0:Z1`` in mm from the start point, for example ``0:100,-50:50,0:20``.
 
         Raises:
@@ -97,7 +99,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Test:
+class AirTest:
     """One run of one program.
 
     Attributes:
@@ -109,11 +111,9 @@ class Test:
         override_percent: feed override at which it is run.
     """
 
-    __test__ = False  # no test case, whatever pytest thinks of its name
-
     name: str
     number: int
-    kind: Literal["stopwatch", "log"]
+    kind: Kind
     purpose: str
     parts: tuple[Part, ...]
     override_percent: int = 100
@@ -153,7 +153,7 @@ def steps(part: Part) -> Iterator[Step]:
             yield Step(0.0, 0.0, part.dwell_s)
 
 
-def check(test: Test, box: Box) -> None:
+def check(test: AirTest, box: AirBox) -> None:
     """Make sure that a test stays inside the box and ends where it began.
 
     Raises:

@@ -1,198 +1,69 @@
-"""The test programs: which moves, written as FANUC programs that any control can run from memory or by DNC."""
+"""The tests as FANUC programs that any control can run from memory or by DNC, with what the operator needs."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shapegcode._core import ArgumentError
-from shapegcode.characterization.plan import AXES, Box, Part, Test, check, steps
-from shapegcode.characterization.timing import Timing, program_time_s
+from shapegcode.characterization.plan import AXES, AirBox, AirTest, steps
+from shapegcode.characterization.result import CharacterisationTests, WrittenTest
+from shapegcode.characterization.sheet import SHEET, sheet_text
+from shapegcode.characterization.tests import make_tests
+from shapegcode.characterization.timing import ControllerTiming, program_time_s
+from shapegcode.errors import ArgumentError
+from shapegcode.io.atomic import write_text
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["make_tests", "program_text", "write_tests"]
+__all__ = ["program_text", "readme_text", "write_characterization_tests"]
 
-#: Feeds to choose from, mm/min: in each, 1 µm is a small and exact part of a period.
-_FEEDS = (3000.0, 1200.0, 600.0, 300.0, 120.0, 60.0)
-_FIRST_NUMBER = 7001  # 8000 and 9000 are often locked
-_STOP_S = 0.032  # a whole multiple of every usual interpolation period
-_LOG_STOP_S = 0.160
-_STOP_DWELL_S = 0.008
-_LOG_DWELL_S = 0.096
-_LOG_PAUSE_S = 0.5
-_STEPS_WAY_S = 0.8  # at full feed: longer than the ramps at both ends
-_LOG_SHARES = (1.0, 0.5, 0.25, 0.1, 0.05)
-_MORE_SHARES = (0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6, 0.55, 0.45, 0.4, 0.35)
-_LONG_RAPID_S = 0.2
-_LONG_RAPIDS = ((1.0, 100), (0.5, 100), (0.2, 60), (0.14, 60), (0.1, 60), (0.07, 60), (0.05, 60), (0.03, 60))
-_SHORT_RAPIDS = ((1.0, 100), (0.85, 60), (0.7, 60), (0.55, 60), (0.4, 60), (0.3, 60), (0.2, 60), (0.1, 60), (0.05, 60))
 _HEADER = "G21 G17 G91 G94 G64"
-_PER_MINUTE = 60.0
 
 
-class _Maker:
-    """Draws up the tests for one machine and one box."""
+def write_characterization_tests(
+    folder: str | Path, machine: Machine, box: str | AirBox = "0:100,0:100,0:20"
+) -> CharacterisationTests:
+    """Write test programs that show what a controller does with blocks, and what the operator needs for them.
 
-    def __init__(self, machine: Machine, box: Box) -> None:
-        self._box = box
-        self._step = machine.controller.least_increment_mm
-        axes = machine.axes.as_tuple()
-        largest = 0.5 * min(axis.max_feed_mm_per_min for axis in axes)
-        usable = [feed for feed in _FEEDS if feed <= largest]
-        if not usable:
-            raise ArgumentError(f"half of the smallest max_feed is {largest:g} mm/min; the tests need 60 or more")
-        self.feed = usable[0]
-        self.rapid = {name: axis.rapid_mm_per_min for name, axis in zip(AXES, axes, strict=True)}
-
-    def _length(self, axis: str, duration_s: float, feed: float, side: int = 0) -> float:
-        """Signed length for a duration; *side* -1 and +1: just below and just above it, whatever the increment."""
-        exact = duration_s * feed / _PER_MINUTE
-        margin = max(self._step, 0.0005 * exact) if side else 0.0
-        units = round((exact + side * margin) / self._step)
-        if side and (units * self._step - exact) * side <= 0.0:
-            units += side
-        return math.copysign(round(max(units, 1) * self._step, 9), self._box.travel_mm(axis))
-
-    def stops(self, pattern: str, axis: str, count: int, side: int, *, log: bool = False, slower: float = 1.0) -> Part:
-        """Moves of nearly the same duration, each ending in a stop."""
-        base, dwell = (_LOG_STOP_S, _LOG_DWELL_S) if log else (_STOP_S, _STOP_DWELL_S)
-        feed = self.feed / slower
-        length = self._fit(axis, self._length(axis, base, feed, side))
-        dwell = dwell if pattern == "dwell" else 0.0
-        return Part(pattern, axis, count, length, feed, dwell_s=dwell)  # type: ignore[arg-type]
-
-    def run(self, axis: str, count: int, duration_s: float, side: int = 0) -> Part:
-        """Continuous moves, there and back over as much of the box as they fill evenly."""
-        length = self._length(axis, duration_s, self.feed, side)
-        room = int((abs(self._box.travel_mm(axis)) + 1e-9) / abs(length))
-        if room < 1:
-            raise ArgumentError(self._too_small(axis, abs(length)))
-        stride = min(room, count // 2)
-        turns = max(1, round(count / (2 * stride)))
-        return Part("continuous", axis, 2 * stride * turns, length, self.feed, stride)
-
-    def rapids(self, axis: str, share: float, count: int) -> Part:
-        """Rapids over a share of the box."""
-        units = math.floor(share * abs(self._box.travel_mm(axis)) / self._step + 1e-9)
-        if units < 1:
-            raise ArgumentError(self._too_small(axis, self._step))
-        length = math.copysign(round(units * self._step, 9), self._box.travel_mm(axis))
-        return Part("rapid", axis, count, length, self.rapid[axis])
-
-    def rapid_series(self, axis: str) -> list[Part]:
-        """Rapids over several lengths for a log; more where none may reach the rate: each gives only a bracket."""
-        reached = self._rate_is_reached(axis)
-        shares = _LOG_SHARES if reached else (*_LOG_SHARES, *_MORE_SHARES)
-        return [self.rapids(axis, share, 6 if reached else 4) for share in shares]
-
-    def rapid_shares(self, axis: str) -> tuple[tuple[float, int], ...]:
-        """Shares of the box and counts of rapids for a stopwatch.
-
-        Half a short rapid lasts whole periods: lengths that round differently tell the time constant.
-        """
-        return _LONG_RAPIDS if self._rate_is_reached(axis) else _SHORT_RAPIDS
-
-    def _rate_is_reached(self, axis: str) -> bool:
-        return abs(self._box.travel_mm(axis)) > _LONG_RAPID_S * self.rapid[axis] / _PER_MINUTE
-
-    def feed_steps(self, axis: str, length_mm: float) -> list[Part]:
-        """Pieces of one length, alternately fast and slow, and back."""
-        room = int((abs(self._box.travel_mm(axis)) + 1e-9) / length_mm)
-        wanted = max(8, 2 * math.ceil(_STEPS_WAY_S * self.feed / _PER_MINUTE / (2.0 * length_mm)))
-        stride = min(wanted, room - room % 2)
-        if stride < 4:
-            return []
-        length = math.copysign(round(round(length_mm / self._step) * self._step, 9), self._box.travel_mm(axis))
-        return [Part("feed_steps", axis, 2 * stride, length, self.feed, stride), Part("pause", dwell_s=_LOG_PAUSE_S)]
-
-    def _fit(self, axis: str, length: float) -> float:
-        if abs(length) > abs(self._box.travel_mm(axis)):
-            raise ArgumentError(self._too_small(axis, abs(length)))
-        return length
-
-    def _too_small(self, axis: str, needed: float) -> str:
-        return f"--box {self._box}: {axis} has {abs(self._box.travel_mm(axis)):g} mm, a test needs {needed:.3f} mm"
-
-
-def make_tests(machine: Machine, box: Box) -> list[Test]:
-    """The tests for a machine: those for a stopwatch first, then the shorter ones for a servo log.
+    Into the folder go every program, ``RESULTS.toml`` to fill in, and ``README.txt``. All moves are in the air.
 
     Args:
+        folder: into which; it is made where it is missing.
         machine: gives the least increment, the largest feeds and the rapid rates.
-        box: where the tests may move.
+        box: where the tests may move, mm from the point at which they are started, "X0:X1,Y0:Y1,Z0:Z1".
+
+    Returns:
+        The tests with the time that each is expected to last, in the order in which they are written.
 
     Raises:
-        ArgumentError: the box or the feeds are too small for the tests.
+        ArgumentError: the box or the feeds are too small; the folder holds a RESULTS.toml, which may be filled in.
+        OSError: the folder or a file cannot be written.
     """
-    make = _Maker(machine, box)
-    tests: list[Test] = []
-
-    def add(kind: str, name: str, purpose: str, parts: Iterable[Part], override: int = 100, same: bool = False) -> None:
-        number = tests[-1].number if same else _FIRST_NUMBER + len({test.number for test in tests})
-        test = Test(name, number, kind, purpose, tuple(parts), override)  # type: ignore[arg-type]
-        check(test, box)
-        tests.append(test)
-
-    def stopwatch(name: str, purpose: str, part: Part, override: int = 100, same: bool = False) -> None:
-        add("stopwatch", name, purpose, [part], override, same)
-
-    stopwatch("overhead", "TIME OF START AND END OF A PROGRAM", Part("pause", dwell_s=10.0))
-    stopwatch("stop_below", "TIME CONSTANT", make.stops("dwell", "X", 200, -1))
-    stopwatch("stop_above", "INTERPOLATION PERIOD", make.stops("dwell", "X", 200, +1))
-    stopwatch("stop_slow", "SHAPE OF THE ACCELERATION", make.stops("dwell", "X", 200, -1, slower=5.0))
-    stopwatch("stop_slower", "SHAPE OF THE ACCELERATION", make.stops("dwell", "X", 200, -1, slower=20.0))
-    stopwatch("run_above", "CEIL OR CARRY", make.run("X", 600, _STOP_S, +1))
-    for axis in AXES:
-        stopwatch(f"exact_{axis.lower()}", f"IN-POSITION TIME OF {axis}", make.stops("exact", axis, 200, -1))
-    stopwatch("blocks_tiny", "BLOCK TIME", make.run("X", 2000, 0.0002))
-    stopwatch("blocks_short", "BLOCK TIME, KNEE", make.run("X", 1000, 0.0041))
-    stopwatch("blocks_medium", "BLOCK TIME, KNEE", make.run("X", 1000, 0.0121))
-    for axis in AXES:
-        for share, count in make.rapid_shares(axis):
-            name = f"rapid_{axis.lower()}_{share * 100:.0f}"
-            stopwatch(name, f"RAPID OF {axis}, {share * 100:.0f} PERCENT OF THE BOX", make.rapids(axis, share, count))
-    override_run = make.run("X", 20, min(1.0, abs(box.travel_mm("X")) / make.feed * _PER_MINUTE))
-    for percent in (50, 100, 120):
-        stopwatch(f"override_{percent}", "FEED OVERRIDE", override_run, percent, same=percent != 50)
-
-    pause = Part("pause", dwell_s=_LOG_PAUSE_S)
-
-    def log(name: str, purpose: str, parts: Iterable[Part]) -> None:
-        add("log", name, purpose, [each for part in parts for each in (part, pause)])
-
-    log("log_cutting", "TIME CONSTANT, PERIOD", [make.stops("dwell", "X", 10, side, log=True) for side in (-1, +1)])
-    log("log_exact", "IN-POSITION TIMES", [make.stops("exact", axis, 10, -1, log=True) for axis in AXES])
-    log("log_run", "CEIL OR CARRY", [make.run("X", 160, _STOP_S, +1)])
-    log("log_blocks", "BLOCK TIME", [make.run("X", 1200, 0.0002)])
-    for axis in AXES:
-        log(f"log_rapid_{axis.lower()}", f"RAPID OF {axis}", make.rapid_series(axis))
-    lengths = (20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2)
-    parts = [part for length in lengths for part in make.feed_steps("X", length * make.feed / 3000.0)]
-    if parts:
-        add("log", "log_feed_steps", "FEED-CONTROL INTERVAL", parts)
-    return tests
+    box = AirBox.parse(box) if isinstance(box, str) else box
+    place = Path(folder)
+    tests = make_tests(machine, box)
+    if (place / SHEET).exists():
+        raise ArgumentError(f"{place / SHEET} exists and may hold results: name another folder")
+    place.mkdir(parents=True, exist_ok=True)
+    for test in {test.number: test for test in reversed(tests)}.values():
+        write_text(place / test.program, program_text(test, box, machine))
+    write_text(place / "README.txt", readme_text(tests, machine, box))
+    write_text(place / SHEET, sheet_text(tests, machine, box))
+    timing = ControllerTiming.of(machine)
+    written = [
+        WrittenTest(
+            each.name, each.program, each.kind, each.override_percent, program_time_s(each, timing), each.purpose
+        )
+        for each in tests
+    ]
+    return CharacterisationTests(machine.name, str(folder), str(box), tuple(written))
 
 
-def _number(value: float, decimals: int) -> str:
-    text = f"{value:.{decimals}f}".rstrip("0")
-    return text.replace("-0.", "-.") if text.startswith("-0.") and text != "-0." else text.removeprefix("0")
-
-
-def _word(address: str, value: float, step: float) -> str:
-    decimals = max(0, round(-math.log10(step)))
-    return f"{address}{_number(value, max(decimals, 1))}"
-
-
-def _feed(value: float) -> str:
-    return f"F{value:.1f}".rstrip("0")
-
-
-def program_text(test: Test, box: Box, machine: Machine) -> str:
+def program_text(test: AirTest, box: AirBox, machine: Machine) -> str:
     """The program of a test: incremental, no spindle, no reference point, no tool change, written out.
 
     Args:
@@ -203,7 +74,7 @@ def program_text(test: Test, box: Box, machine: Machine) -> str:
     step = machine.controller.least_increment_mm
     shared = test.name.startswith("override")  # one program, run at several overrides
     title = "OVERRIDE" if shared else test.name.upper().replace("_", "-")
-    seconds = program_time_s(dataclasses.replace(test, override_percent=100), Timing.of(machine))
+    seconds = program_time_s(replace(test, override_percent=100), ControllerTiming.of(machine))
     sides = [f"{a}{low:g}/{high:g}" for a, low, high in zip(AXES, box.low, box.high, strict=True)]
     lines = [
         "%",
@@ -237,22 +108,72 @@ def program_text(test: Test, box: Box, machine: Machine) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_tests(folder: Path, machine: Machine, box: Box) -> list[Test]:
-    """Write every program, ``RESULTS.toml`` to fill in, and ``README.txt`` into a folder.
+def _number(value: float, decimals: int) -> str:
+    text = f"{value:.{decimals}f}".rstrip("0")
+    return text.replace("-0.", "-.") if text.startswith("-0.") and text != "-0." else text.removeprefix("0")
 
-    Raises:
-        ArgumentError: the box is too small; the folder holds a RESULTS.toml, which may be filled in.
-        OSError: the folder or a file cannot be written.
+
+def _word(address: str, value: float, step: float) -> str:
+    decimals = max(0, round(-math.log10(step)))
+    return f"{address}{_number(value, max(decimals, 1))}"
+
+
+def _feed(value: float) -> str:
+    return f"F{value:.1f}".rstrip("0")
+
+
+def readme_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
+    """Instructions for the operator.
+
+    Args:
+        tests: what was written.
+        machine: for the expected times.
+        box: where the tests move.
     """
-    from shapegcode.characterization.results import readme_text, results_text
-    from shapegcode.io.atomic import write_text
+    timing = ControllerTiming.of(machine)
+    watch = [test for test in tests if test.kind == "stopwatch"]
+    logs = [test for test in tests if test.kind == "log"]
+    rates = ", ".join(f"{n} {a.rapid_mm_per_min:g}" for n, a in zip(AXES, machine.axes.as_tuple(), strict=True))
+    feed = max(part.feed_mm_per_min for test in tests for part in test.parts if part.pattern != "rapid")
 
-    tests = make_tests(machine, box)
-    if (folder / "RESULTS.toml").exists():
-        raise ArgumentError(f"{folder / 'RESULTS.toml'} exists and may hold results: name another folder")
-    folder.mkdir(parents=True, exist_ok=True)
-    for test in {test.number: test for test in reversed(tests)}.values():
-        write_text(folder / test.program, program_text(test, box, machine))
-    write_text(folder / "README.txt", readme_text(tests, machine, box))
-    write_text(folder / "RESULTS.toml", results_text(tests, machine, box))
-    return tests
+    def row(test: AirTest) -> str:
+        seconds = program_time_s(test, timing)
+        note = f"override {test.override_percent} %" if test.name.startswith("override") else ""
+        return f"  {test.program}  {test.name:<15} {seconds:7.1f} s  {test.purpose.capitalize()}  {note}".rstrip()
+
+    text = [
+        f"Characterization of {machine.name}",
+        "",
+        "Before you start",
+        "  No tool, no workpiece, no spindle. The programs only move the axes, in the air.",
+        f"  From the point at which you start, the tests reach X {box.low[0]:g} to {box.high[0]:g}, "
+        f"Y {box.low[1]:g} to {box.high[1]:g}, Z {box.low[2]:g} to {box.high[2]:g} mm.",
+        "  Jog to a point from which all of this box is free, fixtures and tool changer included.",
+        f"  Cutting feed up to {feed:g} mm/min; rapid at the machine's rate ({rates} mm/min in the machine file:",
+        "  compare parameter 1420; a wrong rate makes the rapid time constants wrong).",
+        "  The programs are incremental (G91) and end where they began. After a stop in the middle: reset, jog back",
+        "  to the start point, begin that program anew. Never restart in the middle.",
+        "  First run each program once in single block or dry run, to see where it goes; times count only without.",
+        "  Overrides 100 % unless the table says otherwise. Switch look-ahead modes off (G05.1 Q0, G08 P0),",
+        "  if you want the figures without them; write down which mode was on.",
+        "",
+        f"With a stopwatch: about {sum(program_time_s(test, timing) for test in watch) / 60:.0f} minutes",
+        "  Time from cycle start to the end of the program, or read the cycle time off the control.",
+        "  Put the times into RESULTS.toml (times_s = [34.2] or, for several runs, [34.2, 34.3]).",
+        "  Tests may be left out: what then cannot be known is said. The order does not matter.",
+        "",
+        *(row(test) for test in watch),
+        "",
+        f"With a servo log: about {sum(program_time_s(test, timing) for test in logs):.0f} s of motion",
+        "  Record time and the commanded positions of X, Y, Z (and the actual positions, if you can) every 1 ms, from",
+        "  before the start to after the end. Save as CSV with a header line such as",
+        "    time_ms,X,Y,Z,X_act,Y_act,Z_act",
+        "  in mm, one file for each program, named after the test: log_cutting.csv and so on.",
+        "",
+        *(row(test) for test in logs),
+        "",
+        "Then",
+        "  shapegcode characterize --fit RESULTS.toml -m MACHINE -o fitted.toml",
+        "",
+    ]
+    return "\n".join(text)

@@ -8,10 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.characterization.findings import known, unknown
+from shapegcode.characterization.facts import Facts
+from shapegcode.characterization.hold import held_samples
 from shapegcode.characterization.log import ServoLog
-from shapegcode.characterization.logstate import SOURCE, State
-from shapegcode.characterization.moves import held_samples
 from shapegcode.characterization.plan import AXES
 
 Array = npt.NDArray[np.float64]
@@ -19,7 +18,7 @@ _SERVO_SLACK = 0.02
 _GAINS = (2.0, 1000.0)  # 1/s
 
 
-def fit_servo(state: State, logs: Mapping[str, ServoLog]) -> None:
+def fit_servo(facts: Facts, logs: Mapping[str, ServoLog]) -> None:
     """Position gain K and feed-forward f: e = −K ∫e dt + (1 − f) x + c, fitted to following error e and command x."""
     done = False
     for index, axis in enumerate(AXES):
@@ -30,20 +29,18 @@ def fit_servo(state: State, logs: Mapping[str, ServoLog]) -> None:
         name = f"position gain {axis}"
         gain, rest = _lag_of(records)
         if rest < 0.02 or not 2.0 * _GAINS[0] < gain < 0.5 * _GAINS[1]:
-            why = "the actual position follows the command without a lag that tells it"
-            state.findings.append(unknown(name, "1/s", SOURCE, why))
+            facts.unknown(name, "the actual position follows the command without a lag that tells it", "1/s")
             continue
         spread = np.std(np.array([_lag_of([record]) for record in records]), axis=0) / math.sqrt(len(records))
         # Command and actual position may be sampled up to half a sample apart, which looks like lag.
         apart = 0.5 * min(log.sampling_s for log in logs.values()) * gain
-        key = f"controller.position_gain_per_s.{axis.lower()}"
         half = float(spread[0]) + (_SERVO_SLACK + apart / rest) * gain
-        state.findings.append(known(name, gain, half, "1/s", key, SOURCE))
+        facts.known(name, gain, half, f"controller.position_gain_per_s.{axis.lower()}", unit="1/s")
         half = float(spread[1]) + _SERVO_SLACK + apart
-        forward_key = f"controller.feed_forward_ratio.{axis.lower()}"
-        state.findings.append(known(f"feed-forward {axis}", max(0.0, 1.0 - rest), half, "1", forward_key, SOURCE))
+        key = f"controller.feed_forward_ratio.{axis.lower()}"
+        facts.known(f"feed-forward {axis}", max(0.0, 1.0 - rest), half, key, unit="1")
     if not done:
-        state.findings.append(unknown("position gain", "1/s", SOURCE, "no actual positions in the logs"))
+        facts.unknown("position gain", "no actual positions in the logs", "1/s")
 
 
 def _servo_rows(log: ServoLog, index: int) -> tuple[Array, Array, float] | None:

@@ -1,6 +1,7 @@
 """How long a part lasts on a controller that smooths after interpolation: the one place of these formulas.
 
-Source: paper 004, equations 2 to 16; the in-position wait follows a rapid and an exact stop.
+Source: C.-Y. Lee, S.-K. Ro, C. K. Song, J. S. Oh: Cycle Time Estimation of Block Overlap Based CNC, J. Korean Soc.
+Precis. Eng. 39(7), 2022 (paper 004), equations 2 to 16; the in-position wait follows a rapid and an exact stop.
 """
 
 from __future__ import annotations
@@ -8,20 +9,23 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
-from shapegcode.characterization.plan import AXES, Part, Test
+from shapegcode.characterization.plan import AXES, AirTest, BlockEnd, Part
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["Timing", "part_time_s", "program_time_s", "whole_periods"]
+__all__ = ["NO_PERIOD_S", "ControllerTiming", "part_time_s", "program_time_s", "whole_periods"]
+
+NO_PERIOD_S = 1e-6
+"""An interpolation period so short that nothing is rounded."""
 
 _TICK_DUST = 1e-6  # periods: the dust of doubles
 
 
 @dataclass(frozen=True)
-class Timing:
+class ControllerTiming:
     """The facts of a controller that decide how long a test lasts; times in s.
 
     Attributes:
@@ -36,7 +40,7 @@ class Timing:
     """
 
     period_s: float
-    block_end: Literal["ceil", "carry"]
+    block_end: BlockEnd
     block_time_s: float
     cutting_s: float
     rapid_s: Mapping[str, float] = field(default_factory=dict)
@@ -45,7 +49,7 @@ class Timing:
     overhead_s: float = 0.0
 
     @classmethod
-    def of(cls, machine: Machine) -> Timing:
+    def of(cls, machine: Machine) -> ControllerTiming:
         """What a machine file says."""
         control = machine.controller
 
@@ -70,7 +74,7 @@ def whole_periods(duration_s: float, period_s: float) -> float:
     return math.ceil(duration_s / period_s - _TICK_DUST) * period_s
 
 
-def _rapid_s(part: Part, timing: Timing) -> float:
+def _rapid_s(part: Part, timing: ControllerTiming) -> float:
     ramp = timing.rapid_s[part.axis]
     nominal = part.duration_s
     if nominal >= ramp:
@@ -81,7 +85,7 @@ def _rapid_s(part: Part, timing: Timing) -> float:
     return moving + timing.rapid_bell_s[part.axis] + timing.in_position_s[part.axis]
 
 
-def part_time_s(part: Part, timing: Timing, override: float = 1.0) -> float:
+def part_time_s(part: Part, timing: ControllerTiming, override: float = 1.0) -> float:
     """Duration of one part in s.
 
     Args:
@@ -110,7 +114,7 @@ def part_time_s(part: Part, timing: Timing, override: float = 1.0) -> float:
     return part.count * mean + timing.cutting_s
 
 
-def program_time_s(test: Test, timing: Timing) -> float:
+def program_time_s(test: AirTest, timing: ControllerTiming) -> float:
     """Duration of a test in s, with the operator's overhead."""
     override = test.override_percent / 100.0
     return timing.overhead_s + sum(part_time_s(part, timing, override) for part in test.parts)
