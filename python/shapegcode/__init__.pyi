@@ -1,17 +1,35 @@
 """The public names of shapegcode and their homes: the one list, which type checkers and `__init__.py` read."""
 
 from shapegcode._core import (
+    ChipThickness as ChipThickness,
+    CornerCut as CornerCut,
+    CuttingCoefficients as CuttingCoefficients,
+    EndMill as EndMill,
+    EngagementTrack as EngagementTrack,
+    FeedLimit as FeedLimit,
+    FeedLimits as FeedLimits,
     Fir as Fir,
     FirStream as FirStream,
     LinearPlant as LinearPlant,
+    Material as Material,
+    MillingForce as MillingForce,
     Mode as Mode,
     Path as Path,
     Segment as Segment,
     Shaper as Shaper,
+    SpindleSense as SpindleSense,
+    ToolBeam as ToolBeam,
+    WallSide as WallSide,
     __version__ as __version__,
     convolved_zv as convolved_zv,
     grid_polynomial as grid_polynomial,
+    largest_feed as largest_feed,
+    largest_feeds as largest_feeds,
+    layer_borders as layer_borders,
     minimal_two_mode as minimal_two_mode,
+    sweep as sweep,
+    wall_error_um as wall_error_um,
+    wall_errors_um as wall_errors_um,
     zv as zv,
 )
 from shapegcode.characterization.characterize import characterize as characterize
@@ -52,6 +70,10 @@ from shapegcode.feed.schedule import schedule_feed as schedule_feed
 from shapegcode.feed.shaped import (
     ScheduledConversion as ScheduledConversion,
     convert_scheduled as convert_scheduled,
+)
+from shapegcode.feed.survey import (
+    Survey as Survey,
+    survey as survey,
 )
 from shapegcode.identification.identify import identify as identify
 from shapegcode.identification.result import Identification as Identification

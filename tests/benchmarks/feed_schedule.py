@@ -24,11 +24,12 @@ from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
 from shapegcode.demos.corner_study import CASES, CornerCase, CornerStudy, study_corner
-from shapegcode.feed.plan import limits_of, milling_force
+from shapegcode.feed.plan import limits_of
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.schedule import MARGIN, schedule_feed
-from shapegcode.feed.survey import SurveyedRegion, survey
+from shapegcode.feed.survey import survey
 from shapegcode.feed.travel import OrdinaryMotion
+from shapegcode.feed.walk import SurveyedRegion
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.timing.cycle_time import cycle_time
@@ -127,7 +128,7 @@ def _constant_feed(result: FeedSchedule, tool: Tool, machine: Machine) -> float:
         assert part.track is not None
         free = np.array([not reason for reason in plan.kept])[np.asarray(part.track.segment)]
         feeds, _, _ = _core.largest_feeds(
-            milling_force(tool, part),
+            tool.force(part.spindle_rev_per_min, part.sense),
             part.track,
             limits_of(tool, machine, 0.0),
             1.0,
@@ -155,7 +156,7 @@ def _shares(result: FeedSchedule, limit: float) -> dict[str, float]:
 
 def _finer(written: Program, machine: Machine, tool: Tool, stock: Stock) -> dict[str, Any]:
     """The written program swept anew through a grid of half the width; its stations are its own."""
-    swept = survey(written, machine, [tool], stock, resolution_mm=0.005 * tool.tool.diameter_mm)
+    swept = survey(written, machine, tool, stock, resolution_mm=0.005 * tool.tool.diameter_mm)
     peaks = [float(_peaks(part, machine).max()) for part in swept.regions]
     return {"finer_peak_n": max(peaks)}
 
@@ -164,7 +165,8 @@ def _peaks(part: SurveyedRegion, machine: Machine) -> Vector:
     assert part.tool is not None
     assert part.track is not None
     feeds = _run(part.region.path, np.asarray(part.track.s_mm), part, machine)
-    return np.asarray(milling_force(part.tool, part).figures_of(part.track, feeds)["peak_resultant_n"])
+    force = part.tool.force(part.spindle_rev_per_min, part.sense)
+    return np.asarray(force.figures_of(part.track, feeds)["peak_resultant_n"])
 
 
 def _run(path: _core.Path, stations: Vector, part: SurveyedRegion, machine: Machine) -> Vector:
@@ -175,7 +177,7 @@ def _run(path: _core.Path, stations: Vector, part: SurveyedRegion, machine: Mach
 
 def _brute_force(written: Program, machine: Machine, tool: Tool, stock: Stock, samples: int) -> dict[str, Any]:
     """Some stations of the written program: those with the largest peaks, and random ones."""
-    swept = survey(written, machine, [tool], stock)
+    swept = survey(written, machine, tool, stock)
     block = stock.box
     assert block is not None
     low, high = zip(block.x_mm, block.y_mm, block.z_mm, strict=True)
@@ -273,7 +275,7 @@ def speed(machine: Machine, blocks: int) -> dict[str, float]:
     for part in swept.regions:
         assert part.track is not None
         stations += len(part.track)
-        milling_force(tool, part).figures_of(part.track, np.full(len(part.track), 1200.0))
+        tool.force(part.spindle_rev_per_min, part.sense).figures_of(part.track, np.full(len(part.track), 1200.0))
     end = time.perf_counter()
     return {
         "blocks": sum(len(path) for path in paths),

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import re
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import shapegcode as sg
 from engagement_truth import random_program, section_mm2
 from shapegcode import _core as core
+from shapegcode.results import plot
+
+GOLDEN = Path(__file__).parents[1] / "golden" / "feed"
 
 BORDERS = [-9.0, -6.0, -3.0, 0.0]
 
@@ -163,3 +170,18 @@ def test_layers_follow_the_program() -> None:
     assert borders == pytest.approx([-9.0, -7.5, -7.0, -6.5, -6.0, -3.0, 0.0])
     with pytest.raises(sg.ArgumentError, match="bottom must lie below"):
         core.layer_borders(paths, 0.0, -1.0, 0.5)
+
+
+@pytest.mark.parametrize("page", ["engagement.md", "cutting_force.md", "feed.md"])
+def test_examples_of_the_pages_run_as_they_stand(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, file in (("POCKET.NC", "part.nc"), ("pocket_tool.toml", "T8.toml"), ("pocket_stock.toml", "block.toml")):
+        shutil.copy(GOLDEN / name, tmp_path / file)
+    monkeypatch.chdir(tmp_path)
+    text = (GOLDEN.parents[2] / "docs" / page).read_text(encoding="utf-8")
+    examples = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert examples
+    assert "_core" not in text
+    for example in examples:
+        names: dict[str, object] = {"ax": plot.figure(8.0, 6.0).subplots()}
+        exec(compile(example, page, "exec"), names)
+        assert "sg" in names

@@ -13,7 +13,7 @@ from shapegcode.settings.keys import Float, NonNegative, Positive, Text, TomlTab
 from shapegcode.settings.load import parsed, validated
 from shapegcode.settings.problems import KeyProblem
 
-__all__ = ["Material", "materials"]
+__all__ = ["WorkMaterial", "materials"]
 
 _LIBRARY = "materials.toml"
 
@@ -21,7 +21,7 @@ Exponent = Annotated[Float, Field(gt=-1, lt=1)]
 Name = Annotated[str, Strict(), Field(min_length=1, max_length=60, pattern=r"^[!-$&-'*-~]([ !-$&-'*-~]*[!-$&-'*-~])?$")]
 
 
-class Material(TomlTable):
+class WorkMaterial(TomlTable):
     """A work material with the forces that one cutter was measured to need in it."""
 
     name: Annotated[str, Strict(), Field(pattern=r"^[a-z0-9][a-z0-9-]*$")] = key(
@@ -43,7 +43,7 @@ class Material(TomlTable):
     assumed: Text = key("what the source does not say and is assumed here; empty: nothing")
 
     @model_validator(mode="after")
-    def _range_ascends(self) -> Material:
+    def _range_ascends(self) -> WorkMaterial:
         if self.chip_mm is not None and self.chip_mm[0] >= self.chip_mm[1]:
             raise KeyProblem("chip_mm", self.chip_mm, "the lower end comes first")
         return self
@@ -52,7 +52,7 @@ class Material(TomlTable):
 class _Library(TomlTable):
     """The materials that come with shapegcode."""
 
-    material: tuple[Material, ...] = key("the materials")
+    material: tuple[WorkMaterial, ...] = key("the materials")
 
     @model_validator(mode="after")
     def _names_differ(self) -> _Library:
@@ -64,7 +64,7 @@ class _Library(TomlTable):
 
 
 @cache
-def materials() -> dict[str, Material]:
+def materials() -> dict[str, WorkMaterial]:
     """The materials that come with shapegcode, by name, in the order of their file."""
     text = (resources.files("shapegcode") / "data" / "milling" / _LIBRARY).read_text(encoding="utf-8")
     library = validated(_Library, parsed(text, _LIBRARY, FileError), _LIBRARY, text, FileError)

@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 from pydantic import Field, Strict, field_validator, model_validator
 
 from shapegcode import _core
-from shapegcode.cutting.materials import Exponent, Material, Name, materials
+from shapegcode.cutting.materials import Exponent, Name, WorkMaterial, materials
 from shapegcode.errors import ToolError
 from shapegcode.settings.keys import Float, NonNegative, Positive, Text, TomlTable, key, toml
 from shapegcode.settings.load import loaded, parsed, validated
@@ -156,7 +156,7 @@ class Cutting(TomlTable):
             )
         return self
 
-    def library_entry(self) -> Material | None:
+    def library_entry(self) -> WorkMaterial | None:
         """The material of the library, None without one."""
         return None if self.material is None else materials()[self.material]
 
@@ -305,3 +305,29 @@ class Tool(TomlTable):
     def coefficients(self) -> _core.CuttingCoefficients:
         """The cutting force as the core takes it: the file's values, then those of its material."""
         return self.cutting.coefficients()
+
+    def force(
+        self, spindle_rev_per_min: float, sense: _core.SpindleSense = _core.SpindleSense.clockwise
+    ) -> _core.MillingForce:
+        """The model of its cutting force.
+
+        Args:
+            spindle_rev_per_min: speed of the spindle, 1/min.
+            sense: in which it turns.
+
+        Raises:
+            ArgumentError: a speed that is not positive.
+        """
+        return _core.MillingForce(self.end_mill(), self.coefficients(), spindle_rev_per_min, sense)
+
+    def beam(self) -> _core.ToolBeam:
+        """The tool as the beam that bends: shank and fluted part, clamped at the overhang."""
+        cutter = self.tool
+        return _core.ToolBeam(
+            overhang_mm=cutter.overhang_mm,
+            fluted_length_mm=cutter.flute_length_mm,
+            effective_diameter_mm=cutter.effective_diameter_ratio * cutter.diameter_mm,
+            shank_diameter_mm=cutter.shank_diameter_mm or cutter.diameter_mm,
+            young_modulus_gpa=cutter.youngs_modulus_gpa,
+            holder_n_per_um=cutter.holder_stiffness_n_per_um or math.inf,
+        )

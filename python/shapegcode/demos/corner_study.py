@@ -14,7 +14,6 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
-from shapegcode.feed.plan import tool_beam
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.schedule import schedule_feed
 from shapegcode.feed.travel import OrdinaryMotion
@@ -186,7 +185,7 @@ def study_corner(case: CornerCase, machine: Machine) -> CornerStudy:
     )  # fmt: skip
     track = cut.track(AXIAL_DEPTH_MM, _STEP_MM)
     plain = Tool.from_toml(_tool_text(), "paper001_tool.toml")
-    force = _core.MillingForce(plain.end_mill(), plain.coefficients(), case.spindle_rev_per_min)
+    force = plain.force(case.spindle_rev_per_min)
     programmed = _along(force, track, np.full(len(track), case.feed_mm_per_min))
     borders, feeds = _equation7(cut, track, programmed)
     worst = int(np.argmax(track.radial_depth_mm))
@@ -202,7 +201,7 @@ def study_corner(case: CornerCase, machine: Machine) -> CornerStudy:
         cut=cut,
         track=track,
         force=force,
-        beam=tool_beam(plain),
+        beam=plain.beam(),
         programmed=programmed,
         blocks_mm=borders,
         equation7=_along(force, track, feeds),

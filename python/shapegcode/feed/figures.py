@@ -21,7 +21,8 @@ from shapegcode.feed.result import (
     ResultantForce,
     ScheduledRegion,
 )
-from shapegcode.feed.survey import Survey, SurveyedMove, SurveyedRegion
+from shapegcode.feed.survey import Survey
+from shapegcode.feed.walk import SurveyedMove, SurveyedRegion
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.results.result import Pair

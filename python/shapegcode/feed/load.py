@@ -9,9 +9,9 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.cutting.tool import Tool
-from shapegcode.feed.plan import FeedPlan, goes_on, limits_of, milling_force, tool_beam
-from shapegcode.feed.survey import SurveyedMove, SurveyedRegion
+from shapegcode.feed.plan import FeedPlan, goes_on, limits_of
 from shapegcode.feed.travel import Motion, Travelled, Vector
+from shapegcode.feed.walk import SurveyedMove, SurveyedRegion
 from shapegcode.machine import Machine
 from shapegcode.results.result import Pair
 
@@ -110,7 +110,8 @@ def load_of(part: SurveyedRegion | SurveyedMove, travelled: Travelled) -> Load:
     # What a station meets is met with the feed of the stretch before it and of the one behind it.
     feeds = travelled.feed_mm_per_min.copy()
     feeds[:-1] = np.where(goes_on(part.track), np.maximum(feeds[:-1], feeds[1:]), feeds[:-1])
-    figures = milling_force(part.tool, part).figures_of(part.track, feeds, tool_beam(part.tool))
+    force = part.tool.force(part.spindle_rev_per_min, part.sense)
+    figures = force.figures_of(part.track, feeds, part.tool.beam())
     return Load(travelled.feed_mm_per_min, travelled.time_s, **{name: figures[name] for name in LOADS})
 
 

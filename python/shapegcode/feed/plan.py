@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.cutting.tool import Tool
-from shapegcode.feed.survey import SurveyedMove, SurveyedRegion
 from shapegcode.feed.travel import Motion, Vector
+from shapegcode.feed.walk import SurveyedRegion
 from shapegcode.machine import Machine
 
 __all__ = [
@@ -22,9 +22,7 @@ __all__ = [
     "FeedPlan",
     "goes_on",
     "limits_of",
-    "milling_force",
     "plan_region",
-    "tool_beam",
 ]
 
 _ATTEMPTS = 12
@@ -70,24 +68,6 @@ class FeedPlan:
     window_s: float
 
 
-def milling_force(tool: Tool, surveyed: SurveyedRegion | SurveyedMove) -> _core.MillingForce:
-    """The force model of a region, or of a move outside of the regions."""
-    return _core.MillingForce(tool.end_mill(), tool.coefficients(), surveyed.spindle_rev_per_min, surveyed.sense)
-
-
-def tool_beam(tool: Tool) -> _core.ToolBeam:
-    """The tool as the beam that bends."""
-    cutter = tool.tool
-    return _core.ToolBeam(
-        overhang_mm=cutter.overhang_mm,
-        fluted_length_mm=cutter.flute_length_mm,
-        effective_diameter_mm=cutter.effective_diameter_ratio * cutter.diameter_mm,
-        shank_diameter_mm=cutter.shank_diameter_mm or cutter.diameter_mm,
-        young_modulus_gpa=cutter.youngs_modulus_gpa,
-        holder_n_per_um=cutter.holder_stiffness_n_per_um or math.inf,
-    )
-
-
 def limits_of(tool: Tool, machine: Machine, margin: float) -> _core.FeedLimits:
     """The limits of tool and machine, each less a margin (a share of 1)."""
     room = 1.0 - margin
@@ -104,7 +84,7 @@ def limits_of(tool: Tool, machine: Machine, margin: float) -> _core.FeedLimits:
         peak_torque_nm=least(limits.torque_nm, control.spindle_torque_nm),
         mean_power_w=least(limits.power_w, control.spindle_power_w),
         feed_per_tooth_mm=limits.feed_per_tooth_max_mm or math.inf,
-        beam=tool_beam(tool),
+        beam=tool.beam(),
     )
 
 
@@ -203,7 +183,7 @@ def _limits_along(
     # Without a largest chip nobody said that more than the programmed feed is wanted in material.
     raised = tool.limits.feed_per_tooth_max_mm is not None or tool.feed.max_feed_mm_per_min is not None
     ceiling = np.full(len(programmed), fastest) if raised else np.minimum(programmed, fastest)
-    force = milling_force(tool, surveyed)
+    force = tool.force(surveyed.spindle_rev_per_min, surveyed.sense)
     highest = max(fastest, float(ceiling.max()))
     # Searched to far below the least feed: what needs less than that is told apart from what just reaches it.
     bound, limit, _ = _core.largest_feeds(

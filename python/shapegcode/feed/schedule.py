@@ -20,7 +20,6 @@ from shapegcode.feed.survey import Survey, survey
 from shapegcode.feed.travel import Motion, OrdinaryMotion
 from shapegcode.machine import Machine
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
-from shapegcode.program.compensation import read_for_conversion, require_decision
 from shapegcode.results.result import Pair
 from shapegcode.timing.cycle_time import cycle_time
 
@@ -67,13 +66,6 @@ def schedule_feed(
         StockError: the stock does not suit the program.
         RoundTripError: the written text would not be equivalent: a defect of shapegcode.
     """
-    tools = [tools] if isinstance(tools, Tool) else list(tools)
-    if not tools:
-        raise _core.ArgumentError("a feed schedule needs a tool")
-    if not isinstance(program, Program):
-        program = read_for_conversion(program, machine)
-    require_decision(program, machine)
-
     surveyed = survey(
         program,
         machine,

@@ -19,7 +19,6 @@ from shapegcode.feed.survey import survey
 from shapegcode.feed.travel import OrdinaryMotion, ShapedMotion, travel_emitted
 from shapegcode.machine import Machine
 from shapegcode.program import Program
-from shapegcode.program.compensation import read_for_conversion, require_decision
 from shapegcode.shaping.grid import choose_grid
 
 __all__ = ["ScheduledConversion", "convert_scheduled"]
@@ -80,10 +79,6 @@ def convert_scheduled(
     Raises:
         ProgramError, DesignError, ArgumentError, StockError, RoundTripError: as those two.
     """
-    if not isinstance(program, Program):
-        program = read_for_conversion(program, machine)
-    require_decision(program, machine)
-    tools = [tools] if isinstance(tools, Tool) else list(tools)
     surveyed = survey(
         program, machine, tools, stock, resolution_mm=resolution_mm, on_progress=lambda d, n: on_progress(0.2 * d / n)
     )

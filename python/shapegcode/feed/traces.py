@@ -12,8 +12,9 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.cutting.tool import Limits
 from shapegcode.feed.load import LOADS, Load, PathLoad
-from shapegcode.feed.plan import FeedPlan, milling_force, tool_beam
-from shapegcode.feed.survey import Survey, SurveyedRegion
+from shapegcode.feed.plan import FeedPlan
+from shapegcode.feed.survey import Survey
+from shapegcode.feed.walk import SurveyedRegion
 from shapegcode.results.result import Pair
 
 __all__ = ["FeedTraces", "WallMaps", "envelope", "feed_traces", "groups", "wall_maps"]
@@ -175,7 +176,7 @@ def wall_maps(survey: Survey, loads: Sequence[PathLoad | None], traces: FeedTrac
     owner = np.searchsorted(traces.begins, chosen, side="right") - 1
     for number, part in enumerate(parts):
         assert part.tool is not None and part.track is not None
-        force, beam = milling_force(part.tool, part), tool_beam(part.tool)
+        force, beam = part.tool.force(part.spindle_rev_per_min, part.sense), part.tool.beam()
         inside = height <= part.tool.tool.overhang_mm
         for row in np.flatnonzero(owner == number):
             arcs = part.track.arcs_of(int(chosen[row] - traces.begins[number]))
