@@ -5,7 +5,6 @@ from shapegcode._core import (
     CornerCut as CornerCut,
     CuttingCoefficients as CuttingCoefficients,
     EndMill as EndMill,
-    EngagementTrack as EngagementTrack,
     FeedLimit as FeedLimit,
     FeedLimits as FeedLimits,
     Fir as Fir,

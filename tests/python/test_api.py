@@ -53,6 +53,10 @@ def test_signatures_of_the_core_are_true() -> None:
     made = "(frequency_hz: 'float', damping_ratio: 'float', participation: 'float' = 1.0)"
     assert str(inspect.signature(sg.Mode)) == made
     assert list(inspect.signature(sg.Shaper).parameters) == ["times_s", "amplitudes"]
+    # Defaults that are no literals, and what must be named.
+    assert inspect.signature(sg.MillingForce).parameters["sense"].default is sg.SpindleSense.clockwise
+    limits = inspect.signature(sg.FeedLimits).parameters["mean_power_w"]
+    assert (limits.default, limits.kind) == (math.inf, inspect.Parameter.KEYWORD_ONLY)
 
 
 def test_read_convert_simulate(tmp_path: Path) -> None:

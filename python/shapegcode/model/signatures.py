@@ -5,8 +5,11 @@ from __future__ import annotations
 import ast
 import functools
 import inspect
+import re
 from collections.abc import Callable
 from typing import Any, TypeVar
+
+from shapegcode import _core
 
 __all__ = ["with_signature"]
 
@@ -57,22 +60,39 @@ def _called(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _signature(doc: str | None) -> inspect.Signature | None:
     """Of the first line of a docstring, ``name(first: type, second: type = 1) -> type``; None where there is none."""
+    # pybind11 writes the default of an enumeration as <WallSide.right: 0>.
+    head = re.sub(r"<(\w+\.\w+): -?\d+>", r"\1", (doc or "").partition("\n")[0])
     try:
-        (found,) = ast.parse(f"def {(doc or '').partition(chr(10))[0]}: ...").body
+        (found,) = ast.parse(f"def {head}: ...").body
     except SyntaxError:
         return None
     if not isinstance(found, ast.FunctionDef):
         return None
-    arguments = found.args.args
-    defaults = [inspect.Parameter.empty] * (len(arguments) - len(found.args.defaults))
-    defaults += [ast.literal_eval(default) for default in found.args.defaults]
+    free, named = found.args.args, found.args.kwonlyargs
     parameters = [
-        inspect.Parameter(
-            each.arg, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=default, annotation=_words(each.annotation)
+        inspect.Parameter(each.arg, kind, default=_value(default), annotation=_words(each.annotation))
+        for kind, arguments, defaults in (
+            (
+                inspect.Parameter.POSITIONAL_OR_KEYWORD,
+                free,
+                [None] * (len(free) - len(found.args.defaults)) + list(found.args.defaults),
+            ),
+            (inspect.Parameter.KEYWORD_ONLY, named, found.args.kw_defaults),
         )
         for each, default in zip(arguments, defaults, strict=True)
     ]
     return inspect.Signature(parameters, return_annotation=_words(found.returns))
+
+
+def _value(default: ast.expr | None) -> Any:
+    """Of a default: a literal, inf, or a member of an enumeration of the core."""
+    if default is None:
+        return inspect.Parameter.empty
+    if isinstance(default, ast.Name):
+        return float(default.id)
+    if isinstance(default, ast.Attribute) and isinstance(default.value, ast.Name):
+        return getattr(getattr(_core, default.value.id), default.attr)
+    return ast.literal_eval(default)
 
 
 def _words(annotation: ast.expr | None) -> Any:
