@@ -47,7 +47,7 @@ def api_documentation() -> str:
 def first_sentence(doc: str) -> str:
     """The first sentence of a docstring on one line."""
     text = " ".join(doc.partition("\n\n")[0].split())
-    found = re.match(r".*?\.(?=\s|$)", text)
+    found = re.match(r".*?(?<!\beq)\.(?=\s|$)", text)
     return (found[0] if found else text).rstrip(":.").replace("|", "\\|") + "."
 
 
