@@ -289,7 +289,7 @@ def test_demo_path(folder: Path) -> None:
             assert numbers(row[which]["orbit_error_percent"])
             assert numbers(row[which]["time_s"])
             assert set(row[which]["residual_vibration_um"]) == AXES
-        assert numbers(row["paper"]["orbit_error_percent"])
+        assert numbers(row["published_orbit_error_percent"])
     table = run(folder, "demo", "path")
     assert table.returncode == 0
     assert "0.0270" in table.stdout

@@ -1,4 +1,4 @@
-"""``shapegcode demo shaper``: paper 002's figures against the closed forms and this project's reference values."""
+"""``shapegcode demo shaper``: Park, Hong and Danielson, 2009 (paper 002), against closed forms and reference values."""
 
 from __future__ import annotations
 
@@ -7,13 +7,17 @@ import json
 import math
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 
 from shapegcode.cli import main
 from shapegcode.demos import shaper as demo_shaper
-from shapegcode.demos.shaper import MODES, ShaperDemo, shaper_demo
+from shapegcode.demos import stage
+from shapegcode.demos.shaper import ShaperDemo, shaper_demo
+from shapegcode.demos.stage import MODES
 from shapegcode.results import plot as canvas
+from shapegcode.results.json import schema
 
 
 @pytest.fixture(scope="module")
@@ -32,14 +36,14 @@ def test_shapers_are_those_of_the_paper(demo: ShaperDemo) -> None:
     for name, (times_s, amplitudes) in expected.items():
         np.testing.assert_allclose(demo.shapers[name].times_s, times_s, atol=1e-9)
         np.testing.assert_allclose(demo.shapers[name].amplitudes, amplitudes, atol=1e-5)
-    assert len(demo.report["all_minimal"]) == 7
+    assert len(demo.all_minimal_s) == 7
 
 
 def test_every_statement_that_can_be_compared_agrees(demo: ShaperDemo) -> None:
-    assert demo.report["agrees"]
-    figures = {row["figure"] for row in demo.report["rows"]}
-    assert figures == {"2", "3", "4", "5", "6", "8", "9", "8, 9"}
-    assert all(row["paper"] and row["here"] for row in demo.report["rows"])
+    assert demo.ok
+    places = {row.place for row in demo.rows}
+    assert places == {f"figure {number}" for number in (2, 3, 4, 5, 6, 8, 9)} | {"figures 8, 9"}
+    assert all(row.published and row.ours for row in demo.rows)
 
 
 def test_branches_hold_the_uniform_families(demo: ShaperDemo) -> None:
@@ -83,7 +87,7 @@ def test_unshaped_stage_against_the_superposed_ramps(demo: ShaperDemo) -> None:
         phasor = rectangle * (1.0 - np.exp(-pole * 2.9))
         t = np.linspace(3.0, 3.0 + 3.0 / mode.frequency_hz, 20_000)
         expected = np.abs((phasor * np.exp(pole * t)).imag).max()
-        assert demo.report["stage"]["vibration_mm"]["unshaped"]["after_stop"][beam] == pytest.approx(expected, rel=1e-3)
+        assert demo.stage_vibration["unshaped"].after_stop_mm[beam] == pytest.approx(expected, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -92,20 +96,21 @@ def test_unshaped_stage_against_the_superposed_ramps(demo: ShaperDemo) -> None:
 def test_what_the_remark_says_does_not_depend_on_the_assumptions(
     monkeypatch: pytest.MonkeyPatch, ramp_s: float, damping: float, error: float
 ) -> None:
-    monkeypatch.setattr(demo_shaper, "_RAMP_S", ramp_s)
-    monkeypatch.setattr(demo_shaper, "_DAMPING_RATIO", damping)
-    monkeypatch.setattr(demo_shaper, "_FREQUENCY_ERROR", error)
+    monkeypatch.setattr(stage, "RAMP_S", ramp_s)
+    monkeypatch.setattr(stage, "DAMPING_RATIO", damping)
+    monkeypatch.setattr(stage, "FREQUENCY_ERROR", error)
     monkeypatch.setattr(demo_shaper, "_BRANCH_RATIOS", np.array([1.5, 2.5, 3.5]))
-    rows = [row for row in shaper_demo().report["rows"] if row["figure"] in ("8", "9", "8, 9")]
-    assert [row["agrees"] for row in rows] == [None, None, True, True, True]
+    rows = [row for row in shaper_demo().rows if row.place in ("figure 8", "figure 9", "figures 8, 9")]
+    assert [row.agreement for row in rows] == ["open", "open", "agrees", "agrees", "agrees"]
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(canvas, "FORMATS", (".svg",))  # PNG takes three times as long
     assert main(["demo", "shaper", "--json", str(tmp_path / "demo.json"), "--plots", str(tmp_path / "plots")]) == 0
     out = capsys.readouterr().out
-    assert "Paper 002" in out
+    assert "Park, Hong and Danielson, 2009 (paper 002 in docs/references.md)" in out
     assert "next:" in out
     result = json.loads((tmp_path / "demo.json").read_text(encoding="utf-8"))
-    assert len(result["pictures"]) == 7
-    assert all(Path(name).stat().st_size > 5000 for name in result["pictures"])
+    jsonschema.validate(result, schema(ShaperDemo))
+    assert len(result["plots"]) == 7
+    assert all(Path(name).stat().st_size > 5000 for name in result["plots"])

@@ -240,5 +240,6 @@ def test_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: p
 
 
 def test_demo_without_pictures_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["demo", "path", "--plots", str(tmp_path)]) == 2
-    assert "demo path has no pictures" in capsys.readouterr().err
+    assert main(["demo", "path", "--plots", str(tmp_path)]) == 0
+    assert "pictures: none" in capsys.readouterr().out
+    assert list(tmp_path.iterdir()) == []

@@ -1,10 +1,11 @@
-"""Paper 000, held against this project's figures: orbit error, program listing, emitted blocks, times."""
+"""Ko, Lim and Hong, 2023 (paper 000): orbit error, program listing, emitted blocks, times."""
 
 from __future__ import annotations
 
 import functools
-from typing import Any
+from dataclasses import replace
 
+import jsonschema
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -13,8 +14,10 @@ import shapegcode as sg
 from acceptance import BLOCK_ENDS, convert, figures, machine_with, whole_periods
 from judge import durations, residual_um
 from shapegcode import _core
-from shapegcode.demos.path import ideal_command, path_demo, path_program
+from shapegcode.demos.path import PathDemo, ideal_command, path_demo, path_program
+from shapegcode.demos.result import compared
 from shapegcode.model.controller import motion_limits
+from shapegcode.results.json import schema
 
 Vector = npt.NDArray[np.float64]
 
@@ -161,16 +164,35 @@ def test_override_brings_back_what_spec_4_says(percent_override: int) -> None:
 
 
 def test_the_frame_of_the_listing_is_kept_and_every_condition_is_within_tolerance() -> None:
-    result: dict[str, Any] = path_demo()
-    rows = result["conditions"]
-    assert [(r["feed_mm_per_s"], r["reduction_percent"]) for r in rows] == [(100, 40), (200, 40), (100, 1), (200, 1)]
+    demo = path_demo()
+    jsonschema.validate(demo.to_dict(), schema(PathDemo))
+    rows = demo.conditions
+    assert [(r.feed_mm_per_s, r.reduction_percent) for r in rows] == [(100, 40), (200, 40), (100, 1), (200, 1)]
     for row, (_, _, percent, added) in zip(rows, CONDITIONS, strict=True):
-        assert row["ideal"]["orbit_error_percent"] == pytest.approx(percent, abs=5e-4)
-        assert row["ideal"]["time_increase_percent"] == pytest.approx(added, abs=0.1)
+        assert row.ideal.orbit_error_percent == pytest.approx(percent, abs=5e-4)
+        assert row.ideal.time_increase_percent == pytest.approx(added, abs=0.1)
         # The grid-exact shaper lasts 20 ms where the paper's lasts 11.3: at most two blocks more.
-        assert row["emitted"]["time_s"] - row["ideal"]["time_s"] < 0.015
-        assert row["emitted"]["within_tolerance"]
-    assert [r["paper"]["orbit_error_percent"] for r in rows] == [0.0270, 0.1075, 0.1051, 0.3546]
+        assert row.emitted.time_s - row.ideal.time_s < 0.015
+        assert row.within_tolerance
+    assert [r.published_orbit_error_percent for r in rows] == [0.0270, 0.1075, 0.1051, 0.3546]
+
+
+def test_a_statement_that_differs_for_no_known_reason_fails_the_demonstration() -> None:
+    demo = path_demo()
+    assert demo.ok
+    orbits, times = demo.rows[::2], demo.rows[1::2]
+    assert [row.agreement for row in orbits] == ["agrees", "agrees", "explained", "explained"]
+    assert [row.difference_percent for row in orbits] == pytest.approx([0.0, 0.0, -30.3, -17.9], abs=0.2)
+    assert {row.agreement for row in times} == {"agrees"}
+    assert all(row.note for row in orbits[2:])
+    unexplained = replace(demo, rows=(*demo.rows[:4], replace(demo.rows[4], agreement="differs"), *demo.rows[5:]))
+    assert not unexplained.ok
+    assert unexplained.exit_code == 1
+    assert "1 DIFFER" in unexplained.answer
+    coarse = replace(demo, conditions=(replace(demo.conditions[0], within_tolerance=False), *demo.conditions[1:]))
+    assert not coarse.ok
+    figure = compared("table 2", "orbit error", 0.1075, 0.1078, "%", digits=4, within=1e-4)
+    assert (figure.agreement, figure.ok, figure.ours) == ("differs", False, "0.1078 %")
 
 
 def test_blocks_of_the_emitted_path_last_whole_periods_at_every_feed() -> None:

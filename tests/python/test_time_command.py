@@ -19,7 +19,7 @@ import shapegcode as sg
 from acceptance import PROGRAMS, SAMPLE_KEYS, SAMPLES, machine_with
 from effort import cpu_s
 from shapegcode.cli import main
-from shapegcode.demos import path as demos
+from shapegcode.demos import cycle_time as demos
 from shapegcode.results.json import schema
 from shapegcode.timing import cycle_time as timing
 
@@ -372,14 +372,17 @@ def test_demo_shows_both_sets_beside_the_paper(folder: Path, capsys: pytest.Capt
     assert main(["demo", "cycle-time", "--json", "demo.json"]) == 0
     out = capsys.readouterr().out
     assert "is not published" in " ".join(out.split())
+    assert "Lee, Ro, Song and Oh, 2022 (paper 004 in docs/references.md)" in out
     data = json.loads((folder / "demo.json").read_text())
-    assert [row["paper"]["measured_s"] for row in data["sets"]] == [2169.1, 2157.3]
-    assert [row["paper"]["predicted_s"] for row in data["sets"]] == [2172.4, 2172.0]
-    for row in data["sets"]:
+    jsonschema.validate(data, schema(demos.CycleTimeDemo))
+    assert [row["published_measured_s"] for row in data["cases"]] == [2169.1, 2157.3]
+    assert [row["published_predicted_s"] for row in data["cases"]] == [2172.4, 2172.0]
+    assert [row["agreement"] for row in data["rows"]] == ["open", "open", "agrees", "agrees"]
+    for row in data["cases"]:
         assert abs(row["difference_percent"]) <= 0.5
-        assert row["computing_s"]["closed_form"] > 0.0
+        assert row["closed_form_computing_s"] > 0.0
         assert row["closed_form_s"] > 1800.0
-    first, second = data["sets"]
+    first, second = data["cases"]
     # What does not accelerate does not change.
     for part in ("cutting_s", "rapid_s", "in_position_s", "dwell_s"):
         assert first["parts"][part] == pytest.approx(second["parts"][part], abs=1e-6)

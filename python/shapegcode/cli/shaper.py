@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import math
-from pathlib import Path
+from dataclasses import replace
 
 from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.options import (
@@ -13,8 +12,8 @@ from shapegcode.cli.options import (
     load_machine,
     positive,
     ratio,
-    refuse_same_file,
     seconds,
+    share,
 )
 
 __all__ = ["add_arguments", "run"]
@@ -34,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "the vibration if the frequencies are off, contour cost, negative taps; and recommends one. "
         "Exit code 0: it stays within the vibration limit; 1: the best one does not; 2: bad input."
     )
-    parser.epilog = "example: shapegcode shaper --mode 46:0.02±5% --mode 131:0.02 --period 5ms"
+    parser.epilog = "example: shapegcode shaper --mode 46:0.02±5% --mode 131:0.02 --block-period 5ms"
     parser.add_argument(
         "--mode",
         metavar="HZ[:DAMPING][±BAND]",
@@ -44,16 +43,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_machine_argument(parser, required=False)
     parser.add_argument(
-        "--band",
-        metavar="PERCENT",
-        type=_band,
+        "--uncertainty",
+        metavar="RATIO",
+        type=share,
         default=0.0,
         help="how far the frequency of a mode that states no band may be off, for example 5%% (default: 0)",
     )
     parser.add_argument(
-        "--period",
+        "--block-period",
         metavar="TIME",
-        type=_period,
+        type=_block_period,
         action="append",
         default=None,
         help=f"block period on which the taps must lie, for example 5ms, or {_CONTINUOUS!r}; may be repeated (default: "
@@ -132,29 +131,23 @@ def run(args: argparse.Namespace) -> int:
         OSError: a file cannot be read or written.
     """
     from shapegcode._core import ArgumentError
-    from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.shaping import choose_shaper
-    from shapegcode.shaping.tables import designs_table, families_table, next_step, refusals_table, verdict
+    from shapegcode.cli import runner
+    from shapegcode.cli.console import output_console
+    from shapegcode.shaping import choose_shaper, families_table
 
-    console = output_console(args.json)
     if args.list_families:
-        console.print(families_table())
-        return ExitCode.OK
+        output_console(args.json).print(families_table())
+        return 0
     if bool(args.mode) == (args.machine is not None):
         raise ArgumentError("the modes come from --mode 46:0.02 ... or from -m MACHINE: give one of both")
-    machine = None
-    if args.machine is not None:
-        machine = load_machine(args)
-        if args.json not in (None, "-"):
-            refuse_same_file([Path(args.json)], [Path(args.machine)])
-    with progress("comparing shapers", args.json) as bar:
-        bar.wait()
+    machine = None if args.machine is None else load_machine(args)
+    runner.check_files(args)
+    with runner.progress("comparing shapers", args) as bar:
         result = choose_shaper(
             args.mode,
             machine=machine,
-            uncertainty=args.band,
-            periods_s=None if args.period is None else [period_s or None for period_s in args.period],
+            uncertainty=args.uncertainty,
+            periods_s=None if args.block_period is None else [period_s or None for period_s in args.block_period],
             families=args.family,
             max_duration_s=args.max_duration,
             max_abs_sum=args.max_abs_sum,
@@ -162,33 +155,13 @@ def run(args: argparse.Namespace) -> int:
             objective=args.objective,
             allow_negative=args.negative,
             taps=args.taps,
+            on_progress=bar.update,
         )
-        if args.plots is not None:
-            from shapegcode.shaping.plots import write_shaper_pictures
-
-            write_shaper_pictures(result, args.plots)
-    if args.json is not None:
-        write_json(result.report(), args.json)
-    console.print(designs_table(result, args.speed, args.radius, everything=args.all))
-    if result.refusals:
-        console.print(refusals_table(result.refusals))
-    for line in verdict(result):
-        console.print(line, markup=False)
-    console.print(f"next: {next_step(result, args.machine)}", markup=False)
-    return ExitCode.OK if result.within_limit else ExitCode.OUT_OF_TOLERANCE
+    result = replace(result, machine=args.machine)
+    tables = result.tables(args.speed, args.radius, everything=args.all)
+    return runner.finish(result, args, tables=tables, notes=result.notes())
 
 
-def _period(text: str) -> float:
+def _block_period(text: str) -> float:
     """A time, or 0 for continuous times."""
     return 0.0 if text == _CONTINUOUS else seconds(text)
-
-
-def _band(text: str) -> float:
-    """A share such as ``5%`` or ``0.05``, at least 0 and below 1."""
-    try:
-        value = float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value < 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be at least 0 and below 100%, for example 5%")
-    return value

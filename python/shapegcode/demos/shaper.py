@@ -1,118 +1,145 @@
-"""Paper 002 repeated: minimal two-mode shapers for 1 Hz and 4 Hz, their sensitivity, and its test on a stage.
+"""Minimal two-mode shapers for 1 Hz and 4 Hz, their sensitivity, and their test on a stage.
 
-The paper prints durations and signs in its text; its curves are pictures without numbers. So what can be compared is
-what the text states, beside what the models here give; nothing is tuned.
+Park, Hong and Danielson, 2009 (paper 002 in docs/references.md) print durations and signs in the text; their curves are
+pictures without numbers. So what can be compared is what the text states, beside what the models here give; nothing is
+tuned.
 """
 
 from __future__ import annotations
 
-import cmath
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shapegcode._core import Fir, MinimalBranches, Mode, Shaper, convolved_zv, minimal_branches, minimal_two_mode
+from shapegcode._core import MinimalBranches, Shaper, convolved_zv, minimal_branches, minimal_two_mode
+from shapegcode.demos import stage
+from shapegcode.demos.result import Demonstration, Statement, compared, stated
+from shapegcode.demos.stage import MODES, PERIOD_S, StageVibration
+from shapegcode.results.json import hidden
 from shapegcode.shaping.bands import ModeBand
 from shapegcode.shaping.design import evaluate
 from shapegcode.shaping.modal_run import ModalRun, respond, shaped_step
 from shapegcode.shaping.ranking import NO_RESIDUAL
 
-__all__ = ["MODES", "ShaperDemo", "shaper_demo"]
+__all__ = ["DemoShaper", "ShaperDemo", "shaper_demo"]
 
-FloatArray = NDArray[np.float64]
-
-MODES = (Mode(1.0, 0.0), Mode(4.0, 0.0))
-"""The paper's modes (section 3.2): no damping is stated, and its figures are those without."""
 _PAPER_DURATIONS_S = {"short": 0.4, "medium": 0.6, "long": 0.8, "convolved ZV": 0.625}
 _PAPER_NEGATIVE = {"short": [False, True, False], "medium": [False] * 3, "long": [False] * 3}
 _PAPER_UNIFORM = {"short": True, "medium": False, "long": True}
 _LONGEST_S = 0.81
 _BAND = 0.05  # for the comparison of sensitivities; the paper shows curves only
-_STEP_PERIOD_S = 5e-4  # all taps of the four shapers lie on it
-
-# The stage of section 4. The paper states the way and that the stage stops after 3 s.
-_WAY_MM = 200.0
-_MOVE_S = 3.0
-# Assumed, because not stated: ramps of constant acceleration, damping of the beams, error of the set frequencies.
-_RAMP_S = 0.1
-_DAMPING_RATIO = 0.005
-_FREQUENCY_ERROR = 0.02
 
 _BRANCH_RATIOS = np.linspace(1.05, 8.01, 349)
 _BRANCH_LONGEST_S = 1.0
+_REMARK = (
+    "The paper's curves are pictures without numbers, so its statements are compared, not its curves. Of the "
+    "stage it states 200 mm and a stop after 3 s; ramps of 0.1 s, damping ratio 0.005 and frequencies 2 % "
+    "higher than set are assumptions, and the beams are taken as modes that do not act back on the stage. "
+    "How large the vibration is, and whether start and stop add, cancel or reverse it, depends on them; that a "
+    "little of the faster mode is left, and more of it behind the short shaper, does not. The paper compares "
+    "three minimal shapers; there are seven up to 0.8 s."
+)
 
 
 @dataclass(frozen=True)
-class ShaperDemo:
-    """Everything of the demonstration.
+class DemoShaper:
+    """A shaper of the comparison.
 
     Attributes:
-        shapers: short, medium, long and convolved ZV.
-        branches: minimal shapers over the second frequency, the first one at 1 Hz.
-        runs: of the stage, by the shaper's name, "unshaped" among them.
-        report: figures as plain values: `rows` (figure, what, paper, here, agrees), `shapers`, `stage`, `remark`.
+        times_s: of the taps.
+        amplitudes: of the taps.
+        duration_s: time of the last tap.
+        worst_residual_percent: largest share of the vibration left within 5 % of the modes' frequencies.
     """
 
-    shapers: dict[str, Shaper]
-    branches: MinimalBranches
-    runs: dict[str, ModalRun]
-    report: dict[str, Any]
+    times_s: tuple[float, ...]
+    amplitudes: tuple[float, ...]
+    duration_s: float
+    worst_residual_percent: float
 
 
-def shaper_demo() -> ShaperDemo:
-    """The paper's shapers, branches, step responses, sensitivities and stage test."""
+@dataclass(frozen=True, repr=False, kw_only=True)
+class ShaperDemo(Demonstration):
+    """Two-mode shapers, their branches, step responses and sensitivities, and the test on a stage.
+
+    Attributes:
+        modes_hz: of the paper, undamped.
+        compared: short, medium, long and convolved ZV.
+        all_minimal_s: times of every minimal shaper up to 0.8 s, ascending in duration.
+        stage_vibration: of the stage, by the shaper's name, "unshaped" among them.
+        stage_way_mm: of the stage, as the paper states.
+        stage_move_s: time of the move, as the paper states.
+        assumed_ramp_s: of constant acceleration, which the paper does not state.
+        assumed_damping_ratio: of the beams, which the paper does not state.
+        assumed_frequency_error: of the set frequencies, relative, which the paper does not state.
+        shapers: what is compared, by name.
+        branches: minimal shapers over the second frequency, the first one at 1 Hz.
+        runs: of the stage, by the shaper's name, "unshaped" among them.
+    """
+
+    modes_hz: tuple[float, ...]
+    compared: Mapping[str, DemoShaper]
+    all_minimal_s: tuple[tuple[float, ...], ...]
+    stage_vibration: Mapping[str, StageVibration]
+    stage_way_mm: float
+    stage_move_s: float
+    assumed_ramp_s: float
+    assumed_damping_ratio: float
+    assumed_frequency_error: float
+    shapers: Mapping[str, Shaper] = field(metadata=hidden())
+    branches: MinimalBranches = field(metadata=hidden())
+    runs: Mapping[str, ModalRun] = field(metadata=hidden())
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next."""
+        return "shapegcode shaper --mode 1 --mode 4 --block-period continuous --max-duration 1s"
+
+
+def shaper_demo(on_progress: Callable[[float], None] = lambda _: None) -> ShaperDemo:
+    """The paper's shapers, branches, step responses, sensitivities and stage test.
+
+    Args:
+        on_progress: called with the share of the work done, 0 to 1.
+
+    Source: Park, Hong and Danielson, 2009 (paper 002), sections 3 and 4.
+    """
     found = minimal_two_mode(*MODES, _LONGEST_S)
     shapers = {name: _named(found, name) for name in _PAPER_NEGATIVE} | {"convolved ZV": convolved_zv(list(MODES))}
     branches = minimal_branches(MODES[0], 0.0, _BRANCH_RATIOS.tolist(), _BRANCH_LONGEST_S)
-    runs = _stage_runs(shapers)
-    stage = {name: _stage_figures(run) for name, run in runs.items()}
+    on_progress(0.5)
+    runs = stage.run_stage(shapers)
+    shaken = {name: stage.vibration(run) for name, run in runs.items()}
     bands = [ModeBand(mode, _BAND) for mode in MODES]
     worst = {name: 100.0 * evaluate(name, shaper, bands).worst_residual for name, shaper in shapers.items()}
-    rows = [
-        *_branch_rows(branches),
-        *_shaper_rows(shapers),
-        *_sensitivity_rows(shapers, worst),
-        *_response_rows(shapers),
-        *_stage_rows(stage, _phase_jump_degrees(runs["unshaped"], 1)),
-    ]
-    report = {
-        "modes_hz": [mode.frequency_hz for mode in MODES],
-        "rows": rows,
-        "agrees": all(row["agrees"] is not False for row in rows),
-        "shapers": {
-            name: {
-                "times_s": shaper.times_s.tolist(),
-                "amplitudes": shaper.amplitudes.tolist(),
-                "duration_s": shaper.duration_s,
-                "worst_residual_percent": worst[name],
-            }
-            for name, shaper in shapers.items()
-        },
-        "all_minimal": [
-            {"times_s": each.times_s.tolist(), "amplitudes": each.amplitudes.tolist()} for each in found
-        ],
-        "stage": {
-            "way_mm": _WAY_MM,
-            "move_s": _MOVE_S,
-            "assumed": {
-                "ramp_s": _RAMP_S, "damping_ratio": _DAMPING_RATIO, "frequency_error": _FREQUENCY_ERROR,
-            },
-            "vibration_mm": stage,
-        },
-        "remark": (
-            "The paper's curves are pictures without numbers, so its statements are compared, not its curves. Of the "
-            "stage it states 200 mm and a stop after 3 s; ramps of 0.1 s, damping ratio 0.005 and frequencies 2 % "
-            "higher than set are assumptions, and the beams are taken as modes that do not act back on the stage. "
-            "How large the vibration is, and whether start and stop add, cancel or reverse it, depends on them; that a "
-            "little of the faster mode is left, and more of it behind the short shaper, does not. The paper compares "
-            "three minimal shapers; there are seven up to 0.8 s."
+    return ShaperDemo(
+        paper=ShaperDemo.cited("002"),
+        title="Two-mode shapers for 1 Hz and 4 Hz",
+        rows=(
+            *_branch_rows(branches),
+            *_shaper_rows(shapers),
+            *_sensitivity_rows(shapers, worst),
+            *_response_rows(shapers),
+            *stage.statements(shaken, stage.phase_jump_degrees(runs["unshaped"], 1)),
         ),
-    }  # fmt: skip
-    return ShaperDemo(shapers, branches, runs, report)
+        remark=_REMARK,
+        modes_hz=tuple(mode.frequency_hz for mode in MODES),
+        compared={
+            name: DemoShaper(tuple(each.times_s), tuple(each.amplitudes), each.duration_s, worst[name])
+            for name, each in shapers.items()
+        },
+        all_minimal_s=tuple(tuple(each.times_s) for each in found),
+        stage_vibration=shaken,
+        stage_way_mm=stage.WAY_MM,
+        stage_move_s=stage.MOVE_S,
+        assumed_ramp_s=stage.RAMP_S,
+        assumed_damping_ratio=stage.DAMPING_RATIO,
+        assumed_frequency_error=stage.FREQUENCY_ERROR,
+        shapers=shapers,
+        branches=branches,
+        runs=runs,
+    )
 
 
 def _named(found: Sequence[Shaper], name: str) -> Shaper:
@@ -131,12 +158,7 @@ def _is_uniform(shaper: Shaper) -> bool:
     return bool(np.ptp(np.diff(shaper.times_s)) < 1e-6)
 
 
-def _row(figure: str, what: str, paper: str, here: str, agrees: bool | None) -> dict[str, Any]:
-    """A statement of the paper beside ours; None: the paper leaves open what it depends on."""
-    return {"figure": figure, "what": what, "paper": paper, "here": here, "agrees": agrees}
-
-
-def _branch_rows(branches: MinimalBranches) -> list[dict[str, Any]]:
+def _branch_rows(branches: MinimalBranches) -> list[Statement]:
     """Several shapers per frequency; the shortest branch is the closed form 2/(f1+f2)."""
     durations_s = branches.times_s[..., 2]
     counts = np.isfinite(durations_s).sum(axis=0)
@@ -147,27 +169,26 @@ def _branch_rows(branches: MinimalBranches) -> list[dict[str, Any]]:
     middle = branches.amplitudes[shortest, every, 1]
     turning = float(branches.ratios[middle < 0.0].min())
     return [
-        _row(
-            "2", "shapers for one pair of frequencies, up to 1 s", "several", f"{counts.min()} to {counts.max()}",
-            bool(counts.max() > 1),
+        stated(
+            "figure 2", "shapers for one pair of frequencies, up to 1 s", "several",
+            f"{counts.min()} to {counts.max()}", bool(counts.max() > 1),
         ),
-        _row(
-            "2", "shortest branch against 2/(f1+f2)", "(curve)", f"within {miss_s * 1e3:.1g} ms", bool(miss_s < 1e-9)
+        stated(
+            "figure 2", "shortest branch against 2/(f1+f2)", "(curve)", f"within {miss_s * 1e3:.1g} ms",
+            bool(miss_s < 1e-9),
         ),
-        _row("3", "middle tap of the shortest branch is negative", "(curve)", f"from f2/f1 = {turning:.3g} on", None),
+        stated(
+            "figure 3", "middle tap of the shortest branch is negative", "(curve)",
+            f"from f2/f1 = {turning:.3g} on", None,
+        ),
     ]  # fmt: skip
 
 
-def _shaper_rows(shapers: dict[str, Shaper]) -> list[dict[str, Any]]:
-    rows = []
-    for name, paper_s in _PAPER_DURATIONS_S.items():
-        shaper = shapers[name]
-        rows.append(
-            _row(
-                "4", f"{name}: duration", f"{paper_s:g} s", f"{shaper.duration_s:.6g} s",
-                abs(shaper.duration_s - paper_s) < 1e-6,
-            )
-        )  # fmt: skip
+def _shaper_rows(shapers: dict[str, Shaper]) -> list[Statement]:
+    rows = [
+        compared("figure 4", f"{name}: duration", paper_s, shapers[name].duration_s, "s", digits=3, within=1e-6)
+        for name, paper_s in _PAPER_DURATIONS_S.items()
+    ]
     for name, negative in _PAPER_NEGATIVE.items():
         shaper = shapers[name]
         signs = ", ".join(f"{a:+.4f}" for a in shaper.amplitudes)
@@ -175,119 +196,43 @@ def _shaper_rows(shapers: dict[str, Shaper]) -> list[dict[str, Any]]:
         spacing = "uniform" if _PAPER_UNIFORM[name] else "not uniform"
         agrees = [bool(a < 0.0) for a in shaper.amplitudes] == negative
         times = ", ".join(f"{t:.4g}" for t in shaper.times_s)
-        rows.append(_row("4", f"{name}: taps", f"3, {paper}, {spacing}", f"{signs} at {times} s", agrees))
+        rows.append(stated("figure 4", f"{name}: taps", f"3, {paper}, {spacing}", f"{signs} at {times} s", agrees))
     count = len(shapers["convolved ZV"].times_s)
-    rows.append(_row("4", "convolved ZV: number of taps", "4", str(count), count == 4))
+    rows.append(stated("figure 4", "convolved ZV: number of taps", "4", str(count), count == 4))
     return rows
 
 
-def _sensitivity_rows(shapers: dict[str, Shaper], worst: dict[str, float]) -> list[dict[str, Any]]:
+def _sensitivity_rows(shapers: dict[str, Shaper], worst: dict[str, float]) -> list[Statement]:
     left = max(shaper.residual_ratio(mode) for shaper in shapers.values() for mode in MODES)
     listed = ", ".join(f"{name} {worst[name]:.1f} %" for name in worst)
     return [
-        _row("5", "left at 1 Hz and 4 Hz, all shapers", "0", f"{left:.0e}", left < NO_RESIDUAL),
-        _row(
-            "5", "worst over ±5 %", "short highest; long good", listed,
+        stated("figure 5", "left at 1 Hz and 4 Hz, all shapers", "0", f"{left:.0e}", left < NO_RESIDUAL),
+        stated(
+            "figure 5", "worst over ±5 %", "short highest; long good", listed,
             worst["short"] == max(worst.values()) and worst["long"] < worst["short"],
         ),
-        _row(
-            "5", "longer minimal shapers are less sensitive", "generally",
+        stated(
+            "figure 5", "longer minimal shapers are less sensitive", "generally",
             "yes" if worst["short"] > worst["medium"] > worst["long"] else "no",
             worst["short"] > worst["medium"] > worst["long"],
         ),
     ]  # fmt: skip
 
 
-def _response_rows(shapers: dict[str, Shaper]) -> list[dict[str, Any]]:
+def _response_rows(shapers: dict[str, Shaper]) -> list[Statement]:
     """A step: after the last tap nothing of either mode is left, unshaped all of it."""
     until_s = max(shaper.duration_s for shaper in shapers.values()) + 1.0
     compared = {"unshaped": Shaper([0.0], [1.0])} | {name: shapers[name] for name in ("short", "long", "convolved ZV")}
     left = {
-        name: respond(MODES, shaped_step(shaper, _STEP_PERIOD_S, until_s), _STEP_PERIOD_S).residuals
+        name: respond(MODES, shaped_step(shaper, PERIOD_S, until_s), PERIOD_S).residuals
         for name, shaper in compared.items()
     }
     largest = max(float(values.max()) for name, values in left.items() if name != "unshaped")
     rises = ", ".join(f"{name} {shaper.duration_s:.4g} s" for name, shaper in compared.items() if name != "unshaped")
     return [
-        _row(
-            "6", "step of 1: vibration left, unshaped / shaped", "all removed",
+        stated(
+            "figure 6", "step of 1: vibration left, unshaped / shaped", "all removed",
             f"{left['unshaped'].max():.3f} / {largest:.0e}", largest < 1e-6,
         ),
-        _row("6", "step: rise time", "very different", rises, True),
+        stated("figure 6", "step: rise time", "very different", rises, True),
     ]  # fmt: skip
-
-
-def _beams() -> list[Mode]:
-    return [Mode(mode.frequency_hz * (1.0 + _FREQUENCY_ERROR), _DAMPING_RATIO) for mode in MODES]
-
-
-def _stage_command() -> FloatArray:
-    """Way of the stage, mm, every `_STEP_PERIOD_S`: ramps of constant acceleration, and a second of rest behind."""
-    t = np.arange(round(_MOVE_S / _STEP_PERIOD_S) + 1) * _STEP_PERIOD_S
-    speed = _WAY_MM / (_MOVE_S - _RAMP_S)
-    starting, ending = 0.5 * speed * t**2 / _RAMP_S, _WAY_MM - 0.5 * speed * (_MOVE_S - t) ** 2 / _RAMP_S
-    way = np.where(t < _RAMP_S, starting, np.where(t < _MOVE_S - _RAMP_S, speed * (t - 0.5 * _RAMP_S), ending))
-    return np.concatenate([way, np.full(round(2.0 / _STEP_PERIOD_S), _WAY_MM)])
-
-
-def _stage_runs(shapers: dict[str, Shaper]) -> dict[str, ModalRun]:
-    """The beams on the stage: frequencies a little off what was designed for, a little damping."""
-    beams = _beams()
-    command = _stage_command()
-    runs = {"unshaped": respond(beams, command, _STEP_PERIOD_S)}
-    for name, shaper in shapers.items():
-        delays = [round(t / _STEP_PERIOD_S) for t in shaper.times_s]
-        shaped = Fir(delays, list(shaper.amplitudes)).apply(command)
-        runs[name] = respond(beams, shaped, _STEP_PERIOD_S)
-    return runs
-
-
-def _stage_figures(run: ModalRun) -> dict[str, list[float]]:
-    """Vibration of each beam before the stage slows down (what the start left), and behind the stop, mm."""
-    steady = (run.times_s > _MOVE_S - _RAMP_S - 1.0) & (run.times_s < _MOVE_S - _RAMP_S)
-    while_moving = np.abs(run.responses[steady] - run.command[steady, None]).max(axis=0)
-    return {"before_stop": while_moving.tolist(), "after_stop": run.residuals.tolist()}
-
-
-def _phase_jump_degrees(run: ModalRun, beam: int) -> float:
-    """By how much the phase of a beam's vibration changes between start and stop, 0 to 180 degrees."""
-    mode = _beams()[beam]
-    waves = np.exp(mode.pole * run.times_s)
-    deflection = run.responses[:, beam] - run.command
-    phasors = []
-    for begin_s, end_s in ((_RAMP_S, _MOVE_S - _RAMP_S), (_MOVE_S, run.times_s[-1])):
-        part = (run.times_s >= begin_s) & (run.times_s <= end_s)
-        columns = np.column_stack([waves[part].real, -waves[part].imag])
-        real, imaginary = np.linalg.lstsq(columns, deflection[part], rcond=None)[0]
-        phasors.append(complex(real, imaginary))
-    return abs(math.degrees(cmath.phase(phasors[1] / phasors[0])))
-
-
-def _stage_rows(stage: dict[str, dict[str, list[float]]], jump_degrees: float) -> list[dict[str, Any]]:
-    slow, fast = stage["unshaped"]["after_stop"]
-
-    def left(name: str, beam: int) -> float:
-        return 100.0 * stage[name]["after_stop"][beam] / stage["unshaped"]["after_stop"][beam]
-
-    before = stage["unshaped"]["before_stop"][1]
-    rows = [
-        _row(
-            "8, 9", "unshaped, 4 Hz beam: start and stop superposed", "reverses after 3 s",
-            f"{before:.2f} mm before, {fast:.2f} mm after, phase jumps by {jump_degrees:.0f}°", None,
-        ),
-        _row("8, 9", "unshaped, behind the stop, 1 Hz / 4 Hz", "(curve)", f"{slow:.2f} / {fast:.2f} mm", None),
-    ]  # fmt: skip
-    rows += [
-        _row(
-            figure, f"{name}: left of 1 Hz / 4 Hz", "removed, a little of 4 Hz left",
-            f"{left(name, 0):.1f} / {left(name, 1):.1f} %", left(name, 0) < left(name, 1) < 25.0,
-        )
-        for figure, name in (("8", "short"), ("9", "long"))
-    ]  # fmt: skip
-    rows.append(
-        _row(
-            "8, 9", "more of 4 Hz left behind the short than behind the long one", "yes",
-            "yes" if left("short", 1) > left("long", 1) else "no", left("short", 1) > left("long", 1),
-        )
-    )  # fmt: skip
-    return rows

@@ -1,89 +1,88 @@
-"""The pictures of ``shapegcode demo shaper``: figures 2 to 6, 8 and 9 of paper 002."""
+"""The pictures of ``shapegcode demo shaper``: figures 2 to 6, 8 and 9 of Park, Hong and Danielson, 2009 (paper 002)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapegcode._core import MinimalBranches
-from shapegcode.demos.shaper import MODES, ShaperDemo
-from shapegcode.results import plot as canvas
+from shapegcode.demos.shaper import ShaperDemo
+from shapegcode.demos.stage import MODES
+from shapegcode.results import plot
+from shapegcode.results.result import Plot
 from shapegcode.shaping.bands import ModeBand
-from shapegcode.shaping.modal_run import ModalRun
-from shapegcode.shaping.plots import plot_branches, plot_impulses, plot_sensitivity, plot_steps
+from shapegcode.shaping.shaper_plots import draw_branches, draw_impulses, draw_sensitivity, draw_steps
 
-__all__ = ["plot_branch_amplitudes", "plot_stage", "write_demo_pictures"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["plot_branch_amplitudes", "plot_stage", "plots_of"]
 
 
-def write_demo_pictures(demo: ShaperDemo, folder: str | Path) -> list[str]:
-    """Write the pictures as PNG and SVG into a folder, which is made where it is missing.
-
-    Returns:
-        The files written.
-
-    Raises:
-        OSError: the folder cannot be made or a file not be written.
-    """
+def plots_of(demo: ShaperDemo) -> dict[str, Plot]:
+    """The paper's figures by name."""
     labelled = {f"{name}, {shaper.duration_s:.4g} s": shaper for name, shaper in demo.shapers.items()}
     minimal = {label: shaper for label, shaper in labelled.items() if len(shaper.times_s) == 3}
     compared = {label: shaper for label, shaper in labelled.items() if not label.startswith("medium")}
     bands = [ModeBand(mode, 0.05) for mode in MODES]
-    pictures: dict[str, Callable[[Path], None]] = {
-        "figure2-durations": lambda file: plot_branches(file, demo.branches, MODES),
-        "figure3-amplitudes": lambda file: plot_branch_amplitudes(file, demo.branches),
-        "figure4-impulses": lambda file: plot_impulses(file, minimal),
-        "figure5-sensitivity": lambda file: plot_sensitivity(file, compared, bands),
-        "figure6-responses": lambda file: plot_steps(file, compared, MODES),
-        "figure8-stage-short": lambda file: plot_stage(file, demo.runs, "short"),
-        "figure9-stage-long": lambda file: plot_stage(file, demo.runs, "long"),
+    return {
+        "paper002-figure2-durations": partial(draw_branches, demo.branches, MODES),
+        "paper002-figure3-amplitudes": partial(plot_branch_amplitudes, demo),
+        "paper002-figure4-impulses": partial(draw_impulses, minimal),
+        "paper002-figure5-sensitivity": partial(draw_sensitivity, compared, bands, None),
+        "paper002-figure6-responses": partial(draw_steps, compared, MODES),
+        "paper002-figure8-stage-short": partial(plot_stage, demo, "short"),
+        "paper002-figure9-stage-long": partial(plot_stage, demo, "long"),
     }
-    return canvas.write_pictures(folder, "paper002", pictures)
 
 
-def plot_branch_amplitudes(file: str | Path, branches: MinimalBranches) -> None:
-    """Amplitudes of the shortest minimal shaper over the second frequency.
+def plot_branch_amplitudes(demo: ShaperDemo, ax: Axes | None = None) -> Axes:
+    """Which taps has the shortest minimal shaper if the second frequency is another one?
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Args:
+        demo: of which the branches are drawn.
+        ax: where to draw; None: a new figure.
     """
+    branches = demo.branches
     shortest = np.nanargmin(branches.times_s[..., 2], axis=0)
     amplitudes = branches.amplitudes[shortest, np.arange(len(shortest))]
-    figure = canvas.figure(9.0, 4.5)
-    panel = canvas.panels(figure, 1, 1)[0][0]
+    panel = plot.axes(ax, size_inch=(9.0, 4.8), title="Taps of the shortest minimal shaper, the first mode at 1 Hz")
     for tap, label in enumerate(("first tap", "second tap", "third tap")):
         panel.plot(
             branches.ratios * MODES[0].frequency_hz, amplitudes[:, tap], "--" if tap == 2 else "-",
-            color=canvas.COLOURS[tap], label=label,
+            color=plot.COLOURS[tap], label=label,
         )  # fmt: skip
     panel.axhline(0.0, color="black", linewidth=0.8)
     panel.set_xlabel("second natural frequency in Hz")
     panel.set_ylabel("amplitude")
-    canvas.legend_above(panel)
-    canvas.heading(figure, "Taps of the shortest minimal shaper, the first mode at 1 Hz (figure 3)", "")
-    canvas.save(figure, file)
+    plot.legend_below(panel)
+    return panel
 
 
-def plot_stage(file: str | Path, runs: dict[str, ModalRun], name: str) -> None:
-    """The beams on the stage relative to it, unshaped and behind a shaper.
+def plot_stage(demo: ShaperDemo, name: str, ax: Axes | None = None) -> Axes:
+    """How do the beams on the stage swing, unshaped and behind a shaper? One panel for each, relative to the stage.
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Args:
+        demo: of which the runs are drawn.
+        name: of the shaper: "short", "medium", "long" or "convolved ZV".
+        ax: whose place is divided; None: a new figure.
+
+    Returns:
+        The upper panel.
     """
-    figure = canvas.figure(9.0, 6.0)
-    column = canvas.panels(figure, len(MODES), 1)[0]
-    for label, colour, width in (("unshaped", canvas.GREY, 1.0), (name, canvas.COLOURS[1], 1.6)):
-        run = runs[label]
-        for place, panel in enumerate(column):
+    rows = plot.grid(
+        ax, len(MODES), 1, size_inch=(9.0, 6.2), sharex="col",
+        title=f"Stage moves {demo.stage_way_mm:g} mm in {demo.stage_move_s:g} s: {name} shaper",
+    )  # fmt: skip
+    panels = [row[0] for row in rows]
+    for label, colour, width in (("unshaped", plot.GREY, 1.0), (name, plot.COLOURS[1], 1.6)):
+        run = demo.runs[label]
+        for place, panel in enumerate(panels):
             deflection = run.responses[:, place] - run.command
             panel.plot(run.times_s, np.asarray(deflection), color=colour, linewidth=width, label=label)
-    for panel, mode in zip(column, MODES, strict=True):
+    for panel, mode in zip(panels, MODES, strict=True):
         panel.set_ylabel(f"{mode.frequency_hz:g} Hz beam in mm")
-    column[-1].set_xlabel("time in s")
-    canvas.legend_above(column[0])
-    number = {"short": "8", "long": "9"}.get(name, "8 and 9")
-    canvas.heading(figure, f"Stage moves 200 mm in 3 s: {name} minimal shaper (figure {number})", "")
-    canvas.save(figure, file)
+    panels[-1].set_xlabel("time in s")
+    plot.legend_below(panels[-1])
+    return panels[0]

@@ -1,9 +1,10 @@
 """One serialiser for every JSON, and the schema of a result from its class.
 
 A dataclass becomes an object whose keys are the names of its fields, in their order; what its field's metadata calls
-`hidden` (samples, programs, texts) stays out, and what it calls `sparse` where it is None. Numbers are written as a
-person would write them: nine digits, no minus zero, nothing below a millionth of a unit of length, time or percent.
-What is no number in JSON (NaN, infinity) is null.
+`hidden` (samples, programs, texts) stays out, and what it calls `sparse` where it is None. A class may name properties
+that belong to its object too: `json_extra` (names to types), and those of them that keep every digit: `json_exact`.
+Numbers are written as a person would write them: nine digits, no minus zero, nothing below a millionth of a unit of
+length, time or percent. What is no number in JSON (NaN, infinity) is null.
 """
 
 from __future__ import annotations
@@ -65,10 +66,11 @@ def _plain(value: object, *, coarse: bool, every_digit: bool) -> Any:
             if not field.metadata.get("hidden")
             and not (field.metadata.get("sparse") and getattr(value, field.name) is None)
         ]
+        every = getattr(value, "json_exact", ())
         return {
             field.name: inner(getattr(value, field.name), field.name, bool(field.metadata.get("exact")))
             for field in fields
-        }
+        } | {name: inner(getattr(value, name), name, name in every) for name in getattr(value, "json_extra", {})}
     if isinstance(value, Mapping):
         return {str(key): inner(entry, str(key)) for key, entry in value.items()}
     if isinstance(value, enum.Enum):
@@ -129,20 +131,22 @@ def schema(result: type) -> dict[str, Any]:
         TypeError: an annotation that has no form in JSON.
     """
     definitions: dict[str, Any] = {}
-    root = _object(result, {}, definitions)
+    root = _object(result, {}, definitions, files=hasattr(result, "json_extra"))
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": result.__name__}
     return head | root | ({"$defs": dict(sorted(definitions.items()))} if definitions else {})
 
 
-def _object(cls: Any, arguments: Mapping[Any, Any], definitions: dict[str, Any]) -> dict[str, Any]:
+def _object(
+    cls: Any, arguments: Mapping[Any, Any], definitions: dict[str, Any], *, files: bool = False
+) -> dict[str, Any]:
     hints = typing.get_type_hints(cls)
     meanings = _meanings(cls)
     shown = {field.name: hints[field.name] for field in dataclasses.fields(cls) if not field.metadata.get("hidden")}
     shown |= getattr(cls, "json_extra", {})
     left_out = {field.name for field in dataclasses.fields(cls) if field.metadata.get("sparse")}
-    files = {"plots": tuple[str, ...], "output": str} if hasattr(cls, "json_extra") else {}
+    written: dict[str, Any] = {"plots": tuple[str, ...], "output": str} if files else {}
     properties = {}
-    for name, hint in (shown | files).items():
+    for name, hint in (shown | written).items():
         properties[name] = _of(arguments.get(hint, hint), definitions)
         if name in meanings:
             properties[name] = properties[name] | {"description": meanings[name]}

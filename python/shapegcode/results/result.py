@@ -105,8 +105,7 @@ class Result:
     def to_dict(self) -> dict[str, Any]:
         """What ``--json`` writes: the fields and `json_extra`, as JSON knows them; see `shapegcode.results.json`."""
         found: dict[str, Any] = plain(self)
-        extra: dict[str, Any] = plain({name: getattr(self, name) for name in self.json_extra})
-        return found | extra
+        return found
 
     def tables(self) -> list[Table]:
         """What the command shows below its answer, in this order."""

@@ -14,12 +14,13 @@ from shapegcode.shaping.block_period import (
     choose_robust_grid,
     robust_candidate,
 )
-from shapegcode.shaping.choose import Recommendation, Refusal, choose
+from shapegcode.shaping.choose import choose
 from shapegcode.shaping.comparison import candidate_periods, choose_shaper, machine_bands
 from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.ranking import pareto_front, recommend
 from shapegcode.shaping.registry import FAMILIES, DesignOptions, Family, design, family_named
+from shapegcode.shaping.result import Recommendation, Refusal, families_table
 from shapegcode.shaping.robust.minimax import VIBRATION_LIMIT, RobustDesign, least_worst, minimax_robust
 
 __all__ = [
@@ -41,6 +42,7 @@ __all__ = [
     "choose_shaper",
     "design",
     "evaluate",
+    "families_table",
     "family_named",
     "least_worst",
     "machine_bands",

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 from shapegcode._core import ArgumentError, Mode
+from shapegcode.results.json import hidden
 
 __all__ = ["NARROW_PERCENT", "ModeBand", "parse_mode_band"]
 
@@ -28,8 +30,20 @@ class ModeBand:
             0 to below 1, 0: only the nominal frequency is designed for.
     """
 
-    mode: Mode
+    json_extra: ClassVar[dict[str, Any]] = {"frequency_hz": float, "damping_ratio": float}
+
+    mode: Mode = field(metadata=hidden())
     uncertainty: float = 0.0
+
+    @property
+    def frequency_hz(self) -> float:
+        """Nominal natural frequency, Hz."""
+        return self.mode.frequency_hz
+
+    @property
+    def damping_ratio(self) -> float:
+        """1 = critically damped."""
+        return self.mode.damping_ratio
 
     def __post_init__(self) -> None:
         """Check the range.

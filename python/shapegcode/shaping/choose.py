@@ -10,132 +10,22 @@ import contextlib
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 from shapegcode._core import ArgumentError, DesignError, ShapegcodeError
 from shapegcode.shaping.bands import ModeBand
 from shapegcode.shaping.design import Design, evaluate
 from shapegcode.shaping.ranking import OBJECTIVES, is_within, pareto_front, reason_for, recommend, spoken
 from shapegcode.shaping.registry import FAMILIES, DesignOptions, Family, design, family_named
+from shapegcode.shaping.result import Recommendation, Refusal
 from shapegcode.shaping.robust.minimax import least_worst
 
-__all__ = ["Recommendation", "Refusal", "choose"]
+__all__ = ["choose"]
 
 _ROBUST = "robust"  # the family of which a design is shown even if it leaves more than the limit
 _OWN_TAPS = "taps"  # the family of taps that the user gives
 _MOST_PERIODS = 5000  # of the longest shaper: finer grids are as good as continuous times
 _NEAR_ONE = 0.01  # a pole this close to +1 on the grid is a whole number of swings per period
-
-
-@dataclass(frozen=True)
-class Refusal:
-    """A family that has no design.
-
-    Attributes:
-        family: name of its row in the registry.
-        period_s: grid on which it was tried, s; None: continuous times.
-        reason: why there is none, with what is nearest where the family knows.
-    """
-
-    family: str
-    period_s: float | None
-    reason: str
-
-
-@dataclass(frozen=True)
-class Recommendation:
-    """A comparison of shapers and the one to take.
-
-    Attributes:
-        bands: what is to be cancelled.
-        options: limits of the comparison; its `period_s` plays no part.
-        objective: a name of `OBJECTIVES`.
-        allow_negative: whether a design with negative taps may be taken.
-        designs: every design, in the order of the registry and of the periods.
-        pareto: for each design whether it is worth a look (see `pareto_front`).
-        index: of the design to take.
-        reason: why it is that one, in a sentence.
-        refusals: families without a design.
-    """
-
-    bands: tuple[ModeBand, ...]
-    options: DesignOptions
-    objective: str
-    allow_negative: bool
-    designs: tuple[Design, ...]
-    pareto: tuple[bool, ...]
-    index: int
-    reason: str
-    refusals: tuple[Refusal, ...]
-
-    @property
-    def design(self) -> Design:
-        """The design to take."""
-        return self.designs[self.index]
-
-    @property
-    def within_limit(self) -> bool:
-        """Whether its worst residual stays within the vibration limit."""
-        return is_within(self.design, self.options.vibration_limit)
-
-    @property
-    def grid_index(self) -> int | None:
-        """Index of the design to take of those on a grid, which alone can be written as blocks; None: there is none."""
-        return self._best_of([place for place, each in enumerate(self.designs) if each.period_s is not None])
-
-    @property
-    def best_by_period(self) -> dict[float, int]:
-        """Index of the design to take on each grid, by its period in s, ascending."""
-        places: dict[float, list[int]] = {}
-        for place, each in enumerate(self.designs):
-            if each.period_s is not None:
-                places.setdefault(each.period_s, []).append(place)
-        best = {period_s: self._best_of(places[period_s]) for period_s in sorted(places)}
-        return {period_s: place for period_s, place in best.items() if place is not None}
-
-    def _best_of(self, places: Sequence[int]) -> int | None:
-        if not places:
-            return None
-        designs = [self.designs[place] for place in places]
-        return places[recommend(designs, self.options.vibration_limit, self.objective, self.allow_negative)]
-
-    def report(self) -> dict[str, Any]:
-        """Everything as plain values: `modes`, `designs`, `recommended` (index), `reason`, `refused`, limits."""
-        return {
-            "modes": [
-                {
-                    "frequency_hz": band.mode.frequency_hz,
-                    "damping_ratio": band.mode.damping_ratio,
-                    "uncertainty": band.uncertainty,
-                }
-                for band in self.bands
-            ],
-            "designs": [
-                {
-                    "family": each.family,
-                    "period_s": each.period_s,
-                    "times_s": each.shaper.times_s.tolist(),
-                    "amplitudes": each.shaper.amplitudes.tolist(),
-                    "duration_s": each.duration_s,
-                    "variance_s2": each.variance_s2,
-                    "residual": each.residual,
-                    "worst_residual": each.worst_residual,
-                    "abs_sum": each.abs_sum,
-                    "negative": each.negative,
-                    "pareto": pareto,
-                }
-                for each, pareto in zip(self.designs, self.pareto, strict=True)
-            ],
-            "recommended": self.index,
-            "recommended_on_grid": self.grid_index,
-            "reason": self.reason,
-            "within_limit": self.within_limit,
-            "objective": self.objective,
-            "vibration_limit": self.options.vibration_limit,
-            "max_duration_s": self.options.max_duration_s,
-            "refused": [vars(refusal).copy() for refusal in self.refusals],
-        }
 
 
 def choose(
@@ -194,17 +84,19 @@ def choose(
     if not found:
         reasons = "; ".join(dict.fromkeys(f"{refusal.family}: {refusal.reason}" for refusal in refusals))
         raise DesignError(f"no family has a shaper for {spoken(bands)} within {_ms(options.max_duration_s)}: {reasons}")
-    index = recommend(found, options.vibration_limit, objective, allow_negative)
+    compared = tuple(replace(each, pareto=on) for each, on in zip(found, pareto_front(found), strict=True))
+    index = recommend(compared, options.vibration_limit, objective, allow_negative)
     return Recommendation(
-        bands=tuple(bands),
-        options=options,
+        modes=tuple(bands),
+        designs=compared,
+        recommended=index,
+        reason=reason_for(compared, index, bands, options.vibration_limit, objective, allow_negative),
+        refused=tuple(refusals),
         objective=objective,
         allow_negative=allow_negative,
-        designs=tuple(found),
-        pareto=tuple(pareto_front(found)),
-        index=index,
-        reason=reason_for(found, index, bands, options.vibration_limit, objective, allow_negative),
-        refusals=tuple(refusals),
+        vibration_limit=options.vibration_limit,
+        max_duration_s=options.max_duration_s,
+        max_abs_sum=options.max_abs_sum,
     )
 
 

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.shaping.bands import NARROW_PERCENT, ModeBand, parse_mode_band
-from shapegcode.shaping.choose import Recommendation, choose
+from shapegcode.shaping.choose import choose
 from shapegcode.shaping.options import DesignOptions
 from shapegcode.shaping.ranking import SAME
+from shapegcode.shaping.result import Recommendation
 from shapegcode.shaping.robust.search import Task, shortest_below
 from shapegcode.shaping.taps import parse_taps
 
@@ -108,7 +109,7 @@ def choose_shaper(
         # Long shapers take long to find, and are wanted only where there is no short one.
         with contextlib.suppress(DesignError):
             result = compared(usual_s)
-            if result.within_limit and result.design.exact:
+            if result.ok and result.design.exact:
                 return result
     return compared(longest_s)
 

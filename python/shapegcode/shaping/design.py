@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 from shapegcode._core import Shaper, worst_residual
+from shapegcode.results.json import hidden
 from shapegcode.shaping.bands import ModeBand
 
 __all__ = ["Design", "evaluate"]
@@ -24,14 +26,36 @@ class Design:
         residual: largest residual ratio of the modes at their nominal frequencies.
         worst_residual: the same over the modes' bands.
         exact: whether the modes without a band are cancelled, to a thousandth.
+        pareto: whether no other design of the comparison is at least as good in everything and better in something.
     """
 
+    json_extra: ClassVar[dict[str, Any]] = {
+        "times_s": tuple[float, ...],
+        "amplitudes": tuple[float, ...],
+        "duration_s": float,
+        "variance_s2": float,
+        "abs_sum": float,
+        "negative": bool,
+    }
+    json_exact: ClassVar[tuple[str, ...]] = ("times_s", "amplitudes")
+
     family: str
-    shaper: Shaper
+    shaper: Shaper = field(metadata=hidden())
     period_s: float | None
     residual: float
     worst_residual: float
     exact: bool = True
+    pareto: bool = False
+
+    @property
+    def times_s(self) -> tuple[float, ...]:
+        """Times of the taps, s."""
+        return tuple(self.shaper.times_s.tolist())
+
+    @property
+    def amplitudes(self) -> tuple[float, ...]:
+        """Amplitudes of the taps; they add up to 1."""
+        return tuple(self.shaper.amplitudes.tolist())
 
     @property
     def duration_s(self) -> float:
@@ -52,6 +76,10 @@ class Design:
     def negative(self) -> bool:
         """Whether any tap is negative."""
         return self.shaper.has_negative
+
+    def radial_error_um(self, speed_mm_per_s: float, radius_mm: float) -> float:
+        """By how much a circle comes out too small, µm: variance*v²/(2R)."""
+        return self.variance_s2 * speed_mm_per_s**2 / (2.0 * radius_mm) * 1e3
 
 
 def evaluate(family: str, shaper: Shaper, bands: Sequence[ModeBand], period_s: float | None = None) -> Design:

@@ -1,0 +1,267 @@
+"""A comparison of shapers and the one to take: figures, tables, the answer, the next step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from shapegcode.results.result import Plot, Result
+from shapegcode.results.table import Column, Table
+from shapegcode.shaping.bands import ModeBand
+from shapegcode.shaping.design import Design
+from shapegcode.shaping.ranking import NO_RESIDUAL, is_within, recommend, spoken
+from shapegcode.shaping.registry import FAMILIES
+
+__all__ = ["Recommendation", "Refusal", "families_table", "times_name"]
+
+_MARK, _GRID_MARK = "=>", "->"
+_PARETO_OF_A_FAMILY = 3  # rows, beside the preferred one
+_SPEED_MM_PER_S, _RADIUS_MM = 200.0, 20.0  # at which the contour cost is shown
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A family that has no design.
+
+    Attributes:
+        family: name of its row in the registry.
+        period_s: grid on which it was tried, s; None: continuous times.
+        reason: why there is none, with what is nearest where the family knows.
+    """
+
+    family: str
+    period_s: float | None
+    reason: str
+
+
+@dataclass(frozen=True, repr=False)
+class Recommendation(Result):
+    """A comparison of shapers and the one to take.
+
+    Attributes:
+        modes: what is to be cancelled.
+        designs: every design, in the order of the registry and of the periods.
+        recommended: index of the design to take.
+        reason: why it is that one, in a sentence.
+        refused: families without a design.
+        objective: what is least in the design to take: "shortest", "contour" or "robust".
+        allow_negative: whether a design with negative taps may be taken.
+        vibration_limit: largest worst residual ratio of the design to take.
+        max_duration_s: longest shaper that was looked for, s.
+        max_abs_sum: largest sum of the taps' magnitudes.
+        machine: whose modes they are, as `convert -m` takes it; null: the modes were given.
+        warnings: none as a rule.
+    """
+
+    json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "recommended_on_grid": int | None}
+
+    modes: tuple[ModeBand, ...]
+    designs: tuple[Design, ...]
+    recommended: int
+    reason: str
+    refused: tuple[Refusal, ...]
+    objective: str
+    allow_negative: bool
+    vibration_limit: float
+    max_duration_s: float
+    max_abs_sum: float
+    machine: str | None = None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def design(self) -> Design:
+        """The design to take."""
+        return self.designs[self.recommended]
+
+    @property
+    def ok(self) -> bool:
+        """Whether the worst residual of the design to take stays within the vibration limit."""
+        return is_within(self.design, self.vibration_limit)
+
+    @property
+    def recommended_on_grid(self) -> int | None:
+        """Index of the design to take of those on a grid, which alone can be written as blocks; None: there is none."""
+        return self._best_of([place for place, each in enumerate(self.designs) if each.period_s is not None])
+
+    @property
+    def best_by_period(self) -> dict[float, int]:
+        """Index of the design to take on each grid, by its period in s, ascending."""
+        places: dict[float, list[int]] = {}
+        for place, each in enumerate(self.designs):
+            if each.period_s is not None:
+                places.setdefault(each.period_s, []).append(place)
+        best = {period_s: self._best_of(places[period_s]) for period_s in sorted(places)}
+        return {period_s: place for period_s, place in best.items() if place is not None}
+
+    def _best_of(self, places: Sequence[int]) -> int | None:
+        if not places:
+            return None
+        designs = [self.designs[place] for place in places]
+        return places[recommend(designs, self.vibration_limit, self.objective, self.allow_negative)]
+
+    @property
+    def answer(self) -> str:
+        """What to take, how long it lasts and what it leaves."""
+        word = "take" if self.ok else "NONE is good enough; best is"
+        return f"{word} {_spoken(self.design)}, leaves {self._left(self.design)}"
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        if not self.ok:
+            return (
+                "measure the frequencies more closely (a narrower band), or allow more: --max-duration, "
+                "--vibration-limit, --negative"
+            )
+        place = self.recommended_on_grid
+        if place is None:
+            return (
+                "blocks of a program need taps on a grid: compare some with --block-period 5ms, or name the machine "
+                "with -m"
+            )
+        best = self.designs[place]
+        options = f"--shaper {best.family} --block-period {(best.period_s or 0.0) * 1e3:.6g}ms -o shaped.nc"
+        if best.family == "taps":
+            return "taps of your own cannot be written by convert: take a family, or use the Python interface"
+        if self.machine is None:
+            return (
+                f"put the modes into a machine file (shapegcode machine init -o mine.toml), then "
+                f"shapegcode convert part.nc -m mine.toml {options}"
+            )
+        return f"shapegcode convert part.nc -m {self.machine} {options}"
+
+    def notes(self) -> list[str]:
+        """Why it is that one; what to take for blocks where that is another one; the best of each grid."""
+        lines = [f"{_MARK} {'recommended' if self.ok else 'the best there is'}: {self.reason}"]
+        place = self.recommended_on_grid
+        if place is not None and place != self.recommended:
+            other = self.designs[place]
+            lines.append(f"{_GRID_MARK} for the blocks of a program: {_spoken(other)}, leaves {self._left(other)}")
+        best = [self.designs[place] for place in self.best_by_period.values()]
+        if len(best) > 1:
+            lines.append(f"best of each grid: {'; '.join(map(_spoken, best))}")
+        return lines
+
+    def _left(self, each: Design) -> str:
+        where = (
+            f"{'within the bands of' if any(band.uncertainty for band in self.modes) else 'of'} {spoken(self.modes)}"
+        )
+        if each.worst_residual < NO_RESIDUAL:
+            return f"nothing {where}"
+        return f"at most {_percent(each.worst_residual)} % {where} (limit {_percent(self.vibration_limit)} %)"
+
+    def shown(self, *, everything: bool = False) -> list[int]:
+        """Indices of the designs for a table, shortest first.
+
+        What is recommended, at all and for each grid; of each family at continuous times the preferred design and the
+        shortest ones of the Pareto front, and on grids the shortest one of all.
+
+        Args:
+            everything: all designs instead.
+        """
+        if everything:
+            return sorted(range(len(self.designs)), key=lambda index: (self.designs[index].duration_s, index))
+        kept = {self.recommended, *self.best_by_period.values()}
+        families: dict[tuple[str, bool], list[int]] = {}
+        for index, each in enumerate(self.designs):
+            families.setdefault((each.family, each.period_s is None), []).append(index)
+
+        def length(index: int) -> tuple[float, float]:
+            # Of equally long ones the longest period: it writes the fewest blocks.
+            return round(self.designs[index].duration_s, 9), -(self.designs[index].period_s or 0.0)
+
+        for (_, continuous), members in families.items():
+            by_duration = sorted(members, key=length)
+            front = [index for index in by_duration if self.designs[index].pareto]
+            kept |= {members[0], *front[:_PARETO_OF_A_FAMILY]} if continuous else set(by_duration[:1])
+        return sorted(kept, key=lambda index: (self.designs[index].duration_s, index))
+
+    def tables(
+        self, speed_mm_per_s: float = _SPEED_MM_PER_S, radius_mm: float = _RADIUS_MM, *, everything: bool = False
+    ) -> list[Table]:
+        """The designs with what they cost and leave; the families without one, and why.
+
+        Args:
+            speed_mm_per_s: at which the contour cost is shown.
+            radius_mm: of the arc on which it is shown.
+            everything: all designs, not only those of `shown`.
+        """
+        found = [self._designs_table(speed_mm_per_s, radius_mm, everything)]
+        return [*found, self._refused_table()] if self.refused else found
+
+    def _designs_table(self, speed_mm_per_s: float, radius_mm: float, everything: bool) -> Table:
+        places = self.shown(everything=everything)
+        rows = [self.designs[place] for place in places]
+        marks = {id(self.designs[place]): self._mark(place) for place in places}
+        columns = (
+            Column("", value=lambda each: marks[id(each)], text=True),
+            Column("family", text=True),
+            Column("grid", "ms", lambda each: "any" if each.period_s is None else f"{each.period_s * 1e3:.4g}"),
+            Column("lasts", "ms", lambda each: each.duration_s * 1e3, digits=2),
+            Column("worst", "%", lambda each: _percent(each.worst_residual)),
+            Column("nominal", "%", lambda each: _percent(each.residual)),
+            Column("σ²", "ms²", lambda each: f"{each.variance_s2 * 1e6:.4g}"),
+            Column("arc", "µm", lambda each: f"{each.radial_error_um(speed_mm_per_s, radius_mm):.4g}"),
+            Column("Σ|a|", value=lambda each: f"{each.abs_sum:.3g}"),
+            Column("taps < 0", value=lambda each: sum(tap < 0.0 for tap in each.amplitudes) or None),
+            Column("Pareto", value=lambda each: "yes" if each.pareto else None, text=True),
+        )
+        left_out = len(self.designs) - len(rows)
+        caption = f"arc: by how much R{radius_mm:g} mm comes out too small at {speed_mm_per_s:g} mm/s"
+        return Table(
+            f"shapers for {', '.join(map(str, self.modes))}", columns, rows,
+            caption=caption + (f"; {left_out} more designs: --all shows them" if left_out else ""),
+            row_style=lambda each: "bold" if each is self.design else "",
+        )  # fmt: skip
+
+    def _refused_table(self) -> Table:
+        """The same reason on several kinds of times is one row."""
+        times: dict[tuple[str, str], list[float | None]] = {}
+        for refusal in self.refused:
+            times.setdefault((refusal.family, refusal.reason), []).append(refusal.period_s)
+        columns = (
+            Column("family", value=lambda row: row[0][0], text=True),
+            Column("times", value=lambda row: ", ".join(map(times_name, row[1])), text=True),
+            Column("why", value=lambda row: row[0][1], text=True),
+        )
+        return Table("no design", columns, list(times.items()))
+
+    def plots(self) -> Mapping[str, Plot]:
+        """Pareto front, sensitivity, impulses, steps, and for two modes the branches of minimal shapers."""
+        return self._drawn_beside()
+
+    def _mark(self, index: int) -> str:
+        if index == self.recommended:
+            return _MARK
+        return _GRID_MARK if index == self.recommended_on_grid else ""
+
+
+def families_table() -> Table:
+    """Every family of the registry: what it is, where it comes from, where it is valid."""
+    columns = (
+        Column("family", value="name", text=True),
+        Column("what", value="title", text=True),
+        Column("times", value=_kinds_of_times, text=True),
+        Column("valid for", value="validity", text=True),
+        Column("source", text=True),
+    )
+    return Table("families of shapers", columns, FAMILIES, sections=range(len(FAMILIES)))
+
+
+def _kinds_of_times(row: Any) -> str:
+    return ", ".join(name for name, has in (("continuous", row.continuous), ("grid", row.on_grid)) if has)
+
+
+def times_name(period_s: float | None) -> str:
+    """Kind of times in words."""
+    return "continuous" if period_s is None else f"{period_s * 1e3:.4g} ms grid"
+
+
+def _spoken(each: Design) -> str:
+    times = "at continuous times" if each.period_s is None else f"on the {times_name(each.period_s)}"
+    return f"{each.family} ({each.duration_s * 1e3:.4g} ms {times})"
+
+
+def _percent(ratio: float) -> str:
+    return "0" if ratio < NO_RESIDUAL else f"{100.0 * ratio:.3g}"
