@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from shapegcode.cli import main
-from shapegcode.demos import shaper as demo_shaper
-from shapegcode.demos import stage
+from shapegcode.demos import shaper as demo_shaper, stage
 from shapegcode.demos.shaper import ShaperDemo, shaper_demo
 from shapegcode.demos.stage import MODES
 from shapegcode.results import plot as canvas

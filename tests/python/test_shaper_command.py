@@ -136,7 +136,7 @@ def _rows(out: str) -> list[str]:
 
 
 def test_the_table_shows_some_and_all(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["shaper", *PAPER, "--block-period", "continuous", "--block-period", "2ms", "--block-period", "5ms", *FEW]
+    words = ["shaper", *PAPER, "--continuous", "--block-period", "2ms", "--block-period", "5ms", *FEW]
     rows = []
     for more in ([], ["--all"]):
         assert main([*words, *more]) == 0
@@ -175,12 +175,7 @@ def test_pictures_are_complete(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(canvas, "FORMATS", (".svg",))  # PNG takes three times as long
-    assert (
-        main(
-            ["shaper", *PAPER, "--block-period", "continuous", "--block-period", "5ms", *FEW, "--plots", str(tmp_path)]
-        )
-        == 0
-    )
+    assert main(["shaper", *PAPER, "--continuous", "--block-period", "5ms", *FEW, "--plots", str(tmp_path)]) == 0
     assert "next:" in capsys.readouterr().out
     kinds = {"branches", "pareto", "sensitivity", "impulses", "steps"}
     assert {file.name for file in tmp_path.iterdir()} == {f"shaper-{kind}.svg" for kind in kinds}
@@ -192,12 +187,13 @@ def test_pictures_are_complete(
 def test_pictures_are_drawn_into_the_caller_s_axes() -> None:
     result = choose_shaper(["46:0.02±5%", "131:0.02"], periods_s=[0.005], families=FEW[1:])
     for name, draw in plots_of(result).items():
-        figure = canvas.figure(8.0, 6.0)
+        figure = canvas.figure(16.0, 12.0)
         place = figure.subplots(1, 2)[1]
         drawn = draw(ax=place)
         assert drawn.figure.figure is figure, name
+        figure.draw_without_rendering()
         assert drawn.has_data(), name
-        assert drawn.get_position().x0 > 0.4, name
+        assert drawn.get_window_extent().x0 > 0.5 * figure.bbox.width, name
     assert "shaper-branches" not in plots_of(choose_shaper(["46:0.02"], periods_s=[0.005], families=["zv"]))
 
 

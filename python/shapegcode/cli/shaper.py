@@ -18,7 +18,6 @@ from shapegcode.cli.options import (
 
 __all__ = ["add_arguments", "run"]
 
-_CONTINUOUS = "continuous"
 # The registry's, whose solvers take too long to load for a help text.
 _FAMILIES = (
     "zv", "zvd", "zvdd", "mzv", "ei", "ei2", "ei3", "si", "negative-zv", "simultaneous", "minimal", "polynomial",
@@ -52,11 +51,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--block-period",
         metavar="TIME",
-        type=_block_period,
+        type=seconds,
         action="append",
-        default=None,
-        help=f"block period on which the taps must lie, for example 5ms, or {_CONTINUOUS!r}; may be repeated (default: "
-        "the machine's, or the best few; without a machine continuous times too)",
+        default=[],
+        help="block period on which the taps must lie, for example 5ms; may be repeated (default: the machine's, or "
+        "the best few)",
+    )
+    parser.add_argument(
+        "--continuous",
+        action="store_true",
+        help="designs at continuous times, with --block-period beside those on its grid (default: without a machine)",
     )
     parser.add_argument(
         "--family",
@@ -147,7 +151,7 @@ def run(args: argparse.Namespace) -> int:
             args.mode,
             machine=machine,
             uncertainty=args.uncertainty,
-            periods_s=None if args.block_period is None else [period_s or None for period_s in args.block_period],
+            periods_s=[*([None] if args.continuous else []), *args.block_period] or None,
             families=args.family,
             max_duration_s=args.max_duration,
             max_abs_sum=args.max_abs_sum,
@@ -160,8 +164,3 @@ def run(args: argparse.Namespace) -> int:
     result = replace(result, machine=args.machine)
     tables = result.tables(args.speed, args.radius, everything=args.all)
     return runner.finish(result, args, tables=tables, notes=result.notes())
-
-
-def _block_period(text: str) -> float:
-    """A time, or 0 for continuous times."""
-    return 0.0 if text == _CONTINUOUS else seconds(text)

@@ -94,7 +94,7 @@ class ShaperDemo(Demonstration):
     @property
     def next_step(self) -> str:
         """The one thing to do next."""
-        return "shapegcode shaper --mode 1 --mode 4 --block-period continuous --max-duration 1s"
+        return "shapegcode shaper --mode 1 --mode 4 --continuous --max-duration 1s"
 
 
 def shaper_demo(on_progress: Callable[[float], None] = lambda _: None) -> ShaperDemo:
