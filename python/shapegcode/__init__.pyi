@@ -94,8 +94,12 @@ from shapegcode.shaping import (
     shortest_non_negative as shortest_non_negative,
 )
 from shapegcode.shaping.grid import choose_grid as choose_grid
-from shapegcode.simulation.simulate import (
+from shapegcode.simulation.result import (
+    Motion as Motion,
     Simulation as Simulation,
+)
+from shapegcode.simulation.simulate import (
+    play_motion as play_motion,
     simulate as simulate,
 )
 from shapegcode.timing.cycle_time import cycle_time as cycle_time

@@ -81,7 +81,7 @@ def test_read_convert_simulate(tmp_path: Path) -> None:
     # The residual is what the arrays show.
     still = np.flatnonzero((np.abs(np.diff(region.command_mm, axis=0)) > 0).any(axis=1))[-1] + 1
     after = np.abs(region.response_mm - region.command_mm)[still:].max(axis=0) * 1e3
-    reported = simulation.report["residual_vibration_um"]
+    reported = simulation.residual_vibration_um
     for k, axis in enumerate("xyz"):
         assert after[k] <= reported[axis] + 1e-9
         assert after[k] == pytest.approx(reported[axis], rel=0.1, abs=0.02)
@@ -93,7 +93,7 @@ def test_a_file_name_does_for_a_program(tmp_path: Path, kind: type[str] | type[P
     (tmp_path / "part.nc").write_text(GOOD)
     file = kind(tmp_path / "part.nc")
     program = sg.Program.read(file, machine)
-    assert sg.simulate(file, machine).report == sg.simulate(program, machine).report
+    assert sg.simulate(file, machine).to_dict() == sg.simulate(program, machine).to_dict()
     assert sg.measure([file], machine, 3.0).report() == sg.measure(program, machine, 3.0).report()
     assert sg.measure(file, machine, 3.0, against=file).programs[0].against == str(file)
     streamed, other = (next(sg.stream(each, machine)) for each in (file, program))
@@ -104,7 +104,7 @@ def test_figures_only_keeps_no_samples() -> None:
     machine = sg.Machine.load("vx500")
     simulation = sg.simulate(sg.Program.from_text(GOOD, machine), machine, record_samples=0)
     assert len(simulation.regions[0].command_mm) == 0
-    assert simulation.report["residual_vibration_um"]["x"] > 1.0
+    assert simulation.residual_vibration_um.x > 1.0
 
 
 def test_errors_are_one_family_and_carry_their_place() -> None:

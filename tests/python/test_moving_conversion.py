@@ -13,7 +13,6 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import region_offset
 from shapegcode.program import Program
 from shapegcode.shaping.grid import choose_grid, make_grid
-from shapegcode.simulation.simulate import simulate
 from test_moving_modes import OVER_MASS, OVER_Z, machine_with
 
 HEAD = "%\nO0001\nG21 G90 G94 G17 G54\n"
@@ -107,7 +106,7 @@ def test_warnings_and_modes_reach_the_report_and_the_header() -> None:
     assert b"(MODE X 46 HZ 0.03)" in conversion.text
     heavy = machine_with(OVER_MASS, more="part_mass_kg = 400")
     program = Program.from_text(zig_zag(4, 4.0), heavy)
-    for report in (sg.convert(program, heavy).report, simulate(program, heavy).report):
-        assert any("lies outside the table" in warning for warning in report["warnings"])
+    for warnings in (sg.convert(program, heavy).report["warnings"], sg.simulate(program, heavy).warnings):
+        assert any("lies outside the table" in warning for warning in warnings)
     moving = machine_with(OVER_Z)
     assert b"SHAPERS FOLLOW Z)" in sg.convert(Program.from_text(zig_zag(4, 4.0), moving), moving).text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import json
 import os
@@ -12,6 +13,7 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -23,7 +25,9 @@ from acceptance import PROGRAMS
 from shapegcode.cli import main
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.stream import KINDS, REST_S, Chunk
-from shapegcode.simulation.motion import Envelope, MotionFigures, MotionTraces
+from shapegcode.results import plot
+from shapegcode.results.json import schema
+from shapegcode.simulation.motion import MotionEnvelope
 from shapegcode.simulation.plots import plot_motion
 
 COMMAND = Path(sys.executable).with_name("shapegcode")
@@ -195,7 +199,10 @@ def test_csv_and_npz_hold_the_same_motion_as_the_api(folder: Path) -> None:
         np.testing.assert_array_equal(csv[name], npz[name])
     assert (npz["kind_names"][npz["kind"]] == csv["kind"]).all()
     assert zipfile.ZipFile(folder / "m.npz").testzip() is None
-    motion = json.loads((folder / "r.json").read_text())["motion"]
+    report = json.loads((folder / "r.json").read_text())
+    jsonschema.validate(report, schema(sg.Simulation))
+    motion = report["motion"]
+    assert (motion["csv"], motion["npz"]) == ("m.csv", "m.npz")
     assert motion["samples"] == len(csv["kind"])
     error_um = 1e3 * np.abs(axis(csv, "error_mm")).max(axis=0)
     assert [motion["largest_error_um"][name] for name in "xyz"] == pytest.approx(error_um)
@@ -276,6 +283,7 @@ def test_feed_drive_response_is_that_of_solve_ivp(folder: Path) -> None:
     np.testing.assert_allclose(columns["x_motor_mm"][1:160], played[:, 2], rtol=0.0, atol=2e-5)
     np.testing.assert_allclose(columns["x_friction_force_n"][1:160], played[:, 3], rtol=0.0, atol=0.1)
     report = json.loads((folder / "r.json").read_text())
+    jsonschema.validate(report, schema(sg.Simulation))
     assert report["plant"] == "feed-drive"
     force = report["motion"]["largest_motor_force_n"]["x"]
     assert force == pytest.approx(np.abs(columns["x_motor_force_n"]).max())
@@ -326,14 +334,14 @@ def test_settling_time_is_that_of_a_long_rest() -> None:
     simulation = sg.simulate(program, machine)
     stop = round(simulation.regions[0].figures.duration_s / TICK_S)
     deflection = 1e3 * np.abs(streamed(text, machine).error_mm[stop:, 0])
-    outside = np.flatnonzero(deflection > simulation.report["settling_band_um"])
+    outside = np.flatnonzero(deflection > simulation.settling_band_um)
     assert 0 < outside[-1] < len(deflection) / 2
     swing = 1.0 / min(mode.frequency_hz for mode in machine.axes.x.modes)
     # Between samples it may leave the band once more.
-    assert (outside[-1] + 1) * TICK_S <= simulation.report["settling_time_s"]["x"] <= outside[-1] * TICK_S + swing
+    assert (outside[-1] + 1) * TICK_S <= simulation.settling_time_s.x <= outside[-1] * TICK_S + swing
     data = machine.model_dump(exclude_none=True)
     data["tolerance"]["residual_floor_um"] = 0.0
-    assert sg.simulate(program, sg.Machine.from_data(data, "no band")).report["settling_time_s"]["x"] is None
+    assert sg.simulate(program, sg.Machine.from_data(data, "no band")).settling_time_s.x is None
 
 
 def test_lag_along_the_path_is_no_contour_error() -> None:
@@ -343,8 +351,8 @@ def test_lag_along_the_path_is_no_contour_error() -> None:
     text = "%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\nG01 X30. F6000.\nM30\n%\n"
     program = sg.Program.from_text(text, machine)
     simulation = sg.simulate(program, machine, plant="feed-drive")
-    assert simulation.report["residual_vibration_um"]["x"] > 5000.0
-    assert simulation.report["contour_error_um"]["response"]["max"] < 0.1  # of overshoot: none
+    assert simulation.residual_vibration_um.x > 5000.0
+    assert simulation.contour_error_um.response.max < 0.1  # of overshoot: none
     measured = sg.measure(program, machine, 10.0, plant="feed-drive")
     assert measured.programs[0].contour_error_um < 0.1
 
@@ -352,29 +360,29 @@ def test_lag_along_the_path_is_no_contour_error() -> None:
 def test_contour_error_of_a_drive_is_that_of_its_track() -> None:
     machine = machine_with(DRIVE)
     program = sg.Program.from_text(CORNER, machine)
-    contour = sg.simulate(program, machine, plant="feed-drive").report["contour_error_um"]["response"]
+    contour = sg.simulate(program, machine, plant="feed-drive").contour_error_um.response
     x, y = streamed(CORNER, machine, plant="feed-drive").response_mm[:, :2].T
     # Brute force: distance of every sample from the two legs, and of the corner from the track.
     from_legs = np.minimum(np.hypot(np.maximum(x - 30.0, 0.0), y), np.hypot(x - 30.0, np.maximum(-y, 0.0)))
     from_corner = np.min(np.hypot(x - 30.0, y))
     end = np.min(np.hypot(x - 30.0, y - 20.0))
-    assert contour["max"] == pytest.approx(1e3 * max(from_legs.max(), from_corner, end), abs=2.0)
+    assert contour.max == pytest.approx(1e3 * max(from_legs.max(), from_corner, end), abs=2.0)
     assert from_corner > 10 * end
 
 
 def test_orbit_error_of_the_response_is_the_area_of_its_track() -> None:
     machine = machine_with()
     text = "%\nO1\nG21 G17 G90 G94\nG00 X0. Y0. Z0.\nG01 X20. F12000.\nG03 X40. Y20. R20.\nG01 Y40.\nM30\n%\n"
-    report = sg.simulate(sg.Program.from_text(text, machine), machine).report
+    simulation = sg.simulate(sg.Program.from_text(text, machine), machine)
     x, y = streamed(text, machine).response_mm[:, :2].T
     angle = np.arctan2(y - 20.0, x - 20.0)
     gap = np.abs(20.0**2 - (x - 20.0) ** 2 - (y - 20.0) ** 2)
     fine = np.linspace(-np.pi / 2, 0.0, 100_001)
     on_arc = (angle > -np.pi / 2 - 0.1) & (angle < 0.1) & (x >= 19.0)
     area = np.mean(np.interp(fine, angle[on_arc], gap[on_arc])) * (np.pi / 2) / 2
-    assert report["response_orbit_error_percent"] == [pytest.approx(100 * area / (np.pi * 100.0), rel=0.01)]
-    assert report["response_orbit_error_percent"][0] > 0.02
-    assert report["orbit_error_percent"][0] < 1e-9
+    assert simulation.response_orbit_error_percent == (pytest.approx(100 * area / (np.pi * 100.0), rel=0.01),)
+    assert simulation.response_orbit_error_percent[0] > 0.02
+    assert simulation.orbit_error_percent[0] < 1e-9
 
 
 # ---- pictures, memory --------------------------------------------------------------------------------------
@@ -382,19 +390,28 @@ def test_orbit_error_of_the_response_is_the_area_of_its_track() -> None:
 
 def test_picture_of_the_motion(tmp_path: Path) -> None:
     machine = machine_with(DRIVE)
-    figures, traces = MotionFigures(TICK_S), MotionTraces(TICK_S)
-    for chunk in sg.stream(sg.Program.from_text(SHORT, machine), machine, plant="feed-drive"):
-        traces.add(chunk, figures.add(chunk))
-    plot_motion(tmp_path / "motion.svg", traces, "short.nc, lines 5 to 6")
+    program = sg.Program.from_text(SHORT, machine, source="some/short.nc")
+    motion = sg.play_motion(program, machine, plant="feed-drive", lines=(5, 6))
+    plot.save(plot_motion(motion), tmp_path / "motion.svg")
     drawn = (tmp_path / "motion.svg").read_text()
-    for said in ("lines 5 to 6", "acceleration", "response", "motor", "friction"):
+    for said in ("short.nc, lines 5 to 6", "acceleration", "response", "motor", "friction"):
         assert said in drawn
+    assert "some/" not in drawn
+
+
+def test_a_simulation_draws_what_was_asked_for() -> None:
+    machine = sg.Machine.load("vx500")
+    simulation = sg.simulate(sg.Program.from_text(CORNER, machine), machine)
+    assert list(simulation.plots()) == ["path", "feed", "vibration"]
+    motion = sg.play_motion(sg.Program.from_text(CORNER, machine), machine)
+    assert list(dataclasses.replace(simulation, motion=motion).plots()) == ["motion", "path", "feed", "vibration"]
+    assert list(dataclasses.replace(simulation, regions=()).plots()) == []
 
 
 def test_envelope_is_that_of_all_samples_at_once() -> None:
     rng = np.random.default_rng(1)
     values = np.cumsum(rng.normal(size=(54_321, 2)), axis=0)
-    envelope = Envelope(most=100)
+    envelope = MotionEnvelope(most=100)
     for piece in np.split(values, np.sort(rng.integers(0, len(values), 40))):
         envelope.add(piece)
     middles, low, high = envelope.result()

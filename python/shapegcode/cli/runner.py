@@ -50,6 +50,8 @@ def check_files(args: argparse.Namespace, *, also_written: Sequence[str | Path] 
     piped = [f"--{name} -" for name, value in given.items() if value == "-" and name != "output"]
     if len(piped) > 1:
         raise ArgumentError(f"{' and '.join(piped)}: only one of them can have standard output")
+    if given.get("npz") == "-":
+        raise ArgumentError("--npz -: an archive cannot go to standard output, name a file")
     targets = [Path(value) for value in (*given.values(), *also_written) if value != "-"]
     refuse_same_file(targets, _read_files(args))
     for rank, target in enumerate(targets):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,23 @@ from shapegcode.results.json import sparse
 from shapegcode.results.result import Xyz
 
 Vector = npt.NDArray[np.float64]
+T = TypeVar("T")
+
+CONTOURS = {"command": "contour error of the command", "response": "contour error of the table"}
+"""What the contour errors of `Tracks` are called."""
+
+
+@dataclass(frozen=True)
+class Tracks(Generic[T]):
+    """A figure of both tracks that a machine makes.
+
+    Attributes:
+        command: of the set-points.
+        response: of the table.
+    """
+
+    command: T
+    response: T
 
 
 @dataclass(frozen=True)

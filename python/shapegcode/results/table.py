@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
     from rich.table import Table as RichTable
 
-__all__ = ["Column", "Table", "share_percent", "warning_table"]
+__all__ = ["Column", "Table", "share_percent", "warning_table", "xyz_columns"]
 
 _NO_BREAK = "\N{NO-BREAK SPACE}"
 
@@ -146,6 +147,16 @@ class Table:
 def _whole(column: Column, cell: str) -> str:
     """A figure with its interval or unit is one word."""
     return cell if column.text else cell.replace(" ", _NO_BREAK)
+
+
+def xyz_columns(cell: Callable[[str, Any], object], *, digits: int | None = None) -> tuple[Column, ...]:
+    """Columns of the three axes.
+
+    Args:
+        cell: what a row shows in the column of the axis "x", "y" or "z".
+        digits: see `Column`.
+    """
+    return tuple(Column(axis.upper(), value=partial(cell, axis), digits=digits) for axis in "xyz")
 
 
 def share_percent(part: float, whole: float) -> str:

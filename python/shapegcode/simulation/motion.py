@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode.model.stream import Chunk
-from shapegcode.results.figures import xyz
+from shapegcode.results.result import Xyz
+from shapegcode.simulation.result import Motion
 
-__all__ = ["Envelope", "MotionFigures", "MotionTraces"]
+__all__ = ["MotionEnvelope", "MotionRecorder"]
 
 FloatArray = npt.NDArray[np.float64]
 
 _BUCKETS = 4000
 
 
-class Envelope:
+class MotionEnvelope:
     """Least and largest value of several curves over equal stretches of samples, each as short as room allows."""
 
     def __init__(self, most: int = _BUCKETS) -> None:
@@ -76,74 +75,80 @@ class Envelope:
         return middles, low, high
 
 
-class MotionFigures:
-    """Largest values of a motion, axis by axis."""
+class MotionRecorder:
+    """Largest values of a motion, axis by axis, and its curves as envelopes."""
 
     def __init__(self, period_s: float) -> None:
         """Of a motion whose samples are one period apart."""
         self._period_s = period_s
+        self._begin_s = 0.0
+        self._end_s = 0.0
         self._samples = 0
-        self._last_s = 0.0
         self._largest: dict[str, FloatArray] = {}
         self._velocity: FloatArray | None = None
+        self._envelope = MotionEnvelope()
 
-    def add(self, chunk: Chunk) -> FloatArray:
-        """Further samples; returns the acceleration of the command, (k, 3), mm/s²."""
+    @property
+    def samples(self) -> int:
+        """That have passed."""
+        return self._samples
+
+    def add(self, chunk: Chunk) -> None:
+        """Further samples."""
+        if not self._samples:
+            self._begin_s = float(chunk.time_s[0])
         before = chunk.velocity_mm_per_s[:1] if self._velocity is None else self._velocity
         acceleration = np.diff(np.concatenate([before, chunk.velocity_mm_per_s]), axis=0) / self._period_s
         self._velocity = chunk.velocity_mm_per_s[-1:].copy()
         self._samples += len(chunk)
-        self._last_s = float(chunk.time_s[-1])
+        self._end_s = float(chunk.time_s[-1])
         self._note("largest_speed_mm_per_min", chunk.velocity_mm_per_s * 60.0)
         self._note("largest_acceleration_mm_per_s2", acceleration)
         self._note("largest_error_um", chunk.error_mm * 1e3)
+        curves = [chunk.command_mm, chunk.response_mm, chunk.velocity_mm_per_s, acceleration, chunk.error_mm]
         if chunk.motor_force_n is not None and chunk.friction_force_n is not None:
             self._note("largest_motor_force_n", chunk.motor_force_n)
             self._note("largest_friction_force_n", chunk.friction_force_n)
-        return acceleration
+            curves += [chunk.motor_force_n, chunk.friction_force_n]
+        self._envelope.add(np.concatenate(curves, axis=1))
 
     def _note(self, name: str, values: FloatArray) -> None:
         largest = np.abs(values).max(axis=0)
         known = self._largest.get(name)
         self._largest[name] = largest if known is None else np.maximum(known, largest)
 
-    def report(self) -> dict[str, Any]:
-        """`samples`, `end_s` (time of the last one) and the largest values by axis."""
-        return {
-            "samples": self._samples,
-            "end_s": self._last_s,
-            **{name: xyz(values) for name, values in self._largest.items()},
-        }
+    def result(
+        self,
+        program: str,
+        *,
+        lines: tuple[int, int] | None = None,
+        every: int = 1,
+        csv: str | None = None,
+        npz: str | None = None,
+    ) -> Motion:
+        """What has passed.
 
+        Args:
+            program: its name.
+            lines: first and last that have passed; None: all.
+            every: of how many samples one is in the files.
+            csv: file that was written.
+            npz: likewise.
 
-class MotionTraces:
-    """Envelopes of a motion for its picture."""
-
-    def __init__(self, period_s: float) -> None:
-        """Of a motion whose samples are one period apart."""
-        self.period_s = period_s
-        self.begin_s = 0.0
-        self.driven = False
-        self._envelope = Envelope()
-        self._begun = False
-
-    def add(self, chunk: Chunk, acceleration_mm_per_s2: FloatArray) -> None:
-        """Further samples with the acceleration of their command."""
-        if not self._begun:
-            self._begun = True
-            self.begin_s = float(chunk.time_s[0])
-            self.driven = chunk.motor_force_n is not None
-        curves = [chunk.command_mm, chunk.response_mm, chunk.velocity_mm_per_s, acceleration_mm_per_s2, chunk.error_mm]
-        if chunk.motor_force_n is not None and chunk.friction_force_n is not None:
-            curves += [chunk.motor_force_n, chunk.friction_force_n]
-        self._envelope.add(np.concatenate(curves, axis=1))
-
-    def result(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Times in s, (n,), and least and largest values, (n, curves, 3).
-
-        The curves: command and response (mm), speed (mm/s), acceleration (mm/s²), response minus command (mm), with
-        feed drives also force of the motor and friction (N).
+        Raises:
+            ValueError: no sample has passed.
         """
         middles, low, high = self._envelope.result()
-        times = self.begin_s + middles * self.period_s
-        return times, low.reshape(len(low), -1, 3), high.reshape(len(high), -1, 3)
+        return Motion(
+            lines=lines,
+            every=every,
+            samples=self._samples,
+            end_s=self._end_s,
+            program=program,
+            times_s=self._begin_s + middles * self._period_s,
+            low=low.reshape(len(low), -1, 3),
+            high=high.reshape(len(high), -1, 3),
+            csv=csv,
+            npz=npz,
+            **{name: Xyz(*map(float, values)) for name, values in self._largest.items()},
+        )

@@ -1,26 +1,27 @@
-"""The picture of a played motion: position, speed, acceleration, vibration and forces of each axis over time."""
+"""The pictures of a simulation: the motion of each axis over time, and the region that vibrates most."""
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.results import plot as canvas
+from shapegcode.results import plot
 from shapegcode.results.motion_pictures import RECORD_SAMPLES, PlayedRegion, motion_pictures
-from shapegcode.simulation.motion import MotionTraces
-from shapegcode.simulation.simulate import Simulation
+from shapegcode.results.result import Plot
+from shapegcode.simulation.result import Motion, Simulation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_motion", "write_motion_pictures"]
+__all__ = ["plot_motion", "plots_of"]
 
 FloatArray = npt.NDArray[np.float64]
 
-_COMMAND, _RESPONSE = canvas.COLOURS[1], canvas.COLOURS[0]
+_COMMAND, _RESPONSE = plot.COLOURS[1], plot.COLOURS[0]
 _MOVES_MM = 1e-9
 # Label of the axis, factor from the curve's own unit, and which curves it shows: number, colour, name.
 _Row = tuple[str, float, tuple[tuple[int, str, str], ...]]
@@ -29,68 +30,62 @@ _ROWS: tuple[_Row, ...] = (
     ("speed\nin m/min", 0.06, ((2, _COMMAND, "command"),)),
     ("acceleration\nin m/s²", 1e-3, ((3, _COMMAND, "command"),)),
     ("response − command\nin µm", 1e3, ((4, _RESPONSE, "response"),)),
-)
-_DRIVE_ROWS: tuple[_Row, ...] = (
-    ("force\nin N", 1.0, ((5, canvas.COLOURS[2], "motor"), (6, canvas.COLOURS[3], "friction"))),
+    ("force\nin N", 1.0, ((5, plot.COLOURS[2], "motor"), (6, plot.COLOURS[3], "friction"))),
 )
 
 
-def write_motion_pictures(traces: MotionTraces, folder: str | Path, part: str) -> list[str]:
-    """Write ``motion.png`` and ``motion.svg`` into a folder, which is made where it is missing.
-
-    Args:
-        traces: what passed by; one sample or more.
-        folder: where to.
-        part: which program, and which part of it, for the title.
-
-    Returns:
-        The files written.
-
-    Raises:
-        OSError: the folder cannot be made or a file not be written.
-    """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / f"motion{suffix}" for suffix in canvas.FORMATS]
-    for file in files:
-        plot_motion(file, traces, part)
-    return [str(file) for file in files]
+def plots_of(simulation: Simulation) -> dict[str, Plot]:
+    """Its pictures by name."""
+    found: dict[str, Plot] = {}
+    if simulation.motion is not None:
+        found["motion"] = partial(plot_motion, simulation.motion)
+    if simulation.regions:
+        found |= motion_pictures(partial(_worst_region, simulation))
+    return found
 
 
-def plot_motion(file: str | Path, traces: MotionTraces, part: str) -> None:
+def _worst_region(simulation: Simulation) -> PlayedRegion:
+    run = max(simulation.regions, key=lambda each: max(each.residual_vibration_um))
+    runs = {"program": run.replay(RECORD_SAMPLES)}
+    return PlayedRegion.of_runs(runs, run.path, run.period_s, lines=run.lines, regions=len(simulation.regions))
+
+
+def plot_motion(motion: Motion, ax: Axes | None = None) -> Axes:
     """How does each axis move, and how far is the table from its command?
 
     One column for each axis that moves. A long motion is drawn as the band between the least and the largest value of
     each stretch of time, so that no peak is lost.
 
     Args:
-        file: ``.png`` or ``.svg``.
-        traces: what passed by; one sample or more.
-        part: which program, and which part of it, for the title.
+        motion: what was played.
+        ax: where to draw; None: a new figure.
 
-    Raises:
-        ValueError: a wrong ending, or no sample.
-        OSError: the file cannot be written.
+    Returns:
+        The first panel.
     """
-    times, low, high = traces.result()
+    low, high = motion.low, motion.high
     travel = high[:, 0].max(axis=0) - low[:, 0].min(axis=0)
     moving = [axis for axis in range(3) if travel[axis] > _MOVES_MM] or [0]
-    rows = [*_ROWS, *(_DRIVE_ROWS if traces.driven else ())]
-    figure = canvas.figure(3.4 + 3.6 * len(moving), 1.6 + 1.7 * len(rows))
-    grid = canvas.panels(figure, len(rows), len(moving))
-    for panels, axis in zip(grid, moving, strict=True):
-        for panel, (_, factor, curves) in zip(panels, rows, strict=True):
+    shown = _ROWS if motion.largest_motor_force_n is not None else _ROWS[:-1]
+    part = Path(motion.program).name + ("" if motion.lines is None else ", lines {} to {}".format(*motion.lines))
+    size_inch = (3.4 + 3.6 * len(moving), 1.6 + 1.7 * len(shown))
+    rows = plot.grid(
+        ax, len(shown), len(moving), size_inch=size_inch, title="Motion of the axes", part=part, sharex="col"
+    )
+    for panels, (label, factor, curves) in zip(rows, shown, strict=True):
+        for panel, axis in zip(panels, moving, strict=True):
+            panel.margins(x=0.01)
             for number, colour, name in curves:
-                _band(panel, times, factor * low[:, number, axis], factor * high[:, number, axis], colour, name)
-            if len(curves) > 1 and axis == moving[0]:
-                canvas.legend_above(panel)
-        panels[0].set_title("XYZ"[axis], loc="right", fontsize=10)
-        panels[-1].set_xlabel("time in s")
-    for panel, (label, _, _) in zip(grid[0], rows, strict=True):
-        panel.set_ylabel(label)
-    canvas.heading(figure, "Motion of the axes", part)
-    figure.align_ylabels(grid[0])
-    canvas.save(figure, file)
+                of = (slice(None), number, axis)
+                _band(panel, motion.times_s, factor * low[of], factor * high[of], colour, name)
+        panels[0].set_ylabel(label)
+        if len(curves) > 1:
+            plot.legend_above(panels[0])
+    for top, lowest, axis in zip(rows[0], rows[-1], moving, strict=True):
+        top.set_title("XYZ"[axis], loc="right", fontsize=10)
+        lowest.set_xlabel("time in s")
+    rows[0][0].figure.align_ylabels([panels[0] for panels in rows])
+    return rows[0][0]
 
 
 def _band(panel: Axes, times: FloatArray, low: FloatArray, high: FloatArray, colour: str, name: str) -> None:
@@ -98,24 +93,3 @@ def _band(panel: Axes, times: FloatArray, low: FloatArray, high: FloatArray, col
     if not np.array_equal(low, high):
         panel.fill_between(times, low, high, color=colour, linewidth=0)
     panel.plot(times, (low + high) / 2, color=colour, linewidth=0.9, label=name)
-
-
-def write_simulation_pictures(simulation: Simulation, folder: str | Path) -> list[str]:
-    """Path, feed and vibration of the region that vibrates most after its stop.
-
-    Returns:
-        The files written; none for a program without cutting regions.
-
-    Raises:
-        OSError: the folder cannot be made or a file not be written.
-    """
-    if not simulation.regions:
-        return []
-    run = max(simulation.regions, key=lambda each: float(each.figures.residual_mm.max()))
-
-    def played() -> PlayedRegion:
-        runs = {"program": simulation.play(run, record_samples=RECORD_SAMPLES)}
-        lines = (run.first_line, run.last_line)
-        return PlayedRegion.of_runs(runs, run.path, run.period_s, lines=lines, regions=len(simulation.regions))
-
-    return canvas.save_all(motion_pictures(played), folder)

@@ -1,0 +1,227 @@
+"""What a simulation shows: each cutting region from rest to rest, and the motion of the whole program in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.results.figures import CONTOURS, ContourError, Tracks
+from shapegcode.results.json import hidden, sparse
+from shapegcode.results.result import Plot, Result, Xyz
+from shapegcode.results.table import Column, Table, xyz_columns
+
+__all__ = ["Motion", "RegionRun", "Simulation"]
+
+FloatArray = npt.NDArray[np.float64]
+
+# With a feed drive what is left between command and table is vibration and the lag of the servo loop.
+_NAMES = {"modal": ("residual vibration", "peak vibration"), "feed-drive": ("error after the stop", "largest error")}
+
+
+@dataclass(frozen=True, eq=False)
+class RegionRun:
+    """One cutting region played.
+
+    Attributes:
+        lines: first and last of the program, from 1.
+        time_s: until the set-points rest.
+        residual_vibration_um: largest |response - command| of each axis once the set-points rest.
+        settling_time_s: from that instant until it stays within the band; None: not within the limit, or no band.
+        period_s: time between two samples.
+        path: as programmed.
+        figures: what the core measured, with the samples that were recorded.
+        replay: plays it again and keeps as many samples as one says.
+    """
+
+    lines: tuple[int, int]
+    time_s: float
+    residual_vibration_um: Xyz[float]
+    settling_time_s: Xyz[float | None]
+    period_s: float = field(metadata=hidden())
+    path: _core.Path = field(metadata=hidden())
+    figures: _core.PlaybackFigures = field(metadata=hidden())
+    replay: Callable[[int], _core.PlaybackFigures] = field(metadata=hidden())
+
+    @property
+    def command_mm(self) -> FloatArray:
+        """Set-points after every filter, (n, 3); the decay after the stop included."""
+        return self.figures.recorded_command
+
+    @property
+    def response_mm(self) -> FloatArray:
+        """The table at the same instants, (n, 3)."""
+        return self.figures.recorded_response
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A whole program in time, or some of its lines: its largest values, and its curves as envelopes.
+
+    Attributes:
+        lines: first and last that are looked at; None: all.
+        every: of how many samples one is in the files.
+        samples: how many there are.
+        end_s: time of the last one.
+        largest_speed_mm_per_min: of the command.
+        largest_acceleration_mm_per_s2: of the command, by second difference.
+        largest_error_um: |response - command|.
+        largest_motor_force_n: with feed drives.
+        largest_friction_force_n: likewise.
+        csv: file that was written.
+        npz: likewise.
+        program: its name.
+        times_s: middle of each of n stretches of time.
+        low: least value in each stretch, (n, curves, 3): command and response (mm), speed of the command (mm/s), its
+            acceleration (mm/s²), response minus command (mm), with feed drives force of the motor and friction (N).
+        high: largest value, likewise.
+    """
+
+    lines: tuple[int, int] | None
+    every: int
+    samples: int
+    end_s: float
+    largest_speed_mm_per_min: Xyz[float]
+    largest_acceleration_mm_per_s2: Xyz[float]
+    largest_error_um: Xyz[float]
+    program: str = field(metadata=hidden())
+    times_s: FloatArray = field(metadata=hidden())
+    low: FloatArray = field(metadata=hidden())
+    high: FloatArray = field(metadata=hidden())
+    largest_motor_force_n: Xyz[float] | None = field(default=None, metadata=sparse())
+    largest_friction_force_n: Xyz[float] | None = field(default=None, metadata=sparse())
+    csv: str | None = field(default=None, metadata=sparse())
+    npz: str | None = field(default=None, metadata=sparse())
+
+    def table(self) -> Table:
+        """Its largest values by axis."""
+        forces = (("force of the motor N", self.largest_motor_force_n), ("friction N", self.largest_friction_force_n))
+        rows: list[tuple[str, Xyz[float], float, int]] = [
+            ("speed of the command m/min", self.largest_speed_mm_per_min, 1e-3, 2),
+            ("acceleration of the command m/s²", self.largest_acceleration_mm_per_s2, 1e-3, 2),
+            ("response − command µm", self.largest_error_um, 1.0, 2),
+            *((name, force, 1.0, 0) for name, force in forces if force is not None),
+        ]
+        columns = (
+            Column("largest", value=lambda row: row[0], text=True),
+            *xyz_columns(lambda axis, row: f"{row[1][axis] * row[2]:z.{row[3]}f}"),
+        )
+        part = "whole program" if self.lines is None else f"lines {self.lines[0]} to {self.lines[1]}"
+        return Table(f"{part}, {self.samples} samples up to {self.end_s:.2f} s", columns, rows)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Simulation(Result):
+    """A program played on the machine's model as it is; figures are the largest of its cutting regions.
+
+    Attributes:
+        program: name of the program.
+        machine: name of the machine.
+        plant: "modal" or "feed-drive".
+        shaped: it was played block by block at its feed, as a program that shapegcode wrote.
+        cycle_time_s: whole program: regions, rapids with in-position wait, dwells, drilling cycles.
+        cutting_time_s: the regions alone, until the set-points rest.
+        residual_vibration_um: largest |response - command| of each axis once the set-points rest.
+        peak_vibration_um: before that.
+        settling_time_s: from that instant until it stays within the band; None: not within the limit, or no band.
+        settling_band_um: of the machine file (`tolerance.residual_floor_um`); 0: none.
+        settling_limit_s: how long it is looked at.
+        contour_error_um: against the program's own path.
+        orbit_error_percent: of the command on each arc.
+        response_orbit_error_percent: of the table, likewise.
+        regions: the cutting regions in order.
+        motion: the whole program in time; None: not asked for.
+        warnings: of the program and of the machine.
+    """
+
+    program: str
+    machine: str
+    plant: str
+    shaped: bool
+    cycle_time_s: float
+    cutting_time_s: float
+    residual_vibration_um: Xyz[float]
+    peak_vibration_um: Xyz[float]
+    settling_time_s: Xyz[float | None]
+    settling_band_um: float
+    settling_limit_s: float
+    contour_error_um: Tracks[ContourError]
+    orbit_error_percent: tuple[float, ...]
+    response_orbit_error_percent: tuple[float, ...]
+    regions: tuple[RegionRun, ...]
+    warnings: tuple[str, ...]
+    motion: Motion | None = field(default=None, metadata=sparse())
+
+    @property
+    def ok(self) -> bool:
+        """It was played; nothing is held against a tolerance."""
+        return True
+
+    @property
+    def answer(self) -> str:
+        """How long it takes, how much it vibrates after a stop, how far it leaves the path."""
+        takes = f"{Path(self.program).name} takes {self.cycle_time_s:.2f} s on {self.machine}"
+        if not self.regions:
+            return f"{takes}; no cutting region ({self.plant} plant)"
+        axis = max("xyz", key=lambda each: self.residual_vibration_um[each])
+        return (
+            f"{takes}, {self.cutting_time_s:.2f} s of it in cutting regions; {_NAMES[self.plant][0]} "
+            f"{axis.upper()} {self.residual_vibration_um[axis]:.2f} µm, contour error {self._contour.max:.2f} µm "
+            f"({self.plant} plant)"
+        )
+
+    @property
+    def _contour(self) -> ContourError:
+        return self.contour_error_um.response
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        if self.shaped:
+            return "shapegcode measure ORIGINAL SHAPED measures it against the programmed path"
+        return "shapegcode convert shapes this program and shows what it gains"
+
+    def tables(self) -> list[Table]:
+        """Vibration and settling by axis; contour and orbit errors; the motion in time."""
+        regions = [self._vibration_table(), self._contour_table()] if self.regions else []
+        return [*regions, *([self.motion.table()] if self.motion is not None else [])]
+
+    def _vibration_table(self) -> Table:
+        residual, peak = _NAMES[self.plant]
+        rows: list[tuple[str, Callable[[str], str]]] = [
+            (f"{residual} µm", lambda axis: f"{self.residual_vibration_um[axis]:.2f}"),
+            (f"{peak} µm", lambda axis: f"{self.peak_vibration_um[axis]:.2f}"),
+        ]
+        if self.settling_band_um > 0.0:
+            rows.append((f"settling to ±{self.settling_band_um:g} µm, ms", self._settling))
+        columns = (
+            Column("cutting regions, each from rest to rest", value=lambda row: row[0], text=True),
+            *xyz_columns(lambda axis, row: row[1](axis)),
+        )
+        return Table("", columns, rows)
+
+    def _settling(self, axis: str) -> str:
+        time_s = self.settling_time_s[axis]
+        return f"over {self.settling_limit_s * 1e3:.0f}" if time_s is None else f"{time_s * 1e3:.0f}"
+
+    def _contour_table(self) -> Table:
+        rows: list[tuple[str, str, str]] = []
+        for track, name in CONTOURS.items():
+            error = getattr(self.contour_error_um, track)
+            rows.append((f"{name} µm", f"{error.max:.2f}", f"{error.rms:.2f}"))
+        orbits = {"command": self.orbit_error_percent, "table": self.response_orbit_error_percent}
+        rows += [(f"orbit error of the {name} %", f"{max(of):.4f}", "") for name, of in orbits.items() if of]
+        columns = (
+            Column("cutting regions, against the program's path", value=lambda row: row[0], text=True),
+            Column("largest", value=lambda row: row[1]),
+            Column("RMS", value=lambda row: row[2]),
+        )
+        return Table("", columns, rows)
+
+    def plots(self) -> Mapping[str, Plot]:
+        """`motion`, if it was asked for; `path`, `feed`, `vibration` of the region that vibrates most."""
+        return self._drawn_beside()
