@@ -15,7 +15,6 @@ from shapegcode.errors import MachineError
 from shapegcode.identification.mode import Estimate, IdentifiedMode
 from shapegcode.identification.update import update_machine_file, update_modes
 from shapegcode.machine import Machine
-from shapegcode.settings.edit import chunks
 
 VX500 = Machine.builtin_text("vx500")
 
@@ -39,26 +38,6 @@ def changed(before: str, after: str) -> tuple[list[str], list[str]]:
     """Lines that went, and lines that came."""
     delta = list(difflib.ndiff(before.splitlines(), after.splitlines()))
     return [line[2:] for line in delta if line[0] == "-"], [line[2:] for line in delta if line[0] == "+"]
-
-
-@pytest.mark.parametrize("name", Machine.builtin_names())
-def test_chunks_are_the_file(name: str) -> None:
-    text = Machine.builtin_text(name)
-    parts = chunks(text)
-    assert "".join(part.text for part in parts) == text
-    place = 1
-    for part in parts:
-        assert part.line == place
-        place += part.text.count("\n")
-    heads = [line for line in text.splitlines() if line.startswith("[")]
-    assert sum(part.is_head for part in parts) == len(heads)
-
-
-def test_chunks_of_values_over_several_lines() -> None:
-    text = 'a."b.c" = { d = 1 }\n[[t]] # x\nlist = [ # [[axes.x.modes]]\n 1,\n 2]\ntext = """\n[[axes.x.modes]]\n"""\n'
-    assert [(part.kind, part.path) for part in chunks(text)] == [
-        ("key", ("a", "b.c")), ("array", ("t",)), ("key", ("list",)), ("key", ("text",)),
-    ]  # fmt: skip
 
 
 def test_a_mode_takes_the_table_of_the_one_it_replaces() -> None:
@@ -230,13 +209,13 @@ description = '''
 frequency_hz = 1
 '''
 
-[ axes . "y" ]
+[axes.y]
 max_feed_mm_per_min = 1 # keep me
 rapid_mm_per_min = 1
 max_acceleration_mm_s2 = 1
 # [[axes.x.modes]] is for X
 
-  [[ axes . y . modes ]]  # first
+  [[axes.y.modes]]  # first
   # by hand
   frequency_hz = 40
   damping_ratio = 0.01
@@ -258,6 +237,15 @@ def test_a_file_written_by_hand() -> None:
     assert come.index("[[axes.y.modes]]") < come.index("# about the end")
     with pytest.raises(ArgumentError, match=r"write the axis as a table \[axes\.x\]"):
         update_modes(HAND, "x", [tap(41.0)], source="s")
+
+
+def test_a_line_that_could_not_stay_as_it_is_is_refused_with_its_number() -> None:
+    text = HAND.replace("[axes.y]", '[ axes . "y" ]').replace("[[axes.y.modes]]", "[[ axes . y . modes ]]")
+    line = text.splitlines().index("  [[ axes . y . modes ]]  # first") + 1
+    with pytest.raises(ArgumentError, match=rf"mine.toml:{line}: .*cannot be kept as it is: write it as"):
+        update_modes(text, "y", [tap(41.0)], source="s", file="mine.toml")
+    with pytest.raises(MachineError, match="contour_um"):
+        update_modes(VX500.replace("contour_um = 20", "contour_um = -5"), "x", [tap(46.0)], source="s")
 
 
 def test_what_is_refused() -> None:

@@ -1,102 +1,104 @@
-"""A TOML file as its lines, so that some of them can be changed and the rest stays byte for byte."""
+"""A TOML file edited with tomlkit: some entries change, the rest stays byte for byte.
+
+The entries of a table are the list ``table.value.body``: keys with their items, comments, blank lines. It is edited in
+place; then the document is rendered. Whoever edits reads the result again and compares it with what was meant.
+"""
 
 from __future__ import annotations
 
 import re
-import tomllib
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any, Literal
 
-__all__ = ["Chunk", "chunks", "commented_key", "commented_table"]
+import tomlkit
+from tomlkit.items import AoT, Comment, Item, Key, Table, Whitespace
 
-_COMMENTED_KEY = re.compile(r"\s*#\s*([A-Za-z0-9_-]+)\s*=\s*\.\.\.")
-_COMMENTED_TABLE = re.compile(r"\s*#\s*\[\[\s*([^\[\]]+?)\s*\]\]")
+from shapegcode.errors import ArgumentError
 
+__all__ = [
+    "Entry",
+    "commented_key",
+    "commented_table",
+    "entry_of",
+    "is_blank",
+    "own_end",
+    "parse_exactly",
+    "take_tail",
+]
 
-@dataclass(frozen=True)
-class Chunk:
-    """The lines of one blank line, comment, head of a table, or key with its value.
+Entry = tuple[Key | None, Item]
 
-    Attributes:
-        kind: what it is; "array" is the head of a table in a list, [[name]].
-        text: as in the file, line end included.
-        line: its first line, from 1.
-        path: parts of the dotted name of a table or key; empty for blank lines and comments.
-    """
-
-    kind: Literal["blank", "comment", "table", "array", "key"]
-    text: str
-    line: int
-    path: tuple[str, ...] = ()
-
-    @property
-    def is_head(self) -> bool:
-        """Whether a table begins here."""
-        return self.kind in ("table", "array")
+_COMMENTED_KEY = re.compile(r"#\s*([A-Za-z0-9_-]+)\s*=\s*\.\.\.")
+_COMMENTED_TABLE = re.compile(r"#\s*\[\[\s*([^\[\]]+?)\s*\]\]")
 
 
-def chunks(text: str) -> list[Chunk]:
-    """The chunks of a TOML file; their texts joined are the file.
+def parse_exactly(text: str, file: str) -> tomlkit.TOMLDocument:
+    """A TOML file that can be edited so that the rest of it stays byte for byte.
+
+    Args:
+        text: of the file.
+        file: name for messages.
 
     Raises:
-        tomllib.TOMLDecodeError: it is no TOML.
+        ArgumentError: a line would change though nobody edits it.
+        tomlkit.exceptions.ParseError: it is no TOML.
     """
-    tomllib.loads(text)
-    return list(_chunks(re.findall(r"[^\n]*\n|[^\n]+", text)))
+    document = tomlkit.parse(text)
+    rendered = document.as_string()
+    if rendered == text:
+        return document
+    lines = zip(text.splitlines(), rendered.splitlines(), strict=False)
+    number, (line, other) = next((n, pair) for n, pair in enumerate(lines, start=1) if pair[0] != pair[1])
+    raise ArgumentError(f"{file}:{number}: {line.strip()!r} cannot be kept as it is: write it as {other.strip()!r}")
 
 
-def commented_key(chunk: Chunk) -> str:
+def entry_of(line: str) -> Entry:
+    """A line with a key as an entry, its comment and line end included."""
+    return tomlkit.parse(line).body[0]
+
+
+def commented_key(entry: Entry) -> str:
     """The name in a comment ``# name = ...``, which stands for a key that is left out; empty for everything else."""
-    match = _COMMENTED_KEY.match(chunk.text) if chunk.kind == "comment" else None
-    return match[1] if match else ""
+    return _said(entry, _COMMENTED_KEY)
 
 
-def commented_table(chunk: Chunk) -> str:
+def commented_table(entry: Entry) -> str:
     """The name in a comment ``# [[name]]``, which stands for a list without tables; empty for everything else."""
-    match = _COMMENTED_TABLE.match(chunk.text) if chunk.kind == "comment" else None
+    return _said(entry, _COMMENTED_TABLE)
+
+
+def _said(entry: Entry, pattern: re.Pattern[str]) -> str:
+    match = pattern.match(entry[1].trivia.comment) if isinstance(entry[1], Comment) else None
     return match[1] if match else ""
 
 
-def _chunks(lines: list[str]) -> Iterator[Chunk]:
-    place = 0
-    while place < len(lines):
-        text, number = lines[place], place + 1
-        bare = text.strip()
-        place += 1
-        if not bare:
-            yield Chunk("blank", text, number)
-        elif bare.startswith("#"):
-            yield Chunk("comment", text, number)
-        elif bare.startswith("["):
-            kind: Literal["table", "array"] = "array" if bare.startswith("[[") else "table"
-            yield Chunk(kind, text, number, _path(tomllib.loads(text)))
-        else:
-            # A value may go over several lines: it is whole as soon as it can be read alone.
-            while (data := _loads(text)) is None:
-                text += lines[place]
-                place += 1
-            yield Chunk("key", text, number, _path(data)[: _depth(text)])
+def own_end(entries: list[Entry]) -> int:
+    """One behind the last key, and behind the commented keys that follow it at once: what is there is of others."""
+    end = max((place + 1 for place, (key, _) in enumerate(entries) if key is not None), default=0)
+    for place in range(end, len(entries)):
+        if not isinstance(entries[place][1], Comment) or commented_table(entries[place]):
+            break
+        if commented_key(entries[place]):
+            end = place + 1
+    return end
 
 
-def _loads(text: str) -> dict[str, Any] | None:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
-        return None
+def take_tail(table: Table) -> list[Entry]:
+    """Take away what stands behind the last key of a table and of the tables in it: it is of what follows."""
+    entries = table.value.body
+    last = next((item for key, item in reversed(entries) if key is not None), None)
+    if isinstance(last, AoT):
+        return take_tail(last.body[-1]) + _cut(entries)
+    if isinstance(last, Table):
+        return take_tail(last) + _cut(entries)
+    return _cut(entries)
 
 
-def _path(data: Any) -> tuple[str, ...]:
-    """Names from the outside to the inside, as long as there is but one."""
-    found: list[str] = []
-    while isinstance(data, dict) and len(data) == 1:
-        ((name, data),) = data.items()
-        found.append(name)
-    return tuple(found)
+def _cut(entries: list[Entry]) -> list[Entry]:
+    end = own_end(entries)
+    tail = entries[end:]
+    del entries[end:]
+    return tail
 
 
-def _depth(text: str) -> int:
-    """How many parts the name of a key has: an inline table as its value adds none."""
-    part = r"""\s*(?:[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')\s*"""
-    match = re.match(rf"{part}(?:\.{part})*=", text)
-    return len(re.findall(part, match[0][:-1])) if match else 1
+def is_blank(entry: Entry) -> bool:
+    """Whether it is a blank line."""
+    return isinstance(entry[1], Whitespace)
