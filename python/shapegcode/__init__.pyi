@@ -79,6 +79,12 @@ from shapegcode.identification.result import Identification as Identification
 from shapegcode.io.read import ReadOptions as ReadOptions
 from shapegcode.io.record import Record as Record
 from shapegcode.machine import Machine as Machine
+from shapegcode.machine.fanuc_import import import_parameters as import_parameters
+from shapegcode.machine.result import (
+    MachineDescription as MachineDescription,
+    ParameterImport as ParameterImport,
+    describe_machine as describe_machine,
+)
 from shapegcode.metrology.measure import (
     Measurement as Measurement,
     measure as measure,

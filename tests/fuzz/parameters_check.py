@@ -17,7 +17,7 @@ def check_import(data: bytes) -> str:
     # The last byte says whether the built-in machine stands in for what is missing.
     base = _BASE if data[-1:] != b"\x01" else None
     try:
-        result = import_parameters(data, "CNC-PARA.TXT", base)
+        result = import_parameters(data, base)
     except MachineError as error:
         assert str(error).strip(), "a refusal has words"
         return "refused"
@@ -29,5 +29,5 @@ def check_import(data: bytes) -> str:
         assert axis.max_feed_mm_per_min > 0.0
     lines = data.count(b"\n") + data.count(b"\r") + 1
     for entry in result.read:
-        assert 1 <= entry["line"] <= lines, entry
+        assert 1 <= entry.line <= lines, entry
     return "imported"

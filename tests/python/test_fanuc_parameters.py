@@ -6,6 +6,7 @@ import json
 import math
 from pathlib import Path
 
+import jsonschema
 import pytest
 from hypothesis import given, strategies as st
 
@@ -13,13 +14,15 @@ from effort import cpu_s
 from shapegcode.cli import main
 from shapegcode.errors import MachineError
 from shapegcode.machine import Machine
-from shapegcode.machine.fanuc_import import import_parameters, read_parameters
+from shapegcode.machine.fanuc_import import import_parameters
+from shapegcode.machine.result import ParameterImport
+from shapegcode.results.json import schema
 
 DUMPS = Path(__file__).resolve().parents[1] / "golden" / "parameters"
 
 
 def test_dump_with_q_and_axes_in_another_order() -> None:
-    machine = read_parameters(DUMPS / "with_q.txt").machine
+    machine = import_parameters(DUMPS / "with_q.txt").machine
     controller = machine.controller
     assert [axis.rapid_mm_per_min for axis in machine.axes.as_tuple()] == [20000, 18000, 15000]
     assert [axis.max_feed_mm_per_min for axis in machine.axes.as_tuple()] == [9000, 9000, 7000]
@@ -37,7 +40,7 @@ def test_dump_with_q_and_axes_in_another_order() -> None:
 
 def test_old_dump_with_bell_keeps_the_radial_error_of_the_manual() -> None:
     base = Machine.load("vx500")
-    machine = read_parameters(DUMPS / "old.txt", base).machine
+    machine = import_parameters(DUMPS / "old.txt", base).machine
     controller = machine.controller
     assert controller.motion == "after_interpolation"
     variance = (controller.time_constant_s**2 + controller.bell_time_s**2) / 12
@@ -65,7 +68,7 @@ def test_all_grammars_say_the_same(
         return (end.join([*lines, "%"]) + end).encode()
 
     forms = [("Q1", "", "\n"), ("", "", "\r\n"), ("", " ", "\n\r\r"), ("Q1", "", " \n")]
-    machines = [import_parameters(write(*form), "CNC-PARA.TXT", base).machine for form in forms]
+    machines = [import_parameters(write(*form), base, source="CNC-PARA.TXT").machine for form in forms]
     assert machines.count(machines[0]) == len(forms)
     machine = machines[0]
     assert tuple(axis.rapid_mm_per_min for axis in machine.axes.as_tuple()) == rapid
@@ -76,10 +79,10 @@ def test_all_grammars_say_the_same(
 
 def test_inch_values_and_the_first_path() -> None:
     text = b"%\nN01420Q1A1I100.A2I200.A3M300.\nN01420Q1A1P1A2P1A3P1\n%\n"
-    found = import_parameters(text, "d.txt", Machine.load("vx500"))
+    found = import_parameters(text, Machine.load("vx500"), source="d.txt")
     rapids = [axis.rapid_mm_per_min for axis in found.machine.axes.as_tuple()]
     assert rapids == pytest.approx([2540, 5080, 300])
-    assert any(row["parameter"] == "1420" and row["line"] == 3 for row in found.missing)
+    assert any(row.parameter == "1420" and row.line == 3 for row in found.missing)
 
 
 @pytest.mark.parametrize(
@@ -100,20 +103,20 @@ def test_inch_values_and_the_first_path() -> None:
 )
 def test_bad_dump(data: bytes, message: str) -> None:
     with pytest.raises(MachineError, match=message):
-        import_parameters(data, "d.txt", Machine.load("vx500"))
+        import_parameters(data, Machine.load("vx500"), source="d.txt")
 
 
 def test_limits_that_nobody_gives_are_asked_for() -> None:
     with pytest.raises(MachineError, match=r"axes\.x\.rapid_mm_per_min: not in the dump .*--from"):
-        import_parameters(b"%\nN01622 A1 P 64 A2 P 64 A3 P 64\n%\n", "d.txt")
+        import_parameters(b"%\nN01622 A1 P 64 A2 P 64 A3 P 64\n%\n", source="d.txt")
 
 
 def test_acceleration_of_a_control_without_1660_is_assumed_from_its_time_constant() -> None:
     dump = b"%\nN01420 A1 P 12000 A2 P 12000 A3 P 9000\nN01422 P 6000\nN01622 A1 P 50 A2 P 50 A3 P 50\n%\n"
-    result = import_parameters(dump, "d.txt")
+    result = import_parameters(dump)
     # 6000 mm/min within 50 ms
     assert [axis.max_acceleration_mm_s2 for axis in result.machine.axes.as_tuple()] == [2000.0] * 3
-    assert any(row["key"] == "axes.x.max_acceleration_mm_s2" for row in result.assumed)
+    assert any(row.key == "axes.x.max_acceleration_mm_s2" for row in result.assumed)
 
 
 def test_time_grows_with_the_length_of_a_dump() -> None:
@@ -123,15 +126,23 @@ def test_time_grows_with_the_length_of_a_dump() -> None:
         return (DUMPS / "with_q.txt").read_bytes().removesuffix(b"%\n") + lines.encode() + b"%\n"
 
     small, large = dump(900), dump(9000)
-    assert cpu_s(lambda: import_parameters(large, "d.txt"), 1) < 30.0 * cpu_s(lambda: import_parameters(small, "d.txt"))
+    assert cpu_s(lambda: import_parameters(large), 1) < 30.0 * cpu_s(lambda: import_parameters(small))
 
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / "m.toml"
     argv = ["machine", "import", str(DUMPS / "with_q.txt"), "-o", str(output)]
     assert main([*argv, "--json", "-"]) == 0
-    assert set(json.loads(capsys.readouterr().out)) == {"read", "assumed", "missing"}
-    assert Machine.load(output) == read_parameters(DUMPS / "with_q.txt").machine
+    report = json.loads(capsys.readouterr().out)
+    jsonschema.validate(report, schema(ParameterImport))
+    rapid = [row for row in report["read"] if row["key"] == "axes.y.rapid_mm_per_min"]
+    assert rapid == [
+        {"parameter": 1420, "axis": "A3", "raw": "P18000.0", "line": 5, "key": rapid[0]["key"], "value": 18000.0}
+    ]
+    assert {"key": "controller.rapid_bell_time_s", "value": 0.04} in [
+        {name: row[name] for name in ("key", "value")} for row in report["assumed"]
+    ]
+    assert Machine.load(output) == import_parameters(DUMPS / "with_q.txt").machine
     assert "FANUC 1420" in output.read_text(encoding="utf-8")
     before = output.read_bytes()
     assert main(argv) == 2

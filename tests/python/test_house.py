@@ -158,10 +158,10 @@ def imported_modules(file: Path) -> set[str]:
 PACKAGE_FOLDERS = [
     "settings",
     "io",
+    "results",
     "machine",
     "program",
     "model",
-    "results",
     "shaping",
     "conversion",
     "simulation",

@@ -9,12 +9,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import pytest
 
 from shapegcode.cli import COMMANDS, main
 from shapegcode.cli.console import write_json, write_text
 from shapegcode.errors import MachineError
 from shapegcode.machine import AxisMode, Machine
+from shapegcode.machine.result import MachineDescription
+from shapegcode.results.json import schema
 from shapegcode.settings.keys import PerAxis
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -122,8 +125,8 @@ def test_other_values_leave_the_defaults_what_they_are() -> None:
     machine = Machine.from_toml(MINIMAL)
     other = machine.with_values("controller.in_position_s.y", 0.5)
     assert other.controller.in_position_s.as_tuple() == (0.025, 0.5, 0.12)
-    from_file = {value.info.key for value in other.values() if value.origin == "file"}
-    assert from_file - {value.info.key for value in machine.values() if value.origin == "file"} == {
+    from_file = {value.key for value in other.values() if value.origin == "file"}
+    assert from_file - {value.key for value in machine.values() if value.origin == "file"} == {
         "controller.in_position_s"
     }
     assert other.with_values("controller.in_position_s", None) == machine
@@ -154,7 +157,7 @@ def test_builtin_file_names_every_key_and_the_origin_of_every_machine_value(buil
     text = Machine.builtin_text(builtin)
     lines = text.splitlines()
     for value in Machine.load(builtin).values():
-        name = value.info.key.rpartition(".")[2]
+        name = value.key.rpartition(".")[2]
         if name == "modes":
             continue
         assert any(line.removeprefix("# ").startswith(f"{name} = ") for line in lines), name
@@ -211,7 +214,7 @@ def test_remarks_stand_at_their_lines() -> None:
 @pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
 @pytest.mark.parametrize(
     "key",
-    [v.info.key for v in Machine.load("vx500").values() if v.value.replace(".", "").isdigit() and "." in v.value],
+    [v.key for v in Machine.load("vx500").values() if v.value.replace(".", "").isdigit() and "." in v.value],
 )
 def test_no_number_may_be_nan_or_infinite(key: str, number: str) -> None:
     data = Machine.load("vx500").model_dump(mode="python")
@@ -438,15 +441,15 @@ def test_every_key_has_a_meaning_and_every_dimensioned_key_a_unit_that_agrees_wi
         "_inch": "inch",
     }
     for value in Machine.load("vx500").values():
-        name, info = value.info.key.rpartition(".")[2], value.info
-        assert info.meaning, info.key
+        name = value.key.rpartition(".")[2]
+        assert value.meaning, value.key
         suffix = next((end for end in units if name.endswith(end)), None)
         if suffix is not None and not name.startswith("feed_decimals"):
-            assert info.unit == units[suffix], info.key
+            assert value.unit == units[suffix], value.key
 
 
 def test_origin_tells_file_from_default() -> None:
-    values = {v.info.key: v for v in Machine.from_toml(MINIMAL + "[controller]\nblock_time_s = 0.005\n").values()}
+    values = {v.key: v for v in Machine.from_toml(MINIMAL + "[controller]\nblock_time_s = 0.005\n").values()}
     assert values["controller.block_time_s"].origin == "file"
     assert not values["controller.block_time_s"].assumed
     assert values["controller.block_end"].origin == "default"
@@ -484,7 +487,10 @@ def test_show_prints_values_units_and_origin(
 def test_show_json_is_alone_on_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["machine", "show", "vx500", "--json", "-"]) == 0
     out = capsys.readouterr().out
-    assert json.loads(out)["machine"]["axes"]["y"]["modes"][0]["frequency_hz"] == 131
+    report = json.loads(out)
+    jsonschema.validate(report, schema(MachineDescription))
+    assert report["machine"]["axes"]["y"]["modes"][0]["frequency_hz"] == 131
+    assert report["keys"]["controller.block_time_s"]["unit"] == "s"
     assert main(["machine", "show", "vx500", "--json", "-"]) == 0
     assert capsys.readouterr().out == out
 

@@ -64,115 +64,61 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the action.
 
+    Returns:
+        The exit code.
+
     Raises:
         MachineError: the machine file is bad, or there is no built-in machine of that name.
+        ArgumentError: the file to write exists.
         OSError: a file cannot be read or written.
     """
     actions = {"init": _init, "import": _import, "show": _show}
     return actions[args.action](args)
 
 
-def _import(args: argparse.Namespace) -> int:
-    from rich.text import Text
-
-    from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, write_json
-    from shapegcode.io.atomic import write_text
-    from shapegcode.machine import Machine
-    from shapegcode.machine.fanuc_import import read_parameters
-
-    found = read_parameters(args.dump, Machine.load(args.base) if args.base else None)
-    try:
-        write_text(args.output, found.to_toml(), overwrite=args.force)
-    except FileExistsError:
-        print(f"shapegcode: {args.output} exists; --force overwrites it, -o FILE writes another one", file=sys.stderr)
-        return ExitCode.BAD_INPUT
-    if args.json is not None:
-        write_json({"read": found.read, "assumed": found.assumed, "missing": found.missing}, args.json)
-    console = output_console(args.json)
-    console.print(f"read from {args.dump}:", markup=False)
-    for row in found.read:
-        where = f"line {row['line']}: {row['parameter']} {row['axis']}".rstrip()
-        console.print(Text(f"  {where} = {row['raw']} -> {row['key']} = {row['value']}"))
-    console.print("assumed:")
-    for row in found.assumed:
-        console.print(Text(f"  {row['key']} = {row['value']}: {row['why']}"))
-    console.print("missing or not understood:")
-    for row in found.missing:
-        line = f"line {row['line']}: " if row["line"] else ""
-        console.print(Text(f"  {line}{row['parameter']} {row['why']}".replace(":  ", ": ")))
-    console.print(f"wrote {args.output}", markup=False)
-    return ExitCode.OK
-
-
 def _init(args: argparse.Namespace) -> int:
-    from shapegcode.cli import ExitCode
-    from shapegcode.io.atomic import write_text
     from shapegcode.machine import Machine
 
     text = Machine.builtin_text(args.name)
     if args.output == "-":
         sys.stdout.write(text)
-        return ExitCode.OK
-    try:
-        write_text(args.output, text, overwrite=args.force)
-    except FileExistsError:
-        print(
-            f"shapegcode: {args.output} exists; --force overwrites it, -o FILE writes another one",
-            file=sys.stderr,
-        )
-        return ExitCode.BAD_INPUT
+        return 0
+    _write(args, text)
     print(f"wrote {args.output}, the values of {args.name}")
     print(f"next: put in your machine's limits and vibration modes, then: shapegcode machine show {args.output}")
-    return ExitCode.OK
+    return 0
+
+
+def _import(args: argparse.Namespace) -> int:
+    from shapegcode.cli import runner
+    from shapegcode.machine import Machine
+    from shapegcode.machine.fanuc_import import import_parameters
+
+    runner.check_files(args)
+    found = import_parameters(args.dump, Machine.load(args.base) if args.base else None)
+    _write(args, found.to_toml())
+    return runner.finish(found, args, wrote=[args.output])
 
 
 def _show(args: argparse.Namespace) -> int:
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-    from rich.text import Text
+    from shapegcode.cli import runner
+    from shapegcode.machine.result import describe_machine
 
-    from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, write_json
-    from shapegcode.machine import Machine
+    runner.check_files(args)
+    return runner.finish(describe_machine(args.machine), args)
 
-    machine = Machine.load(args.machine)
-    values = machine.values()
-    if args.json is not None:
-        write_json(
-            {
-                "machine": machine.model_dump(mode="json"),
-                "keys": {
-                    value.info.key: {
-                        "value": value.value,
-                        "unit": value.info.unit,
-                        "origin": value.origin,
-                        "meaning": value.info.meaning,
-                        "fanuc": value.info.fanuc,
-                        "assumed": value.assumed,
-                    }
-                    for value in values
-                },
-            },
-            args.json,
-        )
-    table = Table(
-        title=Text(f"{machine.name}: {machine.description}".rstrip(": ")),
-        title_justify="left",
-        box=SIMPLE_HEAD,
-        pad_edge=False,
-    )
-    for heading in ("key", "value", "unit", "origin", "meaning"):
-        table.add_column(heading, overflow="fold", no_wrap=heading in ("unit", "origin"))
-    section = ""
-    for value in values:
-        head, _, name = value.info.key.rpartition(".")
-        if head != section:
-            table.add_row()
-            table.add_row(Text(f"[{head}]", style="bold"))
-            section = head
-        origin = "assumed" if value.assumed else value.origin
-        cells = (name, value.value, value.info.unit, origin, value.info.meaning)
-        table.add_row(*(Text(cell) for cell in cells))
-    output_console(args.json).print(table)
-    return ExitCode.OK
+
+def _write(args: argparse.Namespace, text: str) -> None:
+    """Write the machine file of ``-o``.
+
+    Raises:
+        ArgumentError: it exists, and nobody said ``--force``.
+    """
+    from shapegcode.errors import ArgumentError
+    from shapegcode.io.atomic import write_text
+
+    try:
+        write_text(args.output, text, overwrite=args.force)
+    except FileExistsError:
+        said = f"{args.output} exists; --force overwrites it, -o FILE writes another one"
+        raise ArgumentError(said) from None

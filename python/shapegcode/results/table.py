@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Column", "Table", "share_percent", "warning_table", "xyz_columns"]
 
 _NO_BREAK = "\N{NO-BREAK SPACE}"
+_NARROWEST = 12
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Column:
         value: what a cell shows: name of an attribute of the row (dots lead further), or a function of the row.
         digits: behind the point of numbers; None: as text.
         text: of words, which wrap and stand at the left; other columns stand at the right and are never cut.
+        left: stands at the left, though it is never cut: a column of names.
         style: of a cell, as rich names it, from the row; None: plain.
     """
 
@@ -41,6 +43,7 @@ class Column:
     value: str | Callable[[Any], object] = ""
     digits: int | None = None
     text: bool = False
+    left: bool = False
     style: Callable[[Any], str] | None = None
 
     @property
@@ -94,7 +97,7 @@ class Table:
     def markdown(self) -> str:
         """The table for a page of text, its title as a line above it."""
         head, *rows = self.cells()
-        rules = ["---" if column.text else "---:" for column in self._shown()]
+        rules = ["---" if column.text or column.left else "---:" for column in self._shown()]
         lines = [f"| {' | '.join(cells)} |" for cells in (head, rules, *rows)]
         return "\n".join(
             [*([self.title, ""] if self.title else []), *lines, *(["", self.caption] if self.caption else [])]
@@ -112,9 +115,9 @@ class Table:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """How rich prints it."""
-        yield self._rich()
+        yield self._rich(options.max_width)
 
-    def _rich(self) -> RichTable:
+    def _rich(self, width: int) -> RichTable:
         from rich.box import SIMPLE_HEAD
         from rich.table import Table as RichTable
         from rich.text import Text
@@ -126,13 +129,9 @@ class Table:
             caption=Text(self.caption, style=self.caption_style) if self.caption else None,
         )  # fmt: skip
         rows = [[_whole(column, column.cell(row)) for column in shown] for row in self.rows]
-        for rank, column in enumerate(shown):
-            words = [*column.heading.split(), *(word for cells in rows for word in cells[rank].split(" "))]
-            # Narrower would cut a figure or a word; a path may be longer than the terminal is wide, and folds.
-            least = min(max(map(len, words), default=1), 24 if column.text else 60)
-            table.add_column(
-                column.heading, justify="left" if column.text else "right", min_width=least, overflow="fold",
-            )  # fmt: skip
+        for column, place in zip(shown, _widths(shown, rows, width), strict=True):
+            side: Literal["left", "right"] = "left" if column.text or column.left else "right"
+            table.add_column(column.heading, justify=side, width=place, overflow="fold")
         for rank, (row, cells) in enumerate(zip(self.rows, rows, strict=True)):
             if rank in self.sections and rank > 0:
                 table.add_section()
@@ -142,6 +141,33 @@ class Table:
             ]
             table.add_row(*styled, style=self.row_style(row) if self.row_style else None)
         return table
+
+
+def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int) -> list[int]:
+    """How wide each column is, so that no word is cut and the table has no more lines than it must have.
+
+    rich shrinks every column alike, below what it was told to keep, and then cuts the last ones.
+    """
+    least, most = [], []
+    for rank, column in enumerate(columns):
+        words = [*column.heading.split(), *(word for cells in rows for word in cells[rank].split(" "))]
+        # A path may be longer than the terminal is wide, and folds.
+        least.append(min(max(map(len, words), default=1), 24 if column.text else 60))
+        most.append(max([len(column.heading), *(len(cells[rank]) for cells in rows)]))
+    found = list(least)
+    spare = width - (2 * len(columns) - 1) - sum(least)
+    for _ in range(-spare):
+        # Too narrow a terminal: long words of texts fold, names and figures stay whole.
+        texts = [rank for rank, column in enumerate(columns) if column.text and found[rank] > _NARROWEST]
+        if texts:
+            found[max(texts, key=found.__getitem__)] -= 1
+    for _ in range(spare):
+        # A character more for the column with most lines.
+        rank = max(range(len(columns)), key=lambda rank: most[rank] / max(found[rank], 1))
+        if found[rank] >= most[rank]:
+            break
+        found[rank] += 1
+    return found
 
 
 def _whole(column: Column, cell: str) -> str:

@@ -30,10 +30,15 @@ def values_of(table: TomlTable, prefix: str = "", given: bool = True) -> Iterato
             for number, item in enumerate(value, start=1):
                 yield from values_of(item, f"{key}.{number}.", from_file)
         else:
+            info = key_info(field, key)
             yield KeyValue(
-                info=key_info(field, key),
+                key=key,
                 value="not set" if value is None else toml(value),
+                unit=info.unit,
                 origin="file" if from_file else "default",
+                assumed=info.assumed and not from_file,
+                meaning=info.meaning,
+                fanuc=info.fanuc,
             )
 
 

@@ -113,22 +113,25 @@ class KeyInfo:
 
 @dataclass(frozen=True)
 class KeyValue:
-    """One value of a loaded machine.
+    """One value of loaded settings, with what the documentation says of its key.
 
     Attributes:
-        info: the key.
+        key: dotted name, ``axes.x.modes.1.frequency_hz``.
         value: the value as TOML, "not set" for an optional key without one.
-        origin: "file" where the machine file gives the value, else "default".
+        unit: unit, "1" for a ratio, empty where there is none.
+        origin: "file" where the file gives the value, else "default".
+        assumed: True where the value is a default that is an assumption.
+        meaning: what it is.
+        fanuc: numbers of the FANUC parameters that correspond to it, or empty.
     """
 
-    info: KeyInfo
+    key: str
     value: str
+    unit: str
     origin: Literal["file", "default"]
-
-    @property
-    def assumed(self) -> bool:
-        """True where the value is a default that is an assumption."""
-        return self.origin == "default" and self.info.assumed
+    assumed: bool
+    meaning: str
+    fanuc: str
 
 
 def facts(field: FieldInfo | None) -> dict[str, Any]:

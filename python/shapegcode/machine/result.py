@@ -1,0 +1,250 @@
+"""What the machine's own commands find: a parameter dump as a machine, and every value of a machine with its origin."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import groupby
+from pathlib import Path
+
+from shapegcode.machine.machine import Machine
+from shapegcode.results.json import hidden
+from shapegcode.results.result import Result, Xyz
+from shapegcode.results.table import Column, Table
+from shapegcode.settings.keys import KeyValue, toml
+
+__all__ = [
+    "AssumedValue",
+    "MachineDescription",
+    "MissingParameter",
+    "ParameterImport",
+    "ReadParameter",
+    "Value",
+    "describe_machine",
+]
+
+Value = bool | int | float | str | tuple[int, ...] | Xyz[float]
+"""Value of a key of the machine file: one, or one per axis."""
+
+
+@dataclass(frozen=True)
+class ReadParameter:
+    """A value of a dump and the key that it went into.
+
+    Attributes:
+        parameter: number of the parameter.
+        axis: "A1" ... of an axis, "S1" ... of a spindle, "L1" ... of a path; empty where the value has none.
+        raw: the value as it stands there, with its letter.
+        line: of the dump, from 1.
+        key: dotted name in the machine file.
+        value: of the key; several values of a dump may make one.
+    """
+
+    parameter: int
+    axis: str
+    raw: str
+    line: int
+    key: str
+    value: Value
+
+
+@dataclass(frozen=True)
+class AssumedValue:
+    """What the dump does not say, and what is taken for it.
+
+    Attributes:
+        key: dotted name in the machine file, or the fact in words.
+        value: what is taken.
+        why: in words.
+    """
+
+    key: str
+    value: Value
+    why: str
+
+
+@dataclass(frozen=True)
+class MissingParameter:
+    """What the dump does not hold, or what was not understood.
+
+    Attributes:
+        parameter: number of the parameter; empty where it is none.
+        line: of the dump, from 1; None where it is about none.
+        why: in words.
+    """
+
+    parameter: str
+    line: int | None
+    why: str
+
+
+@dataclass(frozen=True, repr=False)
+class ParameterImport(Result):
+    """A control's parameter dump as a machine.
+
+    Attributes:
+        dump: name of the dump.
+        machine: the machine that it describes.
+        read: per value that was taken, in the order of the keys.
+        assumed: what is an assumption.
+        missing: what the dump does not say or what was not understood.
+        remarks: text behind the keys of the machine file: where each value comes from.
+        warnings: none; what is to be heeded stands under `assumed` and `missing`.
+    """
+
+    dump: str
+    machine: Machine = field(metadata=hidden())
+    read: tuple[ReadParameter, ...]
+    assumed: tuple[AssumedValue, ...]
+    missing: tuple[MissingParameter, ...]
+    remarks: Mapping[str, str] = field(metadata=hidden())
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether it makes a machine: always, as a dump that makes none is refused."""
+        return True
+
+    @property
+    def answer(self) -> str:
+        """How much of the machine the dump says."""
+        keys = len({row.key for row in self.read})
+        return (
+            f"{self.dump}: {keys} keys of {self.machine.name} read, {len(self.assumed)} assumed, "
+            f"{len(self.missing)} parameters missing or not understood"
+        )
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        if not any(axis.modes for axis in self.machine.axes.as_tuple()):
+            return "find the vibration modes, which no dump holds: shapegcode identify TAP.csv --update MACHINE."
+        return "look at what is assumed, and measure it: shapegcode characterize."
+
+    def to_toml(self) -> str:
+        """The machine file, each value with the parameter it comes from."""
+        return self.machine.to_toml(self.remarks)
+
+    def tables(self) -> list[Table]:
+        """What was read, assumed and missed; those of them that have rows."""
+        read = (
+            Column("key", value=lambda rows: rows[0].key, left=True),
+            Column("value", value=lambda rows: _shown(rows[0]), text=True),
+            Column("from", value=_origins, text=True),
+        )
+        assumed = (
+            Column("key", left=True),
+            Column("value", value=_shown, text=True),
+            Column("why", text=True),
+        )
+        missing = (Column("parameter"), Column("line"), Column("why", text=True))
+        found = [
+            Table("read", read, [list(rows) for _, rows in groupby(self.read, key=lambda row: row.key)]),
+            Table("assumed", assumed, self.assumed),
+            Table("missing or not understood", missing, self.missing),
+        ]
+        return [table for table in found if table.rows]
+
+
+def _origins(rows: list[ReadParameter]) -> str:
+    """Where the value of a key comes from: "line 11: 1660 A1 P900.0 A2 P700.0"."""
+    words = []
+    for (number, line), group in groupby(rows, key=lambda row: (row.parameter, row.line)):
+        words.append(f"line {line}: {number} " + " ".join(f"{row.axis} {row.raw}".strip() for row in group))
+    return "; ".join(words)
+
+
+def _shown(row: ReadParameter | AssumedValue) -> str:
+    value = row.value
+    if isinstance(value, Xyz):
+        one = value.x == value.y == value.z
+        return toml(value.x) if one else toml({axis: value[axis] for axis in "xyz"})
+    return value if isinstance(value, str) else toml(value)
+
+
+@dataclass(frozen=True, repr=False)
+class MachineDescription(Result):
+    """Every value of a machine with its unit, origin and meaning.
+
+    Attributes:
+        machine: the tables of the machine file, defaults as well.
+        keys: every value by its dotted key, in the order of the file.
+        warnings: none.
+    """
+
+    machine: Mapping[str, object]
+    keys: Mapping[str, KeyValue]
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether the machine can be used: always, as one that cannot is refused."""
+        return True
+
+    @property
+    def answer(self) -> str:
+        """Name and description."""
+        return f"{self.machine['name']}: {self.machine['description']}".rstrip(": ")
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        assumed = sum(value.assumed for value in self.keys.values())
+        if assumed:
+            return f"look up or measure what is assumed ({assumed} keys): shapegcode characterize, or machine import."
+        return "use it: shapegcode convert IN -m MACHINE -o OUT."
+
+    def tables(self) -> list[Table]:
+        """The keys, those of one table of the file below its name."""
+        rows = list(self._rows())
+        heads = [rank for rank, row in enumerate(rows) if isinstance(row, str)]
+        columns = (
+            Column("key", value=lambda row: f"[{row}]" if isinstance(row, str) else _last(row.key), left=True),
+            Column("value", value=_with_unit, text=True),
+            Column("origin", value=_origin, left=True),
+            Column("meaning", value=lambda row: getattr(row, "meaning", None), text=True),
+        )
+        return [Table("", columns, rows, sections=heads, row_style=lambda row: "bold" if isinstance(row, str) else "")]
+
+    def _rows(self) -> Iterator[str | KeyValue]:
+        section = ""
+        for key, value in self.keys.items():
+            table = key.rpartition(".")[0]
+            if table != section:
+                section = table
+                yield table
+            yield value
+
+
+def _last(key: str) -> str:
+    return key.rpartition(".")[2]
+
+
+def _with_unit(row: str | KeyValue) -> str | None:
+    if isinstance(row, str):
+        return None
+    return f"{row.value} {row.unit}" if row.unit not in ("", "1") and row.value != "not set" else row.value
+
+
+def _origin(row: str | KeyValue) -> str | None:
+    if isinstance(row, str):
+        return None
+    return "assumed" if row.assumed else row.origin
+
+
+def describe_machine(machine: Machine | str | Path) -> MachineDescription:
+    """Every value of a machine: from the file, a default, or a default that is an assumption.
+
+    Args:
+        machine: a machine, its file, or the name of a built-in one.
+
+    Returns:
+        The values with their units and meanings.
+
+    Raises:
+        MachineError: the file is not TOML or has wrong keys or values; every problem is listed.
+        OSError: the file cannot be read.
+    """
+    loaded = machine if isinstance(machine, Machine) else Machine.load(machine)
+    keys = {value.key: value for value in loaded.values()}
+    return MachineDescription(loaded.model_dump(mode="json"), keys)
