@@ -107,39 +107,6 @@ def _tap(json_target: str | None, folder: str) -> int:
     return ExitCode.OK if result["agrees"] else ExitCode.OUT_OF_TOLERANCE
 
 
-def _corner(json_target: str | None, folder: str) -> int:
-    from rich.table import Table
-
-    from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.demos.corner import corner_demo
-    from shapegcode.demos.corner_plots import write_corner_pictures
-
-    with progress("paper 001", json_target) as bar:
-        demo = corner_demo(bar.update)
-        bar.wait()
-        pictures = write_corner_pictures(demo, folder)
-    result = demo.report
-    if json_target is not None:
-        write_json({**result, "pictures": pictures}, json_target)
-    console = output_console(json_target)
-    table = Table(title="Paper 001: cornering cut with an 8 mm end mill, 0.12 mm/rev, 15 mm deep, 0.8 mm wide")
-    table.add_column("case", no_wrap=True)
-    for column in ("what", "paper", "here", "agrees", "note"):
-        table.add_column(column, overflow="fold")
-    verdicts = {True: "yes", False: "NO", None: ""}
-    for row in result["rows"]:
-        said = "differs" if row["note"].startswith("differs") else verdicts[row["agrees"]]
-        table.add_row(
-            str(row["case"]), row["what"], row["paper"], row["here"], said, row["note"]
-        )  # fmt: skip
-    console.print(table)
-    console.print(result["remark"], markup=False)
-    console.print(f"pictures: {folder}/paper001-*", markup=False)
-    console.print("next: shapegcode feed YOUR.NC -m vx500 --tool T.toml --stock S.toml -o OUT.NC", markup=False)
-    return ExitCode.OK if result["agrees"] else ExitCode.OUT_OF_TOLERANCE
-
-
 def _metrology(json_target: str | None, folder: str) -> int:
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
@@ -163,4 +130,4 @@ def _metrology(json_target: str | None, folder: str) -> int:
     return ExitCode.OK
 
 
-_NOT_TYPED = {"tap": _tap, "corner": _corner, "metrology": _metrology}
+_NOT_TYPED = {"tap": _tap, "metrology": _metrology}

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,14 +11,13 @@ import numpy.typing as npt
 from shapegcode.demos.corner import CornerDemo
 from shapegcode.demos.corner_study import AXIAL_DEPTH_MM, STRAIGHT_MM, TOOL_RADIUS_MM, AlongCorner, CornerStudy
 from shapegcode.feed.plots import draw_walls
-from shapegcode.results import plot as canvas
+from shapegcode.results import plot
+from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = [
-    "plot_depth", "plot_forces", "plot_resultant", "plot_scheduled", "plot_surface", "write_corner_pictures",
-]  # fmt: skip
+__all__ = ["plot_depth", "plot_forces", "plot_resultant", "plot_scheduled", "plot_surface", "plots_of"]
 
 Vector = npt.NDArray[np.float64]
 
@@ -28,27 +26,19 @@ _EVERY = 4  # stations
 _ANGLES = 72
 _HEIGHTS = 31
 _DISTANCE = "distance from the corner's begin in mm"
-_COLOURS = (canvas.COLOURS[0], canvas.COLOURS[4], canvas.COLOURS[1])  # of the feeds that are compared
+_COLOURS = (plot.COLOURS[0], plot.COLOURS[4], plot.COLOURS[1])  # of the feeds that are compared
 
 
-def write_corner_pictures(demo: CornerDemo, folder: str | Path) -> list[str]:
-    """Write the pictures as PNG and SVG into a folder, which is made where it is missing.
-
-    Returns:
-        The files written.
-
-    Raises:
-        OSError: the folder cannot be made or a file not be written.
-    """
+def plots_of(demo: CornerDemo) -> dict[str, Plot]:
+    """Its pictures by name: figures 6, 9, 11 and 12 of the paper, and the scheduler."""
     first = demo.studies[0]
-    pictures: dict[str, Callable[[Path], None]] = {
-        "figure6a-radial-depth": lambda file: plot_depth(file, demo.studies),
-        "figures6bc-forces": lambda file: plot_forces(file, first),
-        "figure9-resultant": lambda file: plot_resultant(file, first),
-        "figures11-12-surface": lambda file: plot_surface(file, first),
-        "scheduled": lambda file: plot_scheduled(file, demo.studies),
+    return {
+        "paper001-figure6a-radial-depth": partial(plot_depth, demo.studies),
+        "paper001-figures6bc-forces": partial(plot_forces, first),
+        "paper001-figure9-resultant": partial(plot_resultant, first),
+        "paper001-figures11-12-surface": partial(plot_surface, first),
+        "paper001-scheduled": partial(plot_scheduled, demo.studies),
     }
-    return canvas.write_pictures(folder, "paper001", pictures)
 
 
 def _shown(study: CornerStudy) -> npt.NDArray[np.intp]:
@@ -72,16 +62,18 @@ def _title(study: CornerStudy) -> str:
     return f"case {case.number}: rough {case.rough_radius_mm:g} mm, finish {case.finish_radius_mm:g} mm"
 
 
-def plot_depth(file: str | Path, studies: tuple[CornerStudy, ...]) -> None:
+def plot_depth(studies: tuple[CornerStudy, ...], ax: Axes | None = None) -> Axes:
     """Radial depth along the three corners (figure 6a).
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Args:
+        studies: of the corners.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The only panel.
     """
-    figure = canvas.figure(9.0, 4.4)
-    panel = canvas.panels(figure, 1, 1)[0][0]
-    for study, colour in zip(studies, canvas.COLOURS, strict=False):
+    ((panel,),) = plot.grid(ax, 1, 1, size_inch=(9.0, 4.4), title="Radial depth along the corner (figure 6a)")
+    for study, colour in zip(studies, plot.COLOURS, strict=False):
         shown = _shown(study)
         depth = np.asarray(study.track.radial_depth_mm)
         panel.plot(_place(study)[shown], depth[shown], color=colour, linewidth=1.4, label=_title(study))
@@ -95,9 +87,8 @@ def plot_depth(file: str | Path, studies: tuple[CornerStudy, ...]) -> None:
     panel.set_ylim(0.0, 7.4)
     panel.set_xlabel(_DISTANCE)
     panel.set_ylabel("radial depth in mm")
-    canvas.legend_above(panel)
-    canvas.heading(figure, "Radial depth along the corner (figure 6a)", "")
-    canvas.save(figure, file)
+    plot.legend_above(panel)
+    return panel
 
 
 def _revolutions(study: CornerStudy, along: AlongCorner, shown: npt.NDArray[np.intp]) -> tuple[Vector, Vector]:
@@ -120,45 +111,53 @@ def _ripple(panel: Axes, place: Vector, values: Vector, colour: str, label: str)
     panel.plot(place, values.mean(axis=1), color=colour, linewidth=1.1, label=label)
 
 
-def plot_forces(file: str | Path, study: CornerStudy) -> None:
+def plot_forces(study: CornerStudy, ax: Axes | None = None) -> Axes:
     """Force with the programmed feed in the frame of the tool and of the machine (figures 6b and 6c).
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Args:
+        study: of the corner.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The upper panel.
     """
     shown = _shown(study)
     place = _place(study)[shown]
-    figure = canvas.figure(9.0, 6.4)
-    (grid,) = canvas.panels(figure, 2, 1)
+    title = f"Cutting force at {study.case.feed_mm_per_min:g} mm/min; band: within one revolution"
+    rows = plot.grid(ax, 2, 1, size_inch=(9.0, 6.4), sharex=True, title=title, part=_title(study))
+    grid = [row[0] for row in rows]
     names = (("along the feed, Fx'", "across it to the left, Fy'"), ("along X, Fx", "along Y, Fy"))
     frames = ("frame of the tool (6b)", "frame of the machine (6c)")
     for panel, force, labels, frame in zip(
         grid, _revolutions(study, study.programmed, shown), names, frames, strict=True
     ):
         for component in range(2):
-            _ripple(panel, place, force[..., component], canvas.COLOURS[component], labels[component])
+            _ripple(panel, place, force[..., component], plot.COLOURS[component], labels[component])
         panel.set_ylabel("force in N")
         panel.set_title(frame, loc="right", fontsize=10)
-        canvas.legend_above(panel)
+        plot.legend_above(panel)
     grid[-1].set_xlim(*_SHOWN_MM)
     grid[-1].set_xlabel(_DISTANCE)
-    feed = study.case.feed_mm_per_min
-    canvas.heading(figure, f"Cutting force at {feed:g} mm/min; band: within one revolution", _title(study))
-    canvas.save(figure, file)
+    return grid[0]
 
 
-def plot_resultant(file: str | Path, study: CornerStudy) -> None:
+def plot_resultant(study: CornerStudy, ax: Axes | None = None) -> Axes:
     """Resultant with the programmed feed, by equation 7 and as scheduled (figure 9).
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Args:
+        study: of the corner.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The uppermost panel.
     """
     shown = _shown(study)
     place = _place(study)[shown]
-    figure = canvas.figure(9.0, 8.6)
-    (grid,) = canvas.panels(figure, len(_COLOURS) + 1, 1)
+    rows = plot.grid(
+        ax, len(_COLOURS) + 1, 1, size_inch=(9.0, 8.6), sharex=True,
+        title="Resultant force (figure 9); band: within one revolution", part=_title(study),
+    )  # fmt: skip
+    grid = [row[0] for row in rows]
     target = float(study.programmed.peak_n[0])
     for panel, (name, along), colour in zip(grid, study.feeds, _COLOURS, strict=False):
         tool, _ = _revolutions(study, along, shown)
@@ -166,24 +165,25 @@ def plot_resultant(file: str | Path, study: CornerStudy) -> None:
         panel.axhline(target, color="black", linewidth=0.9, linestyle=(0, (5, 3)), label="peak of the straight")
         panel.set_ylim(0.0, 1.05 * float(study.programmed.peak_n.max()))
         panel.set_ylabel("resultant in N")
-        canvas.legend_above(panel)
+        plot.legend_above(panel)
         grid[-1].plot(place, along.feed_mm_per_min[shown], color=colour, linewidth=1.2, label=name)
     grid[-1].set_ylabel("feed in mm/min")
     grid[-1].set_ylim(bottom=0.0)
-    canvas.legend_above(grid[-1])
+    plot.legend_above(grid[-1])
     grid[-1].set_xlim(*_SHOWN_MM)
     grid[-1].set_xlabel(_DISTANCE)
-    canvas.heading(figure, "Resultant force (figure 9); band: within one revolution", _title(study))
-    figure.align_ylabels(grid)
-    canvas.save(figure, file)
+    return plot.aligned(grid)
 
 
-def plot_surface(file: str | Path, study: CornerStudy) -> None:
+def plot_surface(study: CornerStudy, ax: Axes | None = None) -> Axes:
     """Form error of the wall with the programmed feed, by equation 7 and as scheduled (figures 11 and 12).
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Args:
+        study: of the corner.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The uppermost panel.
     """
     height = np.linspace(0.0, AXIAL_DEPTH_MM, _HEIGHTS)
     place = _place(study)[::_EVERY]
@@ -191,22 +191,27 @@ def plot_surface(file: str | Path, study: CornerStudy) -> None:
     maps = {name: study.wall_error_um(along, _EVERY, height)[inside] for name, along in study.feeds}
     drawn = place[inside]
     edges = np.append(drawn, 2.0 * drawn[-1] - drawn[-2])
-    drawn_walls = draw_walls(
-        None, edges, height, maps, _COLOURS, along=_DISTANCE, part=_title(study),
+    return draw_walls(
+        ax, edges, height, maps, _COLOURS, along=_DISTANCE, part=_title(study),
         title="Form error of the wall (figures 11 and 12); +: material is left standing",
     )  # fmt: skip
-    canvas.save(drawn_walls, file)
 
 
-def plot_scheduled(file: str | Path, studies: tuple[CornerStudy, ...]) -> None:
+def plot_scheduled(studies: tuple[CornerStudy, ...], ax: Axes | None = None) -> Axes:
     """Peak resultant and feed of the three corners, a column for each.
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Args:
+        studies: of the corners.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The first upper panel.
     """
-    figure = canvas.figure(3.0 + 3.6 * len(studies), 6.4)
-    for study, (upper, lower) in zip(studies, canvas.panels(figure, 2, len(studies)), strict=True):
+    rows = plot.grid(
+        ax, 2, len(studies), size_inch=(3.0 + 3.6 * len(studies), 6.4), sharex="col",
+        title="Peak resultant and feed on the corners of the paper",
+    )  # fmt: skip
+    for study, upper, lower in zip(studies, *rows, strict=True):
         shown = _shown(study)
         place = _place(study)[shown]
         for (name, along), colour in zip(study.feeds, _COLOURS, strict=True):
@@ -220,10 +225,9 @@ def plot_scheduled(file: str | Path, studies: tuple[CornerStudy, ...]) -> None:
         lower.set_ylim(bottom=0.0)
         lower.set_xlim(*_SHOWN_MM)
         lower.set_xlabel(_DISTANCE)
-        if study is studies[0]:
-            upper.set_ylabel("peak resultant in N")
-            lower.set_ylabel("feed in mm/min")
-            handles, labels = upper.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
-    canvas.heading(figure, "Peak resultant and feed on the corners of paper 001", "")
-    canvas.save(figure, file)
+    rows[0][0].set_ylabel("peak resultant in N")
+    rows[1][0].set_ylabel("feed in mm/min")
+    handles, labels = rows[0][0].get_legend_handles_labels()
+    whole: Any = rows[0][0].figure
+    whole.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    return rows[0][0]

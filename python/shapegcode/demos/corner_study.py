@@ -14,7 +14,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
-from shapegcode.feed.result import FeedSchedule
+from shapegcode.feed.result import FeedSchedule, ResultantForce
 from shapegcode.feed.schedule import schedule_feed
 from shapegcode.feed.travel import OrdinaryMotion
 from shapegcode.machine import Machine
@@ -77,10 +77,10 @@ class AlongCorner:
     mean_n: Vector
     peak_n: Vector
 
-    def figures(self, length_mm: Vector) -> dict[str, float]:
+    def resultant(self, length_mm: Vector) -> ResultantForce:
         """Mean of the mean resultant over time, and the largest peak."""
         time = length_mm / self.feed_mm_per_min
-        return {"mean": float((time * self.mean_n).sum() / time.sum()), "max": float(self.peak_n.max())}
+        return ResultantForce(float((time * self.mean_n).sum() / time.sum()), float(self.peak_n.max()))
 
 
 @dataclass(frozen=True)

@@ -115,14 +115,7 @@ def plot_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     panels[-1].set_xlabel("distance along the cutting path in mm")
     for panel in panels:
         panel.margins(x=0.01)
-    _align(panels)
-    return panels[0]
-
-
-def _align(panels: Sequence[Axes]) -> None:
-    """Names of the axes in one line."""
-    whole: Any = panels[0].figure
-    whole.align_ylabels(panels)
+    return plot.aligned(panels)
 
 
 def _limit_label(limit: Vector, unit: str) -> str:
@@ -337,5 +330,4 @@ def draw_walls(
     last.set_ylabel("largest over\nthe height in µm")
     last.set_xlabel(along)
     plot.legend_above(last)
-    _align(panels)
-    return panels[0]
+    return plot.aligned(panels)

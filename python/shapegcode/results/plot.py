@@ -10,7 +10,7 @@ apart.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ __all__ = [
     "COLOURS",
     "FORMATS",
     "GREY",
+    "aligned",
     "axes",
     "figure",
     "grid",
@@ -123,6 +124,13 @@ def panels(figure: Figure, rows: int, columns: int) -> list[list[Axes]]:
 def heading(figure: Figure, text: str, part: str) -> None:
     """Title of the whole picture, and which part of the program it shows."""
     figure.suptitle(text + (f"\n{part}" if part else ""), x=0.01, ha="left", fontsize=11)
+
+
+def aligned(panels: Sequence[Axes]) -> Axes:
+    """Names of the vertical axes of panels below each other in one line; returns the first."""
+    whole: Any = panels[0].figure
+    whole.align_ylabels(panels)
+    return panels[0]
 
 
 def legend_above(panel: Axes, *, columns: int = 4) -> None:
