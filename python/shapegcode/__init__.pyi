@@ -22,13 +22,18 @@ from shapegcode._core import (
     __version__ as __version__,
     convolved_zv as convolved_zv,
     grid_polynomial as grid_polynomial,
+    insensitivity as insensitivity,
     largest_feed as largest_feed,
     largest_feeds as largest_feeds,
     layer_borders as layer_borders,
+    minimal_branches as minimal_branches,
+    minimal_shapers as minimal_shapers,
     minimal_two_mode as minimal_two_mode,
+    repeated_zv as repeated_zv,
     sweep as sweep,
     wall_error_um as wall_error_um,
     wall_errors_um as wall_errors_um,
+    worst_residual as worst_residual,
     zv as zv,
 )
 from shapegcode.characterization.characterize import characterize as characterize

@@ -18,7 +18,7 @@ import shapegcode as sg
 from shapegcode.cli import main
 from shapegcode.conversion.cases import stated_cases
 from shapegcode.results import plot as canvas
-from shapegcode.shaping.comparison import machine_bands
+from shapegcode.shaping.bands import machine_bands
 
 FloatArray = npt.NDArray[np.float64]
 PERIOD_S = 1.0 / 2048.0

@@ -26,7 +26,8 @@ from shapegcode._core import (
     zv,
 )
 from shapegcode.shaping import FAMILIES, DesignOptions, ModeBand, design, parse_mode_band, shortest_non_negative
-from shapegcode.shaping.families.on_grid import Conditions, ResidualLimit, Zero, shortest_on_grid
+from shapegcode.shaping.families.conditions import Conditions, ResidualLimit, Zero
+from shapegcode.shaping.families.on_grid import shortest_on_grid
 from shapegcode.shaping.families.simultaneous import simultaneous_zv
 from shapegcode.shaping.registry import distinct
 from shapegcode.shaping.taps import parse_taps

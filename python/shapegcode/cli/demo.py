@@ -27,7 +27,7 @@ _DEMOS = {
         "tap",
         "equivalent systems, and what end mill and collet deflect: Back, Ko and Kim, 2003 (paper 003)",
     ),
-    "corner": ("corner", "cornering cuts, the feeds of the paper and the scheduler's: Kim and Ko, 2000 (paper 001)"),
+    "corner": ("corner", "cornering cuts, the feeds of the paper and the scheduler's: Kim and Ko, 2001 (paper 001)"),
 }
 
 

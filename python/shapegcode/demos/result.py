@@ -15,7 +15,7 @@ __all__ = ["PAPERS", "Agreement", "Demonstration", "Statement", "compared", "sta
 
 PAPERS = {
     "000": "Ko, Lim and Hong, 2023",
-    "001": "Kim and Ko, 2000",
+    "001": "Kim and Ko, 2001",
     "002": "Park, Hong and Danielson, 2009",
     "003": "Back, Ko and Kim, 2003",
     "004": "Lee, Ro, Song and Oh, 2022",

@@ -18,7 +18,7 @@ from shapegcode.demos.result import Demonstration, Statement, compared, stated
 from shapegcode.demos.stage import MODES, PERIOD_S, StageVibration
 from shapegcode.results.json import hidden
 from shapegcode.shaping.bands import ModeBand
-from shapegcode.shaping.design import evaluate
+from shapegcode.shaping.designs import evaluate
 from shapegcode.shaping.modal_run import ModalRun, respond, shaped_step
 from shapegcode.shaping.ranking import NO_RESIDUAL
 

@@ -1,12 +1,13 @@
 """Designs of shapers, and the choice among them.
 
-`band` says what is to be cancelled, `design` what a design is worth, `registry` which families there are,
-`choice` which to take by the rules of `ranking`, `comparison` what a user may ask of it; `grid_designs` holds the exact
-designs on a sample grid that need an optimiser, `robust` those that hold over bands (`robust_search` and
-`cutting_planes` find them), and `block_period` chooses the grid.
+What is to be cancelled: `bands`. The families, one row each: `registry`, with their solvers in `families`,
+`grid_designs` (exact on a sample grid) and `robust` (within a limit over bands); what one is worth: `designs`; taps of
+a user: `taps`. The choice: `comparison` designs every family on the `periods` worth trying, `ranking` says which to
+take, `recommendation` takes the question and gives a `result`. For a conversion: `block_period` chooses the period,
+`grid` the shaper on it for a machine, `per_axis` one for each axis, `track` those that follow moving modes.
 """
 
-from shapegcode.shaping.bands import ModeBand, parse_mode_band
+from shapegcode.shaping.bands import ModeBand, machine_bands, parse_mode_band
 from shapegcode.shaping.block_period import (
     BlockPeriodCandidate,
     BlockPeriodChoice,
@@ -14,14 +15,20 @@ from shapegcode.shaping.block_period import (
     choose_robust_grid,
     robust_candidate,
 )
-from shapegcode.shaping.choose import choose
-from shapegcode.shaping.comparison import candidate_periods, choose_shaper, machine_bands
-from shapegcode.shaping.design import Design, evaluate
+from shapegcode.shaping.comparison import choose
+from shapegcode.shaping.designs import Design, evaluate
+from shapegcode.shaping.grid import Grid, choose_grid, shaper_track
 from shapegcode.shaping.grid_designs import shortest_non_negative
+from shapegcode.shaping.modal_run import ModalRun, respond, shaped_step
+from shapegcode.shaping.per_axis import design_per_axis
+from shapegcode.shaping.periods import candidate_periods
 from shapegcode.shaping.ranking import pareto_front, recommend
+from shapegcode.shaping.recommendation import choose_shaper
 from shapegcode.shaping.registry import FAMILIES, DesignOptions, Family, design, family_named
 from shapegcode.shaping.result import Recommendation, Refusal, families_table
 from shapegcode.shaping.robust.minimax import VIBRATION_LIMIT, RobustDesign, least_worst, minimax_robust
+from shapegcode.shaping.taps import parse_taps
+from shapegcode.shaping.track import MovingMode, ShaperTrack, TrackNode, design_track
 
 __all__ = [
     "FAMILIES",
@@ -31,16 +38,24 @@ __all__ = [
     "Design",
     "DesignOptions",
     "Family",
+    "Grid",
+    "ModalRun",
     "ModeBand",
+    "MovingMode",
     "Recommendation",
     "Refusal",
     "RobustDesign",
+    "ShaperTrack",
+    "TrackNode",
     "candidate_periods",
     "choose",
     "choose_block_period",
+    "choose_grid",
     "choose_robust_grid",
     "choose_shaper",
     "design",
+    "design_per_axis",
+    "design_track",
     "evaluate",
     "families_table",
     "family_named",
@@ -49,7 +64,11 @@ __all__ = [
     "minimax_robust",
     "pareto_front",
     "parse_mode_band",
+    "parse_taps",
     "recommend",
+    "respond",
     "robust_candidate",
+    "shaped_step",
+    "shaper_track",
     "shortest_non_negative",
 ]

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from shapegcode._core import ArgumentError, Mode
 from shapegcode.results.json import hidden
 
-__all__ = ["NARROW_PERCENT", "ModeBand", "parse_mode_band"]
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
+
+__all__ = ["NARROW_PERCENT", "ModeBand", "machine_bands", "parse_mode_band"]
 
 NARROW_PERCENT = 0.2
 """A band of a mode of a machine is designed for if it is wider than this, either way."""
@@ -86,3 +89,33 @@ def parse_mode_band(text: str) -> ModeBand:
             f"mode frequency {frequency_hz:g} Hz, as typed in {text!r}: must be {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz"
         )
     return ModeBand(mode, band / frequency_hz if match[4] == "Hz" else band / 100.0)
+
+
+def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
+    """The modes of all axes of a machine with the bands that it states; equal ones once, with the wider band.
+
+    A band as narrow as a tap test gives is none: a shaper that is exact at the nominal frequency leaves less there than
+    one that spends `shaping.vibration_limit` all over it. The verdict plays its ends all the same.
+
+    Args:
+        machine: its axes' modes; one shaper serves all axes, because different ones would distort the path.
+        uncertainty: half width of the band, relative, of modes that state none.
+
+    Raises:
+        ArgumentError: the machine has no mode, or an uncertainty outside its range.
+    """
+    from shapegcode.model.modes import still_mode
+
+    widths: dict[tuple[float, float], float] = {}
+    for axis in machine.axes.as_tuple():
+        for mode in axis.modes:
+            stated = mode.frequency_uncertainty_percent
+            width = uncertainty
+            if stated is not None:
+                width = stated / 100.0 if stated > NARROW_PERCENT else 0.0
+            still = still_mode(mode, machine.shaping.part_mass_kg)
+            key = still.frequency_hz, still.damping_ratio
+            widths[key] = max(width, widths.get(key, 0.0))
+    if not widths:
+        raise ArgumentError("the machine file gives no vibration mode (axes.x.modes): nothing to shape for")
+    return [ModeBand(Mode(*key), width) for key, width in widths.items()]

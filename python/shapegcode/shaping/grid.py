@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.modes import axis_modes, mode_tables, moving_axis, numbered_modes, still_mode
+from shapegcode.shaping.bands import ModeBand, machine_bands
+from shapegcode.shaping.block_period import BlockPeriodCandidate, choose_robust_grid, robust_candidate
+from shapegcode.shaping.options import DesignOptions
+from shapegcode.shaping.per_axis import design_per_axis
+from shapegcode.shaping.periods import candidate_periods, check_block_period
+from shapegcode.shaping.registry import design
+from shapegcode.shaping.track import MovingMode, ShaperTrack, design_track
 
-if TYPE_CHECKING:
-    from shapegcode.shaping import BlockPeriodCandidate, ModeBand
-    from shapegcode.shaping.track import ShaperTrack
-
-__all__ = ["Grid", "choose_grid", "make_grid"]
+__all__ = ["Grid", "choose_grid", "make_grid", "shaper_track"]
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,15 @@ class Grid:
 def make_grid(
     block_period_s: float, shaper: _core.Shaper, track: ShaperTrack | None = None, *, family: str = "", note: str = ""
 ) -> Grid:
-    """Grid of a shaper whose times are whole block periods, and of shapers that follow an axis."""
+    """Grid of a shaper whose times are whole block periods, and of shapers that follow an axis.
+
+    Args:
+        block_period_s: T_B.
+        shaper: its times are rounded to whole block periods.
+        track: shapers that follow an axis; None: none.
+        family: name of the design's row in the registry of families.
+        note: what a user should know of the choice.
+    """
     delays = [round(t / block_period_s) for t in shaper.times_s]
     return Grid(block_period_s, shaper, _core.Fir(delays, list(shaper.amplitudes)), track, family, note)
 
@@ -77,10 +87,6 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
         ArgumentError: the machine has no mode, its modes vary over several axes, or the period does not fit the
             controller.
     """
-    # SciPy's solvers take a quarter of a second to load: not before they are needed.
-    from shapegcode.shaping import choose_robust_grid, machine_bands, robust_candidate
-    from shapegcode.shaping.comparison import check_block_period
-
     if not any(axis.modes for axis in machine.axes.as_tuple()):
         raise _core.ArgumentError("the machine file gives no vibration mode (axes.x.modes): nothing to shape for")
     bands = machine_bands(machine)
@@ -119,8 +125,6 @@ def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
         ArgumentError: they are asked for where the contour is not brought back or modes vary.
         DesignError: they are asked for, and there are none.
     """
-    from shapegcode.shaping.per_axis import design_per_axis
-
     wanted = machine.shaping.per_axis
     possible = exact and grid.track is None and machine.shaping.contour != "off"
     if not possible:
@@ -147,8 +151,6 @@ def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
 
 def _of_family(name: str, bands: list[ModeBand], machine: Machine, period_s: float | None) -> Grid:
     """The shortest shaper of a family, on one grid or on the one on which it is shortest."""
-    from shapegcode.shaping import DesignOptions, candidate_periods, design
-
     shaping = machine.shaping
     periods_s = (
         [period_s]
@@ -194,9 +196,6 @@ def shaper_track(
         ArgumentError: no mode varies with position, or modes vary over several axes.
         DesignError: somewhere there is no shaper within the duration and the limit.
     """
-    # SciPy's solvers take a quarter of a second to load: not before they are needed.
-    from shapegcode.shaping.track import MovingMode, design_track
-
     axis = moving_axis(machine)
     if axis is None:
         raise _core.ArgumentError("no mode of the machine file varies with the position of an axis (frequency_over)")

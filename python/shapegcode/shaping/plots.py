@@ -11,7 +11,7 @@ import numpy as np
 from shapegcode._core import MinimalBranches, Shaper, minimal_branches
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
-from shapegcode.shaping.design import Design
+from shapegcode.shaping.designs import Design
 from shapegcode.shaping.result import Recommendation, times_name
 from shapegcode.shaping.shaper_plots import draw_branches, draw_impulses, draw_sensitivity, draw_steps
 

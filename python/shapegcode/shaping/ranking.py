@@ -13,7 +13,7 @@ import numpy as np
 
 from shapegcode._core import ArgumentError
 from shapegcode.shaping.bands import ModeBand
-from shapegcode.shaping.design import Design
+from shapegcode.shaping.designs import Design
 from shapegcode.shaping.registry import FAMILIES
 
 __all__ = ["NO_RESIDUAL", "OBJECTIVES", "SAME", "is_within", "pareto_front", "reason_for", "recommend", "spoken"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from shapegcode._core import ArgumentError, DesignError, Shaper, grid_polynomial
 from shapegcode.shaping.bands import NARROW_PERCENT, ModeBand
-from shapegcode.shaping.design import Design, evaluate
+from shapegcode.shaping.designs import Design, evaluate
 from shapegcode.shaping.families import solvers
 from shapegcode.shaping.families.minimal import solve_minimal
 from shapegcode.shaping.grid_designs import shortest_non_negative
@@ -27,7 +27,7 @@ class Family:
     Attributes:
         name: short name, as it is typed and as it stands in reports.
         title: what people call it.
-        source: where it comes from.
+        source: where it comes from; in full in docs/references.md.
         validity: for which modes and on which times it exists, and what it does not do.
         continuous: whether it can be designed at continuous times.
         on_grid: whether it can be designed on a grid.
@@ -67,7 +67,8 @@ def _robust(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
 
 FAMILIES: tuple[Family, ...] = (
     Family(
-        "zv", "zero vibration, one mode after the other", "paper 002, eq. 1-3; Smith 1958",
+        "zv", "zero vibration, one mode after the other",
+        "Smith 1958; Park, Hong and Danielson 2009 (paper 002), eq. 1-3",
         "any modes, damped or not; exact at the nominal frequencies only", True, True, solvers.repeated("ZV", 1),
     ),
     Family(
@@ -91,12 +92,12 @@ FAMILIES: tuple[Family, ...] = (
         solvers.hump_ei("EI", 1),
     ),
     Family(
-        "ei2", "extra-insensitive, two humps", "Singhose et al. 1997; damped: this project",
+        "ei2", "extra-insensitive, two humps", "Singhose, Porter, Tuttle and Singer 1997; damped: this project",
         "modes damped up to some .45; zero at the nominal frequency, the vibration limit on both sides", True, True,
         solvers.hump_ei("two-hump EI", 2),
     ),
     Family(
-        "ei3", "extra-insensitive, three humps", "Singhose et al. 1997; damped: this project",
+        "ei3", "extra-insensitive, three humps", "Singhose, Porter, Tuttle and Singer 1997; damped: this project",
         "modes damped up to some .3; leaves the vibration limit at the nominal frequency", True, True,
         solvers.hump_ei("three-hump EI", 3),
     ),
@@ -114,7 +115,8 @@ FAMILIES: tuple[Family, ...] = (
         "any modes at continuous times; on a grid it is the family non-negative", True, False, solvers.simultaneous,
     ),
     Family(
-        "minimal", "one tap more than modes", "paper 002, eq. 4-17; searches of this project",
+        "minimal", "one tap more than modes",
+        "Park, Hong and Danielson 2009 (paper 002), eq. 4-17; searches of this project",
         "one to six modes, damped or not, at continuous times (on a grid the polynomial stands for it); exact at the "
         "nominal frequencies only; taps may be negative", True, False, solve_minimal,
     ),

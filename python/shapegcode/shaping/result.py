@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
 from shapegcode.shaping.bands import ModeBand
-from shapegcode.shaping.design import Design
+from shapegcode.shaping.designs import Design
 from shapegcode.shaping.ranking import NO_RESIDUAL, is_within, recommend, spoken
 from shapegcode.shaping.registry import FAMILIES
 

@@ -11,11 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from shapegcode._core import (
     ArgumentError,
@@ -25,71 +20,16 @@ from shapegcode._core import (
     Shaper,
     convolve,
     grid_polynomial,
-    sensitivity_curve,
-    worst_residual,
 )
+from shapegcode.shaping.families.conditions import Conditions
+from shapegcode.shaping.families.grid_search import GridSearch
 
-__all__ = ["Conditions", "ResidualLimit", "Zero", "shortest_on_grid"]
+__all__ = ["joint_title", "shortest_on_grid"]
 
-FloatArray = NDArray[np.float64]
-
-RESIDUAL_LIMIT = 1e-10
-"""Largest residual ratio at a zero of a design that is handed out; the usual one is 1e-16 to 1e-15."""
-
-LIMIT_MARGIN = 1e-3
-"""Share of a tolerated residual that the search leaves unused, so that it ends: the shortest is meant with it."""
 
 _ON_GRID = 1e-9  # periods; forgives the rounding of a quotient
-_SAME_CONDITION = 1e-13  # relative singular value below which two zeros ask for the same thing on this grid
-_TOLERANCES = (1e-10, 1e-9, 1e-8)  # of the linear program; the solver gives up now and then at the first
-_INFEASIBLE = 2
-_SUPPORT_THRESHOLDS = (1e-9, 1e-7, 1e-13)  # magnitudes above one of these are taps
-_FIRST_DIRECTIONS = 8
-_FIRST_FREQUENCIES = 5
-_SWEEP = 65  # frequencies of a band at which new planes are looked for
-_MOST_ROUNDS = 60
-_CENTRES = (0.0, 0.5, 1.0)  # of the duration: starts on the way to the least second central moment
-_CENTRINGS = 4  # steps of that way
 _LONGER = 4  # times the longest duration: how far a refusal looks for what would do
 _HINT_PERIODS = 400  # longest grid that a refusal searches, periods
-
-
-@dataclass(frozen=True)
-class Zero:
-    """A mode of which nothing may be left: `multiplicity` - 1 derivatives of the residual vanish with it."""
-
-    mode: Mode
-    multiplicity: int = 1
-
-
-@dataclass(frozen=True)
-class ResidualLimit:
-    """The most that may be left of a mode (no unit) whose natural frequency lies anywhere in a band (Hz)."""
-
-    mode: Mode
-    lowest_hz: float
-    highest_hz: float
-    limit: float
-
-    def worst(self, shaper: Shaper) -> tuple[float, float]:
-        """Proven bound on the residual over the band, and the frequency (Hz) where it is largest."""
-        found = worst_residual(shaper, self.mode, self.lowest_hz, self.highest_hz)
-        return found.upper_bound, found.frequency_hz
-
-
-@dataclass(frozen=True)
-class Conditions:
-    """What a shaper must satisfy.
-
-    Attributes:
-        zeros: met to rounding.
-        limits: met over their bands.
-        largest_tap: None: no tap is negative; else: the largest magnitude of a tap, either sign.
-    """
-
-    zeros: tuple[Zero, ...] = ()
-    limits: tuple[ResidualLimit, ...] = ()
-    largest_tap: float | None = None
 
 
 def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: float, *, title: str) -> Shaper:
@@ -116,7 +56,7 @@ def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: fl
     for name, value in (("period_s", period_s), ("max_duration_s", max_duration_s)):
         if not (math.isfinite(value) and value > 0.0):
             raise ArgumentError(f"{name} is {value} s: it must be finite and above 0")
-    search = _Search(conditions, period_s)
+    search = GridSearch(conditions, period_s)
     most = _periods(max_duration_s, period_s)
     shaper = search.shortest(most)
     if shaper is not None:
@@ -147,231 +87,6 @@ def _polynomial(conditions: Conditions, period_s: float) -> str:
     except ShapegcodeError as error:
         return f"nor is there a polynomial: {error}"
     return f"the polynomial with its zeros lasts {shaper.duration_s * 1e3:.6g} ms with sum|a| {shaper.abs_sum:.4g}"
-
-
-@dataclass(frozen=True)
-class _Plane:
-    """Re(e^{-j direction} R) <= limit at one frequency, R seen from the middle of the shaper."""
-
-    pole: complex
-    direction: float
-    limit: float
-
-
-class _Search:
-    """The linear programs of one set of conditions; the planes that were found are good for every duration."""
-
-    def __init__(self, conditions: Conditions, period_s: float) -> None:
-        self._conditions = conditions
-        self._period_s = period_s
-        self._planes = [
-            _plane(each, float(frequency_hz), float(direction))
-            for each in conditions.limits
-            for frequency_hz in np.unique(np.linspace(each.lowest_hz, each.highest_hz, _FIRST_FREQUENCIES))
-            for direction in 2.0 * np.pi * np.arange(_FIRST_DIRECTIONS) / _FIRST_DIRECTIONS
-        ]
-
-    def shortest(self, most: int) -> Shaper | None:
-        """The shortest shaper of at most that many periods, or None."""
-        last = self._smallest_feasible(most)
-        while last is not None and last <= most:
-            for taps in self._candidates(last):
-                shaper = self._polished(taps)
-                if shaper is not None:
-                    return shaper
-            last += 1  # what the linear program took for feasible was so within its tolerance only
-        return None
-
-    def _smallest_feasible(self, most: int) -> int | None:
-        """A solution stays one with further taps at zero, so doubling and then halving finds the smallest."""
-        too_few, enough = -1, 0
-        while enough < most and self._feasible(enough) is None:
-            too_few, enough = enough, 2 * enough + 1
-        enough = min(enough, most)
-        if enough <= too_few or self._feasible(enough) is None:
-            return None
-        while enough - too_few > 1:
-            middle = (too_few + enough) // 2
-            if self._feasible(middle) is None:
-                too_few = middle
-            else:
-                enough = middle
-        return enough
-
-    def _candidates(self, last: int) -> list[FloatArray]:
-        """Taps of that many periods, the best first."""
-        feasible = self._feasible(last)
-        rest = [] if feasible is None else [feasible]
-        if self._conditions.largest_tap is not None:
-            best = self._best(last, 0.0)
-            return rest if best is None else [best, *rest]
-
-        def variance(taps: FloatArray) -> float:
-            steps = np.arange(last + 1)
-            return float(taps @ (steps - taps @ steps) ** 2)
-
-        centred = [taps for share in _CENTRES for taps in self._centred(last, share * last)]
-        return [*sorted(centred, key=variance), *rest]
-
-    def _centred(self, last: int, centre: float) -> list[FloatArray]:
-        """Taps on the way from a centre (periods) to a local minimum of the second central moment."""
-        found: list[FloatArray] = []
-        for _ in range(_CENTRINGS):
-            taps = self._best(last, centre)
-            if taps is None:
-                break
-            found.append(taps)
-            mean = float(taps @ np.arange(last + 1))
-            if abs(mean - centre) < 1e-6 * (last + 1):
-                break
-            centre = mean  # the second central moment is concave in the taps: each step lowers it
-        return found
-
-    def _feasible(self, last: int) -> FloatArray | None:
-        """Taps at 0 ... `last` periods that meet the conditions, or None.
-
-        With limits: those whose largest share of its limit is least, until it is below 1 or proven not to be.
-        """
-        for _ in range(_MOST_ROUNDS):
-            found = self._program(last, None)
-            if found is None:
-                return None
-            taps, share = found
-            if share > 1.0 - LIMIT_MARGIN:
-                return None
-            if not self._cut(taps):
-                return taps
-        return None
-
-    def _best(self, last: int, centre: float) -> FloatArray | None:
-        """Taps that meet the conditions with the least second moment about `centre`, or None if none was found.
-
-        `centre` is in periods; taps that may be negative have the least sum of magnitudes instead.
-        """
-        cost = ((np.arange(last + 1) - centre) / max(1, last)) ** 2
-        for _ in range(_MOST_ROUNDS):
-            found = self._program(last, cost)
-            if found is None or not self._cut(found[0]):
-                return None if found is None else found[0]
-        return None
-
-    def _program(self, last: int, cost: FloatArray | None) -> tuple[FloatArray, float] | None:
-        """The taps of least cost, or (None) with the least share of the limits used, and that share.
-
-        The last variable is the share; with a cost it stays below what the margin leaves.
-        """
-        matrix, right = self._equalities(last)
-        planes = self._inequalities(last)
-        limits = np.array([plane.limit for plane in self._planes])
-        objective = np.zeros(last + 1) if cost is None else cost
-        largest = self._conditions.largest_tap
-        if largest is not None:
-            # a tap is the difference of two that are not negative, so that its magnitude is linear
-            matrix, planes = np.hstack([matrix, -matrix]), np.hstack([planes, -planes])
-            objective = np.full(2 * last + 2, 0.0 if cost is None else 1.0)
-        bounds = [(0.0, largest)] * matrix.shape[1] + [(0.0, None if cost is None else 1.0 - LIMIT_MARGIN)]
-        for tolerance in _TOLERANCES:
-            result = linprog(
-                np.append(objective, 1.0 if cost is None else 0.0),
-                A_eq=np.hstack([matrix, np.zeros((len(matrix), 1))]),
-                b_eq=right,
-                A_ub=np.hstack([planes / limits[:, None], -np.ones((len(planes), 1))]) if len(planes) else None,
-                b_ub=np.zeros(len(planes)) if len(planes) else None,
-                bounds=bounds,
-                method="highs-ds",
-                options={"primal_feasibility_tolerance": tolerance, "dual_feasibility_tolerance": tolerance},
-            )
-            if result.status == 0:
-                *_, share = solution = np.asarray(result.x, dtype=np.float64)
-                taps = solution[: last + 1]
-                return taps if largest is None else taps - solution[last + 1 : -1], float(share)
-            if result.status == _INFEASIBLE:
-                return None
-        return None
-
-    def _equalities(self, last: int) -> tuple[FloatArray, FloatArray]:
-        """Matrix and right-hand side of zeros and sum; the zeros' rows are an orthonormal basis of their span.
-
-        Near-equal zeros then cost no precision, and equal ones no row.
-        """
-        rows = []
-        steps = np.arange(last + 1)
-        for zero in self._conditions.zeros:
-            terms = self._terms(zero.mode.pole, last)
-            weighted = [terms * (steps / max(1, last)) ** power for power in range(zero.multiplicity)]
-            rows += [part for each in weighted for part in (each.real, each.imag)]
-        kept = np.empty((0, last + 1))
-        if rows:
-            _, strength, basis = np.linalg.svd(np.array(rows), full_matrices=False)
-            kept = basis[strength > _SAME_CONDITION * strength[0]] * math.sqrt(last + 1)
-        matrix = np.vstack([kept, np.ones(last + 1)])
-        return matrix, np.eye(len(matrix))[-1]
-
-    def _inequalities(self, last: int) -> FloatArray:
-        poles = np.array([plane.pole for plane in self._planes])
-        directions = np.array([plane.direction for plane in self._planes])
-        phases = poles.imag[:, None] * self._period_s * (np.arange(last + 1) - 0.5 * last) - directions[:, None]
-        decay = np.exp(poles.real[:, None] * self._period_s * (last - np.arange(last + 1)))
-        return np.asarray(decay * np.cos(phases), dtype=np.float64)
-
-    def _terms(self, pole: complex, last: int) -> NDArray[np.complex128]:
-        """What each tap leaves of a mode at the instant of the last one."""
-        steps = np.arange(last + 1)
-        decay = np.exp(pole.real * self._period_s * (last - steps))
-        return np.asarray(decay * np.exp(1j * pole.imag * self._period_s * steps), dtype=np.complex128)
-
-    def _cut(self, taps: FloatArray) -> bool:
-        """Add the planes that cut these taps off; False if they meet every limit."""
-        last = len(taps) - 1
-        shaper = Shaper((np.arange(last + 1) * self._period_s).tolist(), (taps / taps.sum()).tolist())
-        before = len(self._planes)
-        for each in self._conditions.limits:
-            worst, frequency_hz = each.worst(shaper)
-            if worst <= each.limit:
-                continue
-            sweep = np.unique(np.linspace(each.lowest_hz, each.highest_hz, _SWEEP))
-            curve = np.array(sensitivity_curve(shaper, each.mode.damping_ratio, sweep.tolist()))
-            padded = np.concatenate([[-1.0], curve, [-1.0]])
-            peaks = sweep[(curve >= padded[:-2]) & (curve >= padded[2:]) & (curve > each.limit)]
-            for frequency in (*peaks.tolist(), frequency_hz):
-                pole = Mode(frequency, each.mode.damping_ratio).pole
-                left = complex(self._terms(pole, last) @ taps)
-                direction = float(np.angle(left)) - pole.imag * self._period_s * 0.5 * last
-                self._planes.append(_Plane(pole, direction, each.limit))
-        return len(self._planes) > before
-
-    def _polished(self, vertex: FloatArray) -> Shaper | None:
-        """The taps solved again to rounding, or None if they then break a condition."""
-        matrix, right = self._equalities(len(vertex) - 1)
-        largest = self._conditions.largest_tap
-        for threshold in _SUPPORT_THRESHOLDS:
-            support = np.flatnonzero(np.abs(vertex) > threshold)
-            taps = vertex[support]
-            free = np.ones(len(taps), dtype=bool)
-            if largest is not None:
-                free = np.abs(taps) < largest - 1e-8
-                taps[~free] = np.copysign(largest, taps[~free])
-            columns = matrix[:, support]
-            for _ in range(3):  # the second removes what the first one's rounding left, the third nothing
-                taps[free] += np.linalg.lstsq(columns[:, free], right - columns @ taps, rcond=1e-14)[0]
-            if abs(taps.sum() - 1.0) <= RESIDUAL_LIMIT and (taps.min() > 0.0 or largest is not None):
-                times = (support - support[0]) * self._period_s
-                shaper = Shaper(times.tolist(), (taps / taps.sum()).tolist())
-                if self._meets(shaper) and float(np.abs(matrix[:-1, support] @ taps).max(initial=0.0)) < RESIDUAL_LIMIT:
-                    return shaper
-        return None
-
-    def _meets(self, shaper: Shaper) -> bool:
-        largest = self._conditions.largest_tap
-        return (
-            all(shaper.residual_ratio(zero.mode) <= RESIDUAL_LIMIT for zero in self._conditions.zeros)
-            and all(each.worst(shaper)[0] <= each.limit for each in self._conditions.limits)
-            and (largest is None or float(np.abs(shaper.amplitudes).max()) <= largest * (1.0 + RESIDUAL_LIMIT))
-        )
-
-
-def _plane(limit: ResidualLimit, frequency_hz: float, direction: float) -> _Plane:
-    return _Plane(Mode(frequency_hz, limit.mode.damping_ratio).pole, direction, limit.limit)
 
 
 def joint_title(name: str, modes: Sequence[Mode]) -> str:

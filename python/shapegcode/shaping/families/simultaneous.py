@@ -2,7 +2,8 @@
 
 A linear program on a fine time grid finds which taps there are and roughly when; Newton's method on amplitudes and
 times together then moves them off the grid to where every mode is cancelled to rounding. In general the shortest such
-shaper of n modes has n+1 taps: it is the shortest non-negative one of the minimal shapers of paper 002.
+shaper of n modes has n+1 taps: it is the shortest non-negative one of the minimal shapers of Park, Hong and
+Danielson 2009 (paper 002).
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapegcode._core import DesignError, Mode, Shaper, convolved_zv
-from shapegcode.shaping.families.on_grid import Conditions, Zero, joint_title, shortest_on_grid
+from shapegcode.shaping.families.conditions import Conditions, Zero
+from shapegcode.shaping.families.on_grid import joint_title, shortest_on_grid
 
 __all__ = ["simultaneous_zv"]
 

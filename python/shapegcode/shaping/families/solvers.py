@@ -19,7 +19,8 @@ from shapegcode._core import (
     repeated_zv,
 )
 from shapegcode.shaping.bands import ModeBand
-from shapegcode.shaping.families.on_grid import Conditions, ResidualLimit, Zero, joint_title, shortest_on_grid
+from shapegcode.shaping.families.conditions import Conditions, ResidualLimit, Zero
+from shapegcode.shaping.families.on_grid import joint_title, shortest_on_grid
 from shapegcode.shaping.families.simultaneous import simultaneous_zv
 from shapegcode.shaping.options import DesignOptions
 from shapegcode.shaping.taps import on_grid
