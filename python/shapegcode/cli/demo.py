@@ -75,38 +75,6 @@ def run(args: argparse.Namespace) -> int:
     return runner.finish(result, args)
 
 
-def _tap(json_target: str | None, folder: str) -> int:
-    from rich.table import Table
-
-    from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.demos.tap import tap_demo
-    from shapegcode.demos.tap_plots import write_demo_pictures
-
-    with progress("paper 003", json_target) as bar:
-        bar.wait()
-        demo = tap_demo()
-        pictures = write_demo_pictures(demo, folder)
-    result = demo.report
-    if json_target is not None:
-        write_json({**result, "pictures": pictures}, json_target)
-    console = output_console(json_target)
-    table = Table(title="Paper 003: mass, damping and stiffness from a tap")
-    table.add_column("section", no_wrap=True)
-    for column in ("what", "paper", "here", "agrees", "note"):
-        table.add_column(column, overflow="fold")
-    verdicts = {True: "yes", False: "NO", None: ""}
-    for row in result["rows"]:
-        table.add_row(
-            row["section"], row["what"], row["paper"], row["here"], verdicts[row["agrees"]], row["note"]
-        )  # fmt: skip
-    console.print(table)
-    console.print(result["remark"], markup=False)
-    console.print(f"pictures: {folder}/paper003-*", markup=False)
-    console.print("next: shapegcode identify --tap-plan", markup=False)
-    return ExitCode.OK if result["agrees"] else ExitCode.OUT_OF_TOLERANCE
-
-
 def _metrology(json_target: str | None, folder: str) -> int:
     from shapegcode.cli import ExitCode
     from shapegcode.cli.console import output_console, progress, write_json
@@ -130,4 +98,4 @@ def _metrology(json_target: str | None, folder: str) -> int:
     return ExitCode.OK
 
 
-_NOT_TYPED = {"tap": _tap, "metrology": _metrology}
+_NOT_TYPED = {"metrology": _metrology}

@@ -1,4 +1,4 @@
-"""Paper 003 repeated: a tap on a body of 5 kg, an end mill, a collet, and both in series under a cutting force.
+"""Back, Ko and Kim, 2003 (paper 003) repeated: a body of 5 kg, an end mill, a collet, and both under a cutting force.
 
 What the paper computes is computed here from the same numbers and printed beside it; where the two differ, the
 difference stays and the reason is said.
@@ -7,7 +7,9 @@ difference stays and the reason is said.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,29 +24,20 @@ from shapegcode._core import (
     poles_to_modes,
     wilson_theta,
 )
+from shapegcode.demos.result import Demonstration, Statement, stated
+from shapegcode.demos.tap_figures import (
+    Body,
+    ColletFigures,
+    EndMillFigures,
+    SeriesFigures,
+    SteppedFigures,
+    SystemFigures,
+)
+from shapegcode.results.json import hidden
 
-__all__ = ["Body", "TapDemo", "tap_demo"]
+__all__ = ["TapDemo", "tap_demo"]
 
 FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Body:
-    """A body on spring and damper: m x'' + c x' + k x = force."""
-
-    mass_kg: float
-    damping_n_s_per_m: float
-    stiffness_n_per_m: float
-
-    @property
-    def frequency_hz(self) -> float:
-        """Undamped natural frequency."""
-        return math.sqrt(self.stiffness_n_per_m / self.mass_kg) / (2.0 * math.pi)
-
-    @property
-    def damping_ratio(self) -> float:
-        """1 = critically damped."""
-        return self.damping_n_s_per_m / (2.0 * math.sqrt(self.mass_kg * self.stiffness_n_per_m))
 
 
 SYSTEM = Body(5.0, 20.0, 4000.0)
@@ -67,54 +60,75 @@ _MILL_MODEL_PHI = (0.6192, -0.9676)
 _MILL_RANGE_KG, _MILL_HALVINGS = (0.1, 100.0), 17
 _MILL_SAMPLES = 2048
 _MILL_FINER = 16
+_MILL_THETA = 1.4  # the usual one
 _CUTTING_FORCE_N = 100.0
-_SLIP = "slip of the paper"
 
 
-@dataclass(frozen=True)
-class TapDemo:
-    """Everything of the demonstration.
+@dataclass(frozen=True, repr=False, kw_only=True)
+class TapDemo(Demonstration):
+    """Mass, damping and stiffness from a tap.
 
     Attributes:
-        report: figures as plain values: `rows` (section, what, paper, here, agrees, note), `agrees`, `system`,
-            `end_mill`, `collet`, `series`, `remark`.
+        system: the body of 5 kg.
+        end_mill: the end mill.
+        collet: the collet.
+        series: both under a force.
         acceleration: of the 5 kg body after 1 N·s, (n,), m/s².
         period_s: of its samples.
     """
 
-    report: dict[str, Any]
-    acceleration: FloatArray
-    period_s: float
+    system: SystemFigures
+    end_mill: EndMillFigures
+    collet: ColletFigures
+    series: SeriesFigures
+    acceleration: FloatArray = field(metadata=hidden())
+    period_s: float = field(metadata=hidden())
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next."""
+        return "shapegcode identify --tap-plan"
 
 
-def tap_demo() -> TapDemo:
-    """The paper's simulation (section 3), its end mill and collet (section 5) and their deflection under 100 N."""
+def tap_demo(on_progress: Callable[[float], None] = lambda _: None) -> TapDemo:
+    """The paper's simulation (section 3), its end mill and collet (section 5) and their deflection under 100 N.
+
+    Args:
+        on_progress: called with the share of the work done, 0 to 1.
+
+    Source: Back, Ko and Kim, 2003 (paper 003).
+    """
     acceleration = _impulse_acceleration(SYSTEM, _PERIOD_S, _SAMPLES)
     system_rows, system = _system(acceleration)
+    on_progress(0.5)
     mill_rows, mill = _end_mill()
     collet_rows, collet = _collet()
     series_rows, series = _series()
-    rows = [*system_rows, *mill_rows, *collet_rows, *series_rows]
-    report = {
-        "rows": rows,
-        "agrees": all(row["agrees"] is not False or row["note"].startswith(_SLIP) for row in rows),
-        "system": system,
-        "end_mill": mill,
-        "collet": collet,
-        "series": series,
-        "remark": (
+    return TapDemo(
+        paper=TapDemo.cited("003"),
+        title="Mass, damping and stiffness from a tap",
+        rows=(*system_rows, *mill_rows, *collet_rows, *series_rows),
+        remark=(
             "The paper's measured records are pictures, so its end mill is repeated from its printed coefficients and "
             "its collet from its equation. Its 'impulse of 1 N' is 1 N·s; its theta is not stated, and 1 gives its phi "
             "to the last digit. Its 4.5078 Hz lies within the rounding of its own phi; exact are 4.5016 Hz. "
             "Deflections are those of the printed stiffnesses."
         ),
-    }
-    return TapDemo(report, acceleration, _PERIOD_S)
+        system=system,
+        end_mill=mill,
+        collet=collet,
+        series=series,
+        acceleration=acceleration,
+        period_s=_PERIOD_S,
+    )
 
 
-def _row(section: str, what: str, paper: str, here: str, agrees: bool | None, note: str = "") -> dict[str, Any]:
-    """A figure of the paper beside ours; None: nothing to agree with."""
-    return {"section": section, "what": what, "paper": paper, "here": here, "agrees": agrees, "note": note}
+_three, _five = partial(stated, "section 3"), partial(stated, "section 5")
+
+
+def _slip(what: str, published: str, ours: str, note: str) -> Statement:
+    """A figure of section 5 that does not follow from the paper's own numbers."""
+    return Statement("section 5", what, published, ours, "explained", note=f"slip of the paper: {note}")
 
 
 def _impulse_acceleration(body: Body, period_s: float, samples: int) -> FloatArray:
@@ -147,7 +161,7 @@ def _half_unit_reach(phi: tuple[float, float], period_s: float) -> tuple[float, 
     return min(found), max(found)
 
 
-def _system(acceleration: FloatArray) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+def _system(acceleration: FloatArray) -> tuple[list[Statement], SystemFigures]:
     """Section 3: the body of 5 kg."""
     wilson = wilson_theta(
         SYSTEM.mass_kg, SYSTEM.damping_n_s_per_m, SYSTEM.stiffness_n_per_m, np.zeros(_SAMPLES), _PERIOD_S,
@@ -158,62 +172,51 @@ def _system(acceleration: FloatArray) -> tuple[list[dict[str, Any]], dict[str, A
         _modes(each.poles, _PERIOD_S) for each in (exact, stepped)
     )
     low_hz, high_hz = _half_unit_reach(_PAPER_PHI, _PERIOD_S)
-    masses = _system_mass(np.asarray(wilson), stepped_hz, stepped_damping)
-    closed, halved = masses["closed_form_kg"], masses["bisection_kg"]
+    closed, halved, halvings = _system_mass(np.asarray(wilson), stepped_hz, stepped_damping)
     omega = 2.0 * math.pi * exact_hz
     rows = [
-        _row(
-            "3", "RMS of the acceleration after 1 N·s", "0.8928", f"{_rms(acceleration):.4f}",
+        _three("RMS of the acceleration after 1 N·s", "0.8928", f"{_rms(acceleration):.4f}",
             _agree(_rms(acceleration), 0.8928, 5e-5), f"by Wilson-theta, theta = 1, {_rms(np.asarray(wilson)):.4f}",
         ),
         *(
-            _row(
-                "3", f"phi{n + 1}", f"{abs(printed):.4f}", f"{stepped.phi[n]:.4f}",
+            _three(f"phi{n + 1}", f"{abs(printed):.4f}", f"{stepped.phi[n]:.4f}",
                 _agree(stepped.phi[n], printed, 5e-5),
                 f"exact {exact.phi[n]:.4f}" + ("" if printed > 0.0 else "; the paper leaves out the sign"),
             )
             for n, printed in enumerate(_PAPER_PHI)
         ),
-        _row("3", "theta1", "0.004", f"{_theta(exact):.4f}", _agree(_theta(exact), 0.004, 1e-3), "exact"),
-        _row(
-            "3", "natural frequency", "4.5078 Hz", f"{exact_hz:.4f} Hz", low_hz <= _PAPER_HZ <= high_hz,
+        _three("theta1", "0.004", f"{_theta(exact):.4f}", _agree(_theta(exact), 0.004, 1e-3), "exact"),
+        _three("natural frequency", "4.5078 Hz", f"{exact_hz:.4f} Hz", low_hz <= _PAPER_HZ <= high_hz,
             f"the rounding of phi allows {low_hz:.3f} ... {high_hz:.3f} Hz; by Wilson-theta {stepped_hz:.3f} Hz",
         ),
-        _row(
-            "3", "damping ratio", "0.0702", f"{exact_damping:.4f}", _agree(exact_damping, _PAPER_DAMPING, 6e-4),
+        _three("damping ratio", "0.0702", f"{exact_damping:.4f}", _agree(exact_damping, _PAPER_DAMPING, 6e-4),
             f"by Wilson-theta {stepped_damping:.4f}",
         ),
-        _row(
-            "3", "eq. 11: 2 zeta omega, omega²", "3.9766, 802.22",
+        _three("eq. 11: 2 zeta omega, omega²", "3.9766, 802.22",
             f"{2.0 * exact_damping * omega:.4f}, {omega**2:.2f}", None, "exact: 4, 800",
         ),
-        _row(
-            "3", "mass in closed form", "(none)", f"{closed:.4f} kg", _agree(closed / SYSTEM.mass_kg, 1.0, 2e-3),
+        _three("mass in closed form", "(none)", f"{closed:.4f} kg", _agree(closed / SYSTEM.mass_kg, 1.0, 2e-3),
             "one simulation instead of a search: RMS is proportional to 1/m",
         ),
-        _row(
-            "3", "mass by bisection, 1 % tolerance", "5.0059 kg", f"{halved:.4f} kg", _agree(halved, 5.0059, 5e-5),
+        _three("mass by bisection, 1 % tolerance", "5.0059 kg", f"{halved:.4f} kg", _agree(halved, 5.0059, 5e-5),
             "a middle of the range: the tolerance, not the data, decides its last digits",
         ),
-        _row(
-            "3", "halvings of 0.001 ... 1000 kg", "12", str(masses["halvings"]), masses["halvings"] == 12,
+        _three("halvings of 0.001 ... 1000 kg", "12", str(halvings), halvings == 12,
         ),
     ]  # fmt: skip
-    return rows, {
-        "phi": exact.phi.tolist(),
-        "theta1": _theta(exact),
-        "rms_m_per_s2": _rms(acceleration),
-        "frequency_hz": exact_hz,
-        "damping_ratio": exact_damping,
-        "wilson_theta": {
-            "theta": _PAPER_THETA,
-            "phi": stepped.phi.tolist(),
-            "rms_m_per_s2": _rms(np.asarray(wilson)),
-            "frequency_hz": stepped_hz,
-            "damping_ratio": stepped_damping,
-        },
-        **masses,
-    }
+    return rows, SystemFigures(
+        phi=tuple(exact.phi.tolist()),
+        theta1=_theta(exact),
+        rms_m_per_s2=_rms(acceleration),
+        frequency_hz=exact_hz,
+        damping_ratio=exact_damping,
+        wilson_theta=SteppedFigures(
+            _PAPER_THETA, 1, stepped_hz, stepped_damping, tuple(stepped.phi.tolist()), _rms(np.asarray(wilson))
+        ),
+        closed_form_kg=closed,
+        bisection_kg=halved,
+        halvings=halvings,
+    )
 
 
 def _theta(model: Arma) -> float:
@@ -224,18 +227,18 @@ def _agree(here: float, paper: float, within: float) -> bool:
     return bool(abs(here - paper) <= within)
 
 
-def _system_mass(response: FloatArray, hertz: float, damping: float) -> dict[str, Any]:
-    """The mass from the simulated record and its impulse, as in the paper: by Wilson-theta, then by halving."""
+def _system_mass(response: FloatArray, hertz: float, damping: float) -> tuple[float, float, int]:
+    """The mass from the simulated record and its impulse, as in the paper: by Wilson-theta, by halving; how often."""
     tap = (np.zeros(_SAMPLES), response, _PERIOD_S, 2.0 * math.pi * hertz, damping)
     low, high = _RANGE_KG
     closed = equivalent_mass_closed_form(*tap, theta=_PAPER_THETA, impulse_n_s=1.0)
     halved = equivalent_mass_bisection(
         *tap, low_kg=low, high_kg=high, tolerance=_TOLERANCE, theta=_PAPER_THETA, impulse_n_s=1.0
     )
-    return {"closed_form_kg": closed.mass_kg, "bisection_kg": halved.mass_kg, "halvings": halved.halvings}
+    return closed.mass_kg, halved.mass_kg, halved.halvings
 
 
-def _end_mill() -> tuple[list[dict[str, Any]], dict[str, Any]]:
+def _end_mill() -> tuple[list[Statement], EndMillFigures]:
     """Section 5: the end mill, from its printed coefficients and its equation."""
     hertz, damping = _of_phi(_MILL_PHI, _MILL_PERIOD_S)
     model_hz, model_damping = _of_phi(_MILL_MODEL_PHI, _MILL_PERIOD_S)
@@ -243,43 +246,28 @@ def _end_mill() -> tuple[list[dict[str, Any]], dict[str, Any]]:
     omega = 2.0 * math.pi * hertz
     stepped = {finer: _stepped_end_mill(finer) for finer in (1, _MILL_FINER)}
     rows = [
-        _row("5", "end mill, table 1: frequency", "1195 Hz", f"{hertz:.1f} Hz", _agree(hertz, 1195.0, 0.5), "6 kHz"),
-        _row("5", "end mill, table 1: damping ratio", "0.013", f"{damping:.4f}", _agree(damping, 0.013, 5e-4)),
-        _row(
-            "5", "end mill, eq. 13: 2 zeta omega, omega²", "195.2, 5.637e7",
+        _five("end mill, table 1: frequency", "1195 Hz", f"{hertz:.1f} Hz", _agree(hertz, 1195.0, 0.5), "6 kHz"),
+        _five("end mill, table 1: damping ratio", "0.013", f"{damping:.4f}", _agree(damping, 0.013, 5e-4)),
+        _five("end mill, eq. 13: 2 zeta omega, omega²", "195.2, 5.637e7",
             f"{2.0 * damping * omega:.1f}, {omega**2:.4g}", _agree(omega**2 / 5.6370064e7, 1.0, 2e-3),
             "with its 0.013 for the damping: 195.2",
         ),
-        _row(
-            "5", "end mill: mass", "0.9 kg", f"{mass:.4f} kg", _agree(mass, 0.9, 5e-3),
+        _five("end mill: mass", "0.9 kg", f"{mass:.4f} kg", _agree(mass, 0.9, 5e-3),
             f"middle {_MILL_HALVINGS} of 0.1 ... 100 kg; the paper's k / omega² = 0.8995",
         ),
-        _row(
-            "5", "end mill, eq. 14: stiffness", "5.07e7 N/m", f"{mass * omega**2:.3g} N/m",
+        _five("end mill, eq. 14: stiffness", "5.07e7 N/m", f"{mass * omega**2:.3g} N/m",
             _agree(mass * omega**2 / END_MILL.stiffness_n_per_m, 1.0, 5e-3), "printed as N/mm",
         ),
-        _row(
-            "5", "end mill, table 2: phi of the model", "1194 Hz, 0.013", f"{model_hz:.1f} Hz, {model_damping:.4f}",
+        _five("end mill, table 2: phi of the model", "1194 Hz, 0.013", f"{model_hz:.1f} Hz, {model_damping:.4f}",
             _agree(model_hz, 1194.0, 0.5),
         ),
-        _row(
-            "5", "end mill, table 2: Wilson-theta at the sampling of the test", "1194 Hz, 0.013",
-            f"{stepped[1][0]:.0f} Hz, {stepped[1][1]:.3f}", None,
+        _five("end mill, table 2: Wilson-theta at the sampling of the test", "1194 Hz, 0.013",
+            f"{stepped[1].frequency_hz:.0f} Hz, {stepped[1].damping_ratio:.3f}", None,
             f"1.25 rad per step is too coarse for it; {_MILL_FINER} steps per sample give "
-            f"{stepped[_MILL_FINER][0]:.0f} Hz, {stepped[_MILL_FINER][1]:.3f}",
+            f"{stepped[_MILL_FINER].frequency_hz:.0f} Hz, {stepped[_MILL_FINER].damping_ratio:.3f}",
         ),
     ]  # fmt: skip
-    return rows, {
-        "frequency_hz": hertz,
-        "damping_ratio": damping,
-        "mass_kg": mass,
-        "stiffness_n_per_m": mass * omega**2,
-        "wilson_theta": {
-            "steps_per_sample": list(stepped),
-            "frequency_hz": [each[0] for each in stepped.values()],
-            "damping_ratio": [each[1] for each in stepped.values()],
-        },
-    }
+    return rows, EndMillFigures(hertz, damping, mass, mass * omega**2, tuple(stepped.values()))
 
 
 def _middle(low: float, high: float, wanted: float, count: int) -> float:
@@ -291,70 +279,55 @@ def _middle(low: float, high: float, wanted: float, count: int) -> float:
     return middle
 
 
-def _stepped_end_mill(steps: int) -> tuple[float, float]:
+def _stepped_end_mill(steps: int) -> SteppedFigures:
     """Frequency and damping of the end mill's response by Wilson-theta with some steps per sample."""
     period_s = _MILL_PERIOD_S / steps
     response = wilson_theta(
         END_MILL.mass_kg, END_MILL.damping_n_s_per_m, END_MILL.stiffness_n_per_m, np.zeros(_MILL_SAMPLES * steps),
-        period_s, velocity_m_per_s=1.0,
+        period_s, theta=_MILL_THETA, velocity_m_per_s=1.0,
     )[2]  # fmt: skip
-    return _modes(arma_decay([response[::steps]], 1).poles, _MILL_PERIOD_S)
+    sampled = np.asarray(response[::steps])
+    model = arma_decay([sampled], 1)
+    return SteppedFigures(
+        _MILL_THETA, steps, *_modes(model.poles, _MILL_PERIOD_S), tuple(model.phi.tolist()), _rms(sampled)
+    )
 
 
-def _collet() -> tuple[list[dict[str, Any]], dict[str, Any]]:
+def _collet() -> tuple[list[Statement], ColletFigures]:
     """Section 5: the collet, of which only the equation is the collet's own."""
     listed = Body(COLLET.mass_kg, _COLLET_DAMPING, COLLET.stiffness_n_per_m)
     rows = [
-        _row(
-            "5", "collet, table 3: frequency", "1195 Hz", f"{COLLET.frequency_hz:.0f} Hz",
-            _agree(COLLET.frequency_hz, 1195.0, 0.5), f"{_SLIP}: table 3 repeats table 1; here from eq. 15",
+        _slip(
+            "collet, table 3: frequency", "1195 Hz", f"{COLLET.frequency_hz:.0f} Hz",
+            "table 3 repeats table 1; here from eq. 15",
         ),
-        _row(
-            "5", "collet, table 3: damping ratio", "0.013",
-            f"{COLLET.damping_ratio:.2f} or {listed.damping_ratio:.3f}", False,
-            f"{_SLIP}: c is 158440 in eq. 15 and 15844 below it",
+        _slip(
+            "collet, table 3: damping ratio", "0.013", f"{COLLET.damping_ratio:.2f} or {listed.damping_ratio:.3f}",
+            "c is 158440 in eq. 15 and 15844 below it",
         ),
     ]  # fmt: skip
-    return rows, {
-        "frequency_hz": COLLET.frequency_hz,
-        "damping_ratio": {"equation": COLLET.damping_ratio, "list": listed.damping_ratio},
-    }
+    return rows, ColletFigures(COLLET.frequency_hz, COLLET.damping_ratio, listed.damping_ratio)
 
 
-def _series() -> tuple[list[dict[str, Any]], dict[str, Any]]:
+def _series() -> tuple[list[Statement], SeriesFigures]:
     """Both under 100 N: the force goes through the end mill into the collet, so their deflections add."""
     mill_um, collet_um = (1e6 * _CUTTING_FORCE_N / each.stiffness_n_per_m for each in (END_MILL, COLLET))
-    total_um = mill_um + collet_um
-    share = 100.0 * mill_um / total_um
     slow_hz, fast_hz, dynamic_share = _chain()
+    figures = SeriesFigures(_CUTTING_FORCE_N, mill_um, collet_um, (slow_hz, fast_hz), dynamic_share)
+    share = figures.end_mill_share_percent
     rows = [
-        _row(
-            "5", "end mill under 100 N", "18 µm", f"{mill_um:.2f} µm", False,
-            f"{_SLIP}: 100 N on its own k = 5.07e7 N/m",
-        ),
-        _row(
-            "5", "collet under 100 N", "0.7 µm", f"{collet_um:.3f} µm", False,
-            f"{_SLIP}: 100 N on its own k = 1.07e9 N/m",
-        ),
-        _row(
-            "5", "share of the end mill in the deflection", f"{100.0 * 18.0 / 18.7:.1f} % (18 of 18.7)",
+        _slip("end mill under 100 N", "18 µm", f"{mill_um:.2f} µm", "100 N on its own k = 5.07e7 N/m"),
+        _slip("collet under 100 N", "0.7 µm", f"{collet_um:.3f} µm", "100 N on its own k = 1.07e9 N/m"),
+        _five(
+            "share of the end mill in the deflection", f"{100.0 * 18.0 / 18.7:.1f} % (18 of 18.7)",
             f"{share:.1f} %", share > 90.0, "most of it is the end mill's: so says the paper too",
         ),
-        _row(
-            "5", "both as one chain: natural frequencies", "(none)", f"{slow_hz:.0f} Hz, {fast_hz:.0f} Hz", None,
-            f"in the slower one the end mill makes {dynamic_share:.0f} % of the tip's deflection",
+        _five(
+            "both as one chain: natural frequencies", "(none)", f"{slow_hz:.0f} Hz, {fast_hz:.0f} Hz",
+            None, f"in the slower one the end mill makes {dynamic_share:.0f} % of the tip's deflection",
         ),
     ]  # fmt: skip
-    return rows, {
-        "force_n": _CUTTING_FORCE_N,
-        "end_mill_um": mill_um,
-        "collet_um": collet_um,
-        "total_um": total_um,
-        "end_mill_share_percent": share,
-        "collet_share_percent": 100.0 - share,
-        "natural_frequencies_hz": [slow_hz, fast_hz],
-        "end_mill_share_of_slow_mode_percent": dynamic_share,
-    }
+    return rows, figures
 
 
 def _chain() -> tuple[float, float, float]:
