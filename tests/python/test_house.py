@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -349,3 +350,65 @@ def test_every_public_name_of_the_extension_is_documented() -> None:
         elif callable(value) and not says_something(name, value.__doc__):
             silent.append(name)
     assert silent == []
+
+
+def public_functions(file: Path) -> Iterator[tuple[str, ast.FunctionDef]]:
+    """The functions of a module and the methods of its classes that anybody may call, without properties."""
+    for node in ast.parse(file.read_text(encoding="utf-8")).body:
+        owner = f"{node.name}." if isinstance(node, ast.ClassDef) else ""
+        for member in node.body if isinstance(node, ast.ClassDef) else [node]:
+            if isinstance(member, ast.FunctionDef) and not owner.startswith("_") and not member.name.startswith("_"):
+                marks = {ast.unparse(mark).partition("(")[0] for mark in member.decorator_list}
+                if not marks & {"overload", "property", "field_validator"}:
+                    yield owner + member.name, member
+
+
+def parameters_of(function: ast.FunctionDef) -> set[str]:
+    given = function.args
+    every = [*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg]
+    return {each.arg for each in every if each is not None} - {"self", "cls"}
+
+
+def described_parameters(function: ast.FunctionDef) -> set[str]:
+    """The names under ``Args:``."""
+    section = re.search(r"^Args:\n((?:    .*\n?|\n(?=    ))*)", ast.get_docstring(function) or "", re.MULTILINE)
+    heads = re.findall(r"^    (\w+(?:, \w+)*):", section[1], re.MULTILINE) if section else []
+    return {name for head in heads for name in head.split(", ")}
+
+
+def silent_on(function: ast.FunctionDef) -> list[str]:
+    """What a docstring does not say; a function without arguments says what it gives in its first line."""
+    doc, takes = ast.get_docstring(function) or "", parameters_of(function)
+    gives = function.returns is not None and ast.unparse(function.returns) not in {"None", "NoReturn"}
+    raises = any(isinstance(node, ast.Raise) and node.exc for node in ast.walk(function))
+    lacks = [f"Args: {name}" for name in sorted(takes - described_parameters(function))]
+    if takes and gives and not re.search(r"^(Returns|Yields):", doc, re.MULTILINE):
+        lacks.append("Returns")
+    return [*lacks, "Raises"] if raises and "Raises:" not in doc else lacks
+
+
+def test_public_names_say_what_they_take_what_they_give_and_what_they_raise() -> None:
+    import shapegcode as sg
+
+    exported: dict[Path, set[str]] = {}
+    for name in sg.__all__:
+        value = getattr(sg, name)
+        if (inspect.isclass(value) or inspect.isfunction(value)) and value.__module__.count(".") > 1:
+            exported.setdefault(Path(inspect.getfile(value)), set()).add(name)
+    offenders = [
+        f"{file.relative_to(PACKAGE)}: {name}: {lacks}"
+        for file, names in exported.items()
+        for name, function in public_functions(file)
+        if name.partition(".")[0] in names and (lacks := silent_on(function))
+    ]
+    assert offenders == []
+
+
+def test_docstrings_name_the_arguments_that_there_are() -> None:
+    offenders = [
+        f"{file.relative_to(PACKAGE)}: {name}: {sorted(described ^ parameters_of(function))}"
+        for file in sorted(PACKAGE.rglob("*.py"))
+        for name, function in public_functions(file)
+        if (described := described_parameters(function)) and described != parameters_of(function)
+    ]
+    assert offenders == []

@@ -99,6 +99,10 @@ def convert(
         budget: what the emitted text may need; None: no limit.
         on_progress: called with stage, regions done and regions in all.
 
+    Returns:
+        The emitted text, where its shaped regions stand, and the verdict on it: `ok`, the figures before and after,
+        every case that was played.
+
     Raises:
         ProgramError: the program cannot be read, or a region not be written.
         DesignError: no shaper exists on this grid.

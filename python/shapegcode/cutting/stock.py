@@ -136,6 +136,12 @@ class Stock(TomlTable):
     def load(cls, path: str | Path) -> Stock:
         """Read a stock file.
 
+        Args:
+            path: the file; names of files in it are relative to its folder.
+
+        Returns:
+            The stock.
+
         Raises:
             StockError: not TOML, or wrong keys or values; every problem is listed.
             OSError: the file cannot be read.
@@ -150,6 +156,9 @@ class Stock(TomlTable):
             text: the text.
             source: name of it in messages.
             folder: what the names of files in it are relative to.
+
+        Returns:
+            The stock.
 
         Raises:
             StockError: not TOML, or wrong keys or values; every problem is listed.
@@ -167,11 +176,27 @@ class Stock(TomlTable):
         return "program"
 
     def beside(self, name: str) -> Path:
-        """The path of a file that this one names."""
+        """The path of a file that this one names.
+
+        Args:
+            name: as it stands in the file.
+
+        Returns:
+            The path, relative to the folder of this file.
+        """
         return self._folder / name
 
     def error(self, key: str, value: str, limit: str) -> StockError:
-        """A key of this file that does not suit the program: its dotted name, its value as TOML, what is wrong."""
+        """A key of this file that does not suit the program: its dotted name, its value as TOML, what is wrong.
+
+        Args:
+            key: dotted name.
+            value: its value as TOML.
+            limit: what is wrong.
+
+        Returns:
+            The error, to be raised, with the line of the key.
+        """
         return StockError(self._source, (Problem(key, value, limit, line_of(key, self._text)),))
 
 

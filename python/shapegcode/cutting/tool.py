@@ -267,6 +267,12 @@ class Tool(TomlTable):
     def load(cls, path: str | Path) -> Tool:
         """Read a tool file.
 
+        Args:
+            path: the file.
+
+        Returns:
+            The tool, its defaults filled in.
+
         Raises:
             ToolError: not TOML, or wrong keys or values; every problem is listed.
             OSError: the file cannot be read.
@@ -276,6 +282,13 @@ class Tool(TomlTable):
     @classmethod
     def from_toml(cls, text: str, source: str = "<text>") -> Tool:
         """Read the text of a tool file; *source* names it in messages.
+
+        Args:
+            text: TOML.
+            source: its name in messages.
+
+        Returns:
+            The tool, its defaults filled in.
 
         Raises:
             ToolError: not TOML, or wrong keys or values; every problem is listed.
@@ -293,7 +306,14 @@ class Tool(TomlTable):
         return _core.EndMill(self.tool.diameter_mm, self.tool.flutes, math.radians(self.tool.helix_deg), runout)
 
     def sense(self, programmed: _core.SpindleSense | None = None) -> _core.SpindleSense:
-        """Sense of the spindle: as the file says, else as *programmed*, else clockwise."""
+        """Sense of the spindle: as the file says, else as *programmed*, else clockwise.
+
+        Args:
+            programmed: by M03 or M04; None: not known.
+
+        Returns:
+            The sense in which the tool turns.
+        """
         match self.tool.spindle:
             case "clockwise":
                 return _core.SpindleSense.clockwise
@@ -314,6 +334,9 @@ class Tool(TomlTable):
         Args:
             spindle_rev_per_min: speed of the spindle, 1/min.
             sense: in which it turns.
+
+        Returns:
+            The model, which gives the force in N from the engagement.
 
         Raises:
             ArgumentError: a speed that is not positive.

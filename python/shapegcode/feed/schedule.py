@@ -60,6 +60,9 @@ def schedule_feed(
         resolution_mm: grid of the material; None: a hundredth of the tool's diameter.
         on_progress: called with the share that is done, 0 to 1.
 
+    Returns:
+        The text with its new feeds, and time, force and load before and after.
+
     Raises:
         ProgramError: the program cannot be read.
         ArgumentError: a value outside its range, no tool, no cutting move.

@@ -76,6 +76,9 @@ def convert_scheduled(
         budget: likewise.
         on_progress: called with the share that is done, 0 to 1.
 
+    Returns:
+        The conversion, and the schedule of the feeds that it runs with.
+
     Raises:
         ProgramError, DesignError, ArgumentError, StockError, RoundTripError: as those two.
     """

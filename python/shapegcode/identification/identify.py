@@ -169,6 +169,9 @@ def identify(
         band_hz: lowest and highest frequency of interest; None: all.
         start_s: time at which a decay begins; None: it is looked for.
 
+    Returns:
+        The modes with their uncertainties, those that were refused and why, and how well they fit.
+
     Raises:
         RecordError: no record can be used; what was found and what is needed.
         OSError: a file cannot be read.

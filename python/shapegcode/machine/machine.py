@@ -96,6 +96,12 @@ class Machine(TomlTable):
         A string without a folder and without ``.toml`` that names a built-in machine is that machine;
         everything else is a path.
 
+        Args:
+            path_or_name: the file, or the name.
+
+        Returns:
+            The machine, its defaults filled in.
+
         Raises:
             MachineError: the file is not TOML or has wrong keys or values; every problem is listed.
             OSError: the file cannot be read.
@@ -113,6 +119,13 @@ class Machine(TomlTable):
     def from_toml(cls, text: str, source: str = "<text>") -> Machine:
         """Read the text of a machine file; *source* names it in messages.
 
+        Args:
+            text: TOML.
+            source: its name in messages.
+
+        Returns:
+            The machine, its defaults filled in.
+
         Raises:
             MachineError: not TOML, or wrong keys or values; every problem is listed.
         """
@@ -121,6 +134,14 @@ class Machine(TomlTable):
     @classmethod
     def from_data(cls, data: dict[str, Any], source: str = "<data>", text: str = "") -> Machine:
         """Validate the tables of a machine file; *source* names it in messages, *text* gives them line numbers.
+
+        Args:
+            data: tables of the file, as TOML gives them.
+            source: their name in messages.
+            text: the file, for line numbers.
+
+        Returns:
+            The machine, its defaults filled in.
 
         Raises:
             MachineError: wrong keys or values; every problem is listed.
@@ -139,6 +160,12 @@ class Machine(TomlTable):
     def builtin_text(cls, name: str) -> str:
         """Text of a built-in machine's file, with its comments.
 
+        Args:
+            name: one of `builtin_names`.
+
+        Returns:
+            The file, word for word.
+
         Raises:
             MachineError: no built-in machine of that name.
         """
@@ -153,6 +180,9 @@ class Machine(TomlTable):
         Args:
             remarks: text for the end of a key's line by its dotted key (modes count from 1:
                 ``axes.x.modes.1.frequency_hz``), for example where the value comes from.
+
+        Returns:
+            The text of the file.
 
         Raises:
             KeyError: a remark for a key that does not exist.

@@ -120,6 +120,9 @@ def stream(
             its start in any case.
         chunk_samples: rows of a piece, at most.
 
+    Returns:
+        Pieces in the order of time: command, response and their lines, of `chunk_samples` rows at most.
+
     Raises:
         ProgramError, OSError: the file cannot be read.
         ArgumentError: a plant, lines or a size that do not exist, or a value that no controller can have.

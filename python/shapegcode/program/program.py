@@ -157,6 +157,9 @@ class Program:
             expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
             collect_alarms: go on behind an alarm and keep all in `core.alarms`.
 
+        Returns:
+            The program: its text to the letter, its cutting regions, what the reader noticed.
+
         Raises:
             ProgramError: the text is no program that can be read; the message starts with ``file:line:column``.
             OSError: the file cannot be read.
@@ -193,6 +196,21 @@ class Program:
         """Read a program text; `source` names it in messages.
 
         Programs that it calls are looked for in the text, in `folder` and in `input.program_folders`.
+
+        Args:
+            text: the program.
+            machine: whose controller reads it; None: the built-in ``vx500``.
+            source: names the text in messages.
+            emitted: the text was written by shapegcode: its arcs are FANUC's, whatever the original's were.
+            probe_lines: ascending line numbers behind which the modal state is kept.
+            program_number: O number to play of a text that holds several; None: the first.
+            expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
+            collect_alarms: go on behind an alarm and keep all in `core.alarms`.
+            folder: where programs that it calls are looked for; None: nowhere but in the text and the machine's
+                folders.
+
+        Returns:
+            The program, as `read` gives it.
 
         Raises:
             ProgramError: the text is no program that can be read; the message starts with ``source:line:column``.
@@ -238,21 +256,46 @@ class Program:
         return self.core.text
 
     def place(self, line: int) -> str:
-        """``file:line`` of the source from which a line of the expanded text comes."""
+        """``file:line`` of the source from which a line of the expanded text comes.
+
+        Args:
+            line: of the expanded text, from 1.
+
+        Returns:
+            The place in words.
+        """
         number, file = self.core.origin(line)
         return f"{file or self.source}:{number}"
 
     def lines(self, region: _core.Region) -> str:
-        """The lines of a region in words: of the source, or of the expanded text."""
+        """The lines of a region in words: of the source, or of the expanded text.
+
+        Args:
+            region: of this program.
+
+        Returns:
+            The lines, first to last.
+        """
         return f"lines {region.first_line} to {region.last_line}{' expanded' if self.core.expanded else ''}"
 
     def region_error(self, region: _core.Region, message: str) -> ProgramError:
-        """An error that names the file and the lines of a region."""
+        """An error that names the file and the lines of a region.
+
+        Args:
+            region: of this program.
+            message: what is wrong there.
+
+        Returns:
+            The error, to be raised.
+        """
         first, file = self.core.origin(region.first_line)
         return located_error(file or self.source, first, 1, f"{self.lines(region)}: {message}")
 
     def refuse_endless(self, limit_s: float) -> None:
         """Refuse a region that cuts for longer than can be computed.
+
+        Args:
+            limit_s: longest time of a region at its programmed feeds, s.
 
         Raises:
             ProgramError: a region takes more than `limit_s` at its programmed feeds.

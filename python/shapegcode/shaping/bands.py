@@ -61,7 +61,14 @@ class ModeBand:
             )
 
     def shifted(self, share: float) -> Mode:
-        """The mode with its frequency moved by `share` (-1 to 1) of the band's half width."""
+        """The mode with its frequency moved by `share` (-1 to 1) of the band's half width.
+
+        Args:
+            share: -1 to 1: the lower end of the band to the upper one.
+
+        Returns:
+            The mode of that frequency, with the same damping.
+        """
         scale = 1.0 + share * self.uncertainty
         return Mode(self.mode.frequency_hz * scale, self.mode.damping_ratio, self.mode.participation)
 

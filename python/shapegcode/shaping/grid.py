@@ -82,6 +82,9 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
         machine: modes and controller.
         block_period_s: a period to use; None: `emission.block_period_s`, or the best one.
 
+    Returns:
+        The grid: block period, shaper for all axes, shapers for stretches of the moving axis.
+
     Raises:
         DesignError: no shaper exists within `shaping.max_duration_s`.
         ArgumentError: the machine has no mode, its modes vary over several axes, or the period does not fit the

@@ -62,6 +62,9 @@ def choose_shaper(
         taps: a shaper of the user's own, compared with the others: as text ("0:.5,10.9ms:.5") or as it is.
         on_progress: called with the share of the work done, 0 to 1.
 
+    Returns:
+        Every design with what it costs and leaves, the one to take and why.
+
     Raises:
         ArgumentError: neither modes nor a machine with modes, equal modes, or a value outside its range.
         DesignError: a mode cannot be cancelled on any of the grids, or no family has a design within the limits.

@@ -159,6 +159,9 @@ class Recommendation(Result):
 
         Args:
             everything: all designs instead.
+
+        Returns:
+            Indices of `designs`.
         """
         if everything:
             return sorted(range(len(self.designs)), key=lambda index: (self.designs[index].duration_s, index))
@@ -186,6 +189,9 @@ class Recommendation(Result):
             speed_mm_per_s: at which the contour cost is shown.
             radius_mm: of the arc on which it is shown.
             everything: all designs, not only those of `shown`.
+
+        Returns:
+            One table, or two where a family was refused.
         """
         found = [self._designs_table(speed_mm_per_s, radius_mm, everything)]
         return [*found, self._refused_table()] if self.refused else found

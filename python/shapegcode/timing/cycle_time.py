@@ -47,6 +47,9 @@ def cycle_time(
         feed_override: scales every programmed feed.
         rapid_override: scales the rapid rates.
 
+    Returns:
+        The whole time in s and where it goes: by part, tool, region and, if asked for, block.
+
     Raises:
         ArgumentError: a value that no controller can have, or a program too long to interpolate.
     """

@@ -213,11 +213,25 @@ class CycleTime(TimeParts, Result):
         return "look at the blocks: --csv FILE."
 
     def slowest_regions(self, count: int = _SLOWEST) -> list[RegionTime]:
-        """The regions that take longest, longest first."""
+        """The regions that take longest, longest first.
+
+        Args:
+            count: how many at most.
+
+        Returns:
+            The regions, longest first.
+        """
         return sorted(self.regions, key=lambda region: -region.duration_s)[:count]
 
     def slowest_blocks(self, count: int = _SLOWEST) -> list[BlockTime]:
-        """The blocks that take longest, longest first."""
+        """The blocks that take longest, longest first.
+
+        Args:
+            count: how many at most.
+
+        Returns:
+            The blocks, longest first; none where the blocks were not asked for.
+        """
         order = np.argsort([-block.duration_s for block in self.blocks], kind="stable")[:count]
         return [self.blocks[index] for index in order]
 
