@@ -100,6 +100,17 @@ def test_a_file_name_does_for_a_program(tmp_path: Path, kind: type[str] | type[P
     assert np.array_equal(streamed.response_mm, other.response_mm)
 
 
+def test_every_function_that_takes_a_program_takes_its_file() -> None:
+    takers = 0
+    for name in sg.__all__:
+        if inspect.isfunction(function := getattr(sg, name)):
+            for parameter in inspect.signature(function).parameters.values():
+                if parameter.name in {"program", "programs", "against"}:
+                    takers += 1
+                    assert "Program | str | Path" in str(parameter.annotation), name
+    assert takers > 7
+
+
 def test_figures_only_keeps_no_samples() -> None:
     machine = sg.Machine.load("vx500")
     simulation = sg.simulate(sg.Program.from_text(GOOD, machine), machine, record_samples=0)

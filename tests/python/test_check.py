@@ -79,6 +79,15 @@ def test_calls_are_told_with_their_callers(tmp_path: Path) -> None:
     assert "called by O1 line 5" in finding.message
 
 
+def test_a_program_that_was_read_is_checked_as_its_file(tmp_path: Path) -> None:
+    (tmp_path / "main.nc").write_text(HEAD + "M98P2\nG1X10.F1000.\n" + END)
+    (tmp_path / "O0002.nc").write_text("%\nO2\nG1X20.F99999.\nM99\n%\n")
+    program = sg.Program.read(tmp_path / "main.nc", machine())
+    assert program.core.expanded
+    assert program.text == (tmp_path / "main.nc").read_bytes()
+    assert sg.check(program, machine()) == sg.check(tmp_path / "main.nc", machine())
+
+
 def test_another_program_of_the_file() -> None:
     text = "%\nO1\nG21\nM30\nO2\nG99.9\nM30\n%\n"
     assert not sg.check_text(text, machine()).refused

@@ -6,7 +6,6 @@ serial line, stop between two cutting moves, run below its F) is worked out from
 
 from __future__ import annotations
 
-import errno
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -25,6 +24,7 @@ from shapegcode.checking.result import (
 from shapegcode.checking.runs import BlockTable, Breaker, CuttingRun, block_table, look_ahead_breakers
 from shapegcode.machine import Machine
 from shapegcode.program import Program
+from shapegcode.program.program import file_bytes
 
 __all__ = ["MOST_FINDINGS", "check", "check_text"]
 
@@ -41,11 +41,11 @@ _NO_ROOM = 70
 _MOST_ALARMS = 200
 
 
-def check(path: str | Path, machine: Machine, *, program_number: int | None = None) -> Check:
-    """Check a program file: what the control would refuse, and what it would not run as programmed.
+def check(program: Program | str | Path, machine: Machine, *, program_number: int | None = None) -> Check:
+    """Check a program: what the control would refuse, and what it would not run as programmed.
 
     Args:
-        path: the file; no `Program`, as what the control refuses is none.
+        program: the file, or what was read of one: a program with alarms can only be checked as a file or a text.
         machine: whose controller would run it.
         program_number: O number to play of a file that holds several; None: the first.
 
@@ -56,11 +56,11 @@ def check(path: str | Path, machine: Machine, *, program_number: int | None = No
         ProgramError: not to be read at all, without a place to point to.
         OSError: the file cannot be read.
     """
-    try:
-        text = Path(path).read_bytes()
-    except OSError as error:
-        raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
-    return check_text(text, machine, source=str(path), program_number=program_number, folder=Path(path).parent)
+    if isinstance(program, Program):
+        text, source, folder = program.text, program.source, program.folder
+    else:
+        text, source, folder = file_bytes(program), str(program), Path(program).parent
+    return check_text(text, machine, source=source, program_number=program_number, folder=folder)
 
 
 def check_text(

@@ -131,10 +131,14 @@ class Program:
     Attributes:
         core: what the core made of it: text, regions (runs of cutting moves between stops), other moves.
         source: name for messages.
+        unexpanded: the text that was read, where the core's is the plain program that it comes to.
+        folder: where programs that it calls are looked for.
     """
 
     core: _core.ProgramText
     source: str
+    unexpanded: bytes | None = None
+    folder: Path | None = None
 
     @classmethod
     def read(
@@ -164,13 +168,8 @@ class Program:
             ProgramError: the text is no program that can be read; the message starts with ``file:line:column``.
             OSError: the file cannot be read.
         """
-        try:
-            text = Path(path).read_bytes()
-        except OSError as error:
-            # A failed read() does not name the file.
-            raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
         return cls.from_text(
-            text,
+            file_bytes(path),
             machine,
             source=str(path),
             program_number=program_number,
@@ -232,10 +231,17 @@ class Program:
         if folders:
             options.load_program = program_loader(folders)
         try:
-            return cls(_core.read_program(data, options), source)
+            core = _core.read_program(data, options)
         except ProgramError as error:
             hint = _absolute_centre_hint(data, options) if _ARC_OFF_RADIUS in str(error) else ""
             raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
+
+        return cls(core, source, data if core.expanded else None, folder)
+
+    @property
+    def text(self) -> bytes:
+        """The text that was read, to the letter."""
+        return self.core.text if self.unexpanded is None else self.unexpanded
 
     @property
     def regions(self) -> list[_core.Region]:
@@ -328,6 +334,24 @@ def _absolute_centre_hint(text: bytes, options: _core.ReaderOptions) -> str:
         return ""
     kind = "absolute" if options.absolute_arc_centres else "incremental"
     return f'; with {kind} I J K the whole program reads: set input.arc_centre = "{kind}"'
+
+
+def file_bytes(path: str | Path) -> bytes:
+    """Content of a file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        Its bytes.
+
+    Raises:
+        OSError: the file cannot be read; it names the file, which a failed read() alone does not.
+    """
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
 
 
 def given_program(program: Program | str | Path, machine: Machine) -> Program:
