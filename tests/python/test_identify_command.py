@@ -273,10 +273,16 @@ def test_what_the_user_says_of_a_file(capsys: pytest.CaptureFixture[str], tmp_pa
 
 
 def test_band_and_number_of_modes(capsys: pytest.CaptureFixture[str], taps: list[str]) -> None:
-    result = asked(capsys, taps[0], "--modes", "2", "--band", "20:300")
+    result = asked(capsys, taps[0], "--modes", "2", "--frequencies", "20:300")
     assert result["order"] == 2
     assert len(result["modes"]) == 2
-    for words in (["--band", "300:20"], ["--band", "20"], ["--modes", "0"], ["--start", "1"], ["--force-scale", "0"]):
+    for words in (
+        ["--frequencies", "300:20"],
+        ["--frequencies", "20"],
+        ["--modes", "0"],
+        ["--start", "1"],
+        ["--force-scale", "0"],
+    ):
         assert main(["identify", taps[0], *words]) == 2
         assert "must be" in capsys.readouterr().err
 

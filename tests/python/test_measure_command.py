@@ -182,7 +182,18 @@ def test_programs_of_different_parts_have_tables_of_their_own(folder: Path, caps
 
 
 def test_sections_by_lines_and_options(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["--lines", "6-7", "--band", "5um", "--station", "0.02mm", "--cutoff", "2.5mm", "--lambda-s", "0.1mm"]
+    words = [
+        "--lines",
+        "6-7",
+        "--settling-band",
+        "5um",
+        "--station",
+        "0.02mm",
+        "--cutoff",
+        "2.5mm",
+        "--lambda-s",
+        "0.1mm",
+    ]
     report = measured(capsys, "part.nc", *words, code=1)
     (section,) = report["programs"][0]["sections"]
     assert section["kind"] == "curve"
@@ -207,7 +218,7 @@ def test_feed_drives(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["part.nc", "--lines", "9-8"], "'9-8': must be lines, first to last"),
         (["part.nc", "--lines", "100-200"], "part.nc: no cutting move in lines 100-200"),
         (["part.nc", "--lines", "5-6", "--lines", "6-7"], "lines 5 to 6 and 6 to 7 overlap"),
-        (["part.nc", "--band", "0um"], "must be a length above 0"),
+        (["part.nc", "--settling-band", "0um"], "must be a length above 0"),
         (["gone.nc"], "gone.nc: no such file"),
         (["shaped.nc", "--against", "short.nc"], "it was not made from that program"),
         (["part.nc", "--json", "part.nc"], "part.nc would overwrite part.nc"),

@@ -386,7 +386,9 @@ def test_points_for_thousands(tmp_path: Path) -> None:
 def test_times_of_the_day(tmp_path: Path) -> None:
     lines = [f"10:15:00,{500 * k:06d};{k},0;{k},5" for k in range(COUNT)]
     text = "Zeit;Kraft [N];Beschleunigung Y [m/s²]\n" + "\n".join(lines) + "\n"
-    with pytest.raises(RecordError, match=r":2: column 1 \(Zeit\) '10:15:00,000000' is a time of the day.*--period"):
+    with pytest.raises(
+        RecordError, match=r":2: column 1 \(Zeit\) '10:15:00,000000' is a time of the day.*--sample-period"
+    ):
         read(tmp_path, text)
     record = only(read(tmp_path, text, period_s=5e-4))
     assert (record.period_s, record.start_s, record.axis) == (5e-4, 0.0, "y")

@@ -59,7 +59,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="largest number of modes that is tried (default: %(default)s)",
     )
     parser.add_argument(
-        "--band", metavar="LOW:HIGH", type=_band, default=None, help="look for modes between these frequencies, Hz"
+        "--frequencies",
+        metavar="LOW:HIGH",
+        type=_band,
+        default=None,
+        help="look for modes between these frequencies, Hz",
     )
     parser.add_argument(
         "--decay",
@@ -92,7 +96,11 @@ def _add_file_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--force-unit", metavar="UNIT", default=None, help="N, kN, kgf or lbf")
     group.add_argument("--response-unit", metavar="UNIT", default=None, help="for example m/s^2, g, mm/s or um")
     group.add_argument(
-        "--period", metavar="TIME", type=seconds, default=None, help="time between two samples, for example 0.1ms"
+        "--sample-period",
+        metavar="TIME",
+        type=seconds,
+        default=None,
+        help="time between two samples, for example 0.1ms",
     )
     group.add_argument(
         "--quantity",
@@ -163,7 +171,7 @@ def _identify(args: argparse.Namespace) -> int:
             _read_options(args),
             most_modes=args.most_modes,
             modes=args.modes,
-            band_hz=args.band,
+            band_hz=args.frequencies,
             start_s=args.start,
         )
         if args.plots is not None and test.found is not None:
@@ -223,7 +231,7 @@ def _read_options(args: argparse.Namespace) -> ReadOptions:
         time_unit=args.time_unit,
         force_unit=args.force_unit,
         response_unit=args.response_unit,
-        period_s=args.period,
+        period_s=args.sample_period,
         quantity=args.quantity,
         force_scale=args.force_scale,
         response_scale=args.response_scale,

@@ -57,7 +57,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="measure the cut of these lines as one section; may be repeated (default: every line and arc)",
     )
     parser.add_argument(
-        "--band", metavar="LENGTH", type=micrometres, default=1.0, help="settled is what stays within it (default: 1um)"
+        "--settling-band",
+        metavar="LENGTH",
+        type=micrometres,
+        default=1.0,
+        help="settled is what stays within it (default: 1um)",
     )
     parser.add_argument(
         "--station",
@@ -113,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
             plant=args.plant,
             against=against,
             lines=args.lines,
-            band_um=args.band,
+            band_um=args.settling_band,
             station_spacing_mm=args.station * 1e-3,
             cutoff_mm=None if args.cutoff is None else args.cutoff * 1e-3,
             lambda_s_mm=args.lambda_s * 1e-3,

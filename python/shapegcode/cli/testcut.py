@@ -108,7 +108,7 @@ def _add_cut_arguments(parser: argparse.ArgumentParser, *, many_feeds: bool = Fa
     if many_feeds:
         parser.add_argument(
             "-F",
-            "--feed",
+            "--feeds",
             metavar="F,F,...",
             type=_list,
             required=True,
@@ -229,7 +229,7 @@ def _conditions(args: argparse.Namespace, machine: Machine) -> Conditions:
     spindle = args.spindle if args.spindle is not None else tool.feed.spindle_rev_per_min
     if spindle is None:
         raise ArgumentError(f"{args.tool} has no feed.spindle_rev_per_min: state the spindle speed with -S")
-    feed = args.feed[0] if isinstance(args.feed, tuple) else args.feed
+    feed = args.feeds[0] if args.action == "taper" else args.feed
     return Conditions(machine, tool, spindle, feed, args.axial_depth, args.up)
 
 
@@ -238,7 +238,7 @@ def _design(args: argparse.Namespace, machine: Machine, given: Conditions) -> De
 
     diameter = 2.0 * given.tool.radius_mm
     if args.action == "taper":
-        feeds = args.feed if len(args.feed) > 1 else tuple(args.feed[0] * share for share in (0.5, 1.0, 2.0))
+        feeds = args.feeds if len(args.feeds) > 1 else tuple(args.feeds[0] * share for share in (0.5, 1.0, 2.0))
         depths = args.radial_depth or (0.05 * diameter, 0.35 * diameter)
         return taper_cut(given, feeds, depths, args.length)
     corner = _corner(args, diameter)

@@ -66,7 +66,7 @@ def even_period(times_s: FloatArray, stated_s: float | None = None) -> tuple[flo
         raise UnevenTimeError(
             row,
             f"time {times_s[row]:.9g} s is repeated: must ascend; if the file gives too few digits, leave the time out "
-            "and state the period (--period)",
+            "and state the period (--sample-period)",
         )
     usual = float(np.median(steps))
     if not coarse:

@@ -107,7 +107,7 @@ class _Chooser:
                     return None
                 raise RecordError(
                     f"{self.where}: no column of time; {self._listed()}; needed is one called time (or t, Zeit), "
-                    "--time-column, or the period (--period)"
+                    "--time-column, or the period (--sample-period)"
                 )
             index = found[0]
             if len(found) > 1:
