@@ -23,7 +23,8 @@ from table import markdown
 from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
-from shapegcode.demos.corner_study import CASES, CornerCase, CornerStudy, study_corner
+from shapegcode.demos.corner_program import CASES, CornerCase
+from shapegcode.demos.corner_study import CornerStudy, study_corner
 from shapegcode.feed.plan import limits_of
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.schedule import MARGIN, schedule_feed

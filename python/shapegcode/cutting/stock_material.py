@@ -44,6 +44,9 @@ def build_material(
         machine: whose controller runs the programs.
         others: further cutting moves, which take part in the layers but not in the walls of an allowance.
 
+    Returns:
+        The material, to be swept by the program's moves.
+
     Raises:
         StockError: the stock does not suit the program, or its roughing program cannot be swept.
         ToolError: the tool file of the roughing program is bad.

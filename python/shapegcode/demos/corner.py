@@ -1,6 +1,6 @@
 """Cornering cuts: three corners in closed form, the feeds of the paper's equation 7, and the scheduler on the same.
 
-What the paper says (Kim and Ko, 2000; paper 001 in docs/references.md) is printed beside what is computed from its
+What the paper says (Kim and Ko, 2001; paper 001 in docs/references.md) is printed beside what is computed from its
 numbers; where the two differ, the difference stays.
 """
 
@@ -10,7 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from shapegcode.demos.corner_figures import DIAMETER_MM, CornerFigures, corner_figures
-from shapegcode.demos.corner_study import BLOCK_MM, CASES, STRAIGHT_MM, CornerStudy, study_corner
+from shapegcode.demos.corner_program import BLOCK_MM, CASES, STRAIGHT_MM
+from shapegcode.demos.corner_study import CornerStudy, study_corner
 from shapegcode.demos.result import Demonstration, Statement, stated
 from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
@@ -74,7 +75,7 @@ def corner_demo(on_progress: Callable[[float], None] = lambda _done: None) -> Co
     Args:
         on_progress: called with the share that is done, 0 to 1.
 
-    Source: Kim and Ko, 2000 (paper 001), table 1, equation 7 and figures 6, 9, 11 and 12.
+    Source: Kim and Ko, 2001 (paper 001), table 1, equation 7 and figures 6, 9, 11 and 12.
     """
     machine = Machine.load("vx500")
     studies: list[CornerStudy] = []

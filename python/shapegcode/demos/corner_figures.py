@@ -7,14 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapegcode.demos.corner_study import (
-    ALLOWANCE_MM,
-    AXIAL_DEPTH_MM,
-    TOOL_RADIUS_MM,
-    AlongCorner,
-    CornerStudy,
-    Scheduled,
-)
+from shapegcode.demos.corner_program import ALLOWANCE_MM, AXIAL_DEPTH_MM, TOOL_RADIUS_MM
+from shapegcode.demos.corner_study import AlongCorner, CornerStudy, Scheduled
 from shapegcode.feed.result import FeedRange, ResultantForce
 from shapegcode.results.result import Pair
 

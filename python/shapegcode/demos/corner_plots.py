@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.demos.corner import CornerDemo
-from shapegcode.demos.corner_study import AXIAL_DEPTH_MM, STRAIGHT_MM, TOOL_RADIUS_MM, AlongCorner, CornerStudy
-from shapegcode.feed.plots import draw_walls
+from shapegcode.demos.corner_program import AXIAL_DEPTH_MM, STRAIGHT_MM, TOOL_RADIUS_MM
+from shapegcode.demos.corner_study import AlongCorner, CornerStudy
+from shapegcode.feed.wall_plot import draw_walls
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
 from itertools import pairwise
 
 import numpy as np
@@ -14,53 +12,34 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
+from shapegcode.demos.corner_program import (
+    ALLOWANCE_MM,
+    AXIAL_DEPTH_MM,
+    BLOCK_MM,
+    STRAIGHT_MM,
+    TOOL_RADIUS_MM,
+    CornerCase,
+    corner_program,
+    program_name,
+    stock_text,
+    tool_text,
+)
 from shapegcode.feed.result import FeedSchedule, ResultantForce
 from shapegcode.feed.schedule import schedule_feed
 from shapegcode.feed.travel import OrdinaryMotion
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 
-__all__ = ["CASES", "AlongCorner", "CornerCase", "CornerStudy", "Scheduled", "study_corner"]
+__all__ = ["AlongCorner", "CornerStudy", "Scheduled", "study_corner"]
 
 Vector = npt.NDArray[np.float64]
 
-TOOL_RADIUS_MM = 4.0
-ALLOWANCE_MM = 0.8
-AXIAL_DEPTH_MM = 15.0
-FEED_MM_PER_REV = 0.12
-BLOCK_MM = 0.6
-STRAIGHT_MM = 30.0
 _STEP_MM = 0.02
 _FINER = 401
 _LEAST_BLOCK_SHARE = 0.1
 _DEEPER = 1.0 + 1e-6
 _FEEDS_MM_PER_MIN = (1.0, 2000.0)  # within which a feed is searched
 _WITHIN = 0.95
-
-
-@dataclass(frozen=True)
-class CornerCase:
-    """A row of table 1.
-
-    Attributes:
-        number: of the case.
-        rough_radius_mm: of the corner as roughing left it.
-        finish_radius_mm: of the corner to be made.
-        spindle_rev_per_min: speed of the spindle.
-    """
-
-    number: int
-    rough_radius_mm: float
-    finish_radius_mm: float
-    spindle_rev_per_min: float
-
-    @property
-    def feed_mm_per_min(self) -> float:
-        """As programmed."""
-        return FEED_MM_PER_REV * self.spindle_rev_per_min
-
-
-CASES = (CornerCase(1, 8.0, 8.0, 1800.0), CornerCase(2, 4.0, 4.0, 2000.0), CornerCase(3, 8.0, 4.0, 2000.0))
 
 
 @dataclass(frozen=True)
@@ -184,7 +163,7 @@ def study_corner(case: CornerCase, machine: Machine) -> CornerStudy:
         STRAIGHT_MM,
     )  # fmt: skip
     track = cut.track(AXIAL_DEPTH_MM, _STEP_MM)
-    plain = Tool.from_toml(_tool_text(), "paper001_tool.toml")
+    plain = Tool.from_toml(tool_text(), "paper001_tool.toml")
     force = plain.force(case.spindle_rev_per_min)
     programmed = _along(force, track, np.full(len(track), case.feed_mm_per_min))
     borders, feeds = _equation7(cut, track, programmed)
@@ -248,11 +227,11 @@ def _scheduled(
     machine: Machine,
 ) -> Scheduled:
     tool = Tool.from_toml(
-        _tool_text(f'[limits]\nresultant_n = {target_n!r}\nresultant = "peak"\n'), "paper001_tool.toml"
+        tool_text(f'[limits]\nresultant_n = {target_n!r}\nresultant = "peak"\n'), "paper001_tool.toml"
     )
-    stock = Stock.from_toml(_stock_text(case), "paper001_stock.toml")
+    stock = Stock.from_toml(stock_text(case), "paper001_stock.toml")
     text = corner_program(case, cut, case.feed_mm_per_min)
-    result = schedule_feed(Program.from_text(text, machine, source=_source(case)), machine, tool, stock)
+    result = schedule_feed(Program.from_text(text, machine, source=program_name(case)), machine, tool, stock)
     window_s = 60.0 / (tool.tool.flutes * case.spindle_rev_per_min)
     stations = np.asarray(track.s_mm)
     motion = OrdinaryMotion(machine)
@@ -266,49 +245,5 @@ def _scheduled(
     limits = _core.FeedLimits(peak_resultant_n=target_n)
     constant = float(np.min(_core.largest_feeds(force, track, limits, *_FEEDS_MM_PER_MIN)[0]))
     constant = math.floor(10.0 * constant) / 10.0  # as it can be written
-    _, constant_s = run(Program.from_text(corner_program(case, cut, constant), machine, source=_source(case)))
+    _, constant_s = run(Program.from_text(corner_program(case, cut, constant), machine, source=program_name(case)))
     return Scheduled(result, text, _along(force, track, feeds), time_s, constant, constant_s)
-
-
-def corner_program(case: CornerCase, cut: _core.CornerCut, feed_mm_per_min: float) -> str:
-    """The corner as a FANUC program: line, arc where there is one, line."""
-    path = cut.path(feed_mm_per_min / 60.0)
-    start = path[0].start_mm
-    moves: Sequence[str] = [_move(path[i], case.finish_radius_mm - TOOL_RADIUS_MM) for i in range(len(path))]
-    return "\n".join(
-        [
-            "%",
-            f"O{1000 + case.number}",
-            "G21 G17 G90 G94",
-            f"M03 S{case.spindle_rev_per_min:.0f}",
-            f"G00 X{start[0]:.3f} Y{start[1]:.3f}",
-            f"G00 Z{-AXIAL_DEPTH_MM:.3f}",
-            f"{moves[0]} F{feed_mm_per_min:g}",
-            *moves[1:],
-            "G00 Z10.",
-            "M30",
-            "%",
-            "",
-        ]
-    )
-
-
-def _move(segment: _core.Segment, radius_mm: float) -> str:
-    place = f"X{segment.end_mm[0]:.3f} Y{segment.end_mm[1]:.3f}"
-    return f"G03 {place} R{radius_mm:.3f}" if segment.kind == _core.SegmentKind.arc else f"G01 {place}"
-
-
-def _source(case: CornerCase) -> str:
-    return f"corner case {case.number}"
-
-
-def _tool_text(limits: str = "") -> str:
-    text = (resources.files("shapegcode") / "data" / "milling" / "paper001_tool.toml").read_text(encoding="utf-8")
-    return f"{text}\n{limits}"
-
-
-def _stock_text(case: CornerCase) -> str:
-    return (
-        f"[allowance]\nallowance_mm = {ALLOWANCE_MM!r}\ncorner_radius_mm = {case.rough_radius_mm!r}\n"
-        f'wall = "right"\nz_mm = [{-AXIAL_DEPTH_MM!r}, 0.0]\n'
-    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,13 +12,14 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.traces import FeedTraces, envelope, groups
+from shapegcode.feed.wall_plot import draw_walls
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_walls", "plot_along_path", "plot_path", "plot_walls", "plots_of"]
+__all__ = ["plot_along_path", "plot_path", "plot_walls", "plots_of"]
 
 Vector = npt.NDArray[np.float64]
 
@@ -276,58 +276,3 @@ def plot_walls(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
         (_BEFORE, _AFTER), along="distance along the cutting path in mm",
         title="Form error of the wall; +: material is left standing", part=_summary(schedule),
     )  # fmt: skip
-
-
-def draw_walls(
-    ax: Axes | None, edges_mm: Vector, height_mm: Vector, maps: Mapping[str, Vector], colours: Sequence[str], *,
-    along: str, title: str, part: str,
-) -> Axes:  # fmt: skip
-    """Maps of the wall's error below each other in one scale, and in the last panel the largest of each column.
-
-    Args:
-        ax: where to draw; None: a new figure.
-        edges_mm: of the columns, (m + 1,).
-        height_mm: above the tip, evenly spaced, (h,).
-        maps: error in µm by name, (m, h); NaN: no wall.
-        colours: of their curves in the last panel.
-        along: name of the axis along the wall.
-        title: of the whole picture.
-        part: which part of the program it shows.
-
-    Returns:
-        The uppermost panel.
-    """
-    everything = np.concatenate([each[np.isfinite(each)] for each in maps.values()])
-    low, high = min(float(everything.min()), 0.0), max(float(everything.max()), 0.0)
-    high = high if high > low else low + 1e-3
-    rows = plot.grid(
-        ax, len(maps) + 1, 1, size_inch=(11.0, 1.3 + 1.9 * (len(maps) + 1)), sharex=True, title=title, part=part,
-    )  # fmt: skip
-    panels = [row[0] for row in rows]
-    step = height_mm[1] - height_mm[0]
-    levels = np.concatenate([height_mm - 0.5 * step, height_mm[-1:] + 0.5 * step])
-    for panel, (name, values) in zip(panels, maps.items(), strict=False):
-        panel.grid(False)
-        panel.spines[["top", "right"]].set_visible(True)
-        panel.set_facecolor("#efefef")
-        mesh = panel.pcolormesh(
-            edges_mm, levels, np.ma.masked_invalid(values.T), cmap="viridis", vmin=low, vmax=high, rasterized=True,
-        )  # fmt: skip
-        panel.set_ylim(levels[0], levels[-1])
-        panel.set_ylabel("height above\nthe tip in mm")
-        worst = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0
-        panel.set_title(f"{name}: up to {worst:.3g} µm", loc="left", fontsize=10)
-    whole: Any = panels[0].figure
-    whole.colorbar(mesh, ax=panels[:-1], pad=0.01, label="error of the wall in µm")
-    last = panels[-1]
-    for (name, values), colour in zip(maps.items(), colours, strict=True):
-        made = np.isfinite(values).any(axis=1)
-        largest = np.full(len(values), np.nan)
-        largest[made] = np.nanmax(np.abs(values[made]), axis=1)
-        last.stairs(largest, edges_mm, baseline=None, color=colour, linewidth=1.1, label=name)
-    last.set_ylim(bottom=0.0)
-    last.margins(x=0.0)
-    last.set_ylabel("largest over\nthe height in µm")
-    last.set_xlabel(along)
-    plot.legend_above(last)
-    return plot.aligned(panels)

@@ -96,6 +96,16 @@ def schedule_survey(
 ) -> FeedSchedule:
     """As :func:`schedule_feed`, for a program whose engagement is known already.
 
+    Args:
+        surveyed: what the tool meets.
+        machine: as `schedule_feed`.
+        motion: likewise.
+        margin: likewise.
+        on_progress: likewise.
+
+    Returns:
+        The program with its new feeds, and what they gain.
+
     Raises:
         ArgumentError: a margin outside its range.
         RoundTripError: the written text would not be equivalent: a defect of shapegcode.
