@@ -1,4 +1,4 @@
-"""The pictures of ``shapegcode demo corner``: figures 6, 9, 11 and 12 of paper 001, and the scheduler."""
+"""The pictures of ``shapegcode demo corner``: the figures of Kim and Ko, 2001 (paper 001), and the scheduler."""
 
 from __future__ import annotations
 

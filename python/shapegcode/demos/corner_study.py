@@ -1,4 +1,4 @@
-"""A corner of paper 001: its engagement in closed form, its force, its feeds by equation 7, and the scheduler on it."""
+"""A corner of Kim and Ko, 2001 (paper 001): engagement in closed form, force, feeds by equation 7, the scheduler on it."""
 
 from __future__ import annotations
 

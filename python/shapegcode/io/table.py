@@ -171,7 +171,7 @@ class TextTable:
                 if is_clock_time(cell):
                     raise RecordError(
                         f"{self.path}:{number}: column {index + 1}{name} {cell!r} is a time of the day, which is not "
-                        "read: state the time between two samples (for example --sample-period 0.1ms), or export seconds"
+                        "read: state the time between samples (for example --sample-period 0.1ms), or export seconds"
                     )
                 if not finite:
                     kind = "is empty" if not cell else f"{cell!r} is not a finite number"
