@@ -5,6 +5,8 @@ from shapegcode._core import (
     CornerCut as CornerCut,
     CuttingCoefficients as CuttingCoefficients,
     EndMill as EndMill,
+    FeedDrive as FeedDrive,
+    FeedDriveRealTime as FeedDriveRealTime,
     FeedLimit as FeedLimit,
     FeedLimits as FeedLimits,
     Fir as Fir,
@@ -26,6 +28,7 @@ from shapegcode._core import (
     largest_feed as largest_feed,
     largest_feeds as largest_feeds,
     layer_borders as layer_borders,
+    linear_model as linear_model,
     minimal_branches as minimal_branches,
     minimal_shapers as minimal_shapers,
     minimal_two_mode as minimal_two_mode,
@@ -60,8 +63,10 @@ from shapegcode.cutting.tool import Tool as Tool
 from shapegcode.errors import (
     ArgumentError as ArgumentError,
     DesignError as DesignError,
+    FileError as FileError,
     MachineError as MachineError,
     NumericError as NumericError,
+    Problem as Problem,
     ProgramError as ProgramError,
     RecordError as RecordError,
     RoundTripError as RoundTripError,
@@ -94,9 +99,11 @@ from shapegcode.metrology.measure import (
     Measurement as Measurement,
     measure as measure,
 )
+from shapegcode.model.drives import drive_parameters as drive_parameters
 from shapegcode.model.response import plant_response as plant_response
 from shapegcode.model.stream import stream as stream
 from shapegcode.program import Program as Program
+from shapegcode.results.result import Pair as Pair, Result as Result, Xyz as Xyz
 from shapegcode.shaping import (
     ModeBand as ModeBand,
     Recommendation as Recommendation,

@@ -26,6 +26,9 @@ def drive_parameters(machine: Machine) -> list[_core.FeedDriveParameters]:
     Args:
         machine: with a table ``[axes.x.drive]``, and so for y and z.
 
+    Returns:
+        Parameters of X, Y and Z, in SI units.
+
     Raises:
         MachineError: an axis has no such table, or its loop is unstable.
     """

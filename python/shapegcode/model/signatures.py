@@ -15,14 +15,8 @@ __all__ = ["with_signature"]
 
 T = TypeVar("T")
 
-# What the core calls a type, and what a reader does; the first that fits counts.
-_WORDS = (
-    ("typing.SupportsFloat | typing.SupportsIndex", "float"),
-    ("typing.SupportsInt | typing.SupportsIndex", "int"),
-    ("collections.abc.", ""),
-    ("shapegcode._core.", ""),
-)
-_ARRAY = "typing.Annotated[numpy.typing.ArrayLike"
+# What the core calls a number, and what a reader does.
+_NUMBERS = (("SupportsFloat | SupportsIndex", "float"), ("SupportsInt | SupportsIndex", "int"))
 
 
 def with_signature(value: T) -> T:
@@ -95,12 +89,24 @@ def _value(default: ast.expr | None) -> Any:
     return ast.literal_eval(default)
 
 
+class _Short(ast.NodeTransformer):
+    """``typing.Annotated[numpy.typing.ArrayLike, ...]`` as ``ArrayLike``: names alone, without notes."""
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+        """The first of what is annotated; every other subscript as it is."""
+        noted = ast.unparse(node.value) == "typing.Annotated" and isinstance(node.slice, ast.Tuple)
+        self.generic_visit(node)
+        return node.slice.elts[0] if noted and isinstance(node.slice, ast.Tuple) else node
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        """The name without its modules."""
+        return ast.Name(node.attr)
+
+
 def _words(annotation: ast.expr | None) -> Any:
     if annotation is None:
         return inspect.Parameter.empty
-    text = ast.unparse(annotation)
-    if text.startswith(_ARRAY):
-        return "ArrayLike"
-    for core, word in _WORDS:
+    text = ast.unparse(_Short().visit(annotation))
+    for core, word in _NUMBERS:
         text = text.replace(core, word)
     return text

@@ -118,6 +118,9 @@ class Result:
     def save_plots(self, folder: str | Path) -> list[str]:
         """Write every picture as PNG and SVG into a folder, which is made where it is missing.
 
+        Args:
+            folder: where to; made where it is missing.
+
         Returns:
             The files written.
 
