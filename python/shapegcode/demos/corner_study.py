@@ -1,4 +1,4 @@
-"""A corner of Kim and Ko, 2001 (paper 001): engagement in closed form, force, feeds by equation 7, the scheduler on it."""
+"""A corner of Kim and Ko, 2001 (paper 001): engagement in closed form, force, feeds by equation 7, the scheduler."""
 
 from __future__ import annotations
 
