@@ -96,9 +96,10 @@ from shapegcode.machine.result import (
     describe_machine as describe_machine,
 )
 from shapegcode.metrology.measure import (
-    Measurement as Measurement,
     measure as measure,
+    measure_samples as measure_samples,
 )
+from shapegcode.metrology.result import Measurement as Measurement
 from shapegcode.model.drives import drive_parameters as drive_parameters
 from shapegcode.model.response import plant_response as plant_response
 from shapegcode.model.stream import stream as stream

@@ -94,8 +94,8 @@ def test_a_file_name_does_for_a_program(tmp_path: Path, kind: type[str] | type[P
     file = kind(tmp_path / "part.nc")
     program = sg.Program.read(file, machine)
     assert sg.simulate(file, machine).to_dict() == sg.simulate(program, machine).to_dict()
-    assert sg.measure([file], machine, 3.0).report() == sg.measure(program, machine, 3.0).report()
-    assert sg.measure(file, machine, 3.0, against=file).programs[0].against == str(file)
+    assert sg.measure([file], machine, 3.0).to_dict() == sg.measure(program, machine, 3.0).to_dict()
+    assert sg.measure(file, machine, 3.0, against=file).programs[0].measured_against == str(file)
     streamed, other = (next(sg.stream(each, machine)) for each in (file, program))
     assert np.array_equal(streamed.response_mm, other.response_mm)
 

@@ -20,9 +20,10 @@ from scipy import ndimage, optimize, spatial
 import shapegcode as sg
 from acceptance import machine_with
 from shapegcode import _core
-from shapegcode.demos.metrology import metrology_demo
+from shapegcode.demos.metrology import MetrologyDemo, SpecimenCase, metrology_demo
 from shapegcode.demos.path import path_program
-from shapegcode.metrology.measure import MeasuredRegion
+from shapegcode.metrology.figures import FittedCircle
+from shapegcode.metrology.result import MeasuredRegion
 from shapegcode.model.machine_model import MachineModel
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -242,11 +243,12 @@ def test_a_shaped_program_is_measured_against_the_original() -> None:
     named = sg.measure(emitted, machine, TOOL_MM, against=original)
     alone = sg.measure(emitted, machine, TOOL_MM)
     assert [each.shaped for each in both.programs] == [False, True]
-    assert both.programs[1].against == named.programs[0].against == original.source
+    assert both.programs[1].measured_against == named.programs[0].measured_against == original.source
     assert both.programs[1].contour_error_um == named.programs[0].contour_error_um
     # Its own path hides what the shaper did to the programmed one.
-    assert alone.programs[0].against == emitted.source
-    assert alone.programs[0].contour_error_um < 0.6 * named.programs[0].contour_error_um
+    assert alone.programs[0].measured_against == emitted.source
+    hidden, seen = (each.programs[0].contour_error_um.response.max for each in (alone, named))
+    assert hidden < 0.6 * seen
     assert [section.section.kind.name for section in both.programs[1].regions[-1].figures.sections] == [
         "line", "arc", "line",
     ]  # fmt: skip
@@ -302,39 +304,46 @@ def test_a_program_without_cuts_measures_nothing() -> None:
 
 
 @functools.cache
-def demo() -> dict[str, Any]:
-    return metrology_demo().report
+def demo() -> MetrologyDemo:
+    return metrology_demo()
 
 
-def case(feed: int, name: str) -> dict[str, Any]:
-    return next(row for row in demo()["cases"] if (row["feed_mm_per_s"], row["program"]) == (feed, name))
+def case(feed: int, name: str) -> SpecimenCase:
+    return next(row for row in demo().cases if (row.feed_mm_per_s, row.program) == (feed, name))
+
+
+def arc_of(row: SpecimenCase) -> FittedCircle:
+    arc = row.sections[1].arc
+    assert arc is not None
+    assert arc.response is not None
+    return arc.response
 
 
 def test_the_band_narrows_and_the_radius_moves_as_the_model_must() -> None:
     unshaped, ideal = case(200, "unshaped"), case(200, "shaped 1 %, paper's shaper")
     kept = case(200, "contour-preserving")
-    bands = [row["sections"][1]["wall_deviation_um"]["left"]["band"] for row in (unshaped, ideal, kept)]
+    bands = [row.sections[1].wall_deviation_um.left.band or 0.0 for row in (unshaped, ideal, kept)]
     assert bands[0] == pytest.approx(49.0, abs=1.0)
     assert bands[1] == pytest.approx(24.0, abs=1.0)
     assert bands[2] < 10.0
-    radii = [row["sections"][1]["arc"]["response"]["radius_deviation_um"] for row in (unshaped, ideal)]
+    radii = [arc_of(row).radius_deviation_um for row in (unshaped, ideal)]
     assert radii[0] == pytest.approx(20.0, abs=2.0)
     assert radii[1] == pytest.approx(-13.0, abs=1.0)
     # Mean radius of both axes' magnification of a circle: each has its own mode.
     for feed in (100, 200):
-        arc = case(feed, "unshaped")["sections"][1]["arc"]["response"]
+        arc = arc_of(case(feed, "unshaped"))
         gains = [1.0 / (1.0 - (feed / 20.0 / (2 * math.pi * f)) ** 2) for f in (46.0, 131.0)]
-        assert arc["mean_radius_deviation_um"] == pytest.approx((sum(gains) / 2 - 1) * 20e3, rel=0.05)
+        assert arc.mean_radius_deviation_um == pytest.approx((sum(gains) / 2 - 1) * 20e3, rel=0.05)
 
 
 def test_the_document_states_what_the_demo_gives() -> None:
     text = (ROOT / "docs" / "metrology.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (100|200) \| ([^|]+) \| (\d+\.\d+) \|[^|]+\| ([\d.]+) \| ([\d.]+) / ([\d.]+) / ([\d.]+) \|",
                       text, re.MULTILINE)  # fmt: skip
-    assert len(rows) == len(demo()["cases"])
+    assert len(rows) == len(demo().cases)
     for feed, name, radius, band, *roughness in rows:
-        sections = case(int(feed), name.strip())["sections"]
-        assert sections[1]["arc"]["inside_wall"]["fitted_radius_mm"] == pytest.approx(float(radius), abs=1e-3)
-        assert sections[1]["wall_deviation_um"]["left"]["band"] == pytest.approx(float(band), abs=0.11)
-        for section, stated in zip(sections, roughness, strict=True):
-            assert section["roughness"]["left"]["ra_um"] == pytest.approx(float(stated), abs=0.006)
+        row = case(int(feed), name.strip())
+        assert row.inside_radius_mm == pytest.approx(float(radius), abs=1e-3)
+        assert row.sections[1].wall_deviation_um.left.band == pytest.approx(float(band), abs=0.11)
+        for section, stated in enumerate(roughness):
+            assert row.left_wall_um(section, "ra_um") == pytest.approx(float(stated), abs=0.006)

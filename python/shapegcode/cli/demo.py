@@ -63,8 +63,6 @@ def run(args: argparse.Namespace) -> int:
     from shapegcode.demos.result import Demonstration
 
     runner.check_files(args)
-    if args.name in _NOT_TYPED:
-        return _NOT_TYPED[args.name](args.json, args.plots or _FOLDER)
     module = _DEMOS[args.name][0]
     found = importlib.import_module(f"shapegcode.demos.{module}")
     demo: Callable[[Callable[[float], None]], Demonstration] = getattr(found, f"{module}_demo")
@@ -73,29 +71,3 @@ def run(args: argparse.Namespace) -> int:
     if args.plots is None and result.plots():
         args.plots = _FOLDER
     return runner.finish(result, args)
-
-
-def _metrology(json_target: str | None, folder: str) -> int:
-    from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, progress, write_json
-    from shapegcode.demos.metrology import metrology_demo
-    from shapegcode.metrology.plots import write_measurement_pictures
-    from shapegcode.metrology.tables import demo_table
-
-    with progress("paper 000", json_target) as bar:
-        bar.wait()
-        demo = metrology_demo()
-        pictures = write_measurement_pictures(demo.drawn, folder)
-    result = demo.report
-    if json_target is not None:
-        write_json({**result, "pictures": pictures}, json_target)
-    console = output_console(json_target)
-    for feed in sorted({row["feed_mm_per_s"] for row in result["cases"]}):
-        console.print(demo_table(result, feed))
-    console.print(result["remark"], markup=False)
-    console.print(f"pictures (highest feed): {folder}/measure-*", markup=False)
-    console.print("next: shapegcode measure YOUR.NC SHAPED.NC -m YOUR_MACHINE.toml --tool-diameter 3mm", markup=False)
-    return ExitCode.OK
-
-
-_NOT_TYPED = {"metrology": _metrology}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.options import (
@@ -13,7 +12,6 @@ from shapegcode.cli.options import (
     line_range,
     load_machine,
     micrometres,
-    refuse_same_file,
 )
 
 __all__ = ["add_arguments", "run"]
@@ -94,28 +92,22 @@ def run(args: argparse.Namespace) -> int:
         ProgramError, MachineError, ArgumentError: bad input.
         OSError: a file cannot be read or written.
     """
-    from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, progress, write_json
+    from shapegcode.cli import runner
     from shapegcode.metrology.measure import measure
-    from shapegcode.metrology.tables import measurement_tables, next_step, verdicts
     from shapegcode.program import Program
-    from shapegcode.results.table import warning_table
 
+    runner.check_files(args)
     machine = load_machine(args)
-    names = [*args.inputs, *([args.against] if args.against is not None else [])]
-    if args.json not in (None, "-"):
-        refuse_same_file([Path(args.json)], [Path(name) for name in [*names, args.machine]])
-    with progress("measuring", args.json) as bar:
-        programs = [Program.read(name, machine, program_number=args.program) for name in args.inputs]
-        against = None
-        if args.against is not None:
-            against = Program.read(args.against, machine, program_number=args.program)
+    with runner.progress("measuring", args) as bar:
+        names = [*args.inputs, *([args.against] if args.against is not None else [])]
+        read = [Program.read(name, machine, program_number=args.program) for name in names]
+        count = len(args.inputs)
         measurement = measure(
-            programs,
+            read[:count],
             machine,
             args.tool_diameter * 1e-3,
             plant=args.plant,
-            against=against,
+            against=read[count] if len(read) > count else None,
             lines=args.lines,
             band_um=args.settling_band,
             station_spacing_mm=args.station * 1e-3,
@@ -123,36 +115,5 @@ def run(args: argparse.Namespace) -> int:
             lambda_s_mm=args.lambda_s * 1e-3,
             on_progress=lambda done, total: bar.update(done / total),
         )
-        report = measurement.report()
-        if args.plots is not None:
-            from shapegcode.metrology.plots import write_measurement_pictures
-
-            report["plots"] = write_measurement_pictures(measurement, args.plots)
-    if args.json is not None:
-        write_json(report, args.json)
-    console = output_console(args.json)
-    for table in measurement_tables(report, every_section=args.all):
-        console.print(table)
-    for program in report["programs"]:
-        console.print(_said(program), markup=False, soft_wrap=True)
-    warnings = list(dict.fromkeys(warning for program in report["programs"] for warning in program["warnings"]))
-    if warnings:
-        console.print(warning_table(warnings))
-    if args.plots is not None:
-        drawn = f"{args.plots}/measure-*" if report["plots"] else "none, as no walls were measured"
-        console.print(f"pictures: {drawn}", markup=False, soft_wrap=True)
-    for verdict in verdicts(report):
-        console.print(verdict, markup=False, soft_wrap=True)
-    console.print(f"next: {next_step(report)}", markup=False)
-    return ExitCode.OK if measurement.within_tolerance else ExitCode.OUT_OF_TOLERANCE
-
-
-def _said(program: dict[str, object]) -> str:
-    name, against = program["program"], program["measured_against"]
-    how = "block by block, as a shaped program" if program["shaped"] else "with the controller's own motion"
-    path = "its own path" if against == name else f"the path of {against}"
-    judged = ""
-    if program["within_tolerance"] is None:
-        judged = ", which is not the programmed one" if program["shaped"] else ", to compare the shaped with"
-        judged += ": not judged"
-    return f"{name}: played {how}, measured against {path}{judged}"
+    tables = measurement.tables(every_section=args.all)
+    return runner.finish(measurement, args, tables=tables, notes=[program.how for program in measurement.programs])

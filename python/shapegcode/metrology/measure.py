@@ -17,13 +17,14 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.metrology.sections import MeasuredProgram, MeasuredRegion, Measurement, WallProfile
+from shapegcode.metrology.figures import MeasuredSection, WallProfile
+from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import machine_warnings, region_range_warnings
 from shapegcode.program import Program, given_program
 from shapegcode.program.program import written_by_shapegcode
 
-__all__ = ["MeasuredProgram", "MeasuredRegion", "Measurement", "WallProfile", "measure", "measure_run"]
+__all__ = ["measure", "measure_samples"]
 
 FloatArray = npt.NDArray[np.float64]
 _MOST_SAMPLES = 100_000_000  # set-points of a region: a minute or two of computing
@@ -74,7 +75,7 @@ def measure(
         on_progress: called with regions done and regions in all.
 
     Returns:
-        Per program and section: contour error, form, walls, roughness and vibration, in µm.
+        The figures of every section of every program, and which of them keep `tolerance.contour_um`.
 
     Raises:
         ArgumentError: no program, one without cuts, a value outside its range, lines that hold no cut, or a program
@@ -88,18 +89,8 @@ def measure(
     several = [given_program(each, machine) for each in given]
     if not several:
         raise _core.ArgumentError("no program to measure")
-    for name, value in (("tool diameter", tool_diameter_mm), ("station spacing", station_spacing_mm)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise _core.ArgumentError(f"{name} is {value:g} mm, must be above 0")
-    if tool_diameter_mm > _LARGEST_TOOL_MM:
-        raise _core.ArgumentError(f"tool diameter is {tool_diameter_mm:g} mm, must be at most {_LARGEST_TOOL_MM:g} mm")
-    if station_spacing_mm < _LEAST_SPACING_MM:
-        raise _core.ArgumentError(
-            f"station spacing is {station_spacing_mm:g} mm, must be at least {_LEAST_SPACING_MM:g} mm"
-        )
-    for name, value in (("cut-off", cutoff_mm if cutoff_mm is not None else 0.0), ("lambda s", lambda_s_mm)):
-        if not (math.isfinite(value) and value >= 0.0):
-            raise _core.ArgumentError(f"{name} is {value:g} mm, must be at least 0")
+    settings = _Settings(tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm)
+    settings.check()
     shaped = [written_by_shapegcode(program) for program in several]
     if against is not None:
         against = given_program(against, machine)
@@ -108,50 +99,105 @@ def measure(
     for program in several if against is None else [against]:
         if not program.regions:
             raise _core.ArgumentError(f"{program.source}: no cutting move, so there is nothing to measure")
-    options = _core.MetrologyOptions()
-    options.period_s = machine.controller.interpolation_period_s
-    options.tool_radius_mm = tool_diameter_mm / 2.0
-    options.station_spacing_mm = station_spacing_mm
-    options.band_mm = band_um * 1e-3
-    options.cutoff_mm = cutoff_mm or 0.0
-    options.lambda_s_mm = lambda_s_mm
-    total = sum(len(program.regions) for program in several)
-    measured: list[MeasuredProgram] = []
-    done = 0
-    for program, is_shaped in zip(several, shaped, strict=True):
+    total, done = sum(len(program.regions) for program in several), 0
+
+    def one_done() -> None:
+        nonlocal done
+        done += 1
+        on_progress(min(done, total), total)
+
+    limit_um = machine.tolerance.contour_um
+    beside = [(each.source, ours, (against or each).source) for each, ours in zip(several, shaped, strict=True)]
+    measured = []
+    for program, is_shaped, counts in zip(several, shaped, _judged(beside), strict=True):
         nominal = against or program
-        program.refuse_endless(_MOST_SAMPLES * options.period_s)
+        program.refuse_endless(_MOST_SAMPLES * machine.controller.interpolation_period_s)
         jobs = _jobs(program, nominal, machine, is_shaped, lines)
-        regions: list[MeasuredRegion] = []
-        kept = 0
-        for job in jobs:
-            region = measure_run(
-                _samples(job, machine, plant, is_shaped),
-                job.path,
-                job.sections,
-                options,
-                (job.nominal.first_line, job.nominal.last_line),
-                keep_walls=kept < _MOST_PROFILE_STATIONS,
+        regions = list(_measured_regions(jobs, machine, plant, is_shaped, settings, one_done))
+        measured.append(
+            MeasuredProgram.of(
+                regions,
+                program=program.source,
+                shaped=is_shaped,
+                measured_against=nominal.source,
+                limit_um=limit_um if counts else None,
+                warnings=[
+                    *program.warnings,
+                    *machine_warnings(machine),
+                    *region_range_warnings(program.regions, machine),
+                    *_spacing_warnings(regions, station_spacing_mm),
+                ],
             )
-            kept += sum(wall.distance_mm.size for wall in region.walls if wall is not None)
-            regions.append(region)
-            done += 1
-            on_progress(min(done, total), total)
-        warnings = [
-            *program.warnings,
-            *machine_warnings(machine),
-            *region_range_warnings(program.regions, machine),
-            *(
-                f"lines {region.lines[0]} to {region.lines[1]}: so long a path that its walls are measured every "
-                f"{region.station_spacing_mm:.3g} mm, not every {station_spacing_mm:g} mm"
-                for region in regions
-                if region.station_spacing_mm > station_spacing_mm
-            ),
-        ]
-        measured.append(MeasuredProgram(program.source, is_shaped, nominal.source, tuple(regions), tuple(warnings)))
+        )
     return Measurement(
-        machine, plant, tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm, tuple(measured)
-    )  # fmt: skip
+        machine=machine.name,
+        plant=plant,
+        tool_diameter_mm=tool_diameter_mm,
+        settling_band_um=band_um,
+        station_spacing_mm=station_spacing_mm,
+        roughness_cutoff_mm=cutoff_mm,
+        roughness_lambda_s_mm=lambda_s_mm,
+        contour_tolerance_um=limit_um,
+        programs=tuple(measured),
+    )
+
+
+def _judged(programs: Sequence[tuple[str, bool, str]]) -> list[bool]:
+    """Which programs are held against the tolerance; each: its name, whether it is shaped, against what it is measured.
+
+    Shaped programs beside the programmed path; what they are compared with only stands beside them. Without such a
+    program the others. A shaped program's own path is not the programmed one: it is not judged against that.
+    """
+    beside = [shaped and against != name for name, shaped, against in programs]
+    return beside if any(beside) else [not shaped for _, shaped, _ in programs]
+
+
+def _spacing_warnings(regions: Iterable[MeasuredRegion], asked_mm: float) -> Iterator[str]:
+    for region in regions:
+        if region.station_spacing_mm > asked_mm:
+            yield (
+                f"lines {region.lines[0]} to {region.lines[1]}: so long a path that its walls are measured every "
+                f"{region.station_spacing_mm:.3g} mm, not every {asked_mm:g} mm"
+            )
+
+
+@dataclass(frozen=True)
+class _Settings:
+    """With what programs are measured; see `measure`."""
+
+    tool_diameter_mm: float
+    band_um: float
+    station_spacing_mm: float
+    cutoff_mm: float | None
+    lambda_s_mm: float
+
+    def check(self) -> None:
+        """Refuse what nobody can measure with, before anything is played."""
+        for name, value in (("tool diameter", self.tool_diameter_mm), ("station spacing", self.station_spacing_mm)):
+            if not (math.isfinite(value) and value > 0.0):
+                raise _core.ArgumentError(f"{name} is {value:g} mm, must be above 0")
+        if self.tool_diameter_mm > _LARGEST_TOOL_MM:
+            raise _core.ArgumentError(
+                f"tool diameter is {self.tool_diameter_mm:g} mm, must be at most {_LARGEST_TOOL_MM:g} mm"
+            )
+        if self.station_spacing_mm < _LEAST_SPACING_MM:
+            raise _core.ArgumentError(
+                f"station spacing is {self.station_spacing_mm:g} mm, must be at least {_LEAST_SPACING_MM:g} mm"
+            )
+        for name, value in (("cut-off", self.cutoff_mm or 0.0), ("lambda s", self.lambda_s_mm)):
+            if not (math.isfinite(value) and value >= 0.0):
+                raise _core.ArgumentError(f"{name} is {value:g} mm, must be at least 0")
+
+    def core(self, period_s: float) -> _core.MetrologyOptions:
+        """The same for the core."""
+        options = _core.MetrologyOptions()
+        options.period_s = period_s
+        options.tool_radius_mm = self.tool_diameter_mm / 2.0
+        options.station_spacing_mm = self.station_spacing_mm
+        options.band_mm = self.band_um * 1e-3
+        options.cutoff_mm = self.cutoff_mm or 0.0
+        options.lambda_s_mm = self.lambda_s_mm
+        return options
 
 
 @dataclass(frozen=True)
@@ -220,33 +266,83 @@ def _short_mm(path: _core.Path, machine: Machine, *, own_blocks: bool) -> float:
     return max(_SHORT_MM, _BLOCKS_PER_CURVE * path.fastest_feed_mm_per_s * machine.controller.block_time_s)
 
 
-def measure_run(
+def measure_samples(
+    chunks: Iterable[tuple[FloatArray, FloatArray]],
+    path: _core.Path,
+    period_s: float,
+    tool_diameter_mm: float,
+    *,
+    lines: tuple[int, int] = (1, 1),
+    band_um: float = 1.0,
+    station_spacing_mm: float = 0.05,
+    cutoff_mm: float | None = None,
+    lambda_s_mm: float = 0.0,
+) -> MeasuredRegion:
+    """Measure samples of command and response against a path, wherever they come from.
+
+    Args:
+        chunks: command and response, (n, 3) each, mm, piece by piece; the first sample is at the start of the path.
+        path: what was programmed.
+        period_s: time between two samples.
+        tool_diameter_mm: of the disc that is swept along the response.
+        lines: first and last of the path in its program, for reports.
+        band_um: settled is what stays within this of the command.
+        station_spacing_mm: see `measure`.
+        cutoff_mm: see `measure`.
+        lambda_s_mm: see `measure`.
+
+    Returns:
+        The figures of the path and of its sections.
+
+    Raises:
+        ArgumentError: a value outside its range, arrays of other shapes, or values that are not finite.
+    """
+    settings = _Settings(tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm)
+    settings.check()
+    return _measured(chunks, path, _core.path_sections(path), settings, period_s, lines)
+
+
+def _measured_regions(
+    jobs: Iterable[_Job],
+    machine: Machine,
+    plant: str,
+    shaped: bool,
+    settings: _Settings,
+    on_done: Callable[[], None],
+) -> Iterator[MeasuredRegion]:
+    """Every region of a program, played and measured."""
+    kept = 0
+    for number, job in enumerate(jobs, start=1):
+        samples = _samples(job, machine, plant, shaped)
+        lines = (job.nominal.first_line, job.nominal.last_line)
+        period_s, keep = machine.controller.interpolation_period_s, kept < _MOST_PROFILE_STATIONS
+        region = _measured(samples, job.path, job.sections, settings, period_s, lines, number, keep_walls=keep)
+        kept += sum(each.walls.distance_mm.size for each in region.sections if each.walls is not None)
+        yield region
+        on_done()
+
+
+def _measured(
     chunks: Iterable[tuple[FloatArray, FloatArray]],
     path: _core.Path,
     sections: list[_core.PathSection],
-    options: _core.MetrologyOptions,
+    settings: _Settings,
+    period_s: float,
     lines: tuple[int, int],
+    region: int = 1,
     *,
     keep_walls: bool = True,
 ) -> MeasuredRegion:
-    """Measure samples of command and response, wherever they come from.
-
-    Args:
-        chunks: command and response, (n, 3) each, mm, one row per `options.period_s`.
-        path: what was programmed.
-        sections: of this path, in order.
-        options: with what is measured.
-        lines: first and last of the region, for reports.
-        keep_walls: keep the profiles of the walls.
-
-    Raises:
-        ArgumentError: an option outside its range, arrays of other shapes, or values that are not finite.
-    """
-    metrology = _core.SectionMetrology(path, sections, options)
+    metrology = _core.SectionMetrology(path, sections, settings.core(period_s))
     for command, response in chunks:
         metrology.feed(command, response)
-    walls = tuple(_wall(metrology, index) if keep_walls else None for index in range(len(sections)))
-    return MeasuredRegion(lines, path, metrology.finish(), walls, metrology.station_spacing_mm)
+    walls = [_wall(metrology, index) if keep_walls else None for index in range(len(sections))]
+    figures = metrology.finish()
+    found = (
+        MeasuredSection.of(each, region, settings.tool_diameter_mm, wall)
+        for each, wall in zip(figures.sections, walls, strict=True)
+    )
+    return MeasuredRegion(lines, path, figures, tuple(found), metrology.station_spacing_mm)
 
 
 def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:

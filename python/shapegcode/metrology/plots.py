@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.metrology.measure import MeasuredProgram, MeasuredRegion, Measurement, WallProfile
-from shapegcode.results import plot as canvas
+from shapegcode.metrology.figures import WallProfile
+from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement
+from shapegcode.results import plot
+from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_part", "plot_walls", "write_measurement_pictures"]
+__all__ = ["plot_part", "plot_walls", "plots_of"]
 
 FloatArray = npt.NDArray[np.float64]
 _SHARE_OF_TOOL = 0.8  # of the tool's radius that the largest deviation takes in the drawing
@@ -23,40 +25,26 @@ _LEAST_DRAWN_UM = 1e-3
 _MOST_MARKED = 12
 
 
-def write_measurement_pictures(measurement: Measurement, folder: str | Path) -> list[str]:
-    """Write the part and the walls of the region whose walls leave their place most, as PNG and SVG.
-
-    Returns:
-        The files written; none where no walls were measured.
-
-    Raises:
-        OSError: the folder cannot be made or a file not be written.
-    """
-    number = _region_to_draw(measurement)
-    if number is None:
-        return []
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for suffix in canvas.FORMATS:
-        for name, plot in (("measure-part", plot_part), ("measure-walls", plot_walls)):
-            file = folder / f"{name}{suffix}"
-            plot(file, measurement, number)
-            written.append(str(file))
-    return written
+def plots_of(measurement: Measurement) -> dict[str, Plot]:
+    """Its pictures by name: of the region whose walls leave their place most; none where no walls were measured."""
+    if _worst_region(measurement) is None:
+        return {}
+    return {"measure-part": partial(plot_part, measurement), "measure-walls": partial(plot_walls, measurement)}
 
 
-def plot_part(file: str | Path, measurement: Measurement, region: int) -> None:
+def plot_part(measurement: Measurement, ax: Axes | None = None, *, region: int | None = None) -> Axes:
     """The slot from above: nominal walls in grey, those of each program magnified.
 
     Args:
-        file: ``.png`` or ``.svg``.
         measurement: what was measured.
-        region: index of the region, whose walls were kept.
+        ax: where to draw; None: a new figure.
+        region: index of the region; None: the one whose walls leave their place most.
+
+    Returns:
+        The panel.
 
     Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+        ValueError: no walls were measured there.
     """
     radius = measurement.tool_diameter_mm / 2.0
     drawn = _drawn(measurement, region)
@@ -64,84 +52,78 @@ def plot_part(file: str | Path, measurement: Measurement, region: int) -> None:
     extent = float(np.ptp(everything, axis=0).max())
     largest_mm = max(_largest_um(each) for _, each in drawn) * 1e-3
     magnified = _round(max(_SHARE_OF_TOOL * radius, _SHARE_OF_PART * extent) / max(largest_mm, _LEAST_DRAWN_UM * 1e-3))
-    figure = canvas.figure(7.5, 7.5)
-    panel = figure.subplots()
-    nominal = _joined(drawn[0][1])
-    for side in (radius, -radius):
-        panel.plot(*_edge(nominal, np.zeros(nominal.left_um.size), side).T, color=canvas.GREY, linewidth=0.9)
-    panel.plot(*nominal.point_mm.T, color=canvas.GREY, linewidth=0.6, linestyle=(0, (8, 3, 2, 3)))
-    for number, (program, each) in enumerate(drawn):
-        colour = canvas.COLOURS[number % len(canvas.COLOURS)]
-        wall = _joined(each)
-        for deviation, side in ((wall.left_um, radius), (wall.right_um, -radius)):
-            label = _label(program) if side > 0.0 else None
-            panel.plot(*_edge(wall, deviation * 1e-3 * magnified, side).T, color=colour, linewidth=1.2, label=label)
-    panel.set_aspect("equal")
-    panel.set_xlabel("X in mm")
-    panel.set_ylabel("Y in mm")
-    panel.spines[["top", "right"]].set_visible(False)
-    canvas.legend_above(panel)
     title = (
         f"Walls cut by a tool of {measurement.tool_diameter_mm:g} mm, deviations magnified {magnified:g} times "
         f"(1 mm drawn is {1e3 / magnified:g} µm)"
     )
-    canvas.heading(figure, title, _part(drawn[0][1]))
-    canvas.save(figure, file)
+    ((panel,),) = plot.grid(ax, 1, 1, size_inch=(7.5, 7.5), title=title, part=_part(drawn[0][1]))
+    nominal = _joined(drawn[0][1])
+    for side in (radius, -radius):
+        panel.plot(*_edge(nominal, np.zeros(nominal.left_um.size), side).T, color=plot.GREY, linewidth=0.9)
+    panel.plot(*nominal.point_mm.T, color=plot.GREY, linewidth=0.6, linestyle=(0, (8, 3, 2, 3)))
+    for number, (program, each) in enumerate(drawn):
+        wall = _joined(each)
+        for deviation, side in ((wall.left_um, radius), (wall.right_um, -radius)):
+            label = program.name if side > 0.0 else None
+            panel.plot(
+                *_edge(wall, deviation * 1e-3 * magnified, side).T, color=_colour(number), linewidth=1.2, label=label
+            )
+    panel.grid(False)
+    panel.set_aspect("equal")
+    panel.set_xlabel("X in mm")
+    panel.set_ylabel("Y in mm")
+    plot.legend_above(panel)
+    return panel
 
 
-def plot_walls(file: str | Path, measurement: Measurement, region: int) -> None:
+def plot_walls(measurement: Measurement, ax: Axes | None = None, *, region: int | None = None) -> Axes:
     """Left wall, right wall and width along the path; the borders of a few sections are marked.
 
     Args:
-        file: ``.png`` or ``.svg``.
         measurement: what was measured.
-        region: index of the region, whose walls were kept.
+        ax: where to draw; None: a new figure.
+        region: index of the region; None: the one whose walls leave their place most.
+
+    Returns:
+        The upper panel.
 
     Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+        ValueError: no walls were measured there.
     """
     drawn = _drawn(measurement, region)
-    figure = canvas.figure(9.5, 7.0)
-    (column,) = canvas.panels(figure, 3, 1)
-    left, right, width = column
+    title = "Deviation of the walls, positive to the left of the path"
+    rows = plot.grid(ax, 3, 1, size_inch=(9.5, 7.0), title=title, part=_part(drawn[0][1]), sharex="col")
+    left, right, width = column = [panel for (panel,) in rows]
     for number, (program, each) in enumerate(drawn):
-        colour = canvas.COLOURS[number % len(canvas.COLOURS)]
         wall = _joined(each)
-        left.plot(wall.distance_mm, wall.left_um, color=colour, linewidth=1.1, label=_label(program))
-        right.plot(wall.distance_mm, wall.right_um, color=colour, linewidth=1.1)
-        width.plot(wall.distance_mm, wall.left_um - wall.right_um, color=colour, linewidth=1.1)
+        curves = (wall.left_um, wall.right_um, wall.left_um - wall.right_um)
+        for panel, values in zip(column, curves, strict=True):
+            panel.plot(wall.distance_mm, values, color=_colour(number), linewidth=1.1, label=program.name)
+            panel.margins(x=0.01)
     left.set_ylabel("left wall, µm\npositive: cut too far")
     right.set_ylabel("right wall, µm\nnegative: cut too far")
     width.set_ylabel(f"width less {measurement.tool_diameter_mm:g} mm, µm")
     width.set_xlabel("distance along the programmed path, mm")
     _mark_sections(column, drawn[0][1])
-    canvas.legend_above(left)
-    canvas.heading(figure, "Deviation of the walls, positive to the left of the path", _part(drawn[0][1]))
-    canvas.save(figure, file)
+    plot.legend_above(left)
+    return left
 
 
 def _mark_sections(panels: list[Axes], region: MeasuredRegion) -> None:
-    sections = [each.section for each in region.figures.sections]
-    if len(sections) > _MOST_MARKED:
+    if len(region.sections) > _MOST_MARKED:
         return
     for panel in panels:
-        for section in sections[1:]:
-            panel.axvline(section.begin_mm, color=canvas.GREY, linewidth=0.7, linestyle=":")
-    for section in sections:
-        middle = (section.begin_mm + section.end_mm) / 2.0
-        panels[-1].annotate(
-            section.kind.name,
-            (middle, 1.0),
-            xycoords=panels[-1].get_xaxis_transform(),
-            ha="center",
-            va="top",
-            fontsize=8,
-            color=canvas.GREY,
-        )
+        for section in region.sections[1:]:
+            panel.axvline(section.begin_mm, color=plot.GREY, linewidth=0.7, linestyle=":")
+    lowest = panels[-1]
+    for section in region.sections:
+        lowest.annotate(
+            section.kind, (section.begin_mm + section.length_mm / 2.0, 1.0), xycoords=lowest.get_xaxis_transform(),
+            ha="center", va="top", fontsize=8, color=plot.GREY,
+        )  # fmt: skip
 
 
-def _region_to_draw(measurement: Measurement) -> int | None:
+def _worst_region(measurement: Measurement) -> int | None:
     """The region whose walls leave their place most in any program, of those whose walls were kept in all."""
     count = min(len(program.regions) for program in measurement.programs)
     found: dict[int, float] = {}
@@ -152,16 +134,21 @@ def _region_to_draw(measurement: Measurement) -> int | None:
     return max(found, key=lambda index: found[index], default=None)
 
 
-def _drawn(measurement: Measurement, region: int) -> list[tuple[MeasuredProgram, MeasuredRegion]]:
-    return [(program, program.regions[region]) for program in measurement.programs]
+def _drawn(measurement: Measurement, region: int | None) -> list[tuple[MeasuredProgram, MeasuredRegion]]:
+    index = _worst_region(measurement) if region is None else region
+    drawn = [(program, program.regions[index]) for program in measurement.programs if index is not None]
+    if not drawn or not all(_walls(each) for _, each in drawn):
+        raise ValueError("no walls were measured there: nothing to draw")
+    return drawn
 
 
 def _walls(region: MeasuredRegion) -> list[WallProfile]:
     """The profiles of a region that hold a wall."""
     return [
-        wall
-        for wall in region.walls
-        if wall is not None and bool((np.isfinite(wall.left_um) | np.isfinite(wall.right_um)).any())
+        section.walls
+        for section in region.sections
+        if section.walls is not None
+        and bool((np.isfinite(section.walls.left_um) | np.isfinite(section.walls.right_um)).any())
     ]
 
 
@@ -190,8 +177,8 @@ def _edge(wall: WallProfile, deviation_mm: FloatArray, side_mm: float) -> FloatA
     return edge
 
 
-def _label(program: MeasuredProgram) -> str:
-    return Path(program.source).name
+def _colour(number: int) -> str:
+    return plot.COLOURS[number % len(plot.COLOURS)]
 
 
 def _part(region: MeasuredRegion) -> str:

@@ -1,341 +1,282 @@
-"""A measurement as a measuring report: section by section what is nominal, what was measured, and the limit."""
+"""The tables of a measurement: the worst of every figure with its place, and section by section as on a report."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from functools import partial
 
-from shapegcode.metrology.summary import summary_table
+from shapegcode.metrology.figures import FittedCircle, MeasuredArc, MeasuredSection, SidedError, WallDeviation
+from shapegcode.results.result import Xyz
+from shapegcode.results.table import Column, Table
 
-if TYPE_CHECKING:
-    from rich.table import Table
-
-__all__ = ["Feature", "demo_table", "features", "measurement_tables", "next_step", "section_name", "verdicts"]
+__all__ = ["section_table", "summary_table"]
 
 _MOST_SECTIONS = 12
-_SIDES = ("left", "right")
-_HEIGHTS = ("above", "below")
 _SHOWN_UM = 0.005  # less is shown as 0.00
 
-Section = Mapping[str, Any]
+Sections = Sequence[MeasuredSection]
+Values = Callable[[MeasuredSection], Sequence[float | None]]
 
 
 @dataclass(frozen=True)
-class Feature:
-    """One row of the report.
+class _Row:
+    """One row of a table.
 
     Attributes:
         name: what is measured.
-        nominal: what it should be; empty where that is nothing but zero.
         values: as text, one per program.
+        nominal: what it should be; empty where that is nothing but zero.
         limit: what the machine file allows; empty: nothing stated.
         out: for each program, whether it is beyond the limit.
+        heading: it begins a section.
     """
 
     name: str
-    nominal: str
     values: tuple[str, ...]
+    nominal: str = ""
     limit: str = ""
     out: tuple[bool, ...] = ()
+    heading: bool = False
 
 
-def measurement_tables(report: Mapping[str, Any], *, every_section: bool = False) -> list[Table]:
-    """A summary and a table of sections for the programs that are measured against the same path, side by side.
+def _program_columns(names: Sequence[str]) -> tuple[Column, ...]:
+    """One per program; the values of more than two wrap, so that they fit beside each other."""
+    return tuple(
+        Column(name, value=partial(_value, rank), style=partial(_style, rank), text=len(names) > 2)
+        for rank, name in enumerate(names)
+    )
+
+
+def _value(rank: int, row: _Row) -> str:
+    return row.values[rank] if row.values else ""
+
+
+def _style(rank: int, row: _Row) -> str:
+    return "bold red" if row.out and row.out[rank] else ""
+
+
+# --- the worst of every figure ----------------------------------------------------------------------------------------
+
+
+def summary_table(
+    title: str, programs: Mapping[str, Sections], whole: Mapping[str, tuple[float, float]], band_um: float
+) -> Table:
+    """The largest of each figure with section and line, one column per program.
 
     Args:
-        report: the JSON of a measurement.
-        every_section: show all sections; False: of many the worst ones.
+        title: of the table.
+        programs: the sections of each by its name, all along the same path.
+        whole: time in s and contour error in µm of each.
+        band_um: settled is what stays within it.
     """
-    paths = dict.fromkeys(program["measured_against"] for program in report["programs"])
-    groups = [[each for each in report["programs"] if each["measured_against"] == path] for path in paths]
-    tables = []
-    for programs in groups:
-        if any(program["sections"] for program in programs):
-            tables.append(summary_table(programs, _names(programs), report))
-        tables.append(_table(programs, report, every_section=every_section))
-    return tables
-
-
-def _table(programs: Sequence[Mapping[str, Any]], report: Mapping[str, Any], *, every_section: bool) -> Table:
-    """One block of rows per section, one column per program."""
-    from rich.table import Table
-    from rich.text import Text
-
-    shown, left_out = _shown_sections(programs, None if every_section else _MOST_SECTIONS)
-    machine, diameter = report["machine"], report["tool_diameter_mm"]
-    table = Table(title=f"measured on {machine} with a tool of {diameter:g} mm diameter", pad_edge=False)
-    table.add_column("section", overflow="fold")
-    table.add_column("feature", overflow="fold")
-    table.add_column("nominal", justify="right", no_wrap=True)
-    for name in _names(programs):
-        table.add_column(name, justify="right", overflow="fold")
-    table.add_column("limit", justify="right", no_wrap=True)
-    for index in shown:
-        sections = [program["sections"][index] for program in programs]
-        judged = any(program["within_tolerance"] is not None for program in programs)
-        limit_um = report["tolerance_um"]["contour"] if judged else None
-        rows = list(features(sections, limit_um, report["settling_band_um"]))
-        for number, row in enumerate(rows):
-            cells = [Text(value) for value in row.values]
-            for cell, out in zip(cells, row.out, strict=False):
-                if out:
-                    cell.stylize("bold red")
-            table.add_row(
-                Text(section_name(sections[0], index) if number == 0 else ""), row.name, row.nominal, *cells, row.limit,
-                end_section=number + 1 == len(rows),
-            )  # fmt: skip
-    if left_out:
-        table.caption = f"{left_out} more sections, whose contour error is less: --all shows them, --json lists them"
-    return table
-
-
-def _shown_sections(programs: Sequence[Mapping[str, Any]], most: int | None) -> tuple[list[int], int]:
-    """Indices of the sections that a table shows, in order, and how many are left out."""
-    count = len(programs[0]["sections"])
-    worst = [
-        max(program["sections"][index]["contour_error_um"]["response"]["max"] for program in programs)
-        for index in range(count)
+    rows = [
+        _Row("cutting time s", tuple(f"{time_s:.2f}" for time_s, _ in whole.values())),
+        _Row("contour error µm, corners included", tuple(f"{largest:.2f}" for _, largest in whole.values())),
     ]
-    shown = sorted(sorted(range(count), key=lambda index: -worst[index])[:most])
-    return shown, count - len(shown)
+    for name, values in _figures(band_um):
+        worst = [_worst(sections, values) for sections in programs.values()]
+        if any(worst):
+            rows.append(_Row(name, tuple(cell or "–" for cell in worst)))
+    columns = (Column("largest (section, line)", value="name", text=True), *_program_columns(list(programs)))
+    return Table(title, columns, rows)
 
 
-def section_name(section: Section, index: int) -> str:
-    """Number, kind and lines of a section."""
-    first, last = section["lines"]
-    kind = section["kind"]
-    if section["arc"] is not None:
-        kind = f"arc R{section['arc']['nominal_radius_mm']:g}"
-    lines = f"line {first}" if first == last else f"lines {first}-{last}"
-    return f"{index + 1} {kind}, {lines}"
+def _worst(sections: Sections, values: Values) -> str:
+    """The largest value and its place; empty where no section has the figure."""
+    found = [
+        (value, -number, section)
+        for number, section in enumerate(sections, start=1)
+        for value in values(section)
+        if value is not None
+    ]
+    if not found:
+        return ""
+    value, number, section = max(found, key=lambda each: each[:2])
+    text = "not settled" if math.isinf(value) else f"{value:.2f}"
+    return f"{text} ({-number}, {section.place})"
 
 
-def features(sections: Sequence[Section], limit_um: float | None, band_um: float) -> Iterator[Feature]:
-    """The rows of one section, as it came out in each program; without a limit none is judged."""
-    yield Feature(
-        "length mm, time s", f"{sections[0]['length_mm']:.3f}", _each(sections, lambda s: f"{s['time_s']:.3f}")
+def _figures(band_um: float) -> Iterator[tuple[str, Values]]:
+    """Name with unit, and the values of a section of which the largest counts."""
+    yield "contour error of a section µm", lambda s: [s.contour_error_um.response.max]
+    for name, key in (("peak vibration", "peak_vibration_um"), ("residual at the stop", "residual_vibration_um")):
+        for axis in "xyz":
+            yield f"{name} {axis.upper()} µm", partial(_of_axis, key, axis)
+    yield f"settling to {band_um:g} µm, ms", _settling_ms
+    yield "fitted radius off µm", lambda s: [_radius_off(s, "response")]
+    yield (
+        "inside, outside wall radius off µm",
+        lambda s: [_radius_off(s, "inside_wall"), _radius_off(s, "outside_wall")],
     )
-    yield from _contour(sections, limit_um)
-    if sections[0]["arc"] is not None:
-        yield from _arc_rows(sections)
-    yield from _walls(sections)
-    yield from _roughness(sections)
-    yield Feature("peak vibration X / Y / Z µm", "", _each(sections, lambda s: _axes(s["peak_vibration_um"], 2)))
-    if any(section["residual_vibration_um"] is not None for section in sections):
-        yield Feature(
-            "residual at the stop X / Y / Z µm", "", _each(sections, lambda s: _axes(s["residual_vibration_um"], 2))
-        )
-        yield Feature(f"settled to {band_um:g} µm X / Y / Z ms", "", _each(sections, _settling))
+    yield "orbit error of response %", lambda s: [None if s.arc is None else s.arc.orbit_error_percent.response]
+    yield "cut-width band µm", lambda s: [wall.band for wall in s.wall_deviation_um.both()]
+    yield "width off µm", _width_off_um
+    yield "Ra of a wall µm", partial(_of_walls, "ra_um")
+    yield "Wa of a wall µm", partial(_of_walls, "wa_um")
 
 
-def demo_table(result: Mapping[str, Any], feed_mm_per_s: float) -> Table:
-    """Paper 000's line, arc and line at one feed: one column per program, the paper's specimens below."""
-    from rich.table import Table
+def _of_axis(key: str, axis: str, section: MeasuredSection) -> list[float | None]:
+    found: Xyz[float] | None = getattr(section, key)
+    return [None if found is None else found[axis]]
 
-    rows = [row for row in result["cases"] if row["feed_mm_per_s"] == feed_mm_per_s]
-    arcs = [row["sections"][1] for row in rows]
-    table = Table(title=f"Paper 000 at {feed_mm_per_s:g} mm/s, tool of {result['tool_diameter_mm']:g} mm, as cut")
-    table.add_column("figure", overflow="fold")
-    for row in rows:
-        heading = row["program"].replace("-", " ")
-        table.add_column(heading, justify="right", overflow="fold", min_width=max(map(len, heading.split())))
-    inside = [arc["arc"]["inside_wall"] for arc in arcs]
-    table.add_row(
-        f"inside radius mm (nominal {inside[0]['nominal_radius_mm']:g})",
-        *(f"{circle['fitted_radius_mm']:.4f}" for circle in inside),
+
+def _of_walls(key: str, section: MeasuredSection) -> list[float | None]:
+    return [None if wall is None else getattr(wall, key) for wall in section.roughness.both()]
+
+
+def _settling_ms(section: MeasuredSection) -> list[float | None]:
+    return [math.inf if value is None else 1e3 * value for value in section.settling_time_s or ()]
+
+
+def _radius_off(section: MeasuredSection, key: str) -> float | None:
+    circle: FittedCircle | None = None if section.arc is None else getattr(section.arc, key)
+    return None if circle is None else abs(circle.radius_deviation_um)
+
+
+def _width_off_um(section: MeasuredSection) -> list[float | None]:
+    width = section.width_mm
+    return [None if value is None else 1e3 * abs(value - width.nominal) for value in (width.min, width.max)]
+
+
+# --- section by section -----------------------------------------------------------------------------------------------
+
+
+def section_table(
+    title: str, programs: Mapping[str, Sections], limit_um: float | None, band_um: float, *, every: bool
+) -> Table:
+    """The figures of each section, one column per program.
+
+    Args:
+        title: of the table.
+        programs: the sections of each by its name, all along the same path.
+        limit_um: contour error that is allowed; None: nothing is judged.
+        band_um: settled is what stays within it.
+        every: show all sections; False: of many those with the largest contour error.
+    """
+    count = min(len(sections) for sections in programs.values())
+    worst = [max(each[index].contour_error_um.response.max for each in programs.values()) for index in range(count)]
+    shown = sorted(range(count), key=lambda index: -worst[index])[: None if every else _MOST_SECTIONS]
+    rows: list[_Row] = []
+    for index in sorted(shown):
+        beside = [sections[index] for sections in programs.values()]
+        rows.append(_Row(beside[0].name(index + 1), (), heading=True))
+        rows += _section_rows(beside, limit_um, band_um)
+    columns = (
+        Column("figure", value="name", text=True),
+        Column("nominal", value="nominal"),
+        *_program_columns(list(programs)),
+        Column("limit", value="limit"),
     )
-    for number in range(2):
-        table.add_row(
-            ("  paper, SM20C (depth .05, .1)", "  paper, Al6061 (depth .05, .1)")[number],
-            *(
-                "" if row["paper"] is None else ", ".join(
-                    f"{radius:.3f}" for radius in list(row["paper"]["inside_radius_mm"].values())[2 * number :][:2]
-                )
-                for row in rows
-            ),
-            end_section=number == 1,
-        )  # fmt: skip
-    table.add_row("band of the arc's walls µm", *(f"{arc['wall_deviation_um']['left']['band']:.1f}" for arc in arcs))
-    for number, name in enumerate(("line in", "arc", "line out")):
-        sections = [row["sections"][number] for row in rows]
-        table.add_row(
-            f"width, {name} mm", *_each(sections, lambda s: _pair([s["width_mm"][key] for key in ("min", "max")], 4))
-        )
-    for name, key, decimals in (("Ra", "ra_um", 3), ("Wa", "wa_um", 2)):
-        table.add_row(
-            f"{name} left wall µm: line, arc, line",
-            *(
-                " / ".join(f"{section['roughness']['left'][key]:z.{decimals}f}" for section in row["sections"])
-                for row in rows
-            ),
-        )
-    ends = [row["sections"][2] for row in rows]
-    table.add_row("residual X / Y / Z µm", *_each(ends, lambda s: _axes(s["residual_vibration_um"], 2)))
-    table.add_row("time s", *(f"{row['time_s']:.3f}" for row in rows))
-    return table
+    left_out = count - len(shown)
+    caption = f"{left_out} more sections, whose contour error is less: --all shows them, --json lists them"
+    return Table(
+        title, columns, rows, caption=caption if left_out else "",
+        sections=[rank for rank, row in enumerate(rows) if row.heading],
+        row_style=lambda row: "bold" if row.heading else "",
+    )  # fmt: skip
 
 
-def next_step(report: Mapping[str, Any]) -> str:
-    """The one thing to do next, in one sentence."""
-    programs = report["programs"]
-    if not report["within_tolerance"] and report["plant"] == "feed-drive":
-        return (
-            "the lag of the servo loops takes the table off the path: more feed-forward or position gain, or less "
-            "feed; --plant modal shows what vibration alone does"
-        )
-    missed = next((each for each in programs if each["shaped"] and each["within_tolerance"] is False), None)
-    if missed is not None:
-        return f"convert again with a smaller --contour-tolerance: {Path(missed['program']).name} leaves the path"
-    if not any(program["shaped"] for program in programs):
-        return "shapegcode convert shapes the program; measure both to see what it gains"
-    if any(program["shaped"] and program["within_tolerance"] is None for program in programs):
-        return "measure it --against the original program: its own path is not the programmed one"
-    if "plots" not in report:
-        return "--plots DIR draws the part with its deviations magnified"
-    return "--lines A-B measures the cut of these lines alone, --json FILE keeps every figure"
+def _section_rows(sections: Sections, limit_um: float | None, band_um: float) -> Iterator[_Row]:
+    """The rows of one section, as it came out in each program."""
+    yield _Row("length mm, time s", _each(sections, lambda s: f"{s.time_s:.3f}"), f"{sections[0].length_mm:.3f}")
+    yield from _contour_rows(sections, limit_um)
+    arcs = [section.arc for section in sections if section.arc is not None]
+    if arcs:
+        yield from _arc_rows(arcs)
+    yield from _wall_rows(sections)
+    yield from _roughness_rows(sections)
+    yield _Row("peak vibration X / Y / Z µm", _each(sections, lambda s: _axes(s.peak_vibration_um)))
+    if any(section.residual_vibration_um is not None for section in sections):
+        yield _Row("residual at the stop X / Y / Z µm", _each(sections, lambda s: _axes(s.residual_vibration_um)))
+        yield _Row(f"settled to {band_um:g} µm X / Y / Z ms", _each(sections, _settling))
 
 
-def verdicts(report: Mapping[str, Any]) -> list[str]:
-    """One sentence for each program that is held against the tolerance: what it keeps or by how much it does not."""
-    limit = report["tolerance_um"]["contour"]
-    said = []
-    for program in report["programs"]:
-        if program["within_tolerance"] is None:
-            continue
-        name, largest = Path(program["program"]).name, program["contour_error_um"]["response"]["max"]
-        within = f"leaves the path by {largest:.2f} µm at most"
-        if program["within_tolerance"]:
-            said.append(f"{name}: within tolerance: {within}, limit {limit:g} µm (tolerance.contour_um)")
-            continue
-        said.append(
-            f"{name}: OUT OF TOLERANCE by {largest - limit:.2f} µm: {within}, limit {limit:g} µm "
-            f"(tolerance.contour_um), {_worst_place(program)}"
-        )
-    return said
+def _contour_rows(sections: Sections, limit_um: float | None) -> Iterator[_Row]:
+    response = [section.contour_error_um.response for section in sections]
+    command = [section.contour_error_um.command for section in sections]
+    yield _Row(
+        "contour error µm",
+        tuple(f"{each.max:.2f}" for each in response),
+        "0",
+        "" if limit_um is None else f"{limit_um:g}",
+        tuple(limit_um is not None and each.max > limit_um for each in response),
+    )
+    yield _Row("  left / right µm", tuple(_pair((each.left, each.right), 2) for each in response))
+    if _off_the_level(response):
+        yield _Row("  above / below µm", tuple(_pair((each.above, each.below), 2) for each in response))
+    yield _Row("  RMS µm", tuple(f"{each.rms:.2f}" for each in response))
+    yield _Row("command left / right µm", tuple(_pair((each.left, each.right), 2) for each in command), "0")
+    if _off_the_level(command):
+        yield _Row("command above / below µm", tuple(_pair((each.above, each.below), 2) for each in command), "0")
 
 
-def _worst_place(program: Mapping[str, Any]) -> str:
-    sections = program["sections"]
-    worst = [section["contour_error_um"]["response"]["max"] for section in sections]
-    index = worst.index(max(worst))
-    if worst[index] < program["contour_error_um"]["response"]["max"]:
-        return "at a corner that it rounds off"
-    return f"in section {section_name(sections[index], index)}"
+def _off_the_level(errors: Sequence[SidedError]) -> bool:
+    return any(value >= _SHOWN_UM for each in errors for value in (each.above, each.below))
 
 
-def _names(programs: Sequence[Mapping[str, Any]]) -> list[str]:
-    """File names; whole paths where two files of one name are compared."""
-    short = [Path(program["program"]).name for program in programs]
-    return short if len(set(short)) == len(short) else [program["program"] for program in programs]
+def _arc_rows(arcs: Sequence[MeasuredArc]) -> Iterator[_Row]:
+    track = [arc.response for arc in arcs]
+    for name, circles in (
+        ("fitted radius", track),
+        ("inside wall", [arc.inside_wall for arc in arcs]),
+        ("outside wall", [arc.outside_wall for arc in arcs]),
+    ):
+        nominal = next((circle.nominal_radius_mm for circle in circles if circle is not None), None)
+        if nominal is not None:
+            yield _Row(f"{name} mm (µm off)", tuple(map(_radius, circles)), f"{nominal:.3f}")
+    if any(circle is not None for circle in track):
+        form = ("–" if circle is None else f"{circle.form_error_um:.2f}" for circle in track)
+        yield _Row("form error µm", tuple(form), "0")
+        centre = ("–" if circle is None else _pair(circle.centre_offset_um, 1) for circle in track)
+        yield _Row("centre off µm", tuple(centre), "0")
+    orbits = (arc.orbit_error_percent.response for arc in arcs)
+    yield _Row("orbit error of response %", tuple("–" if value is None else f"{value:.4f}" for value in orbits), "0")
 
 
-def _each(sections: Sequence[Section], text: Any) -> tuple[str, ...]:
+def _radius(circle: FittedCircle | None) -> str:
+    return "–" if circle is None else f"{circle.fitted_radius_mm:.4f} ({circle.radius_deviation_um:+z.1f})"
+
+
+def _wall_rows(sections: Sections) -> Iterator[_Row]:
+    walls = [section.wall_deviation_um for section in sections]
+    if all(wall.stations == 0 for each in walls for wall in each.both()):
+        return
+    yield _Row("left wall, from / to µm", tuple(_span(each.left) for each in walls), "0")
+    yield _Row("right wall, from / to µm", tuple(_span(each.right) for each in walls), "0")
+    bands = tuple(_pair([wall.band for wall in each.both()], 2) for each in walls)
+    yield _Row("cut-width band left / right µm", bands, "0")
+    widths = [section.width_mm for section in sections]
+    ends = (_pair((width.min, width.max), 4) for width in widths)
+    yield _Row("width least / most mm", tuple(ends), f"{widths[0].nominal:.3f}")
+
+
+def _span(wall: WallDeviation) -> str:
+    return "–" if wall.min is None or wall.max is None else f"{wall.min:+z.2f} … {wall.max:+z.2f}"
+
+
+def _roughness_rows(sections: Sections) -> Iterator[_Row]:
+    if all(wall is None for section in sections for wall in section.roughness.both()):
+        return
+    for name, key in (("Ra", "ra_um"), ("Rz", "rz_um"), ("Wa", "wa_um")):
+        yield _Row(f"{name} left / right µm", tuple(_pair(_of_walls(key, section), 3) for section in sections))
+
+
+def _each(sections: Sections, text: Callable[[MeasuredSection], str]) -> tuple[str, ...]:
     return tuple(text(section) for section in sections)
 
 
-def _contour(sections: Sequence[Section], limit_um: float | None) -> Iterator[Feature]:
-    def sides(who: str, which: Sequence[str]) -> tuple[str, ...]:
-        return _each(sections, lambda s: _pair([s["contour_error_um"][who][side] for side in which], 2))
-
-    def any_of(who: str, which: Sequence[str]) -> bool:
-        return any(s["contour_error_um"][who][side] >= _SHOWN_UM for s in sections for side in which)
-
-    largest = [section["contour_error_um"]["response"]["max"] for section in sections]
-    out = tuple(limit_um is not None and value > limit_um for value in largest)
-    limit = "" if limit_um is None else f"{limit_um:g}"
-    yield Feature("contour error µm", "0", tuple(f"{value:.2f}" for value in largest), limit, out)
-    yield Feature("  left / right µm", "", sides("response", _SIDES))
-    if any_of("response", _HEIGHTS):
-        yield Feature("  above / below µm", "", sides("response", _HEIGHTS))
-    yield Feature("  RMS µm", "", _each(sections, lambda s: f"{s['contour_error_um']['response']['rms']:.2f}"))
-    yield Feature("command left / right µm", "0", sides("command", _SIDES))
-    if any_of("command", _HEIGHTS):
-        yield Feature("command above / below µm", "0", sides("command", _HEIGHTS))
-
-
-def _arc_rows(sections: Sequence[Section]) -> Iterator[Feature]:
-    for name, key in (("fitted radius", "response"), ("inside wall", "inside_wall"), ("outside wall", "outside_wall")):
-        circles = [section["arc"][key] for section in sections]
-        if all(circle is None for circle in circles):
-            continue
-        nominal = next(circle for circle in circles if circle is not None)["nominal_radius_mm"]
-        yield Feature(
-            f"{name} mm (µm off)",
-            f"{nominal:.3f}",
-            tuple(
-                "–" if circle is None else f"{circle['fitted_radius_mm']:.4f} ({circle['radius_deviation_um']:+z.1f})"
-                for circle in circles
-            ),
-        )
-    track = [section["arc"]["response"] for section in sections]
-    if any(circle is not None for circle in track):
-        yield Feature("form error µm", "0", tuple(_or_dash(circle, "form_error_um", 2) for circle in track))
-        yield Feature(
-            "centre off µm",
-            "0",
-            tuple("–" if each is None else _pair(each["centre_offset_um"], 1) for each in track),
-        )
-    yield Feature(
-        "orbit error of response %",
-        "0",
-        _each(sections, lambda s: f"{s['arc']['orbit_error_percent']['response']:.4f}"),
-    )
-
-
-def _walls(sections: Sequence[Section]) -> Iterator[Feature]:
-    if all(section["wall_deviation_um"][side]["stations"] == 0 for section in sections for side in _SIDES):
-        return
-    for side in _SIDES:
-        yield Feature(f"{side} wall, from / to µm", "0", _each(sections, lambda s, side=side: _span(s, side)))
-    yield Feature(
-        "cut-width band left / right µm",
-        "0",
-        _each(sections, lambda s: _pair([s["wall_deviation_um"][side]["band"] for side in _SIDES], 2)),
-    )
-    nominal = sections[0]["width_mm"]["nominal"]
-    yield Feature(
-        "width least / most mm",
-        f"{nominal:.3f}",
-        _each(sections, lambda s: _pair([s["width_mm"]["min"], s["width_mm"]["max"]], 4)),
-    )
-
-
-def _roughness(sections: Sequence[Section]) -> Iterator[Feature]:
-    if all(section["roughness"][side] is None for section in sections for side in _SIDES):
-        return
-    for name, key in (("Ra", "ra_um"), ("Rz", "rz_um"), ("Wa", "wa_um")):
-        yield Feature(
-            f"{name} left / right µm",
-            "",
-            _each(
-                sections,
-                lambda s, key=key: _pair([(s["roughness"][side] or {}).get(key) for side in _SIDES], 3),
-            ),
-        )
-
-
-def _span(section: Section, side: str) -> str:
-    wall = section["wall_deviation_um"][side]
-    return "–" if wall["stations"] == 0 else f"{wall['min']:+z.2f} … {wall['max']:+z.2f}"
-
-
-def _settling(section: Section) -> str:
-    times = section["settling_time_s"]
-    if times is None:
+def _settling(section: MeasuredSection) -> str:
+    if section.settling_time_s is None or section.observed_rest_s is None:
         return "–"
-    late = section["observed_rest_s"] * 1e3
-    return " / ".join(f"> {late:.0f}" if times[axis] is None else f"{times[axis] * 1e3:.0f}" for axis in "xyz")
+    late = f"> {section.observed_rest_s * 1e3:.0f}"
+    return " / ".join(late if value is None else f"{value * 1e3:.0f}" for value in section.settling_time_s)
 
 
-def _axes(values: Mapping[str, float] | None, decimals: int) -> str:
-    return "–" if values is None else " / ".join(f"{values[axis]:.{decimals}f}" for axis in "xyz")
+def _axes(values: Xyz[float] | None) -> str:
+    return "–" if values is None else " / ".join(f"{value:.2f}" for value in values)
 
 
 def _pair(values: Sequence[float | None], decimals: int) -> str:
     return " / ".join("–" if value is None else f"{value:z.{decimals}f}" for value in values)
-
-
-def _or_dash(values: Mapping[str, Any] | None, key: str, decimals: int) -> str:
-    return "–" if values is None else f"{values[key]:.{decimals}f}"

@@ -1,0 +1,339 @@
+"""The figures of one section of a path, measured: vibration, contour, circles, walls, roughness."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.results.figures import ContourError, Tracks, largest_xyz_um
+from shapegcode.results.json import hidden
+from shapegcode.results.result import Xyz
+
+__all__ = [
+    "FittedCircle",
+    "MeasuredArc",
+    "MeasuredSection",
+    "SidedError",
+    "Sides",
+    "WallDeviation",
+    "WallProfile",
+    "WallRoughness",
+    "Width",
+]
+
+FloatArray = npt.NDArray[np.float64]
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Sides(Generic[T]):
+    """A figure of both sides of the travel.
+
+    Attributes:
+        left: of the left one.
+        right: of the right one.
+    """
+
+    left: T
+    right: T
+
+    def both(self) -> tuple[T, T]:
+        """Left and right."""
+        return self.left, self.right
+
+
+@dataclass(frozen=True)
+class SidedError:
+    """How far a track leaves the programmed path, in µm; a vertical deviation is above or below, not left or right.
+
+    Attributes:
+        max: distance, any side.
+        rms: root mean square over the time in which the command moves.
+        left: largest to the left of the travel.
+        right: largest to the right of it.
+        above: largest above it.
+        below: largest below it.
+    """
+
+    max: float
+    rms: float
+    left: float
+    right: float
+    above: float
+    below: float
+
+    @classmethod
+    def of(cls, stats: Sequence[_core.DeviationStats], sides: Sequence[_core.SideFigures]) -> SidedError:
+        """Of one or several runs together, all zero without any; the figures of the core in mm."""
+        whole = ContourError.of(stats)
+        return cls(
+            whole.max,
+            whole.rms,
+            left=max((each.left_mm for each in sides), default=0.0) * 1e3,
+            right=max((each.right_mm for each in sides), default=0.0) * 1e3,
+            above=max((each.above_mm for each in sides), default=0.0) * 1e3,
+            below=max((each.below_mm for each in sides), default=0.0) * 1e3,
+        )
+
+
+@dataclass(frozen=True)
+class FittedCircle:
+    """A circle through what was moved or cut on an arc.
+
+    Attributes:
+        nominal_radius_mm: as programmed; of a wall with the tool's radius.
+        fitted_radius_mm: circle of least squares.
+        radius_deviation_um: fitted less nominal.
+        mean_radius_deviation_um: mean distance from the programmed centre less nominal.
+        centre_offset_um: of the fitted centre from the programmed one, in the plane of the arc.
+        form_error_um: largest less smallest radial distance.
+    """
+
+    nominal_radius_mm: float
+    fitted_radius_mm: float
+    radius_deviation_um: float
+    mean_radius_deviation_um: float
+    centre_offset_um: tuple[float, float]
+    form_error_um: float
+
+    @classmethod
+    def of(cls, arc: _core.ArcFigures | None, nominal_mm: float, centre_mm: FloatArray) -> FittedCircle | None:
+        """From the core; None where there is none.
+
+        Args:
+            arc: what was fitted.
+            nominal_mm: radius.
+            centre_mm: the programmed one, (2,).
+        """
+        if arc is None:
+            return None
+        x, y = (float(value) for value in (arc.fit.centre_mm - centre_mm) * 1e3)
+        off, mean_off = (arc.fit.radius_mm - nominal_mm) * 1e3, (arc.mean_radius_mm - nominal_mm) * 1e3
+        return cls(nominal_mm, arc.fit.radius_mm, off, mean_off, (x, y), arc.fit.form_mm * 1e3)
+
+
+@dataclass(frozen=True)
+class MeasuredArc:
+    """What only an arc has.
+
+    Attributes:
+        nominal_radius_mm: as programmed.
+        command: circle through the set-points; arcs of 10 degrees on, else None.
+        response: through the table's positions, likewise.
+        inside_wall: through the wall towards the centre; None where there is none.
+        outside_wall: through the other wall, likewise.
+        orbit_error_percent: area between track and arc over the sector; None where it cannot be said.
+    """
+
+    nominal_radius_mm: float
+    command: FittedCircle | None
+    response: FittedCircle | None
+    inside_wall: FittedCircle | None
+    outside_wall: FittedCircle | None
+    orbit_error_percent: Tracks[float | None]
+
+    @classmethod
+    def of(cls, figures: _core.SectionFigures, tool_diameter_mm: float) -> MeasuredArc:
+        """From the core's figures of an arc, and the tool that cuts its walls."""
+        nominal, centre, radius = figures.nominal_radius_mm, figures.nominal_centre_mm, tool_diameter_mm / 2.0
+        walls = (figures.left_wall_arc, figures.right_wall_arc)
+        inside, outside = walls if figures.turns_left else walls[::-1]
+        return cls(
+            nominal_radius_mm=nominal,
+            command=FittedCircle.of(figures.command_arc, nominal, centre),
+            response=FittedCircle.of(figures.response_arc, nominal, centre),
+            inside_wall=FittedCircle.of(inside, nominal - radius, centre),
+            outside_wall=FittedCircle.of(outside, nominal + radius, centre),
+            orbit_error_percent=Tracks(figures.command_orbit_percent, figures.response_orbit_percent),
+        )
+
+
+@dataclass(frozen=True)
+class WallDeviation:
+    """A wall from where the programmed path cuts it, in µm, positive to the left of the travel; None without a wall.
+
+    Attributes:
+        min: least.
+        mean: of all stations.
+        max: largest.
+        band: largest less least.
+        stations: places at which it was measured.
+    """
+
+    min: float | None
+    mean: float | None
+    max: float | None
+    band: float | None
+    stations: int
+
+    @classmethod
+    def of(cls, wall: _core.WallFigures) -> WallDeviation:
+        """From the core, in mm."""
+        if wall.stations == 0:
+            return cls(None, None, None, None, 0)
+        return cls(wall.least_mm * 1e3, wall.mean_mm * 1e3, wall.largest_mm * 1e3, wall.band_mm * 1e3, wall.stations)
+
+
+@dataclass(frozen=True)
+class Width:
+    """From wall to wall, in mm; None where there are no two walls.
+
+    Attributes:
+        nominal: the tool's diameter.
+        min: least.
+        mean: of all stations.
+        max: largest.
+        stations: places at which it was measured.
+    """
+
+    nominal: float
+    min: float | None
+    mean: float | None
+    max: float | None
+    stations: int
+
+    @classmethod
+    def of(cls, width: _core.WallFigures, tool_diameter_mm: float) -> Width:
+        """From the core."""
+        if width.stations == 0:
+            return cls(tool_diameter_mm, None, None, None, 0)
+        return cls(tool_diameter_mm, width.least_mm, width.mean_mm, width.largest_mm, width.stations)
+
+
+@dataclass(frozen=True)
+class WallRoughness:
+    """Roughness and waviness of a wall (ISO 4287, ISO 21920-2).
+
+    Attributes:
+        ra_um: arithmetic mean height of the roughness.
+        rz_um: mean of highest less deepest over sampling lengths.
+        wa_um: arithmetic mean height of the waviness.
+        cutoff_mm: cut-off λc.
+        evaluated_mm: length that the figures speak of.
+    """
+
+    ra_um: float
+    rz_um: float
+    wa_um: float
+    cutoff_mm: float
+    evaluated_mm: float
+
+    @classmethod
+    def of(cls, figures: _core.Roughness | None) -> WallRoughness | None:
+        """From the core, in mm; None of a wall that is too short."""
+        if figures is None:
+            return None
+        heights = (figures.ra_mm * 1e3, figures.rz_mm * 1e3, figures.wa_mm * 1e3)
+        return cls(*heights, figures.cutoff_mm, figures.evaluated_mm)
+
+
+@dataclass(frozen=True, eq=False)
+class WallProfile:
+    """The walls of a section.
+
+    Attributes:
+        distance_mm: of the stations from the region's start, (n,).
+        left_um: deviation of the left wall from what the programmed path cuts, positive to the left, (n,); NaN where
+            there is no wall.
+        right_um: of the right wall, likewise.
+        point_mm: of the programmed path there, seen from above, (n, 2).
+        normal: unit vectors to the left of the path, (n, 2); zero where it has no horizontal direction.
+    """
+
+    distance_mm: FloatArray
+    left_um: FloatArray
+    right_um: FloatArray
+    point_mm: FloatArray
+    normal: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredSection:
+    """One section of the path: a line, an arc, a curve of short moves, or the lines that one asked for.
+
+    Attributes:
+        region: cutting region in which it is, from 1.
+        kind: "line", "arc" or "curve".
+        lines: first and last of the nominal program, from 1.
+        begin_mm: distance from the region's start.
+        length_mm: of the section.
+        time_s: while the command moves in it.
+        peak_vibration_um: largest |response - command| of each axis while the command moves.
+        residual_vibration_um: the same once it rests; None: it does not stop here.
+        settling_time_s: from then until it stays within the band; null: not while it was looked at; None: no stop.
+        observed_rest_s: how long the rest was looked at; None: no stop.
+        contour_error_um: distance of command and response from the path.
+        arc: what only arcs have; None for others.
+        wall_deviation_um: of both walls.
+        width_mm: from wall to wall.
+        roughness: of both walls; None where a wall is too short.
+        walls: the profiles; None where so many stations are not kept.
+    """
+
+    region: int
+    kind: str
+    lines: tuple[int, int]
+    begin_mm: float
+    length_mm: float
+    time_s: float
+    peak_vibration_um: Xyz[float]
+    residual_vibration_um: Xyz[float] | None
+    settling_time_s: Xyz[float | None] | None
+    observed_rest_s: float | None
+    contour_error_um: Tracks[SidedError]
+    arc: MeasuredArc | None
+    wall_deviation_um: Sides[WallDeviation]
+    width_mm: Width
+    roughness: Sides[WallRoughness | None]
+    walls: WallProfile | None = field(metadata=hidden())
+
+    @classmethod
+    def of(
+        cls, figures: _core.SectionFigures, region: int, tool_diameter_mm: float, walls: WallProfile | None
+    ) -> MeasuredSection:
+        """From the core's figures, and with what tool the walls were cut."""
+        section, rest = figures.section, figures.rest
+        return cls(
+            region=region,
+            kind=section.kind.name,
+            lines=(section.first_line, section.last_line),
+            begin_mm=section.begin_mm,
+            length_mm=section.length_mm,
+            time_s=figures.time_s,
+            peak_vibration_um=largest_xyz_um([figures.peak_mm]),
+            residual_vibration_um=None if rest is None else largest_xyz_um([rest.residual_mm]),
+            settling_time_s=None
+            if rest is None
+            else Xyz(*(float(value) if math.isfinite(value) else None for value in rest.settling_s)),
+            observed_rest_s=None if rest is None else rest.observed_s,
+            contour_error_um=Tracks(
+                SidedError.of([figures.command], [figures.command_sides]),
+                SidedError.of([figures.response], [figures.response_sides]),
+            ),
+            arc=MeasuredArc.of(figures, tool_diameter_mm) if section.kind == _core.SectionKind.arc else None,
+            wall_deviation_um=Sides(WallDeviation.of(figures.left), WallDeviation.of(figures.right)),
+            width_mm=Width.of(figures.width, tool_diameter_mm),
+            roughness=Sides(WallRoughness.of(figures.left_roughness), WallRoughness.of(figures.right_roughness)),
+            walls=walls,
+        )
+
+    def name(self, number: int) -> str:
+        """Number, kind and lines in words.
+
+        Args:
+            number: of the section in its program, from 1.
+        """
+        kind = self.kind if self.arc is None else f"arc R{self.arc.nominal_radius_mm:g}"
+        return f"{number} {kind}, {self.place}"
+
+    @property
+    def place(self) -> str:
+        """Its lines in words."""
+        first, last = self.lines
+        return f"line {first}" if first == last else f"lines {first}-{last}"
