@@ -75,6 +75,9 @@ def corner_demo(on_progress: Callable[[float], None] = lambda _done: None) -> Co
     Args:
         on_progress: called with the share that is done, 0 to 1.
 
+    Returns:
+        The paper's statements beside ours, and the figures of each corner.
+
     Source: Kim and Ko, 2001 (paper 001), table 1, equation 7 and figures 6, 9, 11 and 12.
     """
     machine = Machine.load("vx500")

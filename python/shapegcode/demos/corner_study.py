@@ -157,7 +157,15 @@ class CornerStudy:
 
 
 def study_corner(case: CornerCase, machine: Machine) -> CornerStudy:
-    """Everything about one case, on a machine."""
+    """Everything about one case.
+
+    Args:
+        case: which.
+        machine: that runs the scheduled program.
+
+    Returns:
+        Engagement in closed form, force, feeds by equation 7, and what the scheduler makes of it.
+    """
     cut = _core.CornerCut(
         TOOL_RADIUS_MM, case.rough_radius_mm, case.finish_radius_mm, ALLOWANCE_MM, 0.5 * math.pi, STRAIGHT_MM,
         STRAIGHT_MM,

@@ -52,6 +52,9 @@ def feed_figures(
         written: the same, as read back.
         cycle_time_s: before and after.
         blocks: likewise.
+
+    Returns:
+        Everything that the JSON, the tables and the pictures show.
     """
     program = surveyed.program
     moves = tuple(_move(move, machine) for move in surveyed.moves)

@@ -69,7 +69,16 @@ class FeedPlan:
 
 
 def limits_of(tool: Tool, machine: Machine, margin: float) -> _core.FeedLimits:
-    """The limits of tool and machine, each less a margin (a share of 1)."""
+    """The limits of tool and machine together.
+
+    Args:
+        tool: its `[limits]`.
+        machine: torque and power of its spindle.
+        margin: share of each limit that is left free; the limits of the chip have none.
+
+    Returns:
+        What a revolution may bear; inf: no limit.
+    """
     room = 1.0 - margin
 
     def least(*values: float | None) -> float:
@@ -99,6 +108,11 @@ def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Motion, divi
         divisible: per segment whether its block may be divided.
         margin: share of each limit that is left free.
         feed_unit_mm_per_min: feeds are whole multiples of it.
+
+    Returns:
+        The feeds as stretches along the region's path, and what holds them at each station.
+
+    Source: this project; that a feed must stand for a least length is of Kim and Ko, 2001 (paper 001).
     """
     region, tool, track = surveyed.region, surveyed.tool, surveyed.track
     assert tool is not None and track is not None

@@ -68,6 +68,8 @@ def schedule_feed(
         ArgumentError: a value outside its range, no tool, no cutting move.
         StockError: the stock does not suit the program.
         RoundTripError: the written text would not be equivalent: a defect of shapegcode.
+
+    Source: this project; the force model and feeds that follow the force are those of Kim and Ko, 2001 (paper 001).
     """
     surveyed = survey(
         program,

@@ -67,6 +67,9 @@ def feed_traces(
         survey: what the tool meets.
         plans: the feeds of each region that may change; None for the others.
         loads: along each region; None where nothing is known.
+
+    Returns:
+        (n,) stations of all these regions in a row.
     """
     parts = [
         (part, part.track, plan, load)
@@ -165,6 +168,11 @@ def wall_maps(survey: Survey, loads: Sequence[PathLoad | None], traces: FeedTrac
         survey: what the tool meets.
         loads: along each region; None where nothing is known.
         traces: the curves of them.
+
+    Returns:
+        Error over distance and height, (m, h), before and after, µm.
+
+    Source: the error of a wall is that of Kim and Ko, 2001 (paper 001), section 2.3; its map is of this project.
     """
     starts = groups(traces.distance_mm, _COLUMNS)
     ends = np.append(starts[1:], len(traces))
