@@ -139,6 +139,9 @@ def read_log(path: Path, units: tuple[float, float] | None = None) -> ServoLog:
         units: factors to s and mm; None: from the header (``time_ms``, ``X [um]``), else a time step from 0.02 to 50 ms
             and mm.
 
+    Returns:
+        Times in s, commanded and actual positions in mm.
+
     Raises:
         ArgumentError: what is wrong, with file, line, value and limit.
         OSError: the file cannot be read.

@@ -85,6 +85,9 @@ def parts_of(log: ServoLog, test: AirTest, bend: int = 1) -> list[PartLog]:
         test: what the program did.
         bend: of :func:`bend_samples`, for all logs of the control.
 
+    Returns:
+        The parts in the order of the test.
+
     Raises:
         ArgumentError: an axis is missing, or the motion does not have as many parts or moves as the test.
     """
@@ -182,6 +185,9 @@ def fit_shape(
         guess: the parameters to begin with.
         low: their lower bounds.
         high: their upper bounds.
+
+    Returns:
+        The curve, its times in s and how well it fits.
     """
     from scipy.optimize import least_squares
 
@@ -230,6 +236,9 @@ def line_slope(log: PartLog, settle_s: float) -> tuple[float, float] | None:
     Args:
         log: the part.
         settle_s: how long the smoothing lasts; so much is left out at both ends.
+
+    Returns:
+        Speed and half-width in mm/s, or None.
     """
     top = int(np.argmax(log.way_mm))
     begin = int(np.argmax(log.way_mm > max(8.0 * log.noise_mm, 0.003)))

@@ -70,6 +70,9 @@ def program_text(test: AirTest, box: AirBox, machine: Machine) -> str:
         test: what to do.
         box: said in the header.
         machine: for the least increment and the expected time.
+
+    Returns:
+        The program.
     """
     step = machine.controller.least_increment_mm
     shared = test.name.startswith("override")  # one program, run at several overrides
@@ -129,6 +132,9 @@ def readme_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
         tests: what was written.
         machine: for the expected times.
         box: where the tests move.
+
+    Returns:
+        The text in Markdown.
     """
     timing = ControllerTiming.of(machine)
     watch = [test for test in tests if test.kind == "stopwatch"]

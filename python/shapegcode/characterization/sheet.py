@@ -140,6 +140,9 @@ def sheet_text(tests: Sequence[AirTest], machine: Machine, box: AirBox) -> str:
         tests: what was written.
         machine: for the expected times.
         box: said in the head.
+
+    Returns:
+        The text in TOML.
     """
     timing = ControllerTiming.of(machine)
     lines = [

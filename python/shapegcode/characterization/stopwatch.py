@@ -84,6 +84,9 @@ def fit_stopwatch(results: FilledSheet) -> WatchFacts:
 
     Args:
         results: the filled-in file; tests without times are left out.
+
+    Returns:
+        What is known, each with its interval.
     """
     rows = _rows(results)
     facts = WatchFacts()

@@ -124,6 +124,9 @@ def make_tests(machine: Machine, box: AirBox) -> list[AirTest]:
         machine: gives the least increment, the largest feeds and the rapid rates.
         box: where the tests may move.
 
+    Returns:
+        The tests.
+
     Raises:
         ArgumentError: the box or the feeds are too small for the tests.
     """

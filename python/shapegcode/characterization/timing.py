@@ -92,6 +92,9 @@ def part_time_s(part: Part, timing: ControllerTiming, override: float = 1.0) -> 
         part: the moves.
         timing: the controller.
         override: feed override, 1 = 100 %.
+
+    Returns:
+        The duration in s.
     """
     if part.pattern == "pause":
         return part.dwell_s

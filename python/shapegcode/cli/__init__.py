@@ -159,6 +159,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     Args:
         argv: the arguments without the program's name; None: those of the process.
 
+    Returns:
+        The exit code.
+
     Raises:
         Exception: with ``--debug``, the error as it is; without it, only what is a defect of shapegcode.
     """

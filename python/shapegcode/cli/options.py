@@ -67,6 +67,12 @@ def add_program_argument(parser: argparse.ArgumentParser) -> None:
 def program_number(text: str) -> int:
     """An O number with or without its letter.
 
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The number.
+
     Raises:
         ArgumentTypeError: no number from 1 to 99999999.
     """
@@ -138,7 +144,17 @@ def refuse_same_file(targets: Iterable[Path], others: Iterable[Path]) -> None:
 
 
 def line_range(text: str) -> tuple[int, int]:
-    """Lines such as ``120-180`` or ``120``, first and last, from 1."""
+    """Lines such as ``120-180`` or ``120``, first and last, from 1.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        First and last line.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
     match = re.fullmatch(r"0*([1-9][0-9]{0,9})(?:-0*([1-9][0-9]{0,9}))?", text)
     first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
     if first > last:
@@ -147,7 +163,17 @@ def line_range(text: str) -> tuple[int, int]:
 
 
 def count(text: str) -> int:
-    """A whole number, 1 or more."""
+    """A whole number, 1 or more.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The number.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
     match = re.fullmatch(r"0*([1-9][0-9]{0,11})", text)
     if match is None:
         raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 1 or more")
@@ -155,7 +181,17 @@ def count(text: str) -> int:
 
 
 def ratio(text: str) -> float:
-    """A share such as ``60%`` or ``0.6``, above 0 and at most 1."""
+    """A share such as ``60%`` or ``0.6``, above 0 and at most 1.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The share, 0.6 for ``60%``.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
     value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
     if not 0.0 < value <= 1.0:
         raise argparse.ArgumentTypeError(f"{text!r}: must be above 0 and at most 100%")
@@ -163,7 +199,17 @@ def ratio(text: str) -> float:
 
 
 def share(text: str) -> float:
-    """A share such as ``3%`` or ``0.03``, at least 0 and below 1."""
+    """A share such as ``3%`` or ``0.03``, at least 0 and below 1.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The share, 0.03 for ``3%``.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
     value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
     if not 0.0 <= value < 1.0:
         raise argparse.ArgumentTypeError(f"{text!r}: must be at least 0 and below 100%")
@@ -171,7 +217,17 @@ def share(text: str) -> float:
 
 
 def override(text: str) -> float:
-    """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control takes)."""
+    """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control takes).
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The override, 0.8 for ``80%``.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
     value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
     if not 0.0 < value <= _LARGEST_OVERRIDE:
         raise argparse.ArgumentTypeError(f"{text!r}: must be above 0 and at most {_LARGEST_OVERRIDE:.0%}")
@@ -179,12 +235,32 @@ def override(text: str) -> float:
 
 
 def seconds(text: str) -> float:
-    """A time with its unit, such as ``5ms`` or ``0.005s``."""
+    """A time with its unit, such as ``5ms`` or ``0.005s``.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The time in s.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
     return _with_unit(text, "time", _TIME_UNITS, "5ms")
 
 
 def micrometres(text: str) -> float:
-    """A length with its unit, such as ``5um`` or ``0.005mm``, in µm."""
+    """A length with its unit, such as ``5um`` or ``0.005mm``, in µm.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The length in µm.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
     return _with_unit(text, "length", _LENGTH_UNITS, "5um")
 
 
@@ -204,7 +280,17 @@ def _with_unit(text: str, what: str, units: Mapping[str, float], example: str) -
 
 
 def size(text: str) -> int:
-    """A number of bytes such as ``262144``, ``256k`` or ``1M`` (1024 bytes, 1024 k), above 0."""
+    """A number of bytes such as ``262144``, ``256k`` or ``1M`` (1024 bytes, 1024 k), above 0.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The number of bytes.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([kM]?)", text)
     value = math.floor(float(match[1]) * _SIZE_UNITS[match[2]]) if match else 0
     if value < 1:
@@ -213,7 +299,17 @@ def size(text: str) -> int:
 
 
 def positive(text: str) -> float:
-    """A number above 0."""
+    """A number above 0.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The number.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
     value = number(text)
     if not (math.isfinite(value) and value > 0.0):
         raise argparse.ArgumentTypeError(f"{text!r}: must be above 0")
@@ -221,7 +317,17 @@ def positive(text: str) -> float:
 
 
 def number(text: str) -> float:
-    """A number."""
+    """A number.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The number.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
     try:
         return float(text)
     except ValueError:

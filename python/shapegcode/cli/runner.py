@@ -77,6 +77,9 @@ def progress(description: str, args: argparse.Namespace, *, endless: bool = Fals
         description: what is being done.
         args: of the command.
         endless: the work cannot tell how much of it is done.
+
+    Returns:
+        The bar, within the block.
     """
     with terminal.progress(description, standard_output(args)) as bar:
         if endless:

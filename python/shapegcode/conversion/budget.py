@@ -82,6 +82,9 @@ def busiest_per_s(durations_s: npt.ArrayLike, amounts: npt.ArrayLike, stretch_s:
         durations_s: of the blocks, s.
         amounts: what each of them needs: its characters, or 1.
         stretch_s: the stretch, s; all blocks together if they last less.
+
+    Returns:
+        Amount per second.
     """
     times = np.concatenate([[0.0], np.cumsum(np.asarray(durations_s, dtype=np.float64))])
     sums = np.concatenate([[0.0], np.cumsum(np.asarray(amounts, dtype=np.float64))])
@@ -178,6 +181,9 @@ class Spending:
             residuals_mm: residual vibration of each of the original's regions: what shaping it is worth.
             design: grid of a block period.
             write: writes all regions on a grid.
+
+        Returns:
+            The grid of that period.
         """
         regions = self.program.regions
         weights = [
@@ -220,6 +226,9 @@ class Spending:
             grid: on which the text is written.
             written: the whole text with its loads.
             figures: of the shaped regions, as in the report.
+
+        Returns:
+            Whether any was given up.
 
         Raises:
             ArgumentError: no choice fits; with value and limit.

@@ -56,6 +56,9 @@ def filter_tolerance(machine: Machine, grid: Grid, contour_tolerance_um: float =
         machine: whose controller smooths the shaped program once more.
         grid: what follows the look-ahead; its spread limits the speed.
         contour_tolerance_um: deviation allowed to it, µm.
+
+    Returns:
+        The tolerance, in mm.
     """
     own = machine.controller.shaped_time_constant_s
     tolerance = _core.FilterTolerance()
@@ -82,6 +85,9 @@ def shaping_options(
         tolerance: see `filter_tolerance`.
         offset: from the region's positions to the machine's; where it is not known of the axis that the grid's track
             follows, the grid's one shaper is used.
+
+    Returns:
+        The options of the core.
     """
     options = _core.ShapingOptions()
     options.limits = limits

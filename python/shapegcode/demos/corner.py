@@ -79,6 +79,9 @@ def corner_demo(on_progress: Callable[[float], None] = lambda _done: None) -> Co
         The paper's statements beside ours, and the figures of each corner.
 
     Source: Kim and Ko, 2001 (paper 001), table 1, equation 7 and figures 6, 9, 11 and 12.
+
+    Returns:
+        Each statement of the paper beside ours.
     """
     machine = Machine.load("vx500")
     studies: list[CornerStudy] = []

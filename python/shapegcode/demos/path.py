@@ -161,6 +161,9 @@ def path_demo(on_progress: Callable[[float], None] = lambda _: None) -> PathDemo
         on_progress: called with the share of the work done, 0 to 1.
 
     Source: Ko, Lim and Hong, 2023 (paper 000), table 2.
+
+    Returns:
+        The figures of each condition, each statement of the paper beside ours.
     """
     machine = Machine.load("vx500")
     conditions = []

@@ -68,6 +68,9 @@ def stated(place: str, what: str, published: str, ours: str, agrees: bool | None
         ours: as it comes out here.
         agrees: whether both say the same; None: the paper leaves open what it depends on.
         note: to the reader.
+
+    Returns:
+        The row, with whether the two agree.
     """
     return Statement(place, what, published, ours, "open" if agrees is None else _verdict(agrees), note=note)
 
@@ -90,6 +93,9 @@ def compared(
         digits: behind the point.
         within: they agree if they differ by no more than this, in the unit.
         note: to the reader.
+
+    Returns:
+        The row, with the difference in percent and whether the two agree.
     """
     said = [f"{value:.{digits}f} {unit}".rstrip() for value in (published, ours)]
     difference_percent = (ours / published - 1.0) * 100.0

@@ -104,6 +104,9 @@ def shaper_demo(on_progress: Callable[[float], None] = lambda _: None) -> Shaper
         on_progress: called with the share of the work done, 0 to 1.
 
     Source: Park, Hong and Danielson, 2009 (paper 002), sections 3 and 4.
+
+    Returns:
+        Each statement of the paper beside ours.
     """
     found = minimal_two_mode(*MODES, _LONGEST_S)
     shapers = {name: _named(found, name) for name in _PAPER_NEGATIVE} | {"convolved ZV": convolved_zv(list(MODES))}

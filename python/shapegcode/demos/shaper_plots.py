@@ -43,6 +43,9 @@ def plot_branch_amplitudes(demo: ShaperDemo, ax: Axes | None = None) -> Axes:
     Args:
         demo: of which the branches are drawn.
         ax: where to draw; None: a new figure.
+
+    Returns:
+        The axes that were drawn into.
     """
     branches = demo.branches
     shortest = np.nanargmin(branches.times_s[..., 2], axis=0)

@@ -105,6 +105,9 @@ def statements(shaken: Mapping[str, StageVibration], jump_degrees: float) -> lis
     Args:
         shaken: by the shaper's name, "unshaped" among them.
         jump_degrees: of the faster beam, unshaped.
+
+    Returns:
+        A row for each.
     """
     slow, fast = shaken["unshaped"].after_stop_mm
 

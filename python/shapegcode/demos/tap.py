@@ -97,6 +97,9 @@ def tap_demo(on_progress: Callable[[float], None] = lambda _: None) -> TapDemo:
         on_progress: called with the share of the work done, 0 to 1.
 
     Source: Back, Ko and Kim, 2003 (paper 003).
+
+    Returns:
+        Each statement of the paper beside ours.
     """
     acceleration = _impulse_acceleration(SYSTEM, _PERIOD_S, _SAMPLES)
     system_rows, system = _system(acceleration)

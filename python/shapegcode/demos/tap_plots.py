@@ -67,6 +67,9 @@ def plot_deflection(demo: TapDemo, ax: Axes | None = None) -> Axes:
     Args:
         demo: what was worked out.
         ax: where to draw; None: a new figure.
+
+    Returns:
+        The axes that were drawn into.
     """
     series = demo.series
     panel = plot.axes(ax, size_inch=(9.0, 2.4), title="")

@@ -20,6 +20,9 @@ def stabilisation_chart(poles: Sequence[npt.NDArray[np.complex128]], period_s: f
     Args:
         poles: discrete poles by number of modes, as `stabilisation_poles` gives them.
         period_s: time between two samples.
+
+    Returns:
+        The poles, by order of their model.
     """
     chart: list[ChartPole] = []
     before: list[tuple[float, float]] = []

@@ -262,6 +262,9 @@ def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s:
         band_hz: highest frequency of interest; None: the strongest vibration of each record.
         start_s: time at which free decays begin; None: it is looked for.
 
+    Returns:
+        The hits that can be used, and what was said of the others.
+
     Raises:
         RecordError: no record can be used, or they do not belong together; with the reason for each.
     """

@@ -161,6 +161,9 @@ def find_decay(record: Record, start_s: float | None = None) -> Record:
         start_s: time of the record at which the decay begins; None: the longest of the strong ones is taken, from
             where its envelope falls and the axis itself no longer moves. Either way it ends before the next event.
 
+    Returns:
+        The decay alone, from its beginning on.
+
     Raises:
         RecordError: nothing vibrates, or *start_s* lies outside the record.
     """

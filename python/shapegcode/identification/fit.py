@@ -141,6 +141,9 @@ def identify(
         accepted_percent: a mode is refused whose damping ratio or stiffness is less certain than this (95 %).
         prepared: the same records checked already; None: they are checked here.
 
+    Returns:
+        The modes, those refused and why, and how well they fit.
+
     Raises:
         RecordError: no record can be used, or they do not belong together; the message says what is needed.
     """

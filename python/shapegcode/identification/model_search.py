@@ -81,6 +81,9 @@ def search(problem: Problem, most_modes: int) -> Search:
         problem: what is fitted.
         most_modes: largest number of modes.
 
+    Returns:
+        Every model that was tried, and the one that the data ask for.
+
     Raises:
         ArgumentError: the records have too few samples for a mode.
     """

@@ -80,6 +80,9 @@ def recording_for(modes: tuple[tuple[float, float], ...]) -> Recording:
 
     Args:
         modes: (frequency in Hz, damping ratio) of those known; empty: the usual range of machining centres.
+
+    Returns:
+        Sampling rate, length of a tap, tip of the hammer.
     """
     known = modes or tuple((frequency, _USUAL_DAMPING) for frequency in _USUAL_HZ)
     highest = max(_LOOK_LEAST_HZ, _LOOK_ABOVE * max(frequency for frequency, _ in known))
@@ -134,6 +137,9 @@ def rapid_stop_program(axis: str, distance_mm: float, dwell_s: float) -> str:
         axis: X, Y or Z.
         distance_mm: length of each rapid, positive or negative.
         dwell_s: rest after each, in which the decay is recorded.
+
+    Returns:
+        The program.
     """
     number = 7201 + _AXES.index(axis)
     there, back = (f"{sign * distance_mm:.3f}".rstrip("0") for sign in (1.0, -1.0))

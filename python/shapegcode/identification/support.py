@@ -99,6 +99,9 @@ def estimates_of(
         alone: of each record by itself, its modes in the same order; fewer than two: no scatter.
         others: the same modes under other courses of the force between its samples.
         aliased: share of the force's spectrum at a frequency in Hz that may come from above half the sampling rate.
+
+    Returns:
+        Estimates per mode, in the order of the fit.
     """
     freedom = max(fit.samples - fit.parameters, 1)
     quantile = float(stats.t.ppf(0.975, freedom))

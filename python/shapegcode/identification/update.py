@@ -92,6 +92,9 @@ def update_modes(
         refused: modes that the data show without supporting their values.
         file: name for messages.
 
+    Returns:
+        The new text, and what changed in it.
+
     Raises:
         ArgumentError: no mode, one without support, no such axis, or modes that are not written as [[axes.x.modes]].
         MachineError: the result would not load.

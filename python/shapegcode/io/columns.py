@@ -76,6 +76,9 @@ def read_label(text: str, unit_text: str, names: Names) -> Label:
         text: the label.
         unit_text: what a row of units below it says; empty: there is none.
         names: of the kind of file.
+
+    Returns:
+        What it measures, of what, in which unit.
     """
     if text.strip().lower() in {"x_value", "x value"}:  # LabVIEW's name of the time, which it writes in seconds
         return Label(text, Meaning("time", "time"), find_unit(unit_text or "s"))
@@ -143,6 +146,9 @@ def unit_of(where: str, label: Label, allowed: tuple[Measured, ...], remedy: str
         allowed: kinds of quantity that the column may hold.
         remedy: what else the user can do, for messages.
 
+    Returns:
+        The unit, or None.
+
     Raises:
         RecordError: a unit that is not known, or one of another quantity.
     """
@@ -183,6 +189,9 @@ def tap_label(text: str, unit_text: str = "") -> Label:
     Args:
         text: the label.
         unit_text: what a row of units below it says; empty: there is none.
+
+    Returns:
+        What it measures, of what, in which unit.
     """
     label = read_label(text, unit_text, _tap_names)
     if label.unit is None or label.measures not in {None, "response"}:

@@ -222,6 +222,9 @@ def find_layout(path: Path, head: bytes, by_number: bool) -> Layout:
         head: its beginning, or all of it.
         by_number: columns are named by number, so that no header is needed.
 
+    Returns:
+        Separator, decimal sign, header and first line of numbers.
+
     Raises:
         RecordError: no numbers, no header, or lines between header and numbers that are neither.
     """

@@ -40,6 +40,9 @@ def even_period(times_s: FloatArray, stated_s: float | None = None) -> tuple[flo
         stated_s: a period stated elsewhere, which the instants must agree with; rounding of the instants to whole
             digits longer than a period is then accepted.
 
+    Returns:
+        The period in s, and warnings.
+
     Raises:
         UnevenTimeError: a gap, a repeated or a descending instant, a changing rate, or not the stated period.
     """

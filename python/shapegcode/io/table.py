@@ -73,6 +73,9 @@ class TextTable:
 
         Args:
             read: a label and what the row of units says below it (empty: nothing) to what they mean.
+
+        Returns:
+            A label per column.
         """
         count = self.layout.columns
         units = [*self.layout.units, *[""] * count][:count]
@@ -85,6 +88,9 @@ class TextTable:
         Args:
             used: their indices.
             fewest: rows that there must be.
+
+        Returns:
+            The values, float64, in the units of the file.
 
         Raises:
             RecordError: a cell is not a finite number, with line, column and text; or too few rows.

@@ -101,6 +101,9 @@ def factor_between(unit: Unit, wanted: str) -> float:
         unit: of the value.
         wanted: name of the other, for example "mm".
 
+    Returns:
+        The factor.
+
     Raises:
         ValueError: they measure different quantities.
     """

@@ -17,6 +17,9 @@ def controller_model(
         machine: the machine.
         feed_override: scales every programmed feed, 1 = as programmed.
         rapid_override: scales the rapid rates, 1 = full.
+
+    Returns:
+        The model, times in s, speeds in mm/s.
     """
     controller = machine.controller
     model = _core.ControllerModel()
@@ -50,6 +53,9 @@ def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.Mot
     Args:
         machine: whose limits.
         arc_feed_ratio: feed on arcs relative to the programmed one.
+
+    Returns:
+        The limits, in mm and s.
     """
     limits = _core.MotionLimits()
     controller = machine.controller

@@ -52,6 +52,9 @@ class PlayingController:
         Args:
             path: the blocks.
             options: plant and what is measured; the filters become the controller's.
+
+        Returns:
+            The figures, positions in mm.
         """
         options.axis_filters = self.filters
         profile = self._planned(path)
@@ -66,6 +69,9 @@ class PlayingController:
             path: the blocks.
             options: plant; the filters become the controller's.
             rest_s: how long the set-points rest behind the end, s.
+
+        Returns:
+            The motion, to be asked for piece by piece.
         """
         options.axis_filters = self.filters
         profile = self._planned(path)
@@ -81,6 +87,9 @@ class PlayingController:
             along: the path to whose length the stations ascend.
             stations_mm: where the travel is asked for, (n,).
             window_s: over which a feed is a mean.
+
+        Returns:
+            Time in s and speed in mm/s along the path.
         """
         period_s, profile = self.model.period_s, self._planned(path)
         if profile is not None:
@@ -144,6 +153,9 @@ class MachineModel:
 
         Args:
             arc_feed_ratio: feed on arcs relative to the programmed one.
+
+        Returns:
+            The limits, in mm and s.
         """
         return motion_limits(self._machine, arc_feed_ratio=arc_feed_ratio)
 
@@ -168,6 +180,9 @@ class MachineModel:
             shift: share of each mode's stated uncertainty by which it is off; see `axis_modes`.
             only: the one mode that is off, such as "x.1"; None: all of them.
             offset: from the command's positions to the machine's, for modes that vary with them.
+
+        Returns:
+            The options of the core.
 
         Raises:
             ArgumentError: there is no such plant.
@@ -195,6 +210,9 @@ class MachineModel:
             path: of a region.
             record_samples: samples kept for pictures.
             offset: see `options`.
+
+        Returns:
+            The figures, positions in mm.
         """
         options = self.options(offset=offset)
         options.record_samples = record_samples
@@ -235,6 +253,9 @@ class MachineModel:
             starved_blocks: behind each of these, tried one by one, the buffer is empty for `verdict.starved_s`.
             memory_s: how long after that its vibration is looked at; 0: to the end.
             tracker: of the programmed path, shared by several runs; None: one of its own.
+
+        Returns:
+            The figures, positions in mm.
         """
         own_s = self.shaped_time_constant_s
         options = self.options(time_constant_s=own_s, shift=shift, only=only, offset=offset)
@@ -259,6 +280,9 @@ class MachineModel:
             blocks: what was emitted.
             path: what was programmed.
             offset: see `options`.
+
+        Returns:
+            The figures, positions in mm.
         """
         filter_s = self._machine.controller.look_ahead_filter_time_constant_s
         options = self.options(time_constant_s=filter_s, offset=offset)

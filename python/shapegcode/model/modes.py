@@ -43,6 +43,9 @@ def still_mode(mode: AxisMode, part_mass_kg: float | None) -> _core.Mode:
     Args:
         mode: of the machine file.
         part_mass_kg: mass of the part; None: not known.
+
+    Returns:
+        The mode as the core takes it.
     """
     nominal = _core.Mode(mode.frequency_hz, mode.damping_ratio, mode.participation)
     over = mode.frequency_over
@@ -61,6 +64,9 @@ def axis_modes(machine: Machine, shift: float = 0.0, only: str | None = None) ->
         machine: whose modes.
         shift: share of each mode's stated uncertainty by which its frequency is moved; see `damping_scale`.
         only: the one mode that is moved, "x.1" for the first of the X axis; None: all of them.
+
+    Returns:
+        Three lists, of X, Y, Z.
     """
     return [
         [
@@ -116,6 +122,9 @@ def mode_tables(
         offset: from the command's positions to the machine's; where it is None for the axis of a table, the mode
             stays nominal.
         only: see `axis_modes`.
+
+    Returns:
+        Three lists, of X, Y, Z.
     """
     return [[_table(mode, moved, offset) for mode, moved in modes] for modes in _moved(machine, shift, only)]
 

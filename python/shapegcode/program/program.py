@@ -36,6 +36,9 @@ def reader_options(
         program_number: O number to play of a file that holds several; None: the first.
         expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
         collect_alarms: go on behind an alarm.
+
+    Returns:
+        The options of the core.
     """
     options = _core.ReaderOptions()
     options.calculator_decimal_point = machine.controller.calculator_decimal_point
@@ -110,6 +113,9 @@ def program_loader(folders: Sequence[Path]) -> Callable[[int], tuple[str, bytes]
 
     Args:
         folders: where to look, in this order.
+
+    Returns:
+        A function of the O number: name and content of the file, None where there is none.
     """
 
     def load(number: int) -> tuple[str, bytes] | None:

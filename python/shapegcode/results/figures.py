@@ -68,6 +68,9 @@ class Deviation:
 
         Args:
             material_side: "left" or "right" of the travel, where the workpiece is; a tool that strays there gouges.
+
+        Returns:
+            Both in µm, 0 or more, by name.
         """
         gouge, excess = (self.left_mm, self.right_mm) if material_side == "left" else (self.right_mm, self.left_mm)
         return {"gouge": gouge * 1e3, "excess": excess * 1e3}
@@ -100,6 +103,9 @@ class ContourError:
         Args:
             stats: of the runs, in mm.
             material_side: "left" or "right" of the travel, where the workpiece is; None: not known.
+
+        Returns:
+            The figures in µm.
         """
         return cls(**deviation_um(stats, material_side))
 
@@ -109,6 +115,9 @@ def largest_xyz_um(vectors: Iterable[Vector]) -> Xyz[float]:
 
     Args:
         vectors: each of shape (3,); none: all zero.
+
+    Returns:
+        The largest in µm.
     """
     return Xyz(**largest_um(vectors))
 
@@ -130,6 +139,9 @@ def deviation_um(stats: Iterable[_core.DeviationStats], material_side: str | Non
     Args:
         stats: of one or several runs.
         material_side: "left" or "right" of the travel, where the workpiece is: adds `gouge` and `excess`.
+
+    Returns:
+        The figures in µm, by name.
     """
     rows = list(stats)
     count = sum(row.count for row in rows)

@@ -49,6 +49,9 @@ def plain(value: object) -> Any:
     Args:
         value: dataclass, mapping, sequence, array, enumeration, path, number or text.
 
+    Returns:
+        The value in dictionaries, lists, texts, numbers, booleans and None.
+
     Raises:
         TypeError: something that has no form in JSON.
     """
@@ -126,6 +129,9 @@ def schema(result: type) -> dict[str, Any]:
     Args:
         result: the class. One with `json_extra` (names to types) has those keys too, and where the command wrote
             pictures and a program, their names under `plots` and `output`.
+
+    Returns:
+        The schema.
 
     Raises:
         TypeError: an annotation that has no form in JSON.

@@ -71,6 +71,9 @@ class PlayedRegion:
             lines: first and last of the region.
             regions: how many the program has.
 
+        Returns:
+            The region and its motion.
+
         Raises:
             ValueError: a run without recorded samples.
         """

@@ -57,6 +57,9 @@ def axes(ax: Axes | None = None, *, size_inch: tuple[float, float] = (8.0, 4.5),
         ax: where to draw; None: into a new figure.
         size_inch: width and height of a new figure.
         title: of the panel.
+
+    Returns:
+        The caller's axes, or those of a new figure.
     """
     panel: Axes = figure(*size_inch).subplots() if ax is None else ax
     _style(panel)
@@ -85,6 +88,12 @@ def grid(
         title: of the whole picture.
         part: which part of the program it shows.
         subplots: what matplotlib's `subplots` knows beside them: sharex, sharey, height_ratios, width_ratios.
+
+    Returns:
+        The panels, row by row.
+
+    Raises:
+        ValueError: the caller's axes have no place in a grid that could be divided.
     """
     whole: Any
     if ax is None:

@@ -181,6 +181,9 @@ def xyz_columns(cell: Callable[[str, Any], object], *, digits: int | None = None
     Args:
         cell: what a row shows in the column of the axis "x", "y" or "z".
         digits: see `Column`.
+
+    Returns:
+        Three columns.
     """
     return tuple(Column(axis.upper(), value=partial(cell, axis), digits=digits) for axis in "xyz")
 

@@ -20,6 +20,9 @@ def values_of(table: TomlTable, prefix: str = "", given: bool = True) -> Iterato
         table: a machine or a part of it.
         prefix: what stands before the names of its keys.
         given: True if the file has this table.
+
+    Returns:
+        The values one by one.
     """
     for name, field in type(table).model_fields.items():
         value, key = getattr(table, name), f"{prefix}{name}"
@@ -48,6 +51,9 @@ def write_toml(machine: TomlTable, remarks: Mapping[str, str]) -> str:
     Args:
         machine: what to write.
         remarks: text for the end of a key's line by its dotted key.
+
+    Returns:
+        The text of the file.
 
     Raises:
         KeyError: a remark for a key that does not exist.
@@ -136,6 +142,9 @@ def documentation(model: type[TomlTable], builtin_names: Sequence[str]) -> str:
     Args:
         model: the table that the file is read as.
         builtin_names: machines that can be named in place of a file.
+
+    Returns:
+        The page.
     """
     builtin = ", ".join(f"`{name}`" for name in builtin_names)
     lines = [
@@ -163,6 +172,9 @@ def key_tables(model: type[TomlTable], *, fanuc: bool = True, heading: str = "##
         model: the table that the file is read as.
         fanuc: with the column of FANUC parameters.
         heading: what a heading begins with.
+
+    Returns:
+        Its lines.
     """
     lines: list[str] = []
     columns = ("key", "unit", "default", "FANUC", "meaning") if fanuc else ("key", "unit", "default", "meaning")

@@ -37,6 +37,9 @@ def parse_exactly(text: str, file: str) -> tomlkit.TOMLDocument:
         text: of the file.
         file: name for messages.
 
+    Returns:
+        The document; written out it is the text again.
+
     Raises:
         ArgumentError: a line would change though nobody edits it.
         tomlkit.exceptions.ParseError: it is no TOML.

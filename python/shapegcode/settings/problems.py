@@ -42,6 +42,9 @@ def problems_of(error: ValidationError, model: type[TomlTable], data: dict[str, 
         model: what the file is read as.
         data: the tables of the file.
         text: the file, for line numbers.
+
+    Returns:
+        The problems, each once, in pydantic's order.
     """
     problems: list[Problem] = []
     for detail in error.errors(include_url=False):

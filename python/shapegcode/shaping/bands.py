@@ -108,6 +108,9 @@ def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
         machine: its axes' modes; one shaper serves all axes, because different ones would distort the path.
         uncertainty: half width of the band, relative, of modes that state none.
 
+    Returns:
+        The bands, one for each mode that differs from the others.
+
     Raises:
         ArgumentError: the machine has no mode, or an uncertainty outside its range.
     """

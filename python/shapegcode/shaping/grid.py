@@ -66,6 +66,9 @@ def make_grid(
         track: shapers that follow an axis; None: none.
         family: name of the design's row in the registry of families.
         note: what a user should know of the choice.
+
+    Returns:
+        The grid.
     """
     delays = [round(t / block_period_s) for t in shaper.times_s]
     return Grid(block_period_s, shaper, _core.Fir(delays, list(shaper.amplitudes)), track, family, note)
@@ -194,6 +197,9 @@ def shaper_track(
         period_s: grid of the shapers (block period), s.
         max_duration_s: longest shaper, s; None: `shaping.max_duration_s`.
         residual_limit: largest residual ratio of a mode anywhere along the axis.
+
+    Returns:
+        The shapers by position of the axis.
 
     Raises:
         ArgumentError: no mode varies with position, or modes vary over several axes.

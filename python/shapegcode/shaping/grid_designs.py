@@ -189,6 +189,9 @@ def lower_hull(
         cheapest: the taps at 0, 1 ... `last` periods of least cost, or None if there are none.
         last: number of periods, at least 1.
         tolerance: share by which a left-out corner may be better than the best one found.
+
+    Returns:
+        The corners, each as taps that add up to 1.
     """
     time = np.arange(last + 1) / last
     moments = np.vstack([time, time**2])

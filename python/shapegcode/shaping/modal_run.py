@@ -42,6 +42,9 @@ def respond(modes: Sequence[_core.Mode], command: FloatArray, period_s: float) -
         command: (n,), n >= 2, at rest before; the last value is held.
         period_s: time between its samples, s.
 
+    Returns:
+        Command and response of each mode.
+
     Raises:
         ArgumentError: no mode, a command that is too short, or a period that is not above 0.
     """

@@ -132,6 +132,9 @@ def plot_sensitivity(result: Recommendation, ax: Axes | None = None) -> Axes:
     Args:
         result: the comparison.
         ax: where to draw; None: a new figure.
+
+    Returns:
+        The axes that were drawn into.
     """
     return draw_sensitivity(_named(result), result.modes, result.vibration_limit, ax)
 
@@ -168,6 +171,9 @@ def plot_branches(result: Recommendation, ax: Axes | None = None) -> Axes:
     Args:
         result: a comparison for two modes.
         ax: where to draw; None: a new figure.
+
+    Returns:
+        The axes that were drawn into.
 
     Raises:
         ValueError: another number of modes, or no minimal shaper within the longest duration.

@@ -100,6 +100,9 @@ def recommend(
         objective: a name of `OBJECTIVES`.
         allow_negative: whether a design with negative taps may be taken.
 
+    Returns:
+        Index into the designs.
+
     Raises:
         ArgumentError: no design.
     """

@@ -180,6 +180,9 @@ def design(name: str, bands: Sequence[ModeBand], options: DesignOptions | None =
         bands: at least one mode with its band.
         options: grid, longest duration and other limits; None: the defaults.
 
+    Returns:
+        The designs; none where the family has none for these modes.
+
     Raises:
         ArgumentError: no mode, no such family, or one that is not designed on the asked kind of times.
         DesignError: the family has no shaper for these modes within the limits; the message tells what is nearest.

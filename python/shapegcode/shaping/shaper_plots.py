@@ -52,6 +52,9 @@ def draw_sensitivity(
         bands: the modes and how far they may be off, at least one.
         vibration_limit: residual ratio drawn as a dashed line; None: none.
         ax: where to draw; None: a new figure.
+
+    Returns:
+        The axes that were drawn into.
     """
     panel = plot.axes(ax, size_inch=(9.0, 5.4), title="What is left if the frequency is another one")
     highest = max(band.mode.frequency_hz * (1.0 + band.uncertainty) for band in bands)
@@ -150,6 +153,9 @@ def draw_branches(branches: MinimalBranches, modes: Sequence[Mode], ax: Axes | N
         branches: over the ratio to the slower mode.
         modes: the two.
         ax: where to draw; None: a new figure.
+
+    Returns:
+        The axes that were drawn into.
     """
     slow, fast = sorted(mode.frequency_hz for mode in modes)
     panel = plot.axes(ax, size_inch=(9.0, 5.0), title=f"Minimal shapers of two modes, the slower one at {slow:g} Hz")

@@ -25,6 +25,9 @@ def parse_taps(given: str | Sequence[Any] | dict[str, Any]) -> Shaper:
             of pairs ``[[0, 0.5], [0.01087, 0.5]]``; a table ``{"times_s": [...], "amplitudes": [...]}``; or the JSON
             text of one of the latter two.
 
+    Returns:
+        The shaper, its times in s.
+
     Raises:
         ArgumentError: not of these forms, times that do not ascend from 0, or amplitudes that do not add up to 1.
     """

@@ -120,6 +120,9 @@ class ShaperTrack:
 
         Args:
             offset_mm: what must be added to a position of the command to get one of the tables (work offset).
+
+        Returns:
+            The filter.
         """
         return FollowingFir(self.filters, self.axis, [node.position_mm - offset_mm for node in self.nodes])
 
@@ -149,6 +152,9 @@ def design_track(
         residual_limit: largest residual ratio, above 0.
         most_nodes: more are not tried.
         design: shaper for the modes at a node; None: non-negative, least second central moment, equal means.
+
+    Returns:
+        The shapers by position of the axis.
 
     Raises:
         ArgumentError: no mode, a span or limit outside its range, or a table over another axis.

@@ -188,6 +188,9 @@ def fit_coefficients(
         thickness: the chip thickness that the power laws are of, "mean" of the engagement or "local".
         edge: with edge forces.
 
+    Returns:
+        The coefficients with their intervals, in N and mm.
+
     Raises:
         ArgumentError: too few forces, chips too alike to tell the exponents, forces that no cut gives (sign or axes).
     """

@@ -165,6 +165,9 @@ def taper_cut(given: Conditions, feeds: Sequence[float], depths_mm: tuple[float,
         depths_mm: radial depth at the beginning and at the end of the stock.
         length_mm: of the stock.
 
+    Returns:
+        The passes, feeds in mm/min.
+
     Raises:
         ArgumentError: what the tool or the machine cannot do.
     """
@@ -191,6 +194,9 @@ def corner_feeds(given: Conditions, radial_depth_mm: Array) -> Array:
     Args:
         given: tool, spindle, axial depth, feed of the first depth.
         radial_depth_mm: (n,).
+
+    Returns:
+        Feeds in mm/min, one per depth.
     """
     tool = given.cut_tool()
     law = ForceLaw(tool, tool.cutting, given.spindle_rev_per_min, given.axial_depth_mm)
@@ -256,6 +262,9 @@ def corner_cut(given: Conditions, corner: Corner, interval_mm: float) -> Design:
         corner: to unroll.
         interval_mm: length of the blocks with a feed of their own.
 
+    Returns:
+        The two passes, feeds in mm/min.
+
     Raises:
         ArgumentError: the corner cannot be unrolled, or is more than the tool or the machine can do.
     """
@@ -316,6 +325,9 @@ def interval_cut(
         depth_mm: radial depth.
         intervals_mm: length of the blocks of each pass.
         sequences: feeds of the blocks of each pass, mm/min.
+
+    Returns:
+        The passes, feeds in mm/min.
 
     Raises:
         ArgumentError: what the tool or the machine cannot do.

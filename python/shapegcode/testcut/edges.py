@@ -60,6 +60,9 @@ def unrolled_edge(s_mm: Array, radial_depth_mm: Array, radius_mm: float, stock_m
         stock_mm: length of the stock, from X = 0 on.
         at_mm: X at which the distance is 0.
 
+    Returns:
+        Points of the edge, mm.
+
     Raises:
         ArgumentError: the depth reaches the radius, or falls faster than a straight pass can.
     """
@@ -88,6 +91,9 @@ def tool_path(edge: Edge, radius_mm: float, start_mm: float, end_mm: float) -> E
         radius_mm: of the tool.
         start_mm: X at which the path begins.
         end_mm: X at which it ends.
+
+    Returns:
+        Points of the line, mm.
     """
     return reduced(_envelope(edge, radius_mm, start_mm, end_mm, 1.0))
 
@@ -122,6 +128,9 @@ def on_increments(line: Edge, step_mm: float) -> Edge:
     Args:
         line: its inner points may move; those at its ends are rounded.
         step_mm: the least increment.
+
+    Returns:
+        Points of the line, mm.
     """
     tried = step_mm * (np.round(line.x_mm / step_mm)[:, None] + np.arange(-_MOVED, _MOVED + 1))
     tried[[0, -1]] = step_mm * np.round(line.x_mm[[0, -1]] / step_mm)[:, None]

@@ -161,6 +161,9 @@ def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, shape: S
         measuring: which pass was recorded.
         shape: course of the mean force that is expected.
 
+    Returns:
+        The forces in N with their places in mm.
+
     Raises:
         ArgumentError: too few samples per revolution, no air before or after the cut, no cut, or a cut whose length
             does not fit the description.

@@ -23,6 +23,9 @@ def noise_of(left: Array, predicted: Array, revolutions: Array, robust: Array) -
         predicted: (n, k) values of the fit.
         revolutions: (n,) how many each is the mean of.
         robust: (n, k) weights from 0 to 1 that keep outliers from widening it.
+
+    Returns:
+        Standard deviations, in the unit of the values.
     """
     found = np.empty_like(left)
     many = revolutions / float(np.mean(revolutions))
@@ -60,6 +63,9 @@ def neighbour_correlation(scaled: Array, group: npt.NDArray[np.intp], outlier: n
         scaled: (n, k) residuals over their standard deviations.
         group: (n,) number of the group.
         outlier: (n,) rows that do not count.
+
+    Returns:
+        The correlation, 0 to 1.
     """
     pairs = (group[1:] == group[:-1]) & ~outlier[1:] & ~outlier[:-1]
     if pairs.sum() < 8:

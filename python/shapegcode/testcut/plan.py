@@ -153,6 +153,9 @@ def engagement(cut: TestCut, measuring: MeasuringPass, x_mm: Array) -> Engagemen
         cut: gives the tool and the side on which the material is.
         measuring: the pass.
         x_mm: (n,) positions of the tool's axis.
+
+    Returns:
+        Angles in rad and depths in mm at each X, (n,).
     """
     radius = cut.tool.radius_mm
     edge_x, edge_y = np.array(measuring.edge_x_mm), np.array(measuring.edge_height_mm)

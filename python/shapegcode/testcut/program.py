@@ -40,6 +40,9 @@ def program_text(design: Design, machine: Machine, number: int) -> str:
         design: what to cut.
         machine: for the increments of the words, and the block time.
         number: of the program, O.
+
+    Returns:
+        The program.
     """
     writer = _Writer(design, machine)
     lines = ["%", f"O{number:04d}({_TITLES[design.cut.kind]})"]

@@ -53,6 +53,9 @@ def expected(cut: TestCut, measuring: MeasuringPass, cutting: Mapping[str, Any] 
         cut: the test cut.
         measuring: the pass.
         cutting: coefficients; None: those known before.
+
+    Returns:
+        The forces in N.
     """
     count = math.ceil((measuring.end_mm - measuring.start_mm) / _STEP_MM) + 1
     x = np.linspace(measuring.start_mm, measuring.end_mm, count)

@@ -142,6 +142,9 @@ def fit_taper(
         thickness: chip thickness of the power laws, "mean" of the engagement or "local".
         edge: with edge forces.
 
+    Returns:
+        The coefficients with their intervals, and how well they fit.
+
     Raises:
         ArgumentError: a record that does not fit the cut, or forces that do not tell the coefficients.
     """

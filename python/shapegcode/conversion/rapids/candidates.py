@@ -89,6 +89,9 @@ def find_gaps(program: Program, machine: Machine) -> list[Gap]:
     Args:
         program: read as emitted text.
         machine: whose controller reads it.
+
+    Returns:
+        The gaps, in the order of the text.
     """
     core = program.core
     moves = core.other_moves

@@ -58,6 +58,9 @@ def settling_time_s(command_mm: Vector, options: _core.PlaybackOptions, slowest_
         options: the plant.
         slowest_per_s: decay rate of the slowest mode (damping ratio times angular frequency), 1/s.
         band_mm: half the width of the band, above 0.
+
+    Returns:
+        The time in s.
     """
     still = _core.Path([_core.Segment.line(command_mm[0], command_mm[0], 1.0)])
     options.measure_contour = False
@@ -150,6 +153,9 @@ class RapidPlant:
         Args:
             steps: in order.
             region: whose modes hold, where modes vary with position.
+
+        Returns:
+            The time in s.
         """
         period = self.model.period_s
         clock_s = math.fsum(step.clock_s for step in steps)

@@ -104,6 +104,9 @@ def shape_rapids(
         pool: runs playbacks.
         budget: limits of the whole text; rapids get what the regions leave.
 
+    Returns:
+        The text with those that were replaced, and what each gained.
+
     Raises:
         ArgumentError: `tolerance.residual_floor_um` is 0: there is no band to settle in.
         RoundTripError: see `verify.read_back`.

@@ -63,6 +63,9 @@ def least_worst(
         max_abs_sum: largest sum of the taps' magnitudes where taps may be negative, at least 1.
         zeros_at_nominal: every mode is cancelled exactly at its nominal frequency besides.
 
+    Returns:
+        The design with its worst residual and the least that is possible.
+
     Raises:
         ArgumentError: no mode, or a value outside its range.
         DesignError: the exact zeros have no solution of this duration, or no band was given and so no duration is
@@ -111,6 +114,9 @@ def minimax_robust(
         max_abs_sum: largest sum of the taps' magnitudes where taps may be negative, at least 1.
         zeros_at_nominal: every mode is cancelled exactly at its nominal frequency besides.
         hints: a refusal looks for what would do, which may take seconds.
+
+    Returns:
+        The design with its worst residual and the least that is possible.
 
     Raises:
         ArgumentError: no mode, or a value outside its range.

@@ -159,7 +159,18 @@ def _exact(task: Task, max_duration_s: float) -> RobustDesign | None:
 
 
 def best_within(task: Task, last: int) -> RobustDesign | None:
-    """The least worst residual within `last` periods; None if the exact zeros have no solution."""
+    """The least worst residual within `last` periods; None if the exact zeros have no solution.
+
+    Args:
+        task: the modes, their bands and the grid.
+        last: periods that the shaper may last.
+
+    Returns:
+        The design, or None.
+
+    Raises:
+        DesignError: it does not survive being solved in full precision.
+    """
     bounds = task.problem(last).least_worst()
     if bounds is None:
         return None
