@@ -29,6 +29,7 @@ from shapegcode._core import (
     largest_feeds as largest_feeds,
     layer_borders as layer_borders,
     linear_model as linear_model,
+    machine_frame as machine_frame,
     minimal_branches as minimal_branches,
     minimal_shapers as minimal_shapers,
     minimal_two_mode as minimal_two_mode,
