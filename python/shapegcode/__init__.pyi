@@ -55,10 +55,8 @@ from shapegcode.checking.result import (
     Finding as Finding,
 )
 from shapegcode.conversion.budget import Budget as Budget
-from shapegcode.conversion.convert import (
-    Conversion as Conversion,
-    convert as convert,
-)
+from shapegcode.conversion.convert import convert as convert
+from shapegcode.conversion.result import Conversion as Conversion
 from shapegcode.cutting.stock import Stock as Stock
 from shapegcode.cutting.tool import Tool as Tool
 from shapegcode.errors import (
@@ -77,10 +75,8 @@ from shapegcode.errors import (
 )
 from shapegcode.feed.result import FeedSchedule as FeedSchedule
 from shapegcode.feed.schedule import schedule_feed as schedule_feed
-from shapegcode.feed.shaped import (
-    ScheduledConversion as ScheduledConversion,
-    convert_scheduled as convert_scheduled,
-)
+from shapegcode.feed.shaped import convert_scheduled as convert_scheduled
+from shapegcode.feed.shaped_result import ScheduledConversion as ScheduledConversion
 from shapegcode.feed.survey import (
     Survey as Survey,
     survey as survey,

@@ -149,7 +149,7 @@ def convert(program: Path, way: Way, contour_um: float, finer: int = 0) -> Outco
             conversion = sg.convert(program, machine)
     except _core.DesignError as error:
         return Outcome(way.name, refusal=str(error))
-    report = conversion.report
+    report = conversion.to_dict()
     emitted = conversion.emitted.core
     places = [(emitted.cutting_path(place.first_line, place.last_line), place) for place in conversion.placed]
 
@@ -167,7 +167,7 @@ def convert(program: Path, way: Way, contour_um: float, finer: int = 0) -> Outco
         response_um=report["contour_error_um"]["response"]["emitted"]["max"],
         cutting_s=report["cutting_time_s"]["emitted"],
         size_bytes=report["bytes_emitted"],
-        within_tolerance=conversion.within_tolerance,
+        within_tolerance=conversion.ok,
     )
 
 

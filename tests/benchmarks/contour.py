@@ -27,8 +27,8 @@ from table import Row, Sample, comparison_table, markdown
 import shapegcode as sg
 from acceptance import machine_with
 from shapegcode import _core
-from shapegcode.conversion.write import filter_tolerance, shaping_options
-from shapegcode.model.controller import motion_limits
+from shapegcode.conversion.write import RegionWriter
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping.grid import Grid, choose_grid
 
 Vector = npt.NDArray[np.float64]
@@ -102,8 +102,9 @@ def _region_rows(repetitions: int) -> list[list[str]]:
             machine = machine_with({"controller.block_time_s": period_s, "shaping.contour": target})
             grid = choose_grid(machine, period_s)
             path = sg.Program.from_text(arcs_and_corners().encode(), machine, source="path").regions[0].path
-            tolerance = filter_tolerance(machine, grid, machine.tolerance.contour_um)
-            options = shaping_options(machine, grid, motion_limits(machine), tolerance)
+            model = MachineModel(machine)
+            writer = RegionWriter(machine, model, grid)
+            options = writer.options(model.limits(), writer.tolerance(machine.tolerance.contour_um))
 
             def shape(path: Any = path, grid: Grid = grid, options: Any = options) -> int:
                 piece = _core.RegionShaper(path, grid.fir, [], options).next(10**7)

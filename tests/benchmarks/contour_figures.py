@@ -23,9 +23,10 @@ from acceptance import Judged, convert, machine_with
 from judge import Move, path_polyline, play, residual_um, response
 from judge.plant import contour_error_um
 from shapegcode import _core
-from shapegcode.conversion.write import filter_tolerance, shaping_options
+from shapegcode.conversion.write import RegionWriter
 from shapegcode.demos.path import path_program
 from shapegcode.model.controller import motion_limits
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping.grid import choose_grid
 
 Vector = npt.NDArray[np.float64]
@@ -185,7 +186,7 @@ def within(text: str, target: str, tolerance_um: float, block_period_s: float = 
     }  # fmt: skip
     judged = convert(text, machine_with(keys), block_period_s=block_period_s)
     ((programmed, blocks, entry),) = judged.regions()
-    report = {**judged.conversion.report, "within": judged.conversion.within_tolerance, "entry": entry}
+    report = {**judged.conversion.to_dict(), "within": judged.conversion.ok, "entry": entry}
     return judge(judged, blocks, programmed, block_period_s, "ceil"), report
 
 
@@ -206,8 +207,9 @@ def exact(target: str, smoothness: float, block_period_s: float) -> tuple[float,
     """
     machine = machine_with({"shaping.contour": target, "controller.block_time_s": block_period_s})
     grid = choose_grid(machine, block_period_s)
-    limits = motion_limits(machine, arc_feed_ratio=ARC_FEED_RATIO)
-    options = shaping_options(machine, grid, limits, filter_tolerance(machine, grid, 1e6))
+    model = MachineModel(machine)
+    writer = RegionWriter(machine, model, grid)
+    options = writer.options(model.limits(arc_feed_ratio=ARC_FEED_RATIO), writer.tolerance(1e6))
     options.contour_smoothness = smoothness
     shaper = _core.RegionShaper(path_program(200.0, machine).regions[-1].path, grid.fir, [], options)
     piece = shaper.next(10**7)

@@ -117,10 +117,10 @@ def convert_path(seed: int, rounding: str, period_s: float, *, inch: bool, incre
         result = convert(program, owner)
     moves = [move for line in interpret(result.text.decode()).lines for move in line.moves if move.kind != "rapid"]
     residuals = [residual_um(play(moves, block_end=rule), MODES, 0.001)[:2] for rule in ("ceil", "carry")]
-    peak = result.report["peak_vibration_um"]["emitted"]
+    peak = result.peak_vibration_um.emitted
     return Outcome(
-        residuals[0], residuals[1], (peak["x"], peak["y"]), max(errors), blocks, len(result.text),
-        int(result.report["slowed_blocks"]),
+        residuals[0], residuals[1], (peak.x, peak.y), max(errors), blocks, len(result.text),
+        result.slowed_blocks,
     )  # fmt: skip
 
 

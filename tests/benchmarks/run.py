@@ -25,9 +25,10 @@ from table import Row, Sample, comparison_table, markdown
 
 import shapegcode as sg
 from shapegcode import _core
-from shapegcode.conversion.convert import choose_grid
-from shapegcode.conversion.write import emit_region, filter_tolerance
-from shapegcode.model.controller import controller_model, motion_limits
+from shapegcode.conversion.write import RegionWriter
+from shapegcode.model.controller import controller_model
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.shaping.grid import choose_grid
 
 _MEGA = 1e6
 _FIR_SAMPLES = 1_000_000
@@ -90,8 +91,9 @@ def _program_rows(folder: Path, program: Path, lines: int, repetitions: int) -> 
 
     machine = sg.Machine.load("vx500")
     grid = choose_grid(machine)
-    limits = motion_limits(machine)
-    tolerance = filter_tolerance(machine, grid, machine.tolerance.contour_um)
+    model = MachineModel(machine)
+    limits, writer = model.limits(), RegionWriter(machine, model, grid)
+    tolerance = writer.tolerance(machine.tolerance.contour_um)
     reading, look_ahead, shaping, emission = [], [], [], []
     peers, conversions = [], []
     for repetition in range(repetitions):
@@ -104,9 +106,7 @@ def _program_rows(folder: Path, program: Path, lines: int, repetitions: int) -> 
         path = region.path
         look_ahead.append(_timed(lambda path=path: _core.plan_speed(path, limits, tolerance))[0])
         with _time_inside(_core, "fit_blocks", "write_blocks") as inside:
-            shaping.append(
-                _timed(lambda read=read, region=region: emit_region(read, region, machine, grid, limits, tolerance))[0]
-            )
+            shaping.append(_timed(lambda read=read, region=region: writer.write(read, region, limits, tolerance))[0])
         emission.append(sum(inside))
         del read, region, path
 

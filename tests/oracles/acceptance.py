@@ -78,7 +78,7 @@ class Judged:
         """Original moves, emitted moves and the report of every region."""
         ours = self.interpretation(self.original, emitted=False).lines
         theirs = self.interpretation(self.emitted, emitted=True).lines
-        for entry in self.conversion.report["regions"]:
+        for entry in self.conversion.to_dict()["regions"]:
             first, last = entry["lines"]
             begin, end = (line - self.header_lines for line in entry["emitted_lines"])
             yield (
@@ -122,10 +122,10 @@ def convert(text: str, machine: sg.Machine, **options: Any) -> Judged:
     complaints = verify_conversion(
         text,
         emitted,
-        [(e["lines"][0], e["lines"][1]) for e in conversion.report["regions"]],
+        [(e["lines"][0], e["lines"][1]) for e in conversion.to_dict()["regions"]],
         calculator_decimal_point=machine.controller.calculator_decimal_point,
         arc_centre=machine.input.arc_centre,
-        contour_tolerance_um=contour_limit_um(machine, conversion.report),
+        contour_tolerance_um=contour_limit_um(machine, conversion.to_dict()),
         inserted=inserted_lines(machine),
     )
     assert not complaints, "\n".join(complaints[:10])
@@ -147,7 +147,7 @@ def inserted_lines(machine: sg.Machine) -> list[str]:
 
 def whole_periods(judged: Judged) -> None:
     """Under "ceil" every block of every region lasts a whole multiple of the block period."""
-    period = judged.conversion.report["block_period_s"]
+    period = judged.conversion.to_dict()["block_period_s"]
     tick = judged.machine.controller.interpolation_period_s
     for _, moves, entry in judged.regions():
         cuts = [m for m in moves if m.length > 0.0]
@@ -207,7 +207,7 @@ def close(ours: float, theirs: float, relative: float = 0.1, absolute_um: float 
 
 def check_figures(judged: Judged, *, contour_budget_s: float = 15.0) -> None:
     """The report's residuals, times and, within a budget of playing time, contour errors are the judge's too."""
-    report = judged.conversion.report
+    report = judged.conversion.to_dict()
     worst = {"command": 0.0, "response": 0.0}
     at_override = np.zeros((len(report["override_residual"]), 3))
     for programmed, blocks, entry in judged.regions():

@@ -68,7 +68,7 @@ def test_read_convert_simulate(tmp_path: Path) -> None:
     assert program.source == str(file)
     conversion = sg.convert(program, machine)
     assert isinstance(conversion.text, bytes)
-    assert conversion.within_tolerance is conversion.report["within_tolerance"] is True
+    assert conversion.ok is conversion.to_dict()["within_tolerance"] is True
     emitted = sg.Program.from_text(conversion.text, machine, source="emitted")
     simulation = sg.simulate(emitted, machine, shaped=True)
     (region,) = simulation.regions
@@ -133,7 +133,7 @@ def test_errors_are_one_family_and_carry_their_place() -> None:
     with pytest.raises(FileNotFoundError):
         sg.Program.read("/nowhere/part.nc", machine)
     for ratio in (0.0, -1.0, 1.01, math.nan):
-        with pytest.raises(sg.ArgumentError, match="arc feed ratio"):
+        with pytest.raises(sg.MachineError, match="arc_feed_ratio"):
             sg.convert(sg.Program.from_text(GOOD, machine), machine, arc_feed_ratio=ratio)
     for period in (0.0, -0.005, 0.0051, 0.002, math.nan, math.inf):
         with pytest.raises(sg.ShapegcodeError):

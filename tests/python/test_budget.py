@@ -7,6 +7,7 @@ import itertools
 import json
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 from subprocess import CompletedProcess
 from typing import Any
@@ -61,12 +62,12 @@ def gain(entry: dict[str, Any]) -> float:
 
 def given_up(judged: Judged) -> set[int]:
     """First lines of the regions given up."""
-    return {entry["lines"][0] for entry in judged.conversion.report["budget"]["given_up"]}
+    return {entry["lines"][0] for entry in judged.conversion.to_dict()["budget"]["given_up"]}
 
 
 def rates(judged: Judged) -> tuple[float, float]:
     """Bits per second and blocks per second of the busiest stretch, tick by tick."""
-    report = judged.conversion.report
+    report = judged.conversion.to_dict()
     tick = judged.machine.controller.interpolation_period_s
     stretch = round(report["shaper"]["times_s"][-1] / tick)
     lines = judged.emitted.split("\n")
@@ -87,7 +88,7 @@ def rates(judged: Judged) -> tuple[float, float]:
 
 def test_least_gain_per_byte_is_given_up_first() -> None:
     """At every limit at which the choice changes, and one byte below."""
-    entries = free().conversion.report["regions"]
+    entries = free().conversion.to_dict()["regions"]
     sizes = {entry["lines"][0]: emitted_size(free(), entry) for entry in entries}
     gains = {entry["lines"][0]: gain(entry) for entry in entries}
     assert min(sizes.values()) > 100
@@ -102,7 +103,7 @@ def test_least_gain_per_byte_is_given_up_first() -> None:
         fits = budgeted(max_bytes=size)
         assert given_up(fits) == prefix
         assert len(fits.conversion.text) == size
-        assert fits.conversion.within_tolerance
+        assert fits.conversion.ok
         assert before <= prefix
         before = prefix
         if count + 1 == len(order):
@@ -114,18 +115,18 @@ def test_least_gain_per_byte_is_given_up_first() -> None:
         left = size - 1 - len(tighter.conversion.text)
         assert left >= 0
         assert all(sizes[line] > left for line in gone if gains[line] > 0.0)
-    assert "keep their text" not in str(free().conversion.report["warnings"])
+    assert "keep their text" not in str(free().conversion.to_dict()["warnings"])
 
 
 def test_what_is_given_up_is_said() -> None:
     limit = len(free().conversion.text) - 900
-    report = budgeted(max_bytes=limit).conversion.report
-    original = {tuple(e["lines"]): e for e in free().conversion.report["regions"]}
+    report = budgeted(max_bytes=limit).conversion.to_dict()
+    original = {tuple(e["lines"]): e for e in free().conversion.to_dict()["regions"]}
     budget = report["budget"]
     assert budget["limits"] == {"max_bytes": limit, "baud": None, "max_blocks_per_second": None}
     assert budget["before"]["bytes"] == len(free().conversion.text)
     assert budget["after"]["bytes"] == report["bytes_emitted"] <= limit
-    assert budget["block_period_s"] == report["block_period_s"] == free().conversion.report["block_period_s"]
+    assert budget["block_period_s"] == report["block_period_s"] == free().conversion.to_dict()["block_period_s"]
     assert len(budget["given_up"]) + len(report["regions"]) == len(FEEDS)
     for entry in budget["given_up"]:
         whole = original.pop(tuple(entry["lines"]))
@@ -140,7 +141,7 @@ def test_what_is_given_up_is_said() -> None:
 def test_everything_is_given_up_before_nothing_fits() -> None:
     judged = budgeted(max_bytes=len(PART))
     assert judged.conversion.text.decode() == PART
-    assert judged.conversion.within_tolerance
+    assert judged.conversion.ok
     assert len(given_up(judged)) == len(FEEDS)
     with pytest.raises(sg.ArgumentError, match=rf"needs {len(PART)} bytes at least .* budget is {len(PART) - 1} bytes"):
         budgeted(max_bytes=len(PART) - 1)
@@ -169,11 +170,11 @@ def test_arcs_with_absolute_centres_cannot_be_given_up() -> None:
     text = HEAD + "G1X10.F60\nG2X20.Y0I15.J0\nG0Z5.\nG1X40.F6000\nG0Z9.\n" + TAIL
     keys = {"input.arc_centre": "absolute"}
     free = convert(text, machine_with(keys))
-    arc, line = free.conversion.report["regions"]
+    arc, line = free.conversion.to_dict()["regions"]
     least = len(free.conversion.text) - emitted_size(free, line)
     fits = budgeted(text, keys, max_bytes=least)
     assert given_up(fits) == {line["lines"][0]}
-    assert [entry["lines"] for entry in fits.conversion.report["regions"]] == [arc["lines"]]
+    assert [entry["lines"] for entry in fits.conversion.to_dict()["regions"]] == [arc["lines"]]
     with pytest.raises(sg.ArgumentError, match=f"needs {least} bytes at least .* absolute centres"):
         budgeted(text, keys, max_bytes=least - 1)
     with pytest.raises(sg.ArgumentError, match="limit 1; their arcs have absolute centres"):
@@ -214,11 +215,11 @@ def test_the_shortest_shaper_whose_blocks_are_slow_enough(limits: dict[str, Any]
     (limit,) = limits.values()
     key = ("baud", "blocks_per_second")[which]
     judged = budgeted(**limits)
-    report = judged.conversion.report
+    report = judged.conversion.to_dict()
     assert rates(judged)[which] <= limit * (1 + 1e-9)
     assert rates(judged) == pytest.approx([report["budget"]["after"][k] for k in ("baud", "blocks_per_second")])
     assert report["budget"]["before"][key] == pytest.approx(rates(wide())[which])
-    assert judged.conversion.within_tolerance
+    assert judged.conversion.ok
     assert not given_up(judged)
     chosen = round(report["block_period_s"] * 1e3)
     assert f"the block period is {chosen} ms instead of 5 ms" in str(report["warnings"])
@@ -239,13 +240,9 @@ def each_alone() -> dict[int, float]:
     """Blocks per second of every region by its first line, at the fixed block period and without a budget."""
     free = convert(PART, machine_with(PERIOD))
     found = {}
-    for entry in free.conversion.report["regions"]:
-        report = {**free.conversion.report, "regions": [entry]}
-        alone = Judged(
-            sg.Conversion(free.conversion.text, report, free.conversion.emitted, ()), free.machine, free.original,
-            free.emitted, free.header_lines,
-        )  # fmt: skip
-        found[entry["lines"][0]] = rates(alone)[1]
+    for entry in free.conversion.regions:
+        alone = replace(free, conversion=replace(free.conversion, regions=(entry,)))
+        found[entry.lines[0]] = rates(alone)[1]
     return found
 
 
@@ -253,17 +250,17 @@ def each_alone() -> dict[int, float]:
 def test_with_a_fixed_block_period_only_the_fast_regions_are_given_up(limit: int) -> None:
     judged = budgeted(keys=PERIOD, max_blocks_per_second=limit)
     assert rates(judged)[1] <= limit * (1 + 1e-9)
-    assert judged.conversion.report["block_period_s"] == 0.005
+    assert judged.conversion.to_dict()["block_period_s"] == 0.005
     for line, blocks_per_s in each_alone().items():
         assert (line in given_up(judged)) == (blocks_per_s > limit * (1 + 1e-9))
 
 
 def test_an_argument_fixes_the_block_period_too() -> None:
     judged = convert(PART, MACHINE, block_period_s=0.005, budget=sg.Budget(baud=300))
-    assert judged.conversion.report["block_period_s"] == 0.005
+    assert judged.conversion.to_dict()["block_period_s"] == 0.005
     assert len(given_up(judged)) == len(FEEDS)
     assert judged.conversion.text.decode() == PART
-    assert "limit 300" in judged.conversion.report["budget"]["given_up"][0]["reason"]
+    assert "limit 300" in judged.conversion.to_dict()["budget"]["given_up"][0]["reason"]
 
 
 def test_what_misses_its_tolerance_only_for_the_longer_period_is_kept() -> None:
@@ -271,12 +268,12 @@ def test_what_misses_its_tolerance_only_for_the_longer_period_is_kept() -> None:
     circles = "G1X5.F3000\n" + "G2X5.Y0I5.\n" * 6 + "G1X0\n"
     text = HEAD + "G1X10.F600\nG0Z5.\nG0X0Y0\n" + circles + TAIL
     keys = {"tolerance.contour_um": 1.2, "shaping.contour": "command", "emission.rounding": "nearest"}
-    assert convert(text, machine_with(keys)).conversion.within_tolerance
+    assert convert(text, machine_with(keys)).conversion.ok
     judged = budgeted(text, keys, max_blocks_per_second=25)
-    assert judged.conversion.within_tolerance
-    (entry,) = judged.conversion.report["budget"]["given_up"]
+    assert judged.conversion.ok
+    (entry,) = judged.conversion.to_dict()["budget"]["given_up"]
     assert entry["lines"] == [8, 15]
-    period_ms = judged.conversion.report["block_period_s"] * 1e3
+    period_ms = judged.conversion.to_dict()["block_period_s"] * 1e3
     assert entry["reason"].endswith(f"limit 1.2 um, at a block period of {period_ms:g} ms")
 
 
@@ -289,10 +286,10 @@ def test_what_runs_too_fast_only_for_the_longer_period_is_kept() -> None:
     }
     circles = "G1X5.F3000\n" + "G2X5.Y0I5.\n" * 6 + "G1X0\n"
     text = HEAD + "G03I.166J.116F1.\nG0Z5.\nX0Y0\n" + circles + TAIL
-    assert convert(text, machine_with(keys)).conversion.within_tolerance
+    assert convert(text, machine_with(keys)).conversion.ok
     judged = budgeted(text, keys, max_blocks_per_second=60)
-    assert judged.conversion.within_tolerance
-    (entry,) = judged.conversion.report["budget"]["given_up"]
+    assert judged.conversion.ok
+    (entry,) = judged.conversion.to_dict()["budget"]["given_up"]
     assert entry["lines"] == [5, 5]
     assert entry["reason"].startswith("runs in ")
     assert "too slow a feed" in entry["reason"]
@@ -310,14 +307,14 @@ def test_sample_under_all_three(name: str) -> None:
     assert len(judged.conversion.text) <= limit
     baud, blocks = rates(judged)
     assert (baud <= 38400 * (1 + 1e-9), blocks <= 150 * (1 + 1e-9)) == (True, True)
-    assert judged.conversion.within_tolerance
+    assert judged.conversion.ok
 
 
 def test_comments_travel_on_the_line_too() -> None:
     """A comment is sent with the block behind it."""
     text = HEAD + "G1X10.F600\n(" + "A" * 100 + ")\nY10.\n" + TAIL
     plain = text.replace("A" * 100, "A")
-    loads = [budgeted(t, PERIOD, baud=1e9).conversion.report["budget"]["before"]["baud"] for t in (plain, text)]
+    loads = [budgeted(t, PERIOD, baud=1e9).conversion.to_dict()["budget"]["before"]["baud"] for t in (plain, text)]
     assert loads[1] > loads[0]
 
 
@@ -339,12 +336,12 @@ def test_busiest_stretch_is_that_of_every_stretch_tried(blocks: list[tuple[int, 
 def test_a_budget_that_is_not_reached_changes_nothing() -> None:
     judged = budgeted(max_bytes=10**6, baud=10**6, max_blocks_per_second=1000)
     assert judged.conversion.text == free().conversion.text
-    report = dict(judged.conversion.report)
+    report = dict(judged.conversion.to_dict())
     budget = report.pop("budget")
-    assert report == free().conversion.report
+    assert report == free().conversion.to_dict()
     assert budget["given_up"] == []
     assert budget["before"] == budget["after"]
-    assert "budget" not in free().conversion.report
+    assert "budget" not in free().conversion.to_dict()
 
 
 @pytest.mark.parametrize(

@@ -20,8 +20,8 @@ from contour_figures import (
 import shapegcode as sg
 from acceptance import BLOCK_ENDS, machine_with
 from shapegcode import _core
-from shapegcode.conversion.write import filter_tolerance, shaping_options
-from shapegcode.model.controller import motion_limits
+from shapegcode.conversion.write import RegionWriter
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping.grid import choose_grid
 
 
@@ -110,8 +110,9 @@ def test_the_feed_on_a_binding_arc_is_the_highest() -> None:
     program = sg.Program.from_text(text.encode(), machine, source="arc")
     deviations = []
     for tolerance_um in (3.0, 1e6):
-        tolerance = filter_tolerance(machine, grid, tolerance_um)
-        options = shaping_options(machine, grid, motion_limits(machine), tolerance)
+        model = MachineModel(machine)
+        writer = RegionWriter(machine, model, grid)
+        options = writer.options(model.limits(), writer.tolerance(tolerance_um))
         shaper = _core.RegionShaper(program.regions[0].path, grid.fir, [], options)
         assert shaper.next(10**6) is not None
         deviations.append(shaper.largest_deviation_mm * 1e3)
@@ -133,10 +134,12 @@ def test_off_is_the_plain_shaper() -> None:
     machine = machine_with({"shaping.contour": "off"})
     grid = choose_grid(machine, 0.005)
     program = sg.Program.from_text(paper_text().encode(), machine, source="paper")
-    limits = motion_limits(machine, arc_feed_ratio=0.99)
-    tolerance = filter_tolerance(machine, grid, 1e6)
+    model = MachineModel(machine)
+    limits = model.limits(arc_feed_ratio=0.99)
+    writer = RegionWriter(machine, model, grid)
+    tolerance = writer.tolerance(1e6)
     path = program.regions[-1].path
-    piece = _core.RegionShaper(path, grid.fir, [], shaping_options(machine, grid, limits, tolerance)).next(10**6)
+    piece = _core.RegionShaper(path, grid.fir, [], writer.options(limits, tolerance)).next(10**6)
     assert piece is not None
     raw = np.asarray(_core.interpolate(path, _core.plan_speed(path, limits, tolerance), 0.005))
     expected = np.asarray(grid.fir.apply(np.asfortranarray(raw)))

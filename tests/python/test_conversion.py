@@ -58,7 +58,7 @@ def test_sample_program(name: str) -> None:
     judged = sample(name)
     whole_periods(judged)
     check_figures(judged, contour_budget_s=3.0)
-    report = judged.conversion.report
+    report = judged.conversion.to_dict()
     assert report["within_tolerance"], report["warnings"]
     assert report["blocks"]["read"] == sum(
         bool(r.words) for r in judged.interpretation(judged.original, emitted=False).lines if r.executed
@@ -224,7 +224,7 @@ def test_emitted_blocks_are_plain(name: str) -> None:
     machine = judged.machine
     frame = [*machine.emission.prologue, *machine.emission.epilogue]
     lines = judged.emitted.split("\n")
-    for entry in judged.conversion.report["regions"]:
+    for entry in judged.conversion.to_dict()["regions"]:
         first, last = (line - judged.header_lines for line in entry["emitted_lines"])
         inside = [line for line in lines[first - 1 : last] if line not in frame and not line.startswith("(")]
         safe = [line for line in inside if "G94G40G64G01" in line]
@@ -253,8 +253,8 @@ def test_no_final_newline_and_end_inside_a_region() -> None:
 def test_program_without_cutting_moves_stays_as_it_is(text: str) -> None:
     judged = convert(text, machine_with())
     assert judged.conversion.text == text.encode()
-    assert judged.conversion.report["regions"] == []
-    assert any("unchanged" in w for w in judged.conversion.report["warnings"])
+    assert judged.conversion.to_dict()["regions"] == []
+    assert any("unchanged" in w for w in judged.conversion.to_dict()["warnings"])
 
 
 def test_bytes_of_a_comment_are_kept() -> None:
@@ -329,9 +329,9 @@ def test_inserted_lines_stand_at_every_region() -> None:
 
 def test_prefill_dwell_counts_in_the_cycle_time() -> None:
     text, keys = CASES["prologue"]
-    with_dwell = case("prologue").conversion.report["cycle_time_s"]["emitted"]
+    with_dwell = case("prologue").conversion.to_dict()["cycle_time_s"]["emitted"]
     without = convert(text, machine_with({**keys, "emission.prefill_dwell_s": 0.0}))
-    assert with_dwell - without.conversion.report["cycle_time_s"]["emitted"] == pytest.approx(0.2)
+    assert with_dwell - without.conversion.to_dict()["cycle_time_s"]["emitted"] == pytest.approx(0.2)
 
 
 def test_every_region_starts_with_a_full_safe_line() -> None:
@@ -350,7 +350,7 @@ def test_a_reversal_is_reached_or_reported() -> None:
         text = part(f"G1X50.F{feed}\nX0\n")
         judged = convert(text, machine_with())
         reached = max(m.end[0] for m in interpret(judged.emitted).cuts)
-        stated = judged.conversion.report["contour_error_um"]["command"]["emitted"]["max"]
+        stated = judged.conversion.to_dict()["contour_error_um"]["command"]["emitted"]["max"]
         assert (50.0 - reached) * 1e3 <= stated + 1.0, f"F{feed}: {reached}, reported {stated} um"
 
 
@@ -369,7 +369,7 @@ def test_original_after_interpolation_is_what_the_judge_plays() -> None:
         run = figures(filtered, programmed, programmed, "ceil")
         for axis, ours in zip("xyz", run.residual, strict=True):
             assert close(ours, entry["residual_vibration_um"]["original"][axis])
-        stated = judged.conversion.report["contour_error_um"]
+        stated = judged.conversion.to_dict()["contour_error_um"]
         assert close(run.command[0], stated["command"]["original"]["max"])
         assert close(run.response[0], stated["response"]["original"]["max"])
 

@@ -7,12 +7,11 @@ import pytest
 
 import shapegcode as sg
 from shapegcode import _core
-from shapegcode.conversion.write import filter_tolerance, shaping_options
-from shapegcode.model.controller import motion_limits
+from shapegcode.conversion.write import RegionWriter
 from shapegcode.model.machine_model import MachineModel
-from shapegcode.model.modes import region_offset
+from shapegcode.model.modes import Offset, region_offset
 from shapegcode.program import Program
-from shapegcode.shaping.grid import choose_grid, make_grid
+from shapegcode.shaping.grid import Grid, choose_grid, make_grid
 from test_moving_modes import OVER_MASS, OVER_Z, machine_with
 
 HEAD = "%\nO0001\nG21 G90 G94 G17 G54\n"
@@ -38,11 +37,12 @@ def fine_machine(contour: str = "off") -> sg.Machine:
     return sg.Machine.from_toml(text)
 
 
-def command(path: _core.Path, grid: object, machine: sg.Machine, offset: tuple[float | None, ...]) -> np.ndarray:
+def command(path: _core.Path, grid: Grid, machine: sg.Machine, offset: Offset) -> np.ndarray:
     """The shaped command of a region, borders and middles in turn."""
-    tolerance = filter_tolerance(machine, grid, 1e6)  # type: ignore[arg-type]
-    options = shaping_options(machine, grid, motion_limits(machine), tolerance, offset)  # type: ignore[arg-type]
-    piece = _core.RegionShaper(path, grid.fir, [], options).next(1 << 30)  # type: ignore[attr-defined]
+    model = MachineModel(machine)
+    writer = RegionWriter(machine, model, grid)
+    options = writer.options(model.limits(), writer.tolerance(1e6), offset)
+    piece = _core.RegionShaper(path, grid.fir, [], options).next(1 << 30)
     assert piece is not None
     rows = np.empty((len(piece.grid_mm) + len(piece.middle_mm), 3))
     rows[::2], rows[1::2] = piece.grid_mm, piece.middle_mm
@@ -57,7 +57,9 @@ def test_the_shaped_command_is_the_followed_one() -> None:
     assert grid.track is not None
     alone = make_grid(grid.block_period_s, _core.Shaper([0.0], [1.0]))
     offset = region_offset(region, machine)
-    options = shaping_options(machine, alone, motion_limits(machine), filter_tolerance(machine, grid, 1e6), offset)
+    model = MachineModel(machine)
+    tolerance = RegionWriter(machine, model, grid).tolerance(1e6)
+    options = RegionWriter(machine, model, alone).options(model.limits(), tolerance, offset)
     bare = _core.RegionShaper(region.path, alone.fir, [], options).next(1 << 30)
     assert bare is not None
     before = np.empty((len(bare.grid_mm) + len(bare.middle_mm), 3))
@@ -74,9 +76,9 @@ def test_following_leaves_a_fraction_of_what_one_shaper_leaves(contour: str) -> 
     machine = fine_machine(contour)
     program = Program.from_text(zig_zag(21, 40.0), machine)  # all of it near 52 Hz
     followed = sg.convert(program, machine)
-    assert followed.report["shaper"]["following"]["axis"] == "z"
-    was = followed.report["residual_vibration_um"]["original"]["x"]
-    left = followed.report["residual_vibration_um"]["emitted"]["x"]
+    assert followed.to_dict()["shaper"]["following"]["axis"] == "z"
+    was = followed.to_dict()["residual_vibration_um"]["original"]["x"]
+    left = followed.to_dict()["residual_vibration_um"]["emitted"]["x"]
     # The same program with one shaper for the nominal frequency, played by the same plant.
     fixed_machine = sg.Machine.from_toml(machine.to_toml().replace("frequency_over = ", "# frequency_over = ", 1))
     fixed = sg.convert(Program.from_text(zig_zag(21, 40.0), fixed_machine), fixed_machine)
@@ -85,7 +87,7 @@ def test_following_leaves_a_fraction_of_what_one_shaper_leaves(contour: str) -> 
     assert was > 20.0
     assert left < 0.01 * was
     assert left < 0.2 * one_left
-    assert followed.report["within_tolerance"]
+    assert followed.to_dict()["within_tolerance"]
 
 
 def test_an_unknown_position_is_shaped_for_the_nominal_frequency() -> None:
@@ -93,9 +95,10 @@ def test_an_unknown_position_is_shaped_for_the_nominal_frequency() -> None:
     program = Program.from_text(HEAD.encode() + b"G00 X0 Y0\nG01 X30. F6000\nX0\nX30.\nM30\n%\n", machine)
     grid = choose_grid(machine)
     offset = region_offset(program.regions[0], machine)
-    options = shaping_options(machine, grid, motion_limits(machine), _core.FilterTolerance(), offset)
+    model = MachineModel(machine)
+    options = RegionWriter(machine, model, grid).options(model.limits(), _core.FilterTolerance(), offset)
     assert options.following is None
-    report = sg.convert(program, machine).report
+    report = sg.convert(program, machine).to_dict()
     assert any("position of Z is not known" in warning for warning in report["warnings"])
     assert report["residual_vibration_um"]["emitted"]["x"] < 0.1
 
@@ -106,7 +109,7 @@ def test_warnings_and_modes_reach_the_report_and_the_header() -> None:
     assert b"(MODE X 46 HZ 0.03)" in conversion.text
     heavy = machine_with(OVER_MASS, more="part_mass_kg = 400")
     program = Program.from_text(zig_zag(4, 4.0), heavy)
-    for warnings in (sg.convert(program, heavy).report["warnings"], sg.simulate(program, heavy).warnings):
+    for warnings in (sg.convert(program, heavy).warnings, sg.simulate(program, heavy).warnings):
         assert any("lies outside the table" in warning for warning in warnings)
     moving = machine_with(OVER_Z)
     assert b"SHAPERS FOLLOW Z)" in sg.convert(Program.from_text(zig_zag(4, 4.0), moving), moving).text

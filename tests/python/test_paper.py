@@ -127,7 +127,7 @@ def test_emitted_program_leaves_what_the_project_promises() -> None:
     # Those of the continuous command; 1 ms set-points smooth the 131 Hz of Y a little.
     assert unshaped_residual_um(200, 0.99, 1e-4)[:2] == pytest.approx([16.7, 8.4], rel=0.02)
     assert before[:2] == pytest.approx([16.7, 8.4], rel=0.15)
-    assert judged.conversion.report["block_period_s"] == 0.005
+    assert judged.conversion.to_dict()["block_period_s"] == 0.005
     *_, (programmed, blocks, entry) = judged.regions()
     for rule in BLOCK_ENDS:
         after = figures(judged, blocks, programmed, rule, contour=False).residual
@@ -136,7 +136,7 @@ def test_emitted_program_leaves_what_the_project_promises() -> None:
     reported = entry["residual_vibration_um"]["emitted"]
     assert reported["x"] <= 0.08 * before[0]
     assert reported["y"] <= 0.15 * before[1]
-    assert judged.conversion.within_tolerance
+    assert judged.conversion.ok
 
 
 def test_rounding_the_paper_s_own_design_to_the_block_grid_loses_the_benefit() -> None:

@@ -83,11 +83,11 @@ def test_program(target: str) -> None:
     common = convert(PART, machine_with({"shaping.contour": target}))
     judged = convert(PART, machine_with({"shaping.contour": target, "shaping.per_axis": True}))
     check_figures(judged, contour_budget_s=3.0)
-    report = judged.conversion.report
-    assert judged.conversion.within_tolerance
+    report = judged.conversion.to_dict()
+    assert judged.conversion.ok
     assert report["shaper"]["duration_s"] == pytest.approx(0.015)
-    assert common.conversion.report["shaper"]["per_axis_duration_s"] == pytest.approx(0.015)
-    assert report["cutting_time_s"]["emitted"] < common.conversion.report["cutting_time_s"]["emitted"]
+    assert common.conversion.to_dict()["shaper"]["per_axis_duration_s"] == pytest.approx(0.015)
+    assert report["cutting_time_s"]["emitted"] < common.conversion.to_dict()["cutting_time_s"]["emitted"]
 
 
 @pytest.mark.parametrize("keys", [{"shaping.contour": "off"}, {"shaping.family": "zvd"}])

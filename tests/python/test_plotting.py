@@ -1,4 +1,4 @@
-"""Pictures and the before/after table: complete files, honest curves, the right figures."""
+"""Pictures: complete files, honest curves, the right figures."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from scipy.spatial import KDTree
 from effort import cpu_s
 from shapegcode.conversion import plots as pictures
 from shapegcode.conversion.convert import convert
-from shapegcode.conversion.report import before_after_rows, before_after_table, next_step
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.results import plot
@@ -28,30 +27,6 @@ from shapegcode.results.table import warning_table
 from shapegcode.results.trace import Trace
 
 FloatArray = npt.NDArray[np.float64]
-
-REPORT = {
-    "cycle_time_s": {"original": 0.6, "emitted": 0.63},
-    "cutting_time_s": {"original": 0.4, "emitted": 0.42},
-    "residual_vibration_um": {
-        "original": {"x": 16.7, "y": 8.4, "z": 0.0},
-        "emitted": {"x": 0.9, "y": 0.4, "z": 0.0},
-    },
-    "peak_vibration_um": {"original": {"x": 90, "y": 11, "z": 0}, "emitted": {"x": 47, "y": 5.5, "z": 0}},
-    "contour_error_um": {
-        "command": {"original": {"max": 0.0, "rms": 0.0}, "emitted": {"max": 4.2, "rms": 1.1}},
-        "response": {"original": {"max": 42.0, "rms": 14.0}, "emitted": {"max": 5.2, "rms": 2.0}},
-    },
-    "orbit_error_percent": [0.0061, -0.3],
-    "block_period_s": 0.005,
-    "shaper": {"times_s": [0, 0.005, 0.02], "amplitudes": [0.3, 0.4, 0.3]},
-    "blocks": {"read": 16, "emitted": 71},
-    "bytes_read": 800,
-    "bytes_emitted": 2100,
-    "limits": {"contour_um": 50.0, "residual_ratio": 0.1, "residual_floor_um": 3.0},
-    "override_residual": [{"override": 0.9, "residual_um": {"x": 1.1, "y": 0.6, "z": 0.0}}],
-    "within_tolerance": True,
-    "warnings": [],
-}
 
 
 def quarter(points: int) -> FloatArray:
@@ -186,14 +161,14 @@ LONG = "%\nO1\nG21G90G94G17\nG00X0Y0Z0\nG01X20.F200\nG03X40.Y20.I0.J20.\nG01Y40.
 def test_a_long_region_shows_its_worst_place_and_its_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     machine = Machine.load("vx500")
     conversion = convert(Program.from_text(LONG.encode(), machine, source="long"), machine)
-    assert len(pictures.write_pictures(conversion, machine, tmp_path)) == 6
+    assert len(conversion.save_plots(tmp_path)) == 6
     text = svg_text(tmp_path / "path.svg")
     assert "around the worst place of the original" in text and "on the whole path" in text
     text = svg_text(tmp_path / "vibration.svg")
     assert "the worst place, at" in text and "the stop, at" in text and "come to rest" in text
 
     monkeypatch.setattr(pictures, "RECORD_SAMPLES", 20_000)
-    pictures.write_pictures(conversion, machine, tmp_path)
+    conversion.save_plots(tmp_path)
     text = svg_text(tmp_path / "vibration.svg")
     assert "first 20 s of" in text and "come to rest" not in text and "the stop" not in text
 
@@ -320,92 +295,9 @@ def test_trace_knows_when_the_command_moves() -> None:
     assert still.departure_s == still.rest_s == 0
 
 
-def test_table_sets_original_against_emitted() -> None:
-    rows = {row.figure: row for row in before_after_rows(REPORT)}
-    assert rows["cycle time"].change_percent == pytest.approx(5)
-    assert rows["residual vibration X"].change_percent == pytest.approx(-94.61, abs=0.01)
-    assert "residual vibration Z" not in rows
-    assert rows["contour error of the command, largest"].change_percent is None
-    assert rows["largest orbit error of 2 arcs"].emitted == -0.3
-    assert rows["duration of the shaper"].emitted == pytest.approx(20)
-    assert rows["residual X at 90 % override"].emitted == (1.1,)
-    assert rows["size of the program"].original == 800
-    assert rows["contour error of the command, largest"].limit == 50
-    assert "contour error of the table (response), RMS" in rows
-
-    stream = io.StringIO()
-    Console(file=stream, width=100).print(before_after_table(REPORT))
-    text = stream.getvalue()
-    for part in ("+5.0 %", "-94.6 %", "µm", "limit", "50.0", "within tolerance"):
-        assert part in text
-
-
-def test_percentages_of_next_to_nothing_are_blank() -> None:
-    report = {"residual_vibration_um": {"original": {"x": 0.4, "y": 2.0}, "emitted": {"x": 1.1, "y": 1.0}}}
-    rows = {row.figure: row for row in before_after_rows(report)}
-    assert rows["residual vibration X"].change_percent is None
-    assert rows["residual vibration Y"].change_percent == -50
-
-
-def test_overrides_and_frequencies_have_one_row_per_axis() -> None:
-    report = {
-        "override_residual": [{"override": o, "residual_um": {"x": o, "y": 0.0}} for o in (0.8, 0.9, 1.1, 1.2)],
-        "frequency_residual": [{"shift": s, "residual_um": {"x": 2.0 + s}} for s in (-1, 1)],
-    }
-    rows = list(before_after_rows(report))
-    assert [row.figure for row in rows] == [
-        "residual X at 80/90/110/120 % override",
-        "residual X with the modes low/high",
-    ]
-    assert rows[0].emitted == (0.8, 0.9, 1.1, 1.2)
-
-
-def test_residual_limit_is_that_of_the_region_shown() -> None:
-    def region(emitted: float, limit: float) -> dict[str, object]:
-        return {"residual_vibration_um": {"emitted": {"x": emitted}}, "residual_limit_um": {"x": limit}}
-
-    report = {
-        "residual_vibration_um": {"original": {"x": 50}, "emitted": {"x": 4}},
-        "regions": [region(1, 9), region(4, 5)],
-    }
-    assert next(iter(before_after_rows(report))).limit == 5
-
-
-def test_nothing_to_shape_is_one_line() -> None:
-    report = {**REPORT, "blocks": {"read": 3, "emitted": 0}}
-    stream = io.StringIO()
-    Console(file=stream, width=100).print(before_after_table(report))
-    assert stream.getvalue() == "nothing to shape: the text is unchanged\n"
-    assert next_step(report).startswith("run the original")
-
-
 def test_long_warnings_wrap_under_their_own_text() -> None:
     stream = io.StringIO()
     Console(file=stream, width=40).print(warning_table(["one two three four five six seven eight nine ten", "b"]))
     lines = stream.getvalue().splitlines()
     assert lines[0].startswith("warning: one") and lines[1].startswith("         ")
     assert lines[-1].startswith("warning: b")
-
-
-def test_table_leaves_out_what_the_report_does_not_have() -> None:
-    assert [row.figure for row in before_after_rows({"cycle_time_s": {"original": 0, "emitted": 1}})] == ["cycle time"]
-    empty = {
-        "orbit_error_percent": None,
-        "shaper": None,
-        "override_residual": None,
-        "blocks": None,
-        "residual_vibration_um": {"original": None, "emitted": None},
-    }
-    assert list(before_after_rows(empty)) == []
-    before_after_table(empty)
-
-
-def test_next_step_follows_the_verdict() -> None:
-    assert next_step(REPORT).startswith("run the emitted program")
-    assert next_step({**REPORT, "warnings": ["w"]}).startswith("settle the warnings")
-    regions = [
-        {"lines": [3, 9], "misses": []},
-        {"lines": [12, 20], "misses": ["residual vibration X 9.0 um"]},
-    ]
-    bad = next_step({**REPORT, "within_tolerance": False, "regions": regions})
-    assert bad.startswith("do not run it (lines 12 to 20: residual vibration X 9.0 um)")

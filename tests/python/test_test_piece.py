@@ -138,4 +138,4 @@ def test_feeds_are_those_of_a_machine_like_the_vx500_and_take_half_an_hour() -> 
 @pytest.mark.slow
 def test_it_converts_within_tolerance() -> None:
     judged = convert(TEXT, machine_with({}))
-    assert judged.conversion.within_tolerance
+    assert judged.conversion.ok

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import cmath
-import io
 import json
 import math
 from itertools import pairwise
@@ -13,16 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from rich.console import Console
 
 import shapegcode as sg
 from acceptance import Judged, close, convert, machine_with
 from judge import Mode, Move, contour_error_um, durations, play, residual_um, response, starts
 from judge.player import BlockEnd, moving_average
 from shapegcode.cli import main
-from shapegcode.conversion.case_table import case_table
 from shapegcode.conversion.cases import CaseFigures, Limits, judge_region, stated_cases
-from shapegcode.conversion.report import before_after_rows
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.results.figures import Deviation
 from shapegcode.shaping import choose_shaper
@@ -85,7 +81,7 @@ def shifted_modes(judged: Judged, which: str | None, shift: float) -> list[list[
 def test_overrides_and_shifted_modes_are_the_judges_too(judged: Judged) -> None:
     cuts = emitted_cuts(judged)
     compared = 0
-    for case in judged.conversion.report["cases"]:
+    for case in judged.conversion.to_dict()["cases"]:
         if case["look_ahead"] or case["starved_ms"]:
             continue
         points = play(cuts, period_s=TICK, block_end=case["block_end"], override=case["override"])
@@ -152,7 +148,7 @@ def test_the_contour_of_a_mode_that_is_off_is_the_judges_too(judged: Judged) -> 
     ((programmed, _, _),) = judged.regions()
     points = play(emitted_cuts(judged), period_s=TICK, block_end="ceil")
     compared = 0
-    for case in judged.conversion.report["cases"]:
+    for case in judged.conversion.to_dict()["cases"]:
         if case["mode"] is None:
             continue
         _, _, moved = response(points, shifted_modes(judged, case["mode"], case["shift"]), TICK)
@@ -168,8 +164,8 @@ def test_the_contour_of_a_mode_that_is_off_is_the_judges_too(judged: Judged) -> 
 
 def test_a_stated_uncertainty_is_part_of_the_feed_search(judged: Judged) -> None:
     # The table as such has room left, so that it stays within the tolerance with its modes off.
-    report = judged.conversion.report
-    assert judged.conversion.within_tolerance
+    report = judged.conversion.to_dict()
+    assert judged.conversion.ok
     assert report["worst_case"]["mode"] is not None
     assert report["worst_case"]["contour_error_um"]["response"] > report["cases"][0]["contour_error_um"]["response"]
 
@@ -196,7 +192,7 @@ def test_a_starved_block_is_as_bad_as_the_worst_of_all_places(time_constant_tick
     keys = {**UNCERTAIN, "controller.shaped_time_constant_s": time_constant_ticks * TICK}
     judged = convert(PART, machine_with(keys))
     cuts = emitted_cuts(judged)
-    case = judged.conversion.report["cases"][-1]
+    case = judged.conversion.to_dict()["cases"][-1]
     assert (case["name"], case["starved_ms"]) == ("starved 20 ms", 20.0)
     worst = np.zeros(3)
     for after in range(len(cuts) - 1):
@@ -211,7 +207,7 @@ def test_a_starved_block_is_as_bad_as_the_worst_of_all_places(time_constant_tick
     # place with slightly less speed may be the worst: hence a lower bound for the few places that are tried.
     for axis, theirs in zip("xy", worst, strict=False):
         assert 0.98 * theirs <= case["residual_um"][axis] <= 1.005 * theirs, (axis, worst)
-    nominal = judged.conversion.report["cases"][0]
+    nominal = judged.conversion.to_dict()["cases"][0]
     assert case["time_s"] == pytest.approx(nominal["time_s"] + 0.020)
 
 
@@ -239,9 +235,9 @@ def test_look_ahead_left_on_is_planned_within_feeds_and_acceleration() -> None:
         {"controller.law": "jerk_limited", "controller.bell_time_s": 0.0, "axes.x.max_acceleration_mm_s2": 1500.0}
     )
     judged = convert(LINE, machine)
-    (case,) = (case for case in judged.conversion.report["cases"] if case["look_ahead"])
+    (case,) = (case for case in judged.conversion.to_dict()["cases"] if case["look_ahead"])
     points = planned_points(emitted_cuts(judged), 1500.0)
-    nominal = judged.conversion.report["cases"][0]
+    nominal = judged.conversion.to_dict()["cases"][0]
     assert case["time_s"] > nominal["time_s"] + 0.01
     assert abs(case["time_s"] - (len(points) - 1) * TICK) < 2.1 * TICK
     # The planned speed is the same but for the grid of 0.1 um on which it is integrated here.
@@ -281,9 +277,9 @@ def test_a_band_decides_what_counts() -> None:
 )
 def test_the_worst_case_that_counts_decides(keys: dict[str, Any], words: str) -> None:
     judged = convert(PART, machine_with(keys))
-    report = judged.conversion.report
+    report = judged.conversion.to_dict()
     worst = report["worst_case"]
-    assert not judged.conversion.within_tolerance
+    assert not judged.conversion.ok
     assert worst["counts"] and not worst["within"] and worst["name"].startswith(words)
     assert worst["value_um"] > worst["limit_um"] and worst["share_of_limit"] > 1.0
     shares = [case["share_of_limit"] for case in report["cases"] if case["counts"]]
@@ -317,7 +313,7 @@ CREEP = "%\nO3\nG21G17G90G94\nG00X0Y0Z0\nG03I.166J.116F1.\nG00Z50.\nM30\n%\n"
 
 def test_a_region_that_runs_faster_than_programmed_is_missed(tmp_path: Path) -> None:
     judged = convert(CREEP, machine_with(ONLY_Z), block_period_s=0.007)
-    (miss,) = judged.conversion.report["regions"][0]["misses"]
+    (miss,) = judged.conversion.to_dict()["regions"][0]["misses"]
     ((_, blocks, entry),) = judged.regions()
     rules: tuple[BlockEnd, ...] = ("ceil", "carry")
     lasts_s = max(sum(durations(blocks, period_s=TICK, block_end=rule)) for rule in rules)
@@ -328,7 +324,7 @@ def test_a_region_that_runs_faster_than_programmed_is_missed(tmp_path: Path) -> 
     was_s, now_s = entry["time_s"]["original"], entry["time_s"]["emitted"]
     assert miss.startswith(f"runs in {now_s:.1f} s instead of {was_s:.1f} s: too slow a feed for blocks of 7 ms")
     # The same feed where its F word fits blocks of 5 ms.
-    assert convert(CREEP, machine_with(ONLY_Z), block_period_s=0.005).conversion.within_tolerance
+    assert convert(CREEP, machine_with(ONLY_Z), block_period_s=0.005).conversion.ok
 
     (tmp_path / "part.nc").write_text(CREEP)
     (tmp_path / "machine.toml").write_text(machine_with(ONLY_Z).to_toml(), encoding="utf-8")
@@ -342,7 +338,7 @@ def test_a_region_is_not_too_fast_because_its_original_is_slow() -> None:
     """1 mm at 100 mm/s takes 10 ms, the original .3 s for its long time constant; the shaped one is faster."""
     machine = machine_with({"controller.motion": "after_interpolation", "controller.time_constant_s": 0.3})
     judged = convert("%\nO4\nG21G17G90G94\nG00X0Y0Z0\nG01X1.F6000\nG00Z50.\nM30\n%\n", machine)
-    (entry,) = judged.conversion.report["regions"]
+    (entry,) = judged.conversion.to_dict()["regions"]
     assert entry["time_s"]["emitted"] < 0.5 * entry["time_s"]["original"]
     assert entry["misses"] == []
 
@@ -352,7 +348,7 @@ def test_keys_of_a_case_are_stable(judged: Judged) -> None:
         "name", "block_end", "override", "mode", "shift", "look_ahead", "starved_ms", "counts", "residual_um",
         "contour_error_um", "time_s", "within", "figure", "value_um", "limit_um", "share_of_limit", "lines",
     }  # fmt: skip
-    report = judged.conversion.report
+    report = judged.conversion.to_dict()
     for case in [*report["cases"], report["worst_case"]]:
         assert set(case) == keys
         assert set(case["residual_um"]) == {"x", "y", "z"}
@@ -372,14 +368,13 @@ def test_keys_of_a_case_are_stable(judged: Judged) -> None:
 def test_nothing_shaped_has_no_cases() -> None:
     machine = machine_with()
     conversion = sg.convert(sg.Program.from_text("%\nO1\nG21G90\nG00X1.\nM30\n%\n", machine), machine)
-    assert (conversion.report["cases"], conversion.report["worst_case"]) == ([], None)
-    assert case_table(conversion.report) is None
+    assert (conversion.cases, conversion.worst_case, conversion.tables()) == ((), None, [])
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_gouge_is_what_lies_on_the_side_of_the_material(side: str) -> None:
     judged = convert(PART, machine_with({"shaping.contour": "off", "input.material_side": side}))
-    report = judged.conversion.report
+    report = judged.conversion.to_dict()
     points = play(emitted_cuts(judged), period_s=TICK, block_end="ceil")[:, :2]
     # A filter cuts the counter-clockwise arc about (20, 20) short, on its inside: left of the travel.
     turn = np.degrees(np.arctan2(points[:, 0] - 20.0, 20.0 - points[:, 1]))
@@ -393,8 +388,8 @@ def test_gouge_is_what_lies_on_the_side_of_the_material(side: str) -> None:
         assert set(case["gouge_um"]) == set(case["excess_um"]) == {"command", "response"}
         assert (case["gouge_um"]["response"] is None) == (case["contour_error_um"]["response"] is None)
     assert report["cases"][0]["gouge_um"]["command"] == pytest.approx(found["gouge"], abs=1.0)
-    rows = {row.figure: row for row in before_after_rows(report)}
-    assert rows["contour error of the command, gouge"].emitted == found["gouge"]
+    rows = {row.figure: row for row in judged.conversion.tables()[0].rows}
+    assert rows["contour error of the command, gouge"].emitted == pytest.approx(found["gouge"])
 
 
 def test_the_contour_limit_is_for_the_targeted_deviation() -> None:
@@ -419,17 +414,14 @@ def test_what_has_to_be_measured_depends_on_the_target() -> None:
 
 
 def test_table_shows_what_only_stands_beside_in_brackets(judged: Judged) -> None:
-    stream = io.StringIO()
-    table = case_table(judged.conversion.report)
-    assert table is not None
-    Console(file=stream, width=120).print(table)
-    lines = stream.getvalue().splitlines()
+    table = judged.conversion.tables()[1]
+    lines = str(table).splitlines()
     assert sum("<- worst" in line for line in lines) == 1
-    rows = {case["name"]: line for case in judged.conversion.report["cases"] for line in lines if case["name"] in line}
+    rows = {case.name: line for case in judged.conversion.cases for line in lines if case.name in line}
     assert "(out)" in rows["starved 20 ms"]
     assert "within" in rows["all modes low"] and "(" not in rows["all modes low"]
     assert "8 of 17 cases count" in lines[-1]
-    assert max(map(len, lines)) <= 120
+    assert max(map(len, lines)) <= 80
 
 
 @pytest.mark.parametrize("band", [[110, 90], [0, 100], [90], [90, 300]])

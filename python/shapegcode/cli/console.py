@@ -9,9 +9,9 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from shapegcode.io.atomic import write_text
 
@@ -23,7 +23,6 @@ __all__ = [
     "ProgressBar",
     "add_json_argument",
     "output_console",
-    "print_before_after",
     "progress",
     "write_json",
 ]
@@ -50,23 +49,6 @@ def output_console(json_target: str | None = None, *, file: TextIO | None = None
     # A pipe has no width: rich would take 80 characters and break the tables.
     width = None if stream.isatty() or "COLUMNS" in os.environ else _PIPE_WIDTH
     return Console(file=stream, width=width, quiet=json_target == "-", highlight=False, soft_wrap=False)
-
-
-def print_before_after(report: Mapping[str, Any], json_target: str | None = None) -> None:
-    """Print the table original / emitted of a conversion's report, its cases, warnings and the one next step."""
-    from shapegcode.conversion.case_table import case_table
-    from shapegcode.conversion.report import before_after_table, next_step
-    from shapegcode.results.table import warning_table
-
-    console = output_console(json_target)
-    console.print(before_after_table(report))
-    cases = case_table(report)
-    if cases is not None:
-        console.print()
-        console.print(cases)
-    if report.get("warnings"):
-        console.print(warning_table(report["warnings"]))
-    console.print(f"next: {next_step(report)}", markup=False)
 
 
 def write_json(data: object, target: str | Path) -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import threading
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.feed import add_cutting_arguments
@@ -18,7 +17,6 @@ from shapegcode.cli.options import (
     output_file,
     positive,
     ratio,
-    refuse_same_file,
     seconds,
     size,
 )
@@ -26,8 +24,7 @@ from shapegcode.cli.overrides import add_override_arguments, overridden
 
 if TYPE_CHECKING:
     from shapegcode.cli.console import ProgressBar
-    from shapegcode.conversion.budget import Budget
-    from shapegcode.feed.shaped import ScheduledConversion
+    from shapegcode.conversion.result import Conversion
     from shapegcode.machine import Machine
     from shapegcode.program import Program
 
@@ -112,83 +109,53 @@ def run(args: argparse.Namespace) -> int:
         OSError: a file cannot be read or written.
     """
     from shapegcode._core import ArgumentError
-    from shapegcode.cli import ExitCode
-    from shapegcode.cli.console import output_console, print_before_after, progress, write_json
-    from shapegcode.conversion.budget import Budget
-    from shapegcode.conversion.convert import convert
-    from shapegcode.io.atomic import write_bytes
+    from shapegcode.cli import runner
     from shapegcode.program.compensation import read_for_conversion
 
     output = output_file(args.output)
-    limits = (args.max_bytes, args.baud, args.max_blocks_per_second)
-    budget = None if limits == (None, None, None) else Budget(*limits)
     machine = overridden(load_machine(args), args, MACHINE_KEYS)
     failed = output.with_name(output.name + machine.emission.failed_suffix)
-    cutting = [Path(name) for name in (*(args.tool or ()), *([args.stock] if args.stock else ()))]
     if args.feed_schedule != bool(args.tool and args.stock) or bool(args.tool) != bool(args.stock):
         raise ArgumentError("--feed-schedule, --tool and --stock belong together: give all three or none")
-    read = [Path(args.input), Path(args.machine), *cutting]
-    refuse_same_file([output, failed], read)
-    if args.json not in (None, "-"):
-        refuse_same_file([Path(args.json)], [*read, output, failed])
+    runner.check_files(args, also_written=[failed])
     # The solvers load while the program is read.
     threading.Thread(target=importlib.import_module, args=("shapegcode.shaping",), daemon=True).start()
-    with progress(f"converting {args.input}", args.json) as bar:
+    with runner.progress(f"converting {args.input}", args) as bar:
         program = read_for_conversion(args.input, machine, program_number=args.program)
-        if args.feed_schedule:
-            scheduled = _convert_scheduled(args, program, machine, budget, bar)
-            conversion, within = scheduled.conversion, scheduled.within_tolerance
-        else:
-            stages = {"shaping": 0.0, "shaping again, slower": 0.0, "round trip": 0.5}
-            conversion = convert(
-                program,
-                machine,
-                arc_feed_ratio=args.arc_feed,
-                block_period_s=args.block_period,
-                budget=budget,
-                on_progress=lambda stage, done, total: bar.update(stages[stage] + 0.5 * done / total),
-            )
-            within = conversion.within_tolerance
-        target = output if within else failed
-        report = {**conversion.report, "output": str(target)}
-        if args.plots is not None:
-            from shapegcode.conversion.plots import write_pictures
-
-            report["plots"] = write_pictures(conversion, machine, args.plots)
-            if args.feed_schedule:
-                report["plots"] += scheduled.schedule.save_plots(args.plots)
-        if args.json not in (None, "-"):
-            write_json(report, args.json)
-        # Last of all, so that no program stands there when something else could not be written.
-        write_bytes(target, conversion.text)
-    if args.json == "-":
-        write_json(report, args.json)
-    console = output_console(args.json)
-    if args.feed_schedule:
-        for table in scheduled.schedule.tables():
-            console.print(table)
-        console.print(scheduled.schedule.answer, markup=False, soft_wrap=True)
-        console.print("original, below: the program with these feeds, not yet shaped", markup=False)
-    print_before_after(report, args.json)
-    console.print(f"wrote {target}", markup=False, soft_wrap=True)
+        result = (_scheduled if args.feed_schedule else _converted)(args, program, machine, bar)
+    target = output if result.ok else failed
+    notes = ["original: the program with these feeds, not yet shaped"] if args.feed_schedule else []
     if target == failed and output.exists():
-        console.print(f"{output} is of an earlier run and was left alone", markup=False, soft_wrap=True)
-    return ExitCode.OK if within else ExitCode.OUT_OF_TOLERANCE
+        notes.append(f"{output} is of an earlier run and was left alone")
+    return runner.finish(result, args, notes=notes, output=(target, result.text))
 
 
-def _convert_scheduled(
-    args: argparse.Namespace, program: Program, machine: Machine, budget: Budget | None, bar: ProgressBar
-) -> ScheduledConversion:
+def _options(args: argparse.Namespace) -> dict[str, Any]:
+    """What `convert` and `convert_scheduled` both take."""
+    from shapegcode.conversion.budget import Budget
+
+    limits = (args.max_bytes, args.baud, args.max_blocks_per_second)
+    return {
+        "arc_feed_ratio": args.arc_feed,
+        "block_period_s": args.block_period,
+        "budget": None if limits == (None, None, None) else Budget(*limits),
+    }
+
+
+def _converted(args: argparse.Namespace, program: Program, machine: Machine, bar: ProgressBar) -> Conversion:
+    from shapegcode.conversion.convert import convert
+
+    begins = {"shaping": 0.0, "shaping again, slower": 0.0, "round trip": 0.5}
+
+    def show(stage: str, done: int, total: int) -> None:
+        bar.update(begins[stage] + 0.5 * done / total)
+
+    return convert(program, machine, **_options(args), on_progress=show)
+
+
+def _scheduled(args: argparse.Namespace, program: Program, machine: Machine, bar: ProgressBar) -> Conversion:
     """Feeds and shaping in one go."""
     from shapegcode.cli.feed import read_cutting_arguments
     from shapegcode.feed.shaped import convert_scheduled
 
-    return convert_scheduled(
-        program,
-        machine,
-        **read_cutting_arguments(args),
-        arc_feed_ratio=args.arc_feed,
-        block_period_s=args.block_period,
-        budget=budget,
-        on_progress=bar.update,
-    )
+    return convert_scheduled(program, machine, **read_cutting_arguments(args), **_options(args), on_progress=bar.update)

@@ -7,9 +7,9 @@ the machine file states (table `[verdict]`). The cases inside the band decide; t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -27,8 +27,6 @@ __all__ = [
     "judge_region",
     "region_misses",
     "stated_cases",
-    "summarise_cases",
-    "worst_counted",
 ]
 
 Vector = npt.NDArray[np.float64]
@@ -220,81 +218,3 @@ def region_misses(cases: Sequence[Case], figures: Sequence[CaseFigures], limits:
         for judged, case in worst.values()
         if judged.is_missed
     ]
-
-
-def summarise_cases(
-    cases: Sequence[Case],
-    figures: Sequence[Sequence[CaseFigures]],
-    limits: Sequence[Limits],
-    lines: Sequence[tuple[int, int]],
-    material_side: str | None = None,
-) -> list[dict[str, Any]]:
-    """Every case over all regions as an entry of the report's `cases`.
-
-    Args:
-        cases: as played.
-        figures: per region, one per case.
-        limits: per region.
-        lines: of the original program, per region.
-        material_side: "left" or "right" of the travel; None: not known.
-    """
-    entries = []
-    for index, case in enumerate(cases):
-        played = [region[index] for region in figures]
-        worst, where = max(
-            (
-                (judged, place)
-                for place, run, limit in zip(lines, played, limits, strict=True)
-                for judged in judge_region(run, limit)
-            ),
-            key=lambda pair: pair[0].share,
-        )
-        residual_um = np.max([run.residual_mm for run in played], axis=0) * 1e3
-        deviations = {
-            "command": _largest(run.command for run in played),
-            "response": _largest(run.response for run in played),
-        }
-        entry: dict[str, Any] = {
-            "name": case.name,
-            "block_end": case.block_end,
-            "override": case.override,
-            "mode": case.mode,
-            "shift": case.shift,
-            "look_ahead": case.look_ahead,
-            "starved_ms": case.starved_s * 1e3,
-            "counts": case.counts,
-            "residual_um": dict(zip("xyz", residual_um.tolist(), strict=True)),
-            "contour_error_um": {
-                what: None if found is None else found.largest_mm * 1e3 for what, found in deviations.items()
-            },
-            "time_s": sum(run.time_s for run in played),
-            "within": not worst.is_missed,
-            "figure": worst.figure,
-            "value_um": worst.value_um,
-            "limit_um": worst.limit_um,
-            "share_of_limit": worst.share if math.isfinite(worst.share) else None,
-            "lines": list(where),
-        }
-        if material_side is not None:
-            for name in ("gouge", "excess"):
-                entry[f"{name}_um"] = {
-                    what: None if found is None else found.gouge_and_excess_um(material_side)[name]
-                    for what, found in deviations.items()
-                }
-        entries.append(entry)
-    return entries
-
-
-def worst_counted(entries: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
-    """The case that decides: of those that count the one with the largest share of a limit; None without cases."""
-    counted = [entry for entry in entries if entry["counts"]]
-    if not counted:
-        return None
-    return max(counted, key=lambda entry: math.inf if entry["share_of_limit"] is None else entry["share_of_limit"])
-
-
-def _largest(deviations: Iterable[Deviation | None]) -> Deviation | None:
-    """Of all regions; None if one was not measured."""
-    rows = list(deviations)
-    measured = [each for each in rows if each is not None]
-    return Deviation.largest(measured) if rows and len(measured) == len(rows) else None

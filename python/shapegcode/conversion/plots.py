@@ -2,40 +2,36 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from functools import partial
 
-import numpy as np
-
-from shapegcode.conversion.convert import Conversion
-from shapegcode.machine import Machine
-from shapegcode.model.machine_model import MachineModel
-from shapegcode.results import plot
+from shapegcode.conversion.result import Conversion
 from shapegcode.results.motion_pictures import RECORD_SAMPLES, PlayedRegion, motion_pictures
+from shapegcode.results.result import Plot
+
+__all__ = ["plots_of"]
 
 
-def write_pictures(conversion: Conversion, machine: Machine, folder: str | Path) -> list[str]:
+def plots_of(conversion: Conversion) -> dict[str, Plot]:
     """Path, feed and vibration of the region that vibrates most after its stop, before and after.
 
+    Args:
+        conversion: its region is played again when the first picture is drawn.
+
     Returns:
-        The files written; none for a program without shaped regions.
-
-    Raises:
-        OSError: the folder cannot be made or a file not be written.
+        By name; none for a program without shaped regions.
     """
-    if not conversion.placed:
-        return []
-    residuals = [max(region["residual_vibration_um"]["original"].values()) for region in conversion.report["regions"]]
-    place = conversion.placed[int(np.argmax(residuals))]
+    return motion_pictures(partial(_played, conversion)) if conversion.placed else {}
 
-    def played() -> PlayedRegion:
-        model, path = MachineModel(machine), place.region.path
-        offset = model.offset(place.region)
-        blocks = conversion.emitted.core.cutting_path(place.first_line, place.last_line)
-        runs = {
-            "original": model.play_original(path, record_samples=RECORD_SAMPLES, offset=offset),
-            "emitted": model.play_emitted(blocks, path, record_samples=RECORD_SAMPLES, offset=offset),
-        }
-        lines = (place.region.first_line, place.region.last_line)
-        return PlayedRegion.of_runs(runs, path, model.period_s, lines=lines, regions=len(residuals))
 
-    return plot.save_all(motion_pictures(played), folder)
+def _played(conversion: Conversion) -> PlayedRegion:
+    worst = max(
+        range(len(conversion.regions)), key=lambda rank: max(conversion.regions[rank].residual_vibration_um.original)
+    )
+    place, model = conversion.placed[worst], conversion.model
+    path, blocks = place.region.path, place.blocks(conversion.emitted)
+    offset = model.offset(place.region)
+    runs = {
+        "original": model.play_original(path, record_samples=RECORD_SAMPLES, offset=offset),
+        "emitted": model.play_emitted(blocks, path, record_samples=RECORD_SAMPLES, offset=offset),
+    }
+    return PlayedRegion.of_runs(runs, path, model.period_s, lines=place.original_lines, regions=len(conversion.regions))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,22 +36,38 @@ class Placed:
     first_line: int
     last_line: int
 
+    @property
+    def original_lines(self) -> tuple[int, int]:
+        """First and last line of the region in the original program."""
+        return self.region.first_line, self.region.last_line
+
+    def blocks(self, emitted: Program) -> _core.Path:
+        """The shaped blocks as they were read back."""
+        return emitted.core.cutting_path(self.first_line, self.last_line)
+
 
 def read_back(text: bytes, placed: Sequence[Placed], machine: Machine) -> Program:
     """Read the emitted text and hold it against the original: end points, modal state at every border, sweeps.
 
+    Args:
+        text: the whole emitted program.
+        placed: its regions.
+        machine: whose controller reads it.
+
     Raises:
         RoundTripError: something differs; the message names the line and both values.
     """
+    # Half an increment: a program may carry more digits than the controller resolves.
+    tolerance_mm = {units: 0.5 * least_increment_mm(machine, units) + 1e-9 for units in (20, 21)}
     probes = [line for place in placed for line in (place.first_line - 1, place.last_line)]
     emitted = Program.from_text(text, machine, source="emitted program", emitted=True, probe_lines=probes)
     states = emitted.core.probed
     for index, place in enumerate(placed):
         region = place.region
-        _compare_states(states[2 * index], region.entry, place.first_line - 1, region.incremental, machine)
-        _compare_states(states[2 * index + 1], region.exit, place.last_line, region.incremental, machine)
-        blocks = emitted.core.cutting_path(place.first_line, place.last_line)
-        _compare_ends(blocks, place, machine)
+        _compare_states(states[2 * index], region.entry, place.first_line - 1, region.incremental, tolerance_mm)
+        _compare_states(states[2 * index + 1], region.exit, place.last_line, region.incremental, tolerance_mm)
+        blocks = place.blocks(emitted)
+        _compare_ends(blocks, place, tolerance_mm)
         if blocks.largest_sweep_rad >= _LARGEST_SWEEP_RAD:
             raise RoundTripError(
                 f"emitted arc between lines {place.first_line} and {place.last_line} sweeps "
@@ -61,7 +77,11 @@ def read_back(text: bytes, placed: Sequence[Placed], machine: Machine) -> Progra
 
 
 def _compare_states(
-    emitted: _core.ModalState, original: _core.ModalState, line: int, incremental: bool, machine: Machine
+    emitted: _core.ModalState,
+    original: _core.ModalState,
+    line: int,
+    incremental: bool,
+    tolerance_mm: Mapping[int, float],
 ) -> None:
     for field in _STATE_FIELDS:
         was, now = getattr(original, field), getattr(emitted, field)
@@ -71,25 +91,20 @@ def _compare_states(
         raise RoundTripError(f"emitted line {line}: known axes {emitted.known}, the original has {original.known}")
     if incremental:
         return
-    limit = _end_tolerance_mm(machine, original.units)
+    limit = tolerance_mm[original.units]
     for axis, known, was, now in zip("XYZ", original.known, original.position_mm, emitted.position_mm, strict=True):
         if known and abs(was - now) > limit:
             raise RoundTripError(f"emitted line {line}: {axis} is at {now:.6f} mm, the original at {was:.6f} mm")
 
 
-def _compare_ends(blocks: _core.Path, place: Placed, machine: Machine) -> None:
+def _compare_ends(blocks: _core.Path, place: Placed, tolerance_mm: Mapping[int, float]) -> None:
     path = place.region.path
     travel = path.end_mm - path.start_mm
     gap = float(np.abs((blocks.end_mm - blocks.start_mm) - travel).max())
     # Start and end are rounded to the increment, each once.
-    limit = 2.0 * _end_tolerance_mm(machine, place.region.exit.units)
+    limit = 2.0 * tolerance_mm[place.region.exit.units]
     if gap > limit:
         raise RoundTripError(
             f"shaped blocks of lines {place.region.first_line} to {place.region.last_line} end {gap * 1e3:.2f} um off "
             f"(limit {limit * 1e3:.2f} um)"
         )
-
-
-def _end_tolerance_mm(machine: Machine, units: int) -> float:
-    # Half an increment: a program may carry more digits than the controller resolves.
-    return 0.5 * least_increment_mm(machine, units) + 1e-9

@@ -1,29 +1,75 @@
-"""Warnings of a conversion that are no misses: figures made worse, and what the control will make of the text."""
+"""Warnings of a conversion: misses, figures made worse, and what the control will make of the text."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Iterator, Sequence
 
+from shapegcode.conversion.figures import PlayedFigures
 from shapegcode.conversion.readback import Placed
 from shapegcode.machine import Machine
+from shapegcode.machine.controller import Controller
+from shapegcode.machine.output import Tolerance
 from shapegcode.program import Program, least_increment_mm
 
-__all__ = ["binding_warnings", "controller_warnings", "region_warnings", "worse_warnings"]
+__all__ = ["played_warnings", "text_warnings"]
 
 # How much worse than the original's a figure must be to be worth a warning: ratio, and size in um.
 _WORSE_RATIO, _WORSE_UM = 1.2, 5.0
 
 
-def worse_warnings(figures: dict[str, Any]) -> list[str]:
+def played_warnings(program: Program, figures: PlayedFigures, machine: Machine) -> list[str]:
+    """What playing the emitted program showed: misses, the tolerance that binds, figures made worse.
+
+    Args:
+        program: the original.
+        figures: of its regions.
+        machine: whose tolerances were applied.
+    """
+    expanded = " expanded" if program.core.expanded else ""
+    misses = [
+        f"{program.place(region.lines[0])}: lines {region.lines[0]} to {region.lines[1]}{expanded}: {miss}"
+        for region in figures.regions
+        for miss in region.misses
+    ]
+    rounding_um = math.sqrt(2.0) * least_increment_mm(machine, 21) * 1e3
+    return [*misses, *_binding(figures, machine.tolerance, rounding_um), *_worse(figures)]
+
+
+def text_warnings(
+    program: Program, placed: Sequence[Placed], figures: PlayedFigures, machine: Machine, size: int, blocks: int
+) -> list[str]:
+    """What the control must be told or cannot do with the emitted text.
+
+    Args:
+        program: the original.
+        placed: its shaped regions.
+        figures: of these.
+        machine: that shall run it.
+        size: of the text in bytes.
+        blocks: shaped blocks in it.
+    """
+    fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
+    return [
+        *_mode_left_on(program, placed, machine.emission.prologue),
+        *_too_fast(program, placed, fastest),
+        *_memory_and_line(machine.controller, size, blocks, figures.region_time_s().emitted),
+        *_slowed(figures.slowed_blocks, blocks),
+    ]
+
+
+def _worse(figures: PlayedFigures) -> list[str]:
     """Figures that the conversion made noticeably worse, within tolerance or not."""
     pairs = [
-        (f"{name} {axis.upper()}", figures[key]["original"][axis], figures[key]["emitted"][axis])
-        for name, key in (("residual vibration", "residual_vibration_um"), ("peak vibration", "peak_vibration_um"))
+        (f"{name} {axis.upper()}", both.original[axis], both.emitted[axis])
+        for name, both in (
+            ("residual vibration", figures.residual_vibration_um),
+            ("peak vibration", figures.peak_vibration_um),
+        )
         for axis in "xyz"
     ]
-    response = figures["contour_error_um"]["response"]
-    pairs.append(("contour error of the table", response["original"]["max"], response["emitted"]["max"]))
+    response = figures.contour_error_um.response
+    pairs.append(("contour error of the table", response.original.max, response.emitted.max))
     return [
         f"{name} is larger than the original's: {before:.1f} -> {after:.1f} um"
         for name, before, after in pairs
@@ -31,33 +77,24 @@ def worse_warnings(figures: dict[str, Any]) -> list[str]:
     ]
 
 
-def binding_warnings(figures: dict[str, Any], machine: Machine) -> list[str]:
-    """Which tolerance a conversion left, by how much, and what would be feasible; empty where all were kept."""
-    tolerance = machine.tolerance
-    regions = figures["regions"]
-    warnings = []
-    contour = max((region["contour_error_um"] for region in regions), default=0.0)
+def _binding(figures: PlayedFigures, tolerance: Tolerance, rounding_um: float) -> Iterator[str]:
+    """Which tolerance a conversion left, by how much, and what would be feasible; nothing where all were kept."""
+    contour = max((region.contour_error_um for region in figures.regions), default=0.0)
     if contour > tolerance.contour_um:
-        rounding = math.sqrt(2.0) * least_increment_mm(machine, 21) * 1e3
-        alone = f"; rounding the words alone may take {rounding:.1f} um of it" if rounding > 0.2 * contour else ""
-        warnings.append(
+        share = f"; rounding the words alone may take {rounding_um:.1f} um of it"
+        yield (
             f"tolerance.contour_um = {tolerance.contour_um:g} binds: {contour:.1f} um were reached with the feed "
-            f"lowered as far as it helps{alone}; feasible: {_rounded_up(contour):g} um"
+            f"lowered as far as it helps{share if rounding_um > 0.2 * contour else ''}; "
+            f"feasible: {_rounded_up(contour):g} um"
         )
-    over = [
-        (region["residual_vibration_um"]["emitted"][axis], limit)
-        for region in regions
-        for axis, limit in region["residual_limit_um"].items()
-        if region["residual_vibration_um"]["emitted"][axis] > limit
-    ]
+    over = [pair for region in figures.regions for pair in region.over_limit()]
     if over:
         left, limit = max(over)
-        warnings.append(
+        yield (
             f"the tolerance of residual vibration binds: {left:.2f} um are left, limit {limit:.2f} um "
             f"(tolerance.residual_*); feasible: tolerance.residual_floor_um = {_rounded_up(left):g}, "
             "or a longer shaper (`shapegcode shaper`)"
         )
-    return warnings
 
 
 def _rounded_up(value: float) -> float:
@@ -67,45 +104,43 @@ def _rounded_up(value: float) -> float:
     return math.ceil(value / step) * step
 
 
-def region_warnings(program: Program, placed: list[Placed], machine: Machine) -> list[str]:
-    """What the control must be told or cannot do: look-ahead mode left on, feeds over the axes' limits."""
-    warnings = []
+def _mode_left_on(program: Program, placed: Sequence[Placed], prologue: Sequence[str]) -> Iterator[str]:
     on = next((place.region for place in placed if place.region.look_ahead_mode), None)
-    if on is not None and not machine.emission.prologue:
-        warnings.append(
+    if on is not None and not prologue:
+        yield (
             f"{program.place(on.first_line)}: shaped blocks run while the program's look-ahead mode is on; the "
             'verdict holds for it off: set emission.prologue = ["G05.1Q0"] and emission.epilogue = ["G05.1Q1"]'
         )
-    fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
+
+
+def _too_fast(program: Program, placed: Sequence[Placed], fastest: float) -> Iterator[str]:
     fast = next((place.region for place in placed if place.region.path.fastest_feed_mm_per_s * 60.0 > fastest), None)
     if fast is not None:
-        warnings.append(
+        yield (
             f"{program.place(fast.first_line)}: programmed feed {fast.path.fastest_feed_mm_per_s * 60.0:g} mm/min is "
             f"over every axis' largest ({fastest:g} mm/min, axes.*.max_feed_mm_per_min): shaped at the axes' limits"
         )
-    return warnings
 
 
-def controller_warnings(machine: Machine, text: bytes, cutting_s: float, blocks: int, slowed_blocks: int) -> list[str]:
-    """What the emitted text asks of memory, serial line and look-ahead."""
-    controller = machine.controller
-    warnings = []
-    if len(text) > controller.program_memory_bytes:
-        warnings.append(
-            f"the emitted program has {len(text)} bytes, the controller's memory {controller.program_memory_bytes} "
+def _memory_and_line(controller: Controller, size: int, blocks: int, cutting_s: float) -> Iterator[str]:
+    if size > controller.program_memory_bytes:
+        yield (
+            f"the emitted program has {size} bytes, the controller's memory {controller.program_memory_bytes} "
             "(controller.program_memory_bytes): run it from DNC or a data server"
         )
     if controller.dnc_baud > 0 and blocks > 0 and cutting_s > 0.0:
-        needed = len(text) * controller.dnc_bits_per_character / cutting_s
+        needed = size * controller.dnc_bits_per_character / cutting_s
         if needed > controller.dnc_baud:
-            warnings.append(
+            yield (
                 f"drip feeding needs {needed:.0f} baud on average, the line has {controller.dnc_baud} "
                 "(controller.dnc_baud): the buffer will run empty"
             )
-    if slowed_blocks:
-        warnings.append(
-            f"{slowed_blocks} of {blocks} shaped blocks step an axis by more than "
+
+
+def _slowed(slowed: int, blocks: int) -> Iterator[str]:
+    if slowed:
+        yield (
+            f"{slowed} of {blocks} shaped blocks step an axis by more than "
             "controller.corner_speed_difference_mm_per_min: run them with the look-ahead mode off "
             '(emission.prologue, for example ["G05.1Q0"]), or it slows them'
         )
-    return warnings

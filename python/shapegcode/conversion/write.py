@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.model.modes import NO_OFFSET, Offset, axis_modes, mode_tables, region_offset
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.modes import NO_OFFSET, Offset
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.shaping.grid import Grid
 
@@ -49,62 +50,20 @@ class EmittedRegion:
     planned_um: float
 
 
-def filter_tolerance(machine: Machine, grid: Grid, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
+def filter_tolerance(grid: Grid, own_filter_s: float, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
     """What keeps the shaped command within a tolerance at corners and on arcs.
 
     Args:
-        machine: whose controller smooths the shaped program once more.
         grid: what follows the look-ahead; its spread limits the speed.
+        own_filter_s: time constant with which the controller smooths the shaped program once more, s.
         contour_tolerance_um: deviation allowed to it, µm.
-
-    Returns:
-        The tolerance, in mm.
     """
-    own = machine.controller.shaped_time_constant_s
     tolerance = _core.FilterTolerance()
-    tolerance.variance_s2 = max(shaper.variance_s2 for shaper in grid.shapers) + own * own / 12.0
-    tolerance.mean_deviation_s = max(_mean_deviation_s(shaper) for shaper in grid.shapers) + own / 4.0
+    tolerance.variance_s2 = max(shaper.variance_s2 for shaper in grid.shapers) + own_filter_s * own_filter_s / 12.0
+    tolerance.mean_deviation_s = max(_mean_deviation_s(shaper) for shaper in grid.shapers) + own_filter_s / 4.0
     tolerance.contour_tolerance_mm = contour_tolerance_um * 1e-3
     tolerance.corner_share = _CORNER_SHARE
     return tolerance
-
-
-def shaping_options(
-    machine: Machine,
-    grid: Grid,
-    limits: _core.MotionLimits,
-    tolerance: _core.FilterTolerance,
-    offset: Offset = NO_OFFSET,
-) -> _core.ShapingOptions:
-    """How a region is shaped on a grid: what the core needs of the machine file.
-
-    Args:
-        machine: controller and modes.
-        grid: block period and shapers.
-        limits: see `motion_limits`.
-        tolerance: see `filter_tolerance`.
-        offset: from the region's positions to the machine's; where it is not known of the axis that the grid's track
-            follows, the grid's one shaper is used.
-
-    Returns:
-        The options of the core.
-    """
-    options = _core.ShapingOptions()
-    options.limits = limits
-    options.tolerance = tolerance
-    options.block_period_s = grid.block_period_s
-    options.interpolation_period_s = machine.controller.interpolation_period_s
-    options.plunge_axis_angle_rad = machine.shaping.plunge_angle_deg * _DEGREE
-    options.plunge_corner_angle_rad = _PLUNGE_CORNER_DEG * _DEGREE
-    options.rest_at_stop_s = machine.controller.shaped_time_constant_s
-    options.target = _TARGETS[machine.shaping.contour]
-    options.modes = axis_modes(machine)
-    options.axis_shapers = list(grid.axis_firs)
-    options.least_feed_mm_per_s = machine.controller.minimum_feed_mm_per_min / 60.0
-    if grid.track is not None and (start := offset[grid.track.axis]) is not None:
-        options.following = grid.track.following(start)
-        options.mode_tables = mode_tables(machine, offset=offset)
-    return options
 
 
 class _Marks:
@@ -137,81 +96,155 @@ class _Marks:
         return marks, breaks
 
 
-def emit_region(
-    program: Program,
-    region: _core.Region,
-    machine: Machine,
-    grid: Grid,
-    limits: _core.MotionLimits,
-    tolerance: _core.FilterTolerance,
-) -> EmittedRegion:
-    """Shape one region and write it.
+class RegionWriter:
+    """Shapes regions on one grid and writes them.
 
-    The text begins with `emission.prologue` and a full safe line and ends with the modal state of the original.
+    Args:
+        machine: how motion is shaped and text is written.
+        model: the same machine for the core.
+        grid: block period and shapers.
     """
-    notes = region.notes
-    options = shaping_options(machine, grid, limits, tolerance, region_offset(region, machine))
-    shaper = _core.RegionShaper(region.path, grid.fir, [note.segment for note in notes], options)
 
-    inch = region.exit.units == 20
-    unit = MM_PER_INCH if inch else 1.0
-    increment = least_increment_mm(machine, region.exit.units)
-    feed_decimals = machine.controller.feed_decimals_inch if inch else machine.controller.feed_decimals_mm
-    fit = _core.FitOptions()
-    fit.increment_mm = increment
-    fit.block_period_s = grid.block_period_s
-    fit.interpolation_period_s = machine.controller.interpolation_period_s
-    fit.feed_unit_mm_per_s = 10.0**-feed_decimals * unit / 60.0
-    fit.minimum_feed = max(1, math.ceil(machine.controller.minimum_feed_mm_per_min / unit * 10**feed_decimals - 1e-9))
-    fit.merge_tolerance_increments = machine.emission.merge_tolerance_increments
-    fit.arc_min_chord_mm = machine.emission.arc_min_chord_mm
-    if machine.emission.rounding == "vibration":
-        fit.modes = options.modes
-    last = region.path[-1]
-    writer = _core.WriterOptions()
-    writer.position_decimals = -round(math.log10(increment / unit))
-    writer.feed_decimals = feed_decimals
-    writer.incremental = region.incremental
-    writer.plane = region.entry.plane
-    writer.line_end = program.core.line_end
-    marks = _Marks(program, notes)
-    texts: list[bytes] = []
-    periods: list[npt.NDArray[np.uint32]] = []
-    piece = shaper.next(_PIECE_PERIODS)
-    assert piece is not None  # the first one always exists
-    starts: list[list[int]] = []  # of the pieces, in increments
-    while piece is not None:
-        following = shaper.next(_PIECE_PERIODS)
-        if following is None:
-            writer.exact_stop_at_end = region.exact_stop_at_end
-            if region.exit.motion in (2, 3) and last.kind == _core.SegmentKind.arc:
-                fit.end_with_arc(region.exit.motion == 2, last.normal, last.radius_mm)
-        here, breaks = marks.within(piece, last=following is None)
-        fitted = _core.fit_blocks(piece, sorted({*piece.run_ends, *breaks}), fit)
-        fit.lent_periods = fitted.left_periods
-        starts.append([round(float(x) / increment) for x in piece.grid_mm[0]])
-        text, writer.motion, writer.plane = _core.write_blocks(fitted, starts[-1], here, writer)
-        texts.append(text)
-        periods.append(fitted.periods)
-        piece = following
-    text = b"".join(texts)
-    all_periods = np.concatenate(periods)
-    first_number, line_end = marks.first_number, program.core.line_end
+    def __init__(self, machine: Machine, model: MachineModel, grid: Grid) -> None:
+        self._machine = machine
+        self._model = model
+        self._grid = grid
 
-    # A search for the region's N word must not skip the prologue.
-    head = [*machine.emission.prologue, _safe_line(region, starts[0], writer.position_decimals, machine)]
-    if first_number >= 0:
-        head[0] = f"N{first_number}{head[0]}"
-    if machine.emission.prefill_dwell_s > 0.0:
-        head.append(f"G04P{round(machine.emission.prefill_dwell_s * 1e3)}")
-    tail = [_restore_line(region, writer.motion, writer.plane), *machine.emission.epilogue]
-    end = line_end.encode()
-    before = b"".join(line.encode("latin-1") + end for line in head)
-    after = b"".join(line.encode("latin-1") + end for line in tail)
-    return EmittedRegion(
-        before + text + after, len(all_periods), all_periods, len(before), len(before) + len(text),
-        shaper.largest_deviation_mm * 1e3,
-    )  # fmt: skip
+    def tolerance(self, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
+        """See `filter_tolerance`."""
+        return filter_tolerance(self._grid, self._model.shaped_time_constant_s, contour_tolerance_um)
+
+    def options(
+        self, limits: _core.MotionLimits, tolerance: _core.FilterTolerance, offset: Offset = NO_OFFSET
+    ) -> _core.ShapingOptions:
+        """How a region is shaped: what the core needs.
+
+        Args:
+            limits: of the look-ahead.
+            tolerance: see `filter_tolerance`.
+            offset: from the region's positions to the machine's; where it is not known of the axis that the grid's
+                track follows, the grid's one shaper is used.
+        """
+        grid, plant = self._grid, self._model.options(offset=offset)
+        options = _core.ShapingOptions()
+        options.limits = limits
+        options.tolerance = tolerance
+        options.block_period_s = grid.block_period_s
+        options.interpolation_period_s = self._model.period_s
+        options.plunge_axis_angle_rad = self._machine.shaping.plunge_angle_deg * _DEGREE
+        options.plunge_corner_angle_rad = _PLUNGE_CORNER_DEG * _DEGREE
+        options.rest_at_stop_s = self._model.shaped_time_constant_s
+        options.target = _TARGETS[self._machine.shaping.contour]
+        options.modes = plant.modes
+        options.axis_shapers = list(grid.axis_firs)
+        options.least_feed_mm_per_s = self._machine.controller.minimum_feed_mm_per_min / 60.0
+        if grid.track is not None and (start := offset[grid.track.axis]) is not None:
+            options.following = grid.track.following(start)
+            options.mode_tables = plant.mode_tables
+        return options
+
+    def write(
+        self,
+        program: Program,
+        region: _core.Region,
+        limits: _core.MotionLimits,
+        tolerance: _core.FilterTolerance,
+    ) -> EmittedRegion:
+        """Shape one region and write it.
+
+        The text begins with `emission.prologue` and a full safe line and ends with the modal state of the original.
+
+        Args:
+            program: whose region it is.
+            region: what is replaced.
+            limits: of the look-ahead.
+            tolerance: see `tolerance`.
+
+        Raises:
+            ArgumentError: it cannot be shaped or written.
+        """
+        notes = region.notes
+        options = self.options(limits, tolerance, self._model.offset(region))
+        shaper = _core.RegionShaper(region.path, self._grid.fir, [note.segment for note in notes], options)
+        fit = self._fit(region, options)
+        state = self._writer(program, region, fit)
+        marks = _Marks(program, notes)
+        texts: list[bytes] = []
+        periods: list[npt.NDArray[np.uint32]] = []
+        starts: list[list[int]] = []  # of the pieces, in increments
+        piece = shaper.next(_PIECE_PERIODS)
+        assert piece is not None  # the first one always exists
+        while piece is not None:
+            following = shaper.next(_PIECE_PERIODS)
+            if following is None:
+                state.exact_stop_at_end = region.exact_stop_at_end
+                last = region.path[-1]
+                if region.exit.motion in (2, 3) and last.kind == _core.SegmentKind.arc:
+                    fit.end_with_arc(region.exit.motion == 2, last.normal, last.radius_mm)
+            here, breaks = marks.within(piece, last=following is None)
+            fitted = _core.fit_blocks(piece, sorted({*piece.run_ends, *breaks}), fit)
+            fit.lent_periods = fitted.left_periods
+            starts.append([round(float(x) / fit.increment_mm) for x in piece.grid_mm[0]])
+            text, state.motion, state.plane = _core.write_blocks(fitted, starts[-1], here, state)
+            texts.append(text)
+            periods.append(fitted.periods)
+            piece = following
+        # A search for the region's N word must not skip the prologue.
+        number = f"N{marks.first_number}" if marks.first_number >= 0 else ""
+        before = self._head(region, number, starts[0], state)
+        after = _lines([_restore_line(region, state.motion, state.plane), *self._machine.emission.epilogue], state)
+        text, all_periods = b"".join(texts), np.concatenate(periods)
+        return EmittedRegion(
+            before + text + after, len(all_periods), all_periods, len(before), len(before) + len(text),
+            shaper.largest_deviation_mm * 1e3,
+        )  # fmt: skip
+
+    def _fit(self, region: _core.Region, options: _core.ShapingOptions) -> _core.FitOptions:
+        """How shaped motion becomes blocks in the units of a region."""
+        controller, emission = self._machine.controller, self._machine.emission
+        unit, feed_decimals = self._units(region)
+        fit = _core.FitOptions()
+        fit.increment_mm = least_increment_mm(self._machine, region.exit.units)
+        fit.block_period_s = self._grid.block_period_s
+        fit.interpolation_period_s = self._model.period_s
+        fit.feed_unit_mm_per_s = 10.0**-feed_decimals * unit / 60.0
+        fit.minimum_feed = max(1, math.ceil(controller.minimum_feed_mm_per_min / unit * 10**feed_decimals - 1e-9))
+        fit.merge_tolerance_increments = emission.merge_tolerance_increments
+        fit.arc_min_chord_mm = emission.arc_min_chord_mm
+        if emission.rounding == "vibration":
+            fit.modes = options.modes
+        return fit
+
+    def _writer(self, program: Program, region: _core.Region, fit: _core.FitOptions) -> _core.WriterOptions:
+        """How the blocks of a region are written, and the modal state that they leave."""
+        unit, feed_decimals = self._units(region)
+        writer = _core.WriterOptions()
+        writer.position_decimals = -round(math.log10(fit.increment_mm / unit))
+        writer.feed_decimals = feed_decimals
+        writer.incremental = region.incremental
+        writer.plane = region.entry.plane
+        writer.line_end = program.core.line_end
+        return writer
+
+    def _units(self, region: _core.Region) -> tuple[float, int]:
+        """Millimetres of the program's unit, and digits behind the point of F."""
+        inch = region.exit.units == 20
+        controller = self._machine.controller
+        return (MM_PER_INCH, controller.feed_decimals_inch) if inch else (1.0, controller.feed_decimals_mm)
+
+    def _head(self, region: _core.Region, number: str, start: list[int], writer: _core.WriterOptions) -> bytes:
+        """The lines before the blocks: prologue, a safe line, the dwell in which the buffer fills."""
+        emission = self._machine.emission
+        fastest = max(axis.max_feed_mm_per_min for axis in self._machine.axes.as_tuple())
+        lines = [*emission.prologue, _safe_line(region, start, writer.position_decimals, fastest)]
+        lines[0] = number + lines[0]
+        if emission.prefill_dwell_s > 0.0:
+            lines.append(f"G04P{round(emission.prefill_dwell_s * 1e3)}")
+        return _lines(lines, writer)
+
+
+def _lines(lines: Sequence[str], writer: _core.WriterOptions) -> bytes:
+    return b"".join((line + writer.line_end).encode("latin-1") for line in lines)
 
 
 def decimal(value: float, decimals: int) -> str:
@@ -232,7 +265,7 @@ def _mean_deviation_s(shaper: _core.Shaper) -> float:
     return float(sum(abs(a) * abs(t - mean) for t, a in zip(shaper.times_s, shaper.amplitudes, strict=True)))
 
 
-def _safe_line(region: _core.Region, start: list[int], decimals: int, machine: Machine) -> str:
+def _safe_line(region: _core.Region, start: list[int], decimals: int, fastest_mm_per_min: float) -> str:
     entry = region.entry
     words = [f"G{entry.plane}", "G91" if region.incremental else "G90", "G94", "G40", "G64", "G01"]
     if not region.incremental:
@@ -244,8 +277,7 @@ def _safe_line(region: _core.Region, start: list[int], decimals: int, machine: M
         ]
     # In G93 the modal F is no speed; a feed over the axes' limit is none that the machine runs.
     unit = MM_PER_INCH if entry.units == 20 else 1.0
-    fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
-    words.append(feed_word(max(1e-8, min(region.path[0].feed_mm_per_s * 60.0, fastest) / unit)))
+    words.append(feed_word(max(1e-8, min(region.path[0].feed_mm_per_s * 60.0, fastest_mm_per_min) / unit)))
     return "".join(words)
 
 

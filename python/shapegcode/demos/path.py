@@ -19,7 +19,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.controller import motion_limits
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
-from shapegcode.results.figures import largest_um
+from shapegcode.results.figures import largest_xyz_um
 from shapegcode.results.result import Xyz
 from shapegcode.results.table import Column, Table
 
@@ -187,23 +187,23 @@ def _condition(feed: int, reduction: int, machine: Machine) -> PathCondition:
     unshaped_s = _core.plan_speed(path, motion_limits(machine)).duration_s
     _, ideal = ideal_command(path, machine, ratio)
     conversion = convert(program, machine, arc_feed_ratio=ratio)
-    region = conversion.report["regions"][-1]
+    region = conversion.regions[-1]
 
-    def run(time_s: float, orbit_percent: float, residual_um: dict[str, float]) -> PathRun:
-        return PathRun(time_s, (time_s / unshaped_s - 1.0) * 100.0, orbit_percent, Xyz(**residual_um))
+    def run(time_s: float, orbit_percent: float, residual_um: Xyz[float]) -> PathRun:
+        return PathRun(time_s, (time_s / unshaped_s - 1.0) * 100.0, orbit_percent, residual_um)
 
     return PathCondition(
         feed,
         reduction,
-        unshaped=run(unshaped_s, 0.0, region["residual_vibration_um"]["original"]),
-        ideal=run(ideal.duration_s, ideal.orbit_error_percent[0], largest_um([ideal.residual_mm])),
+        unshaped=run(unshaped_s, 0.0, region.residual_vibration_um.original),
+        ideal=run(ideal.duration_s, ideal.orbit_error_percent[0], largest_xyz_um([ideal.residual_mm])),
         emitted=run(
-            region["time_s"]["emitted"],
-            conversion.report["orbit_error_percent"][-1],
-            region["residual_vibration_um"]["emitted"],
+            region.time_s.emitted,
+            conversion.orbit_error_percent[-1],
+            region.residual_vibration_um.emitted,
         ),
-        blocks=conversion.report["blocks"]["emitted"],
-        within_tolerance=conversion.within_tolerance,
+        blocks=conversion.blocks.emitted,
+        within_tolerance=conversion.ok,
         published_orbit_error_percent=_PAPER_ORBIT_PERCENT[feed, reduction],
     )
 

@@ -3,48 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from shapegcode.conversion.budget import Budget
-from shapegcode.conversion.convert import Conversion, convert, marked_out_of_tolerance
+from shapegcode.conversion.convert import convert
+from shapegcode.conversion.result import Conversion
+from shapegcode.conversion.whole_text import marked_out_of_tolerance
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
 from shapegcode.feed.figures import feed_figures
 from shapegcode.feed.load import PathLoad, load_of
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.schedule import MARGIN, schedule_survey
+from shapegcode.feed.shaped_result import ScheduledConversion
 from shapegcode.feed.survey import survey
 from shapegcode.feed.travel import OrdinaryMotion, ShapedMotion, travel_emitted
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.shaping.grid import choose_grid
 
-__all__ = ["ScheduledConversion", "convert_scheduled"]
+__all__ = ["convert_scheduled"]
 
 _ROUNDS = 4
 _MORE_MARGIN = 0.005  # beyond what the last round was off by
 
 Progress = Callable[[float], None]
-
-
-@dataclass(frozen=True)
-class ScheduledConversion:
-    """A program with scheduled feeds, shaped.
-
-    Attributes:
-        conversion: the emitted program; its report holds that of the schedule under ``feed_schedule``.
-        schedule: the feeds; its loads "after" are those of the emitted program.
-    """
-
-    conversion: Conversion
-    schedule: FeedSchedule
-
-    @property
-    def within_tolerance(self) -> bool:
-        """Whether the shaped program keeps the machine's tolerances and the tool's limits."""
-        return self.conversion.within_tolerance and self.schedule.ok
 
 
 def convert_scheduled(
@@ -98,10 +82,9 @@ def convert_scheduled(
         if excess <= 0.0:
             break
         margin += excess + _MORE_MARGIN
-    report: dict[str, Any] = {**conversion.report, "feed_schedule": emitted.to_dict()}
-    report["warnings"] = list(dict.fromkeys([*emitted.warnings, *conversion.report["warnings"]]))
+    warnings = tuple(dict.fromkeys([*emitted.warnings, *conversion.warnings]))
     text = conversion.text if emitted.ok else marked_out_of_tolerance(conversion.text)
-    return ScheduledConversion(replace(conversion, text=text, report=report), emitted)
+    return ScheduledConversion(**vars(conversion) | {"text": text, "warnings": warnings}, feed_schedule=emitted)
 
 
 def _measured(planned: FeedSchedule, conversion: Conversion, machine: Machine, margin: float) -> FeedSchedule:
@@ -122,9 +105,8 @@ def _measured(planned: FeedSchedule, conversion: Conversion, machine: Machine, m
             blocks = conversion.emitted.core.cutting_path(place.first_line, place.last_line)
             travelled = travel_emitted(blocks, along, machine, load.s_mm, window_s)
         loads.append(replace(load, emitted=load_of(part, travelled)))
-    times, blocks = conversion.report["cycle_time_s"], conversion.report["blocks"]
     return feed_figures(
         planned.survey, planned.plans, loads, machine, margin=margin, text=planned.text, written=planned.written,
-        cycle_time_s=replace(planned.cycle_time_s, emitted=times["emitted"]),
-        blocks=replace(planned.blocks, emitted=blocks["emitted"]),
+        cycle_time_s=replace(planned.cycle_time_s, emitted=conversion.cycle_time_s.emitted),
+        blocks=replace(planned.blocks, emitted=conversion.blocks.emitted),
     )  # fmt: skip

@@ -13,7 +13,7 @@ is loaded when somebody asks for them.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
@@ -60,7 +60,7 @@ class Xyz(Generic[T]):
     y: T
     z: T
 
-    def __iter__(self) -> Any:
+    def __iter__(self) -> Iterator[T]:
         """X, Y, Z."""
         return iter((self.x, self.y, self.z))
 

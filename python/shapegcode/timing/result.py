@@ -17,7 +17,7 @@ AGREEMENT_PERCENT = 0.5
 """Closed form and full interpolation agree if they differ by no more than this."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class TimeParts:
     """Where a stretch of time goes; the parts add up to the whole.
 

@@ -82,16 +82,19 @@ def settling_time_s(command_mm: Vector, options: _core.PlaybackOptions, slowest_
 
 
 class RapidPlant:
-    """Rapids as the controller and the modes of a machine make them."""
+    """Rapids as the controller and the modes of a machine make them.
 
-    def __init__(self, machine: Machine) -> None:
-        self.machine = machine
-        self._playing = MachineModel(machine)
-        self.model = self._playing.ordinary.model
+    Args:
+        machine: tolerances and modes.
+        model: the same machine for the core.
+    """
+
+    def __init__(self, machine: Machine, model: MachineModel) -> None:
+        self._playing = model
+        self.model = model.ordinary.model
         self.band_mm = machine.tolerance.residual_floor_um * 1e-3
-        self._slowest_per_s = self._playing.slowest_decay_per_s
         self._moving = any(mode.frequency_over is not None for axis in machine.axes.as_tuple() for mode in axis.modes)
-        self.longest_memory_s = self._playing.vibration_memory_s or math.inf
+        self.longest_memory_s = model.vibration_memory_s or math.inf
         """What moved longer ago no longer counts, s."""
         self._known: dict[tuple[float, ...], Timing] = {}
 
@@ -105,7 +108,7 @@ class RapidPlant:
         timing = Timing(
             _core.rapid_time_s(travel, self.model),
             _core.in_position_wait_s(travel, self.model),
-            settling_time_s(samples, self._options(rapid.region), self._slowest_per_s, self.band_mm),
+            settling_time_s(samples, self._options(rapid.region), self._playing.slowest_decay_per_s, self.band_mm),
             samples,
         )
         self._known[key] = timing
@@ -131,7 +134,7 @@ class RapidPlant:
             )
             count = round(figures.duration_s / period) + 1
             command = np.array(figures.recorded_command[:count])
-            settling = settling_time_s(command, self._options(region), self._slowest_per_s, self.band_mm)
+            settling = settling_time_s(command, self._options(region), self._playing.slowest_decay_per_s, self.band_mm)
             still = np.repeat(command[:1], round(stops_s / period), axis=0)
             runs.append(
                 Timing(
@@ -172,13 +175,13 @@ class RapidPlant:
             end = way[0]
             after_s += step.clock_s
         command = np.concatenate(parts[::-1])
-        settling_s = settling_time_s(command, self._options(region), self._slowest_per_s, self.band_mm)
+        settling_s = settling_time_s(command, self._options(region), self._playing.slowest_decay_per_s, self.band_mm)
         moves = np.flatnonzero(np.abs(np.diff(command, axis=0)).max(axis=1))
         still_s = (len(command) - 1 - (moves[-1] + 1 if len(moves) else 0)) * period
         return clock_s + max(0.0, settling_s - still_s)
 
     def _filter_periods(self) -> int:
-        return math.ceil(self.machine.controller.shaped_time_constant_s / self.model.period_s) + 1
+        return math.ceil(self._playing.shaped_time_constant_s / self.model.period_s) + 1
 
     def _options(self, region: _core.Region | None) -> _core.PlaybackOptions:
         return self._playing.options(offset=NO_OFFSET if region is None else self._playing.offset(region))

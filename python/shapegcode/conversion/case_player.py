@@ -1,0 +1,121 @@
+"""One emitted region played in every case of the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapegcode import _core
+from shapegcode.conversion.cases import ALL_MODES, Case, CaseFigures, Target
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.modes import Offset
+from shapegcode.results.figures import Deviation
+
+__all__ = ["BLOCK_ENDS", "CasePlayer"]
+
+BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
+"""Both rules of block timing."""
+
+
+@dataclass(frozen=True)
+class CasePlayer:
+    """Plays one emitted region; every method is a task of its own.
+
+    Attributes:
+        blocks: what was emitted.
+        path: what was programmed.
+        model: the machine for the core.
+        cases: in which it is played.
+        target: what the contour tolerance is about.
+        offset: from the region's positions to the machine's.
+        tracker: of the programmed path.
+    """
+
+    blocks: _core.Path
+    path: _core.Path
+    model: MachineModel
+    cases: Sequence[Case]
+    target: Target
+    offset: Offset
+    tracker: _core.ContourTracker
+
+    def nominal(self, rule: _core.BlockEnd) -> _core.PlaybackFigures:
+        """Blocks at 100 %; under the controller's own rule also with an empty buffer where a stop excites most."""
+        own = rule == self.model.own_rule
+        return self.model.play_emitted(
+            self.blocks, self.path, rule, offset=self.offset,
+            starved_blocks=_core.fastest_block_ends(self.blocks) if own else (),
+            memory_s=self.model.vibration_memory_s, tracker=self.tracker,
+        )  # fmt: skip
+
+    def planned(self) -> _core.PlaybackFigures | None:
+        """The look-ahead left on; None where no case asks."""
+        wanted = any(case.look_ahead for case in self.cases)
+        return self.model.play_planned(self.blocks, self.path, offset=self.offset) if wanted else None
+
+    def groups(self) -> list[list[Case]]:
+        """Overrides and shifted modes: those played in full each by itself, the short ones in one task."""
+        others = [case for case in self.cases if case.override != 1.0 or case.mode is not None]
+        whole = [[case] for case in others if case.needs_contour(self.target)]
+        return [*whole, [case for case in others if not case.needs_contour(self.target)]]
+
+    def others(self, cases: Sequence[Case]) -> dict[str, _core.PlaybackFigures]:
+        """A group of them by the name of their case."""
+        played = {}
+        for case in cases:
+            whole = case.needs_contour(self.target)
+            played[case.name] = self.model.play_emitted(
+                self.blocks, self.path, override=case.override, shift=case.shift,
+                only=None if case.mode == ALL_MODES else case.mode, offset=self.offset, contour=whole,
+                command_contour=case.override != 1.0,
+                last_seconds=0.0 if whole else self.model.vibration_memory_s, tracker=self.tracker,
+            )  # fmt: skip
+        return played
+
+    def figures(
+        self,
+        nominal: Sequence[_core.PlaybackFigures],
+        planned: _core.PlaybackFigures | None,
+        others: Mapping[str, _core.PlaybackFigures],
+    ) -> tuple[CaseFigures, ...]:
+        """One entry per case, of what the tasks gave."""
+        by_rule = {rule.name: run for rule, run in zip(BLOCK_ENDS, nominal, strict=True)}
+        own = by_rule[self.model.own_rule.name]
+        figures = []
+        for case in self.cases:
+            if case.name in others:
+                figures.append(self._other(case, others[case.name], own))
+            elif case.starved_s > 0.0:
+                figures.append(_starved(own, case.starved_s if own.starved else 0.0))
+            else:
+                run = planned if case.look_ahead and planned is not None else by_rule[case.block_end or ""]
+                figures.append(_whole(run))
+        return tuple(figures)
+
+    def _other(self, case: Case, run: _core.PlaybackFigures, own: _core.PlaybackFigures) -> CaseFigures:
+        whole = case.needs_contour(self.target)
+        if case.override == 1.0:  # the set-points are those of the nominal case, only the table is another
+            response = Deviation.of([run.response]) if whole else None
+            return CaseFigures(run.residual_mm, Deviation.of([own.command]), response, own.duration_s)
+        if whole:
+            return _whole(run)
+        model = self.model
+        cut_s = [_core.play_duration_s(self.blocks, model.period_s, model.own_rule, at) for at in (case.override, 1.0)]
+        return CaseFigures(run.residual_mm, None, None, own.duration_s + cut_s[0] - cut_s[1])
+
+
+def _whole(run: _core.PlaybackFigures) -> CaseFigures:
+    return CaseFigures(run.residual_mm, Deviation.of([run.command]), Deviation.of([run.response]), run.duration_s)
+
+
+def _starved(run: _core.PlaybackFigures, waited_s: float) -> CaseFigures:
+    """The worst of all places; at the end of the region the vibration is that without a wait, but for a wait nearby."""
+    runs: list[_core.PlaybackFigures | _core.StarvedFigures] = [run, *run.starved]
+    return CaseFigures(
+        np.max([each.residual_mm for each in runs], axis=0),
+        Deviation.of(each.command for each in runs),
+        Deviation.of(each.response for each in runs),
+        run.duration_s + waited_s,
+    )

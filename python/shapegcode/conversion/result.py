@@ -1,0 +1,189 @@
+"""What a conversion made: figures before and after, cases, regions, warnings, the next step, the emitted program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from shapegcode.conversion.budget import BudgetOutcome
+from shapegcode.conversion.figures import AppliedLimits, BlockCount, PlayedFigures, UsedShaper
+from shapegcode.conversion.rapids.result import RapidsOutcome
+from shapegcode.conversion.readback import Placed
+from shapegcode.conversion.tables import BeforeAfter, before_after_table, case_table, change_percent, percent
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.program import Program
+from shapegcode.results.figures import CONTOURS, ContourError
+from shapegcode.results.json import exact, hidden, sparse
+from shapegcode.results.result import Pair, Plot, Result, Xyz
+from shapegcode.results.table import Table
+
+__all__ = ["Conversion"]
+
+_VIBRATIONS = {"residual_vibration_um": "residual vibration", "peak_vibration_um": "peak vibration"}
+_DEVIATIONS = {"max": "largest", "rms": "RMS", "gouge": "gouge", "excess": "excess"}
+
+
+@dataclass(frozen=True, repr=False, kw_only=True)
+class Conversion(PlayedFigures, Result):
+    """A program, shaped: the emitted text, and what playing it beside the original showed.
+
+    Attributes:
+        program: name of the original.
+        machine: name of the machine.
+        cycle_time_s: whole program: regions, rapids with in-position wait, dwells, drilling cycles.
+        cutting_time_s: the regions alone, until the set-points rest.
+        block_period_s: grid of the shaped blocks.
+        shaper: the design on it.
+        blocks: how many there are.
+        expanded: the original was expanded (calls, macros, coordinate modes) before it was shaped.
+        expanded_radii_mm: radii of cutter compensation that are in the path now, by offset.
+        bytes_read: size of the original, expanded.
+        bytes_emitted: size of the emitted program.
+        limits: tolerances that were applied.
+        warnings: what to heed.
+        budget: only under one: what it allowed, and what was given up for it.
+        rapids: only where rapids may be shaped: what became of them.
+        text: the emitted program, as a file holds it.
+        emitted: the same, read back.
+        placed: the shaped regions and their places in it.
+        model: the machine that it was played on.
+    """
+
+    json_extra: ClassVar[dict[str, Any]] = Result.json_extra | {"within_tolerance": bool}
+
+    program: str
+    machine: str
+    cycle_time_s: Pair[float]
+    cutting_time_s: Pair[float]
+    block_period_s: float
+    shaper: UsedShaper = field(metadata=exact())
+    blocks: BlockCount
+    expanded: bool
+    expanded_radii_mm: Mapping[str, float]
+    bytes_read: int
+    bytes_emitted: int
+    limits: AppliedLimits
+    warnings: tuple[str, ...]
+    budget: BudgetOutcome | None = field(default=None, metadata=sparse())
+    rapids: RapidsOutcome | None = field(default=None, metadata=sparse())
+    text: bytes = field(metadata=hidden())
+    emitted: Program = field(metadata=hidden())
+    placed: tuple[Placed, ...] = field(metadata=hidden())
+    model: MachineModel = field(metadata=hidden())
+
+    @property
+    def ok(self) -> bool:
+        """Whether every region keeps its tolerances in every case that counts."""
+        return self.within_tolerance
+
+    @property
+    def nothing_shaped(self) -> bool:
+        """Whether the program is as it was."""
+        return self.blocks.emitted == 0
+
+    @property
+    def answer(self) -> str:
+        """The verdict, and the three figures that people look at first."""
+        if self.nothing_shaped:
+            return f"nothing {'fits the budget' if self._gave_up else 'to shape'}: the text is unchanged"
+        vibration = self.residual_vibration_um
+        axis = max("xyz", key=lambda each: vibration.original[each])
+        target = getattr(self.contour_error_um, self.limits.contour_target)
+        change = change_percent(self.cycle_time_s.original, self.cycle_time_s.emitted)
+        return (
+            f"{'within tolerance' if self.ok else 'OUT OF TOLERANCE'}: residual vibration {axis.upper()} "
+            f"{vibration.original[axis]:.1f} → {vibration.emitted[axis]:.1f} µm, "
+            f"contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, time {percent(change)}"
+        )
+
+    @property
+    def _gave_up(self) -> bool:
+        return self.budget is not None and bool(self.budget.given_up)
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        if self.nothing_shaped:
+            return "run the original program: nothing in it was shaped."
+        if not self.ok:
+            return f"do not run it ({next(self.misses())}): lower the feed there, and convert again."
+        if self.warnings:
+            return "settle the warnings, then run the emitted program above the workpiece, without a tool."
+        return "run the emitted program above the workpiece, without a tool, at 100 % feed override."
+
+    def misses(self) -> Iterator[str]:
+        """Every tolerance that a region misses, with the lines of the original program."""
+        for region in self.regions:
+            for miss in region.misses:
+                yield "lines {} to {}: {}".format(*region.lines, miss)
+
+    def tables(self) -> list[Table]:
+        """Original against emitted; the cases of the verdict. None where nothing was shaped."""
+        if self.nothing_shaped:
+            return []
+        groups = [self._times(), *self._vibrations(), *self._contours(), self._orbits(), self._sizes()]
+        cases = [case_table(self.cases, self.worst_case)] if self.cases else []
+        return [before_after_table(groups), *cases]
+
+    def _times(self) -> list[BeforeAfter]:
+        pairs = (("cycle time", self.cycle_time_s), ("cutting time", self.cutting_time_s))
+        return [BeforeAfter(name, "s", pair.original, pair.emitted, 3) for name, pair in pairs]
+
+    def _vibrations(self) -> Iterator[list[BeforeAfter]]:
+        for key, name in _VIBRATIONS.items():
+            both: Pair[Xyz[float]] = getattr(self, key)
+            yield [
+                BeforeAfter(
+                    f"{name} {axis.upper()}",
+                    "µm",
+                    both.original[axis],
+                    both.emitted[axis],
+                    limit=self._residual_limit(axis) if name.startswith("residual") else None,
+                )
+                for axis in "xyz"
+                if both.original[axis] or both.emitted[axis]
+            ]
+
+    def _residual_limit(self, axis: str) -> float | None:
+        """Limit of the region with the largest emitted residual, the one that the table shows."""
+        worst = max(self.regions, key=lambda each: each.residual_vibration_um.emitted[axis], default=None)
+        return None if worst is None else worst.residual_limit_um[axis]
+
+    def _contours(self) -> Iterator[list[BeforeAfter]]:
+        for track, name in CONTOURS.items():
+            both: Pair[ContourError] = getattr(self.contour_error_um, track)
+            rows = []
+            for statistic, suffix in _DEVIATIONS.items():
+                original, emitted = getattr(both.original, statistic), getattr(both.emitted, statistic)
+                if original is not None and emitted is not None:
+                    judged = (track, statistic) == (self.limits.contour_target, "max")
+                    limit = self.limits.contour_um if judged else None
+                    rows.append(BeforeAfter(f"{name}, {suffix}", "µm", original, emitted, limit=limit))
+            yield rows
+
+    def _orbits(self) -> list[BeforeAfter]:
+        errors = self.orbit_error_percent
+        if not errors:
+            return []
+        name = "orbit error" if len(errors) == 1 else f"largest orbit error of {len(errors)} arcs"
+        return [BeforeAfter(name, "%", None, max(errors, key=abs), 4)]
+
+    def _sizes(self) -> list[BeforeAfter]:
+        """Figures of the emitted program and its shaper."""
+        rows = [
+            BeforeAfter("blocks", "", self.blocks.read, self.blocks.emitted, 0),
+            BeforeAfter("size of the program", "bytes", self.bytes_read, self.bytes_emitted, 0),
+            BeforeAfter("block period", "ms", None, self.block_period_s * 1e3, 3),
+        ]
+        if self.budget is not None:
+            rows.append(BeforeAfter("regions given up for the budget", "", None, len(self.budget.given_up), 0))
+        rows.append(BeforeAfter("duration of the shaper", "ms", None, self.shaper.duration_s * 1e3, 3))
+        if self.shaper.per_axis_duration_s:
+            shorter_ms = self.shaper.per_axis_duration_s * 1e3
+            rows.append(BeforeAfter("with one for each axis (--per-axis)", "ms", None, shorter_ms, 3))
+        return rows
+
+    def plots(self) -> Mapping[str, Plot]:
+        """`path`, `feed` and `vibration` of the region that vibrates most, before and after."""
+        return self._drawn_beside()

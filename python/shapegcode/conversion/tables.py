@@ -1,0 +1,132 @@
+"""The tables of a conversion: original against emitted, and the cases of the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from shapegcode.conversion.figures import CaseVerdict
+from shapegcode.results.table import Column, Table
+
+__all__ = ["BeforeAfter", "before_after_table", "case_table", "change_percent", "percent"]
+
+# Rounding in sums of increments stays far below this, a least increment far above.
+# A percentage of less than this compares rounding with rounding.
+_LEAST_COMPARED_UM = 1.0
+_SWINGS_UM = 0.005  # an axis that nowhere reaches this has no column
+
+
+def change_percent(original: float, emitted: float) -> float:
+    """Change from original to emitted; the original is not zero."""
+    return (emitted - original) / abs(original) * 100
+
+
+def percent(change: float) -> str:
+    """A change in words."""
+    return "0 %" if abs(change) < 0.05 else f"{change:+.1f} %"
+
+
+@dataclass(frozen=True)
+class BeforeAfter:
+    """One line of the table: a figure of both programs, or of the emitted one alone.
+
+    Attributes:
+        figure: what it is.
+        unit: its unit.
+        original: figure of the original program; None where there is none.
+        emitted: figure of the emitted program.
+        digits: behind the point.
+        limit: what the emitted figure is judged by; None where it is not judged.
+    """
+
+    figure: str
+    unit: str
+    original: float | None
+    emitted: float
+    digits: int = 1
+    limit: float | None = None
+
+    @property
+    def change(self) -> str:
+        """From original to emitted; empty without an original, and where it is too small to compare with."""
+        least = _LEAST_COMPARED_UM if self.unit == "µm" else 0.5 * 10.0**-self.digits
+        if self.original is None or abs(self.original) < least:
+            return ""
+        return percent(change_percent(self.original, self.emitted))
+
+    def text(self, value: float | None) -> str:
+        """One of its figures with its digits."""
+        return "" if value is None else f"{float(value):z.{self.digits}f}"
+
+
+_BEFORE_AFTER = (
+    Column("figure", text=True),
+    Column("unit", text=True),
+    Column("original", value=lambda row: row.text(row.original)),
+    Column("emitted", value=lambda row: row.text(row.emitted)),
+    Column("change"),
+    Column("limit", value=lambda row: row.text(row.limit)),
+)
+
+
+def before_after_table(groups: Sequence[Sequence[BeforeAfter]]) -> Table:
+    """Original against emitted, in groups of figures.
+
+    Args:
+        groups: from top to bottom; a line stands between them.
+    """
+    filled = [group for group in groups if group]
+    sections = [sum(len(group) for group in filled[:rank]) for rank in range(1, len(filled))]
+    return Table("", _BEFORE_AFTER, [row for group in filled for row in group], sections=sections)
+
+
+def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table:
+    """What every case leaves, whether it counts, and which one decides.
+
+    Args:
+        cases: as played.
+        worst: the one that decides; None: no case counts.
+    """
+    columns = (
+        Column("case", value="name", text=True),
+        *(
+            Column(axis.upper(), value=f"residual_um.{axis}", digits=2)
+            for axis in "xyz"
+            if any(case.residual_um[axis] >= _SWINGS_UM for case in cases)
+        ),
+        Column("command", value=lambda case: _micrometres(case.contour_error_um.command)),
+        Column("table", value=lambda case: _micrometres(case.contour_error_um.response)),
+        Column("s", value="time_s", digits=2),
+        Column("limit", value=lambda case: _share(case.share_of_limit)),
+        Column("verdict", value=lambda case: _verdict(case) + (" <- worst" if case is worst else ""), text=True),
+    )
+    shown = sum(not case.counts for case in cases)
+    brackets = "; those in brackets are only shown" if shown else ""
+    return Table(
+        "cases of the verdict: residual X Y Z, contour error of command and table, µm",
+        columns,
+        cases,
+        caption=f"{len(cases) - shown} of {len(cases)} cases count{brackets} ([verdict])",
+        row_style=lambda case: _style(case, case is worst),
+    )
+
+
+def _micrometres(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}"
+
+
+def _share(share: float | None) -> str:
+    """Of the limit in percent; a limit of zero leaves no share."""
+    return "no limit but 0" if share is None else f"{share * 100:.0f} %"
+
+
+def _verdict(case: CaseVerdict) -> str:
+    word = "within" if case.within else "OUT"
+    return word if case.counts else f"({word.lower()})"
+
+
+def _style(case: CaseVerdict, worst: bool) -> str:
+    if not case.counts:
+        return "dim"
+    colour = "" if case.within else "red"
+    return f"bold {colour}".strip() if worst else colour

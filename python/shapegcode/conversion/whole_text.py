@@ -1,0 +1,192 @@
+"""The whole emitted text: header and guards, shaped regions in their places, everything else as it was."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from shapegcode import _core
+from shapegcode.conversion.budget import Load, measure_load
+from shapegcode.conversion.readback import Placed
+from shapegcode.conversion.spending import keepable
+from shapegcode.conversion.write import EmittedRegion, RegionWriter
+from shapegcode.machine import Machine
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.program import Program
+from shapegcode.program.compensation import guard_lines, header_lines
+from shapegcode.shaping.grid import Grid
+
+__all__ = ["TextWriter", "Written", "judged", "marked_out_of_tolerance", "why_kept"]
+
+_COMMENT_WIDTH = 60
+# One length, so that the verdict can take its place without moving a line.
+_VERDICT_PENDING, _VERDICT_GOOD, _VERDICT_BAD = (
+    b"(VERDICT PENDING                )",
+    b"(VERDICT WITHIN TOLERANCE       )",
+    b"(OUT OF TOLERANCE - DO NOT RUN  )",
+)
+
+Step = Callable[[int, int], None]
+
+
+def judged(text: bytes, *, good: bool) -> bytes:
+    """An emitted program with the verdict in its header."""
+    return text.replace(_VERDICT_PENDING, _VERDICT_GOOD if good else _VERDICT_BAD, 1)
+
+
+def marked_out_of_tolerance(text: bytes) -> bytes:
+    """An emitted program that misses a limit which only its caller knows of, with the verdict in its header."""
+    return text.replace(_VERDICT_GOOD, _VERDICT_BAD, 1)
+
+
+def why_kept(region: _core.Region, machine: Machine) -> str:
+    """Why a region cannot be written as shaped blocks; empty if it can."""
+    slowest = region.path.slowest_feed_mm_per_s * 60.0
+    least = machine.controller.minimum_feed_mm_per_min
+    if slowest < least * (1 - 1e-9):
+        return f"feed {slowest:g} mm/min is below controller.minimum_feed_mm_per_min = {least:g}"
+    return ""
+
+
+@dataclass(frozen=True)
+class Written:
+    """The emitted text before it is judged.
+
+    Attributes:
+        text: the whole program.
+        placed: its shaped regions.
+        blocks: shaped blocks in it.
+        kept_warnings: a sentence for every region that keeps its text.
+        planned_um: per index of a shaped region the deviation that its feed was planned for, µm, where the contour is
+            kept by a target.
+        loads: per index of a shaped region what it asks of memory, line and control, where that was asked for.
+    """
+
+    text: bytes
+    placed: list[Placed]
+    blocks: int
+    kept_warnings: list[str]
+    planned_um: dict[int, float]
+    loads: dict[int, Load]
+
+
+class TextWriter:
+    """Writes a program with its regions shaped on one grid.
+
+    Args:
+        program: the original.
+        machine: how text is written.
+        model: the same machine for the core.
+        grid: block period and shapers.
+        arc_feed_ratio: feed on arcs relative to the programmed one.
+    """
+
+    def __init__(
+        self, program: Program, machine: Machine, model: MachineModel, grid: Grid, arc_feed_ratio: float
+    ) -> None:
+        self._program = program
+        self._machine = machine
+        self._model = model
+        self._grid = grid
+        self._arc_feed_ratio = arc_feed_ratio
+        self._regions = RegionWriter(machine, model, grid)
+
+    def write(
+        self,
+        reasons: Sequence[str],
+        room_um: Sequence[float],
+        untold: Mapping[int, object] | None = None,
+        on_progress: Step = lambda _done, _total: None,
+    ) -> Written:
+        """The whole text.
+
+        Args:
+            reasons: why a region keeps its text, per region; empty: it is shaped.
+            room_um: deviation that its feed is planned for, per region, µm.
+            untold: indices of kept regions that need no warning of their own, under a budget, which asks for loads;
+                None: there is no budget.
+            on_progress: called with regions done and regions in all.
+
+        Raises:
+            ProgramError: a region cannot be written.
+        """
+        core, regions = self._program.core, self._program.regions
+        parts = [core.slice(0, core.header_offset), self._opening(shapes=not all(reasons))]
+        line = 1 + sum(part.count(b"\n") for part in parts)
+        position = core.header_offset
+        written = Written(b"", [], 0, [], {}, {})
+        blocks = 0
+        for index, (region, reason, room) in enumerate(zip(regions, reasons, room_um, strict=True)):
+            between = core.slice(position, region.text_begin)
+            position = region.text_end
+            line += between.count(b"\n")
+            if reason:
+                if untold is None or index not in untold:
+                    written.kept_warnings.append(self._keep(region, reason))
+                text = core.slice(region.text_begin, region.text_end)
+            else:
+                shaped = self._shape(region, room)
+                text = shaped.text
+                blocks += shaped.blocks
+                written.placed.append(Placed(region, line, line + text.count(b"\n") - 1))
+                if shaped.planned_um > 0.0:
+                    written.planned_um[index] = shaped.planned_um
+                if untold is not None:
+                    bits = self._machine.controller.dnc_bits_per_character
+                    written.loads[index] = measure_load(region, shaped, self._grid, bits)
+                on_progress(index + 1, len(regions))
+            line += text.count(b"\n")
+            parts += [between, text]
+        parts.append(core.slice(position, core.size))
+        return Written(
+            b"".join(parts), written.placed, blocks, written.kept_warnings, written.planned_um, written.loads
+        )
+
+    def _shape(self, region: _core.Region, room_um: float) -> EmittedRegion:
+        limits = self._model.limits(arc_feed_ratio=self._arc_feed_ratio)
+        try:
+            return self._regions.write(self._program, region, limits, self._regions.tolerance(room_um))
+        except _core.ArgumentError as error:
+            raise self._program.region_error(region, str(error)) from error
+
+    def _keep(self, region: _core.Region, reason: str) -> str:
+        """The warning for a region that keeps its text."""
+        if not keepable(region, self._machine):
+            raise self._program.region_error(
+                region, f"{reason}; its arcs have absolute centres and cannot be kept as they are"
+            )
+        program = self._program
+        return f"{program.place(region.first_line)}: {program.lines(region)} kept untouched: {reason}"
+
+    def _opening(self, *, shapes: bool) -> bytes:
+        """Header comments where something is shaped, and the guards of expanded radii."""
+        radii_mm = self._program.core.expanded_radii_mm
+        lines = guard_lines(radii_mm, self._machine)
+        if self._machine.emission.header and shapes:
+            lines = [*self._header(), *(f"({note})" for note in header_lines(radii_mm)), *lines]
+        return b"".join((line + self._program.core.line_end).encode() for line in lines)
+
+    def _header(self) -> list[str]:
+        from shapegcode import __version__
+
+        grid = self._grid
+        modes = [
+            f"{axis} {mode.frequency_hz:g} HZ {mode.damping_ratio:g}"
+            for axis, modes in zip("XYZ", self._model.options().modes, strict=True)
+            for mode in modes
+        ]
+        lines = [
+            f"SHAPEGCODE {__version__} MACHINE {self._machine.name}",
+            *(f"MODE {mode}" for mode in modes),
+            f"BLOCK PERIOD {grid.block_period_s * 1e3:g} MS SHAPER {grid.duration_s * 1e3:g} MS",
+            *([f"{len(grid.track.nodes)} SHAPERS FOLLOW {'XYZ'[grid.track.axis]}"] if grid.track else []),
+            "SET FEED OVERRIDE 100 PCT",
+            f"TIME CONSTANT AFTER INTERPOLATION {self._model.shaped_time_constant_s * 1e3:g} MS",
+        ]
+        first, *rest = (f"({_plain(line)[:_COMMENT_WIDTH]})" for line in lines)
+        return [first, _VERDICT_PENDING.decode(), *rest]
+
+
+def _plain(text: str) -> str:
+    """Only what a FANUC comment may hold: capitals, digits and plain signs."""
+    return "".join(c if c.isalnum() or c in " .-" else " " for c in text.upper())
