@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
 from table import markdown
 
 from extra_insensitive import ei_convolved, fine_enough_period_s, random_pairs, worst_over_bands
-from shapegcode.shaping import ModeBand, choose_robust_grid, least_worst, minimax_robust
+from shapegcode.shaping import ModeBand, choose_block_period, least_worst, minimax_robust
 
 _PERIODS_MS = (1, 2, 3, 4, 5)
 
@@ -68,7 +68,7 @@ def main() -> int:
         shortest = minimax_robust(bands, fine_s, vibration_limit=theirs)
         shares.append(shortest.shaper.duration_s / float(times_s.max()))
         minimax_s.append(_seconds(lambda bands=bands, fine_s=fine_s: minimax_robust(bands, fine_s)))
-        choice_s.append(_seconds(lambda bands=bands: choose_robust_grid(bands, 0.001, 0.002)))
+        choice_s.append(_seconds(lambda bands=bands: choose_block_period(bands, 0.001, 0.002)))
 
     rows = [
         [name, f"{sum(r <= 1.0 for r in values)} of {len(values)}", f"{np.median(values):.2f}", f"{max(values):.2f}"]
@@ -83,7 +83,7 @@ def main() -> int:
     times = [
         _times("least_worst", least_s),
         _times("minimax_robust", minimax_s),
-        _times("choose_robust_grid, 2 to 20 ms", choice_s),
+        _times("choose_block_period, 2 to 20 ms", choice_s),
     ]
     print(markdown(["CPU time", "median", "95 %", "most"], times), end="\n\n")
     print(markdown(["worse than EI", "grid", "periods per swing at the upper end", "ours", "EI"], worse))

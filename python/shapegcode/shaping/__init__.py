@@ -12,7 +12,6 @@ from shapegcode.shaping.block_period import (
     BlockPeriodCandidate,
     BlockPeriodChoice,
     choose_block_period,
-    choose_robust_grid,
     robust_candidate,
 )
 from shapegcode.shaping.comparison import choose
@@ -51,7 +50,6 @@ __all__ = [
     "choose",
     "choose_block_period",
     "choose_grid",
-    "choose_robust_grid",
     "choose_shaper",
     "design",
     "design_per_axis",

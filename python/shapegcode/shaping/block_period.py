@@ -1,14 +1,14 @@
 """The choice of the block period: it decides how long a shaper on its grid must be.
 
-Candidates are the multiples of the controller's interpolation period. :func:`choose_block_period` compares the
-shortest exact designs, :func:`choose_robust_grid` the robust ones where modes state a band.
+Candidates are the multiples of the controller's interpolation period: the shortest exact designs are compared, or the
+robust ones where modes state a band.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.shaping.bands import ModeBand
@@ -28,7 +28,6 @@ __all__ = [
     "BlockPeriodCandidate",
     "BlockPeriodChoice",
     "choose_block_period",
-    "choose_robust_grid",
     "robust_candidate",
 ]
 
@@ -36,138 +35,106 @@ _SAME = 0.02  # designs whose durations (or worst residuals) differ by less are 
 _ON_GRID = 1e-9  # periods; forgives the rounding of a quotient
 
 
-class BlockPeriodCandidate(NamedTuple):
-    """One row of the comparison of block periods."""
+@dataclass(frozen=True)
+class BlockPeriodCandidate:
+    """One row of the comparison of block periods.
+
+    Attributes:
+        period_s: block period, s, a whole multiple of the interpolation period.
+        shaper: best on that grid; None: there is none.
+        refusal: why there is none; empty if there is one.
+        worst_residual: largest residual ratio over the modes' bands, proven; None: no shaper, or no mode states a band.
+        note: a sentence for the report where the shaper leaves more than the vibration limit; else empty.
+    """
 
     period_s: float
-    """Block period in s, a whole multiple of the interpolation period."""
     shaper: Shaper | None
-    """Best shaper on that grid, or None if there is none."""
-    refusal: str
-    """Why there is none; empty if there is one."""
+    refusal: str = ""
     worst_residual: float | None = None
-    """Largest residual ratio over the modes' bands, proven; None: no shaper, or no mode states a band."""
     note: str = ""
-    """A sentence for the report where the shaper leaves more than the vibration limit; else empty."""
-
-    @property
-    def variance_s2(self) -> float | None:
-        """Contour cost of the shaper in s², or None if there is none."""
-        return None if self.shaper is None else self.shaper.variance_s2
 
 
-class BlockPeriodChoice(NamedTuple):
-    """The chosen block period, its shaper, and what it was chosen from."""
+@dataclass(frozen=True)
+class BlockPeriodChoice:
+    """The chosen block period, its shaper, and what it was chosen from.
+
+    Attributes:
+        period_s: block period, s.
+        shaper: best on its grid.
+        candidates: every period that was tried, ascending, the chosen one among them.
+        worst_residual: largest residual ratio over the modes' bands, proven; None: no mode states a band.
+        note: a sentence for the report where the shaper leaves more than the vibration limit; else empty.
+    """
 
     period_s: float
-    """Chosen block period in s."""
     shaper: Shaper
-    """Best shaper on its grid."""
     candidates: tuple[BlockPeriodCandidate, ...]
-    """Every period that was tried, ascending, the chosen one among them."""
-    worst_residual: float | None = None
-    """Largest residual ratio over the modes' bands, proven; None: no mode states a band."""
-    note: str = ""
-    """A sentence for the report where the shaper leaves more than the vibration limit; else empty."""
+    worst_residual: float | None
+    note: str
 
 
 def choose_block_period(
-    modes: Sequence[Mode],
-    interpolation_period_s: float,
-    block_time_s: float,
-    max_block_period_s: float = 0.02,
-    max_duration_s: float = 0.25,
-) -> BlockPeriodChoice:
-    """Block period on which the shortest non-negative shaper is shortest.
-
-    Every whole multiple of the interpolation period from the controller's block time up to
-    `max_block_period_s` is tried. The shortest duration wins; among durations within 2 % of it the longest
-    period does, because it writes the fewest blocks.
-
-    Args:
-        modes: Modes to cancel, at least one.
-        interpolation_period_s: Interpolation period of the controller in s, above 0.
-        block_time_s: Time in s that the controller needs for a block, at least 0; no block is shorter.
-        max_block_period_s: Longest block period in s; the path is sampled once per block.
-        max_duration_s: Longest duration in s of a shaper.
-
-    Returns:
-        The period, its shaper, and the table of all candidates for the report.
-
-    Raises:
-        ArgumentError: No mode, a time outside its range, or no multiple of the interpolation period in the
-        range. DesignError: No candidate has a non-negative shaper within `max_duration_s`.
-
-    Source: this project.
-    """
-    periods_s = _periods(modes, interpolation_period_s, block_time_s, max_block_period_s, max_duration_s)
-    candidates = tuple(_exact_candidate(modes, period_s, max_duration_s) for period_s in periods_s)
-    if all(each.shaper is None for each in candidates):
-        raise DesignError(
-            f"no block period from {ms(periods_s[0])} to {ms(periods_s[-1])} in steps of "
-            f"{ms(interpolation_period_s)} has a non-negative shaper within {ms(max_duration_s)} for modes "
-            f"{', '.join(f'{mode.frequency_hz:g} Hz (zeta {mode.damping_ratio:g})' for mode in modes)}; "
-            f"the first says: {candidates[0].refusal}"
-        )
-    return _shortest(candidates)
-
-
-def choose_robust_grid(
-    bands: Sequence[ModeBand],
+    modes: Sequence[Mode | ModeBand],
     interpolation_period_s: float,
     block_time_s: float,
     max_block_period_s: float = 0.02,
     max_duration_s: float = 0.25,
     vibration_limit: float = VIBRATION_LIMIT,
 ) -> BlockPeriodChoice:
-    """Block period on which the shortest non-negative shaper that is robust over the modes' bands is shortest.
+    """Block period on which the shortest non-negative shaper is shortest.
 
-    As :func:`choose_block_period`, with the shortest design that leaves at most `vibration_limit` anywhere in the
-    bands; a mode without a band is cancelled exactly. Without any band the two functions are the same. If no period
-    has such a design within `max_duration_s`, the design with the least worst residual of that duration is taken,
-    and `note` of the result says so; among worst residuals within 2 % of each other the longest period wins.
+    Every whole multiple of the interpolation period from the controller's block time up to `max_block_period_s` is
+    tried. The shortest duration wins; among durations within 2 % of it the longest period does, because it writes the
+    fewest blocks.
+
+    A mode without a band is cancelled exactly; where any states one, the shaper leaves at most `vibration_limit`
+    anywhere in the bands. If no period has such a design within `max_duration_s`, the one with the least worst residual
+    of that duration is taken, and `note` of the result says so; among worst residuals within 2 % of each other the
+    longest period wins.
 
     Args:
-        bands: Modes with their bands, at least one.
-        interpolation_period_s: Interpolation period of the controller in s, above 0.
-        block_time_s: Time in s that the controller needs for a block, at least 0; no block is shorter.
-        max_block_period_s: Longest block period in s; the path is sampled once per block.
-        max_duration_s: Longest duration in s of a shaper.
-        vibration_limit: Largest residual ratio over the bands, above 0 and below 1.
+        modes: to cancel, with or without bands, at least one.
+        interpolation_period_s: of the controller, s, above 0.
+        block_time_s: what the controller needs for a block, s, at least 0; no block is shorter.
+        max_block_period_s: longest block period, s; the path is sampled once per block.
+        max_duration_s: longest shaper, s.
+        vibration_limit: largest residual ratio over the bands, above 0 and below 1.
 
     Returns:
-        The period, its shaper, the worst residual, and the table of all candidates. The contour cost is made least for
-        the chosen one only.
+        The period, its shaper, the worst residual over bands, and all candidates. Where modes state bands the contour
+        cost is made least for the chosen one only.
 
     Raises:
-        ArgumentError: No mode, a value outside its range, or no multiple of the interpolation period in the range.
-        DesignError: No candidate has a design: the modes without a band cannot be cancelled within
-        `max_duration_s`, or every grid has a frequency of the bands that swings a whole number of times per period.
+        ArgumentError: no mode, a value outside its range, or no multiple of the interpolation period in the range.
+        DesignError: no candidate has a design: modes without a band cannot be cancelled within `max_duration_s`, or
+            every grid has a frequency of the bands that swings a whole number of times per period.
 
     Source: this project.
     """
-    if not any(band.uncertainty for band in bands):
-        modes = [band.mode for band in bands]
-        return choose_block_period(modes, interpolation_period_s, block_time_s, max_block_period_s, max_duration_s)
-    _check_limit(vibration_limit)
+    bands = [each if isinstance(each, ModeBand) else ModeBand(each) for each in modes]
     periods_s = _periods(bands, interpolation_period_s, block_time_s, max_block_period_s, max_duration_s)
-    candidates = tuple(
-        _below_candidate(bands, period_s, max_duration_s, vibration_limit, least_cost=False) for period_s in periods_s
+    if not any(band.uncertainty for band in bands):
+        candidates = tuple(_exact_candidate(bands, period_s, max_duration_s) for period_s in periods_s)
+        if any(each.shaper is not None for each in candidates):
+            return _shortest(candidates)
+    else:
+        _check_limit(vibration_limit)
+        rough = tuple(_below_candidate(bands, each, max_duration_s, vibration_limit) for each in periods_s)
+        if any(each.shaper is not None for each in rough):
+            period_s = _shortest(rough).period_s
+            best = _below_candidate(bands, period_s, max_duration_s, vibration_limit, least_cost=True)
+            return _shortest(tuple(best if each.period_s == period_s else each for each in rough))
+        candidates = tuple(_fallback(each, bands, max_duration_s, vibration_limit) for each in rough)
+        found = [(each, each.worst_residual) for each in candidates if each.worst_residual is not None]
+        if found:
+            least = (1.0 + _SAME) * min(worst for _, worst in found)
+            near = (each for each, worst in found if worst <= least)
+            return _choice(max(near, key=lambda each: each.period_s), candidates)
+    raise DesignError(
+        f"no block period from {ms(periods_s[0])} to {ms(periods_s[-1])} in steps of {ms(interpolation_period_s)} has "
+        f"a shaper without negative taps within {ms(max_duration_s)} for {names(bands)}; the first says: "
+        f"{candidates[0].refusal}"
     )
-    if any(each.shaper is not None for each in candidates):
-        period_s = _shortest(candidates).period_s
-        best = _below_candidate(bands, period_s, max_duration_s, vibration_limit, least_cost=True)
-        return _shortest(tuple(best if each.period_s == period_s else each for each in candidates))
-    candidates = tuple(_fallback(each, bands, max_duration_s, vibration_limit) for each in candidates)
-    found = [(each, each.worst_residual) for each in candidates if each.worst_residual is not None]
-    if not found:
-        raise DesignError(
-            f"no block period from {ms(periods_s[0])} to {ms(periods_s[-1])} in steps of "
-            f"{ms(interpolation_period_s)} has a design within {ms(max_duration_s)} for {names(bands)}; "
-            f"the first says: {candidates[0].refusal}"
-        )
-    least = (1.0 + _SAME) * min(worst for _, worst in found)
-    return _choice(max((each for each, worst in found if worst <= least), key=lambda each: each.period_s), candidates)
 
 
 def robust_candidate(
@@ -176,7 +143,7 @@ def robust_candidate(
     max_duration_s: float = 0.25,
     vibration_limit: float = VIBRATION_LIMIT,
 ) -> BlockPeriodCandidate:
-    """What :func:`choose_robust_grid` would take on one given period.
+    """What :func:`choose_block_period` would take on one given period.
 
     Args:
         bands: Modes with their bands, at least one.
@@ -196,7 +163,7 @@ def robust_candidate(
     check_modes_and_times(bands, period_s=period_s, max_duration_s=max_duration_s)
     if not any(band.uncertainty for band in bands):
         shaper = shortest_non_negative([band.mode for band in bands], period_s, max_duration_s)
-        return BlockPeriodCandidate(period_s, shaper, "")
+        return BlockPeriodCandidate(period_s, shaper)
     _check_limit(vibration_limit)
     candidate = _below_candidate(bands, period_s, max_duration_s, vibration_limit, least_cost=True)
     if candidate.shaper is None:
@@ -207,7 +174,7 @@ def robust_candidate(
 
 
 def _periods(
-    modes: Sequence[Mode | ModeBand],
+    bands: Sequence[ModeBand],
     interpolation_period_s: float,
     block_time_s: float,
     max_block_period_s: float,
@@ -215,7 +182,7 @@ def _periods(
 ) -> list[float]:
     """The block periods to try, ascending."""
     check_modes_and_times(
-        modes,
+        bands,
         interpolation_period_s=interpolation_period_s,
         max_block_period_s=max_block_period_s,
         max_duration_s=max_duration_s,
@@ -249,9 +216,10 @@ def _choice(chosen: BlockPeriodCandidate, candidates: tuple[BlockPeriodCandidate
     return BlockPeriodChoice(chosen.period_s, chosen.shaper, candidates, chosen.worst_residual, chosen.note)
 
 
-def _exact_candidate(modes: Sequence[Mode], period_s: float, max_duration_s: float) -> BlockPeriodCandidate:
+def _exact_candidate(bands: Sequence[ModeBand], period_s: float, max_duration_s: float) -> BlockPeriodCandidate:
     try:
-        return BlockPeriodCandidate(period_s, shortest_non_negative(modes, period_s, max_duration_s), "")
+        shaper = shortest_non_negative([band.mode for band in bands], period_s, max_duration_s)
+        return BlockPeriodCandidate(period_s, shaper)
     except DesignError as error:
         return BlockPeriodCandidate(period_s, None, str(error))
 
@@ -261,7 +229,7 @@ def _task(bands: Sequence[ModeBand], period_s: float) -> Task:
 
 
 def _below_candidate(
-    bands: Sequence[ModeBand], period_s: float, max_duration_s: float, limit: float, *, least_cost: bool
+    bands: Sequence[ModeBand], period_s: float, max_duration_s: float, limit: float, *, least_cost: bool = False
 ) -> BlockPeriodCandidate:
     """The shortest design below the limit, without the search for hints that a refusal by itself would make."""
     task = _task(bands, period_s)
@@ -285,8 +253,8 @@ def _fallback(
         f"{ms(refused.period_s)} grid: the one with the least worst residual, {100.0 * found.worst_residual:.3g} %, "
         "is used"
     )
-    return _candidate(found)._replace(note=note)
+    return replace(_candidate(found), note=note)
 
 
 def _candidate(found: RobustDesign) -> BlockPeriodCandidate:
-    return BlockPeriodCandidate(found.period_s, found.shaper, "", found.worst_residual)
+    return BlockPeriodCandidate(found.period_s, found.shaper, worst_residual=found.worst_residual)

@@ -8,7 +8,12 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.modes import axis_modes, mode_tables, moving_axis, numbered_modes, still_mode
 from shapegcode.shaping.bands import ModeBand, machine_bands
-from shapegcode.shaping.block_period import BlockPeriodCandidate, choose_robust_grid, robust_candidate
+from shapegcode.shaping.block_period import (
+    BlockPeriodCandidate,
+    BlockPeriodChoice,
+    choose_block_period,
+    robust_candidate,
+)
 from shapegcode.shaping.options import DesignOptions
 from shapegcode.shaping.per_axis import design_per_axis
 from shapegcode.shaping.periods import candidate_periods, check_block_period
@@ -110,13 +115,12 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
             )
         return _of_family(shaping.family, bands, machine, period)
     family = "robust" if any(band.uncertainty for band in bands) else "non-negative"
-    best: BlockPeriodCandidate
+    best: BlockPeriodChoice | BlockPeriodCandidate
     if period is None:
-        choice = choose_robust_grid(
+        best = choose_block_period(
             bands, controller.interpolation_period_s, controller.block_time_s,
             max_duration_s=shaping.max_duration_s, vibration_limit=shaping.vibration_limit,
         )  # fmt: skip
-        best = next(each for each in choice.candidates if each.period_s == choice.period_s)
     else:
         best = robust_candidate(bands, period, shaping.max_duration_s, shaping.vibration_limit)
     assert best.shaper is not None  # what is chosen exists
