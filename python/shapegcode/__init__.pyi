@@ -96,12 +96,16 @@ from shapegcode.metrology.measure import (
     measure as measure,
     measure_samples as measure_samples,
 )
+from shapegcode.metrology.plots import plot_part as plot_part, plot_walls as plot_walls
 from shapegcode.metrology.result import Measurement as Measurement
 from shapegcode.model.drives import drive_parameters as drive_parameters
 from shapegcode.model.response import plant_response as plant_response
 from shapegcode.model.stream import stream as stream
 from shapegcode.program import Program as Program
+from shapegcode.results.motion_plots import View as View, plot_feed as plot_feed, plot_vibration as plot_vibration
+from shapegcode.results.path_plots import plot_path as plot_path
 from shapegcode.results.result import Pair as Pair, Result as Result, Xyz as Xyz
+from shapegcode.results.trace import Trace as Trace
 from shapegcode.shaping import (
     ModeBand as ModeBand,
     Recommendation as Recommendation,
@@ -110,6 +114,7 @@ from shapegcode.shaping import (
     shortest_non_negative as shortest_non_negative,
 )
 from shapegcode.shaping.grid import choose_grid as choose_grid
+from shapegcode.simulation.plots import plot_motion as plot_motion
 from shapegcode.simulation.result import (
     Motion as Motion,
     Simulation as Simulation,

@@ -25,6 +25,7 @@ from shapegcode.demos.path import path_program
 from shapegcode.metrology.figures import FittedCircle
 from shapegcode.metrology.result import MeasuredRegion
 from shapegcode.model.machine_model import MachineModel
+from shapegcode.results import plot
 
 ROOT = Path(__file__).resolve().parents[2]
 TOOL_MM = 3.0
@@ -301,6 +302,30 @@ def test_a_program_without_cuts_measures_nothing() -> None:
     machine = sg.Machine.load("vx500")
     with pytest.raises(sg.ArgumentError, match="no cutting move, so there is nothing to measure"):
         sg.measure(program(["G00X10."], machine), machine, TOOL_MM)
+
+
+def test_walls_are_drawn_into_the_callers_axes() -> None:
+    original, emitted, machine = shaped(200.0, "off")
+    measurement = sg.measure([original, emitted], machine, TOOL_MM)
+    assert list(measurement.plots()) == ["measure-part", "measure-walls"]
+    figure = plot.figure(16, 8)
+    left, right = figure.subplots(1, 2)
+    part, walls = sg.plot_part(measurement, left), measurement.plots()["measure-walls"](right)
+    figure.draw_without_rendering()
+    assert part.get_window_extent().x1 < walls.get_window_extent().x0
+    # The first curve is the left wall of the original, gaps between sections included.
+    drawn = np.concatenate([line.get_ydata() for line in walls.get_lines()[:1]])
+    expected = [each.wall_deviation_um.left for each in measurement.programs[0].sections]
+    assert np.nanmax(drawn) == pytest.approx(max(each.max or 0.0 for each in expected), abs=1e-9)
+    assert np.nanmin(drawn) == pytest.approx(min(each.min or 0.0 for each in expected), abs=1e-9)
+
+
+def test_without_walls_there_is_nothing_to_draw() -> None:
+    machine = sg.Machine.load("vx500")
+    plunge = sg.measure(program(["G01Z-5.F600."], machine), machine, TOOL_MM)
+    assert plunge.plots() == {}
+    with pytest.raises(ValueError, match="no walls were measured"):
+        sg.plot_walls(plunge)
 
 
 @functools.cache

@@ -28,7 +28,6 @@ from shapegcode.model.stream import KINDS, REST_S, Chunk
 from shapegcode.results import plot
 from shapegcode.results.json import schema
 from shapegcode.simulation.motion import MotionEnvelope
-from shapegcode.simulation.plots import plot_motion
 
 COMMAND = Path(sys.executable).with_name("shapegcode")
 TICK_S = 0.001
@@ -392,11 +391,26 @@ def test_picture_of_the_motion(tmp_path: Path) -> None:
     machine = machine_with(DRIVE)
     program = sg.Program.from_text(SHORT, machine, source="some/short.nc")
     motion = sg.play_motion(program, machine, plant="feed-drive", lines=(5, 6))
-    plot.save(plot_motion(motion), tmp_path / "motion.svg")
+    plot.save(sg.plot_motion(motion), tmp_path / "motion.svg")
     drawn = (tmp_path / "motion.svg").read_text()
     for said in ("short.nc, lines 5 to 6", "acceleration", "response", "motor", "friction"):
         assert said in drawn
     assert "some/" not in drawn
+
+
+def test_the_motion_is_drawn_into_the_callers_axes() -> None:
+    """A short one is drawn sample by sample: the curves are those of the whole motion."""
+    machine = sg.Machine.load("vx500")
+    motion = sg.play_motion(sg.Program.from_text(SHORT, machine), machine)
+    figure = plot.figure(12, 12)
+    places = figure.subplots(2, 1)
+    panel = sg.plot_motion(motion, places[1])
+    figure.draw_without_rendering()
+    assert panel.get_window_extent().y1 < places[0].get_window_extent().y0
+    command, response = panel.get_lines()[:2]
+    played = streamed(SHORT, machine)
+    np.testing.assert_array_equal(command.get_ydata(), played.command_mm[:, 0])
+    np.testing.assert_array_equal(response.get_ydata(), played.response_mm[:, 0])
 
 
 def test_a_simulation_draws_what_was_asked_for() -> None:

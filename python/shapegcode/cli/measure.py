@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.options import (
@@ -54,30 +55,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="measure the cut of these lines as one section; may be repeated (default: every line and arc)",
     )
-    parser.add_argument(
-        "--settling-band",
-        metavar="LENGTH",
-        type=micrometres,
-        default=1.0,
-        help="settled is what stays within it (default: 1um)",
-    )
-    parser.add_argument(
-        "--station",
-        metavar="LENGTH",
-        type=micrometres,
-        default=50.0,
-        help="distance of the places at which walls are measured (default: 0.05mm)",
-    )
-    parser.add_argument(
-        "--cutoff",
-        metavar="LENGTH",
-        type=micrometres,
-        default=None,
-        help="cut-off of the roughness (default: 0.8mm, less on sections shorter than 5.6 mm)",
-    )
-    parser.add_argument(
-        "--lambda-s", metavar="LENGTH", type=micrometres, default=0.0, help="short-wave cut-off (default: none)"
-    )
+    length = partial(parser.add_argument, metavar="LENGTH", type=micrometres)
+    length("--settling-band", default=1.0, help="settled is what stays within it (default: 1um)")
+    length("--station", default=50.0, help="distance of the places at which walls are measured (default: 0.05mm)")
+    length("--cutoff", help="cut-off of the roughness (default: 0.8mm, less on sections shorter than 5.6 mm)")
+    length("--lambda-s", default=0.0, help="short-wave cut-off (default: none)")
     parser.add_argument(
         "--all", action="store_true", help="show every section (default: the 12 with the largest contour error)"
     )

@@ -17,9 +17,9 @@ from shapegcode.conversion.convert import convert
 from shapegcode.demos.path import ideal_command, path_program
 from shapegcode.demos.result import Demonstration, Statement
 from shapegcode.machine import Machine
-from shapegcode.metrology.figures import MeasuredSection
 from shapegcode.metrology.measure import measure, measure_samples
 from shapegcode.metrology.result import MeasuredRegion, Measurement
+from shapegcode.metrology.section import MeasuredSection
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.results.json import hidden

@@ -17,8 +17,9 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
-from shapegcode.metrology.figures import MeasuredSection, WallProfile
+from shapegcode.metrology.jobs import Job, jobs_of
 from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement
+from shapegcode.metrology.section import MeasuredSection, WallProfile
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import machine_warnings, region_range_warnings
 from shapegcode.program import Program, given_program
@@ -33,12 +34,8 @@ _LONGEST_REST_S = 10.0  # that a vibration is waited for behind a stop
 _LEAST_REST_S = 0.25
 _MILLIONTH = math.log(1e6)
 _MOST_PROFILE_STATIONS = 200_000  # kept of each program for pictures
-_SAME_PLACE_MM = 0.005
-_SHORT_MM = 0.5
-_LAST_LINE = 2**32 - 1
 _LARGEST_TOOL_MM = 1000.0
 _LEAST_SPACING_MM = 1e-3
-_BLOCKS_PER_CURVE = 2.5  # a shaped program's own blocks are shorter than this many block periods at its feed
 
 
 def measure(
@@ -112,7 +109,7 @@ def measure(
     for program, is_shaped, counts in zip(several, shaped, _judged(beside), strict=True):
         nominal = against or program
         program.refuse_endless(_MOST_SAMPLES * machine.controller.interpolation_period_s)
-        jobs = _jobs(program, nominal, machine, is_shaped, lines)
+        jobs = jobs_of(program, nominal, machine, is_shaped, lines)
         regions = list(_measured_regions(jobs, machine, plant, is_shaped, settings, one_done))
         measured.append(
             MeasuredProgram.of(
@@ -200,72 +197,6 @@ class _Settings:
         return options
 
 
-@dataclass(frozen=True)
-class _Job:
-    """A region to play, the nominal one, and its sections."""
-
-    played: _core.Region
-    nominal: _core.Region
-    path: _core.Path
-    sections: list[_core.PathSection]
-
-
-def _jobs(
-    program: Program, nominal: Program, machine: Machine, shaped: bool, lines: Sequence[tuple[int, int]] | None
-) -> list[_Job]:
-    """Pairs of regions that are measured, those without a section left out."""
-    jobs = []
-    for played, region in _paired(program, nominal):
-        path = region.path
-        if path.length_mm <= 0.0:
-            continue
-        if lines is None:
-            sections = _core.path_sections(path, _short_mm(path, machine, own_blocks=shaped and nominal is program))
-        else:
-            sections = _core.line_sections(path, [(min(a, _LAST_LINE), min(b, _LAST_LINE)) for a, b in lines])
-        if sections:
-            jobs.append(_Job(played, region, path, sections))
-    if lines is not None and not jobs:
-        names = ", ".join(f"{first}-{last}" for first, last in lines)
-        raise _core.ArgumentError(f"{nominal.source}: no cutting move in lines {names}")
-    return jobs
-
-
-def _paired(program: Program, nominal: Program) -> Iterator[tuple[_core.Region, _core.Region]]:
-    """Regions of a program beside those of the nominal one, found by where they start and end."""
-    if program is nominal:
-        yield from ((region, region) for region in program.regions)
-        return
-    candidates = iter(program.regions)
-    for region in nominal.regions:
-        for candidate in candidates:
-            if _same_ends(candidate.path, region.path):
-                yield candidate, region
-                break
-        else:
-            raise _core.ArgumentError(
-                f"{program.source}: no cut from {_place(region.path.start_mm)} to {_place(region.path.end_mm)} as "
-                f"{nominal.source} has in {nominal.lines(region)}: it was not made from that program, or its rapids "
-                "are shaped into the cuts; measure it without --against"
-            )
-
-
-def _same_ends(one: _core.Path, other: _core.Path) -> bool:
-    ends = ((one.start_mm, other.start_mm), (one.end_mm, other.end_mm))
-    return all(float(np.abs(a - b).max()) <= _SAME_PLACE_MM for a, b in ends)
-
-
-def _place(position_mm: npt.ArrayLike) -> str:
-    return " ".join(f"{axis}{value:.3f}" for axis, value in zip("XYZ", np.asarray(position_mm), strict=True))
-
-
-def _short_mm(path: _core.Path, machine: Machine, *, own_blocks: bool) -> float:
-    """Runs shorter than this that follow each other are one curve."""
-    if not own_blocks:
-        return _SHORT_MM
-    return max(_SHORT_MM, _BLOCKS_PER_CURVE * path.fastest_feed_mm_per_s * machine.controller.block_time_s)
-
-
 def measure_samples(
     chunks: Iterable[tuple[FloatArray, FloatArray]],
     path: _core.Path,
@@ -303,7 +234,7 @@ def measure_samples(
 
 
 def _measured_regions(
-    jobs: Iterable[_Job],
+    jobs: Iterable[Job],
     machine: Machine,
     plant: str,
     shaped: bool,
@@ -351,7 +282,7 @@ def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
     return WallProfile(distance_mm, left * 1e3, right * 1e3, point, normal)
 
 
-def _samples(job: _Job, machine: Machine, plant: str, shaped: bool) -> Iterator[tuple[FloatArray, FloatArray]]:
+def _samples(job: Job, machine: Machine, plant: str, shaped: bool) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Command and response of a region, and what follows the stop until vibration and servo lag have decayed."""
     model = MachineModel(machine)
     memory_s = max(model.vibration_memory_s, _LEAST_REST_S)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.metrology.figures import WallProfile
 from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measurement
+from shapegcode.metrology.section import WallProfile
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
 

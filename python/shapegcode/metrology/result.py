@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from shapegcode import _core
-from shapegcode.metrology.figures import MeasuredSection, SidedError
+from shapegcode.metrology.figures import SidedError
+from shapegcode.metrology.section import MeasuredSection
 from shapegcode.metrology.tables import section_table, summary_table
 from shapegcode.results.figures import Tracks, largest_xyz_um
 from shapegcode.results.json import hidden

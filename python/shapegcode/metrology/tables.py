@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from shapegcode.metrology.figures import FittedCircle, MeasuredArc, MeasuredSection, SidedError, WallDeviation
+from shapegcode.metrology.figures import FittedCircle, MeasuredArc, SidedError, WallDeviation
+from shapegcode.metrology.section import MeasuredSection
 from shapegcode.results.result import Xyz
 from shapegcode.results.table import Column, Table
 

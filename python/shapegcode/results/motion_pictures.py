@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.results import motion_plots
 from shapegcode.results.follow import COARSE_STEP_RAD, follow, piece_of, polyline_of
-from shapegcode.results.motion_plots import View
+from shapegcode.results.motion_plots import View, plot_feed, plot_vibration
+from shapegcode.results.path_plots import Plane, plot_path
 from shapegcode.results.result import Plot
 from shapegcode.results.trace import Trace
 
@@ -112,17 +112,17 @@ def motion_pictures(played: Callable[[], PlayedRegion]) -> dict[str, Plot]:
 
 def _path(scene: Callable[[], _Scene], ax: Axes | None = None) -> Axes:
     s = scene()
-    return motion_plots.plot_path(
+    return plot_path(
         s.programmed_mm, s.near, ax, plane=_widest_plane(s.programmed_mm), part=s.near_part, whole_mm=s.whole_mm
     )
 
 
 def _feed(scene: Callable[[], _Scene], ax: Axes | None = None) -> Axes:
-    return motion_plots.plot_feed(scene().views, ax, part=scene().part)
+    return plot_feed(scene().views, ax, part=scene().part)
 
 
 def _vibration(scene: Callable[[], _Scene], ax: Axes | None = None) -> Axes:
-    return motion_plots.plot_vibration(scene().views, ax, part=scene().part)
+    return plot_vibration(scene().views, ax, part=scene().part)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,9 +199,9 @@ def _worst_place(traces: tuple[Trace, ...], programmed: FloatArray) -> _Worst:
     return _Worst(tuple(near), piece_of(programmed, float(limits[0]), float(limits[2])), float(first.times_s[at]))
 
 
-def _widest_plane(programmed: FloatArray) -> motion_plots.Plane:
+def _widest_plane(programmed: FloatArray) -> Plane:
     spans = np.ptp(programmed, axis=0)
-    planes: dict[motion_plots.Plane, float] = {
+    planes: dict[Plane, float] = {
         "XY": spans[0] * spans[1] + 1e-6, "ZX": spans[2] * spans[0], "YZ": spans[1] * spans[2],
     }  # fmt: skip
     return max(planes, key=lambda plane: planes[plane])

@@ -84,7 +84,16 @@ class Trace:
         return self.start_s + (float(moved[-1] + 1) * self.period_s if len(moved) else 0.0)
 
     def part(self, begin_s: float, end_s: float, zero_s: float = 0.0) -> Trace:
-        """The samples between two instants, at least two; `zero_s` becomes time zero."""
+        """The samples between two instants.
+
+        Args:
+            begin_s: of the first one, as far as there are samples.
+            end_s: of the last one, likewise.
+            zero_s: instant that becomes time zero.
+
+        Returns:
+            At least two samples; it stops if the stop is among them.
+        """
         count = len(self.command_mm)
         ranks = (np.array([begin_s, end_s]) - self.start_s) / self.period_s
         first = round(float(np.clip(ranks[0], 0, count - 2)))

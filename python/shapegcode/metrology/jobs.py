@@ -1,0 +1,86 @@
+"""What is measured of a program: its regions beside those of the nominal one, and the sections of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.program import Program
+
+__all__ = ["Job", "jobs_of"]
+
+_SAME_PLACE_MM = 0.005
+_SHORT_MM = 0.5
+_LAST_LINE = 2**32 - 1
+_BLOCKS_PER_CURVE = 2.5  # a shaped program's own blocks are shorter than this many block periods at its feed
+
+
+@dataclass(frozen=True)
+class Job:
+    """A region to play, the nominal one, and its sections."""
+
+    played: _core.Region
+    nominal: _core.Region
+    path: _core.Path
+    sections: list[_core.PathSection]
+
+
+def jobs_of(
+    program: Program, nominal: Program, machine: Machine, shaped: bool, lines: Sequence[tuple[int, int]] | None
+) -> list[Job]:
+    """Pairs of regions that are measured, those without a section left out."""
+    jobs = []
+    for played, region in _paired(program, nominal):
+        path = region.path
+        if path.length_mm <= 0.0:
+            continue
+        if lines is None:
+            sections = _core.path_sections(path, _short_mm(path, machine, own_blocks=shaped and nominal is program))
+        else:
+            sections = _core.line_sections(path, [(min(a, _LAST_LINE), min(b, _LAST_LINE)) for a, b in lines])
+        if sections:
+            jobs.append(Job(played, region, path, sections))
+    if lines is not None and not jobs:
+        names = ", ".join(f"{first}-{last}" for first, last in lines)
+        raise _core.ArgumentError(f"{nominal.source}: no cutting move in lines {names}")
+    return jobs
+
+
+def _paired(program: Program, nominal: Program) -> Iterator[tuple[_core.Region, _core.Region]]:
+    """Regions of a program beside those of the nominal one, found by where they start and end."""
+    if program is nominal:
+        yield from ((region, region) for region in program.regions)
+        return
+    candidates = iter(program.regions)
+    for region in nominal.regions:
+        for candidate in candidates:
+            if _same_ends(candidate.path, region.path):
+                yield candidate, region
+                break
+        else:
+            raise _core.ArgumentError(
+                f"{program.source}: no cut from {_place(region.path.start_mm)} to {_place(region.path.end_mm)} as "
+                f"{nominal.source} has in {nominal.lines(region)}: it was not made from that program, or its rapids "
+                "are shaped into the cuts; measure it without --against"
+            )
+
+
+def _same_ends(one: _core.Path, other: _core.Path) -> bool:
+    ends = ((one.start_mm, other.start_mm), (one.end_mm, other.end_mm))
+    return all(float(np.abs(a - b).max()) <= _SAME_PLACE_MM for a, b in ends)
+
+
+def _place(position_mm: npt.ArrayLike) -> str:
+    return " ".join(f"{axis}{value:.3f}" for axis, value in zip("XYZ", np.asarray(position_mm), strict=True))
+
+
+def _short_mm(path: _core.Path, machine: Machine, *, own_blocks: bool) -> float:
+    """Runs shorter than this that follow each other are one curve."""
+    if not own_blocks:
+        return _SHORT_MM
+    return max(_SHORT_MM, _BLOCKS_PER_CURVE * path.fastest_feed_mm_per_s * machine.controller.block_time_s)

@@ -1,0 +1,184 @@
+"""A path and what was driven of it, from above, with the deviations magnified."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode.results import plot
+from shapegcode.results.follow import follow
+from shapegcode.results.motion_plots import line_style
+from shapegcode.results.trace import Trace
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["Plane", "plot_path"]
+
+FloatArray = npt.NDArray[np.float64]
+Plane = Literal["XY", "ZX", "YZ"]
+
+_AXIS_NAMES = "XYZ"
+_MOVES_MM = 1e-9
+# A deflection below this is none.
+_SHOWN_MM = 5e-5
+_STRAIGHT = (
+    "The path is straight: the table deviates along it only,\nwhich no drawing of the path shows. "
+    "See the picture of the vibration."
+)
+
+
+def plot_path(
+    programmed_mm: npt.ArrayLike,
+    traces: Sequence[Trace],
+    ax: Axes | None = None,
+    *,
+    quantity: Literal["response", "command"] = "response",
+    plane: Plane = "XY",
+    magnification: float | None = None,
+    part: str = "",
+    whole_mm: npt.ArrayLike | None = None,
+) -> Axes:
+    """How far, and to which side, does the table leave the programmed path?
+
+    Each curve is the programmed path plus the deviation times the magnification, every sample of it; the title says the
+    magnification. The legend has the figure that the core measured over the whole run; where a trace has none, that of
+    the samples drawn.
+
+    Args:
+        programmed_mm: the programmed path as a polyline, shape (m, 3), fine enough for its arcs.
+        traces: usually the original and the emitted program.
+        ax: where to draw; None: a new figure.
+        quantity: deviation of the table ("response") or of the set-points ("command").
+        plane: plane of the picture.
+        magnification: factor of the deviation; None: chosen so that the largest one is easy to see.
+        part: which part of the program this is, for the title.
+        whole_mm: the whole path where `programmed_mm` is a piece of it, shape (k, 3): a second panel shows where
+            the piece lies.
+
+    Returns:
+        The panel of the path.
+
+    Raises:
+        ValueError: a wrong shape or magnification, or no trace.
+    """
+    polyline = _checked_polyline("programmed_mm", programmed_mm)
+    whole = None if whole_mm is None else _checked_polyline("whole_mm", whole_mm)
+    if not traces:
+        raise ValueError("no trace: must be one or more")
+    if magnification is not None and not (math.isfinite(magnification) and magnification > 0):
+        raise ValueError(f"magnification = {magnification}: must be finite and greater than 0")
+
+    drawn = [(trace, *_deviation(trace, polyline, quantity, whole is None)) for trace in traces]
+    largest_mm = max(float(np.linalg.norm(deviation, axis=1).max()) for _, _, deviation in drawn)
+    size_mm = float(np.linalg.norm(np.ptp(polyline, axis=0)))
+    factor = magnification or _round_factor(0.1 * size_mm / largest_mm if largest_mm > 0 else 1.0)
+
+    what = "table" if quantity == "response" else "command"
+    widths = [1.0] if whole is None else [2.4, 1.0]
+    panels = plot.grid(
+        ax, 1, len(widths), size_inch=(7.2 if whole is None else 10.4, 6.4), width_ratios=widths,
+        title=f"Deviation of the {what} from the path, drawn ×{factor:g}", part=part,
+    )[0]  # fmt: skip
+    panel, shown = panels[0], [_AXIS_NAMES.index(name) for name in plane]
+    panel.plot(*polyline[:, shown].T, color=plot.GREY, linewidth=3, alpha=0.55, label="programmed path")
+    straight = _only_along(polyline, [deviation for _, _, deviation in drawn])
+    for number, (trace, feet, deviation) in enumerate(drawn):
+        curve = (feet + factor * deviation)[:, shown]
+        label = _path_label(trace, deviation, quantity, is_part=whole is not None)
+        # Of a straight path the label alone.
+        panel.plot(*curve[: 0 if straight else None].T, label=label, **line_style(number))
+    panel.set_aspect("equal", adjustable="datalim")
+    panel.margins(0.08)
+    panel.set_xlabel(f"{plane[0]} in mm")
+    panel.set_ylabel(f"{plane[1]} in mm")
+    if straight:
+        panel.text(0.5, 0.3, _STRAIGHT, transform=panel.transAxes, ha="center", va="center")
+    else:
+        _deviation_scale(panel, factor, largest_mm)
+    plot.legend_above(panel, columns=1)
+    if whole is not None:
+        _locate(panels[1], whole[:, shown], polyline[:, shown])
+    return panel
+
+
+def _checked_polyline(name: str, points: npt.ArrayLike) -> FloatArray:
+    polyline = np.asarray(points, dtype=np.float64)
+    if polyline.ndim != 2 or polyline.shape[1] != 3 or len(polyline) < 2 or not np.isfinite(polyline).all():
+        raise ValueError(f"{name} has shape {polyline.shape}: must be (m, 3), m >= 2, and finite")
+    return polyline
+
+
+def _deviation(trace: Trace, polyline: FloatArray, quantity: str, is_whole: bool) -> tuple[FloatArray, FloatArray]:
+    """Where each sample belongs on the path, and how far it is from there."""
+    points = trace.response_mm if quantity == "response" else trace.command_mm
+    _, feet = follow(trace.command_mm, points, polyline, complete=trace.stops and is_whole)
+    return feet, points - feet
+
+
+def _path_label(trace: Trace, deviation: FloatArray, quantity: str, *, is_part: bool) -> str:
+    """Name and figures: the core's own, which also see what lies between and beyond the samples drawn."""
+    here = f"{1e3 * float(np.linalg.norm(deviation, axis=1).max()):.1f} µm"
+    if trace.largest_mm is None or quantity != "response":
+        return f"{trace.label}, largest {here} in this picture"
+    return f"{trace.label}, largest {1e3 * trace.largest_mm:.1f} µm" + (f", here {here}" if is_part else "")
+
+
+def _only_along(polyline: FloatArray, deviations: Sequence[FloatArray]) -> bool:
+    """Whether the path is one straight line and nothing deviates across it."""
+    chord = polyline[-1] - polyline[0]
+    length = float(np.linalg.norm(chord))
+    if length == 0:
+        return False
+    direction = chord / length
+
+    def across(vectors: FloatArray) -> float:
+        return float(np.linalg.norm(vectors - np.outer(vectors @ direction, direction), axis=1).max())
+
+    return across(polyline - polyline[0]) < _MOVES_MM and max(map(across, deviations)) < _SHOWN_MM
+
+
+def _round_factor(factor: float) -> float:
+    """The largest of 1, 2, 5, 10, 20, ... that is not above the factor; at least 1."""
+    if factor <= 1:
+        return 1.0
+    decade = 10.0 ** math.floor(math.log10(factor))
+    return max(step * decade for step in (1, 2, 5) if step * decade <= factor * (1 + 1e-9))
+
+
+def _locate(axes: Axes, whole: FloatArray, piece: FloatArray) -> None:
+    """The whole path, small, and where the piece lies on it."""
+    axes.plot(whole[:, 0], whole[:, 1], color=plot.GREY, linewidth=0.8)
+    axes.plot(piece[:, 0], piece[:, 1], color="black", linewidth=2)
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(piece, axis=0), axis=1))])
+    middle = [float(np.interp(along[-1] / 2, along, piece[:, axis])) for axis in range(2)]
+    axes.plot(*middle, marker="o", markersize=16, markerfacecolor="none", markeredgecolor="black")
+    axes.set_aspect("equal", adjustable="box", anchor="N")
+    axes.margins(0.08)
+    axes.set_title("where that is on the whole path", loc="left", fontsize=9)
+    axes.tick_params(labelsize=8)
+
+
+def _deviation_scale(axes: Axes, factor: float, largest_mm: float) -> None:
+    """A bar that shows how long a round number of µm is drawn."""
+    from matplotlib.lines import Line2D
+    from matplotlib.offsetbox import AnchoredOffsetbox, AuxTransformBox, TextArea, VPacker
+
+    if largest_mm <= 0:
+        return
+    target_um = largest_mm * 1e3
+    decade = 10.0 ** math.floor(math.log10(target_um))
+    length_um = max(step * decade for step in (1, 2, 5) if step * decade <= target_um * (1 + 1e-9))
+    length_mm = factor * length_um / 1e3
+    bar = AuxTransformBox(axes.transData)
+    bar.add_artist(Line2D([0, length_mm], [0, 0], color="black", linewidth=2.5, solid_capstyle="butt"))
+    label = TextArea(f"{length_um:g} µm of deviation")
+    packed = VPacker(children=[bar, label], align="center", pad=0, sep=4)
+    above = AnchoredOffsetbox(
+        "lower right", child=packed, frameon=False, pad=0.4, bbox_to_anchor=(1.0, 1.0), bbox_transform=axes.transAxes
+    )
+    axes.add_artist(above)
