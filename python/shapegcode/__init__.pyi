@@ -123,5 +123,26 @@ from shapegcode.simulation.simulate import (
     play_motion as play_motion,
     simulate as simulate,
 )
+from shapegcode.testcut.conditions import (
+    CornerShape as CornerShape,
+    CutConditions as CutConditions,
+)
+from shapegcode.testcut.cut import (
+    TestCut as TestCut,
+    read_test_cut as read_test_cut,
+)
+from shapegcode.testcut.cuts import (
+    corner_cut as corner_cut,
+    interval_cut as interval_cut,
+    taper_cut as taper_cut,
+)
+from shapegcode.testcut.design_result import CutDesign as CutDesign
+from shapegcode.testcut.fit import fit_test_cut as fit_test_cut
+from shapegcode.testcut.program import write_test_cut as write_test_cut
+from shapegcode.testcut.result import (
+    CornerResult as CornerResult,
+    IntervalResult as IntervalResult,
+    TaperResult as TaperResult,
+)
 from shapegcode.timing.cycle_time import cycle_time as cycle_time
 from shapegcode.timing.result import CycleTime as CycleTime

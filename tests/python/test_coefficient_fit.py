@@ -11,9 +11,11 @@ import pytest
 
 import cut_reference as reference
 from shapegcode._core import ArgumentError
-from shapegcode.testcut.coefficient_fit import CoefficientFit, MeanForces, fit_coefficients
-from shapegcode.testcut.force import COEFFICIENTS, ForceLaw, mean_chip_mm
-from shapegcode.testcut.plan import CutTool, Engagement, straight_engagement
+from shapegcode.testcut.coefficient_fit import CoefficientFit, fit_coefficients
+from shapegcode.testcut.cut import COEFFICIENTS, CuttingLaw, CutTool
+from shapegcode.testcut.engagement import Engagement, straight_engagement
+from shapegcode.testcut.force import ForceLaw, mean_chip_mm
+from shapegcode.testcut.mean_forces import MeanForces
 
 Array = npt.NDArray[np.float64]
 
@@ -58,7 +60,7 @@ def test_the_law_is_the_closed_form(up: bool) -> None:
         begin, end = -end, -begin
     np.testing.assert_allclose(met.from_rad, begin, atol=1e-12)
     np.testing.assert_allclose(met.to_rad, end, atol=1e-12)
-    forces = ForceLaw(TOOL, law, SPINDLE, AXIAL).forces(met, np.full(9, 216.0))
+    forces = ForceLaw(TOOL, CuttingLaw(**law), SPINDLE, AXIAL).forces(met, np.full(9, 216.0))
     expected = reference.mean_force(begin, end, 0.02, 6, AXIAL, law)
     np.testing.assert_allclose(forces.mean_n, expected, rtol=1e-6, atol=1e-6)
     chip = mean_chip_mm(TOOL, SPINDLE, AXIAL, met, np.full(9, 216.0))

@@ -10,14 +10,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 import cut_reference as reference
+import shapegcode as sg
 from shapegcode import _core
 from shapegcode.cli import main
 from shapegcode.cutting.tool import Tool
+from shapegcode.results import plot
+from shapegcode.results.json import schema
 
 Array = npt.NDArray[np.float64]
 
@@ -136,7 +140,8 @@ def test_the_unrolled_corner_has_the_corners_radial_depth(tmp_path: Path, capsys
     assert min(feeds) == pytest.approx(90.8, abs=0.05)  # paper 001: 91
     assert {feed for _, feed in side["passes"][0]["feeds"]} == {216.0}
     deeper = about["deeper_than_corner"]
-    assert re.search(r"up to 0\.2[12]\d mm more than the corner", capsys.readouterr().out)
+    out = " ".join(capsys.readouterr().out.split())
+    assert re.search(r"up to 0\.2[12]\d mm more than the corner", out)
     at = np.arange(2.0, 34.0, 0.11)
     corner = _core.CornerCut(4.0, 8.0, 8.0, 0.8, before_mm=40.0, after_mm=40.0)
     # The tool's front, sqrt(4² - 3.2²) = 2.4 before its axis, reaches the rough arc 8.8 before the corner of the walls;
@@ -257,6 +262,11 @@ def fitted(folder: Path, *arguments: str, code: int = 0) -> dict[str, Any]:
     report = folder / "report.json"
     assert main(["testcut", "fit", *arguments, "--cut", str(folder / "CUT.json"), "--json", str(report)]) == code
     found: dict[str, Any] = json.loads(report.read_text(encoding="utf-8"))
+    jsonschema.validate(
+        found, schema({"taper": sg.TaperResult, "corner": sg.CornerResult}.get(found["kind"], sg.IntervalResult))
+    )
+    assert found["ok"] is (code == 0)
+    assert (found["program"], found["machine"]) == ("CUT.NC", "VX500")
     return found
 
 
@@ -276,7 +286,7 @@ def test_the_taper_gives_the_coefficients_behind_its_records(tmp_path: Path) -> 
         assert each["low"] < true < each["high"], each
     assert [each["feed_mm_per_min"] for each in report["passes"]] == pytest.approx([194.4, 388.8, 777.6], rel=2e-3)
     assert [each["spindle_rev_per_min"] for each in report["passes"]] == pytest.approx([1782.0] * 3, rel=2e-3)
-    assert any("the feed was" in note for note in report["notes"])
+    assert any("the feed was" in note for note in report["warnings"])
     assert report["left_out"] == []
     text = (tmp_path / "cutting.toml").read_text(encoding="utf-8")
     tool = Tool.from_toml(TOOL.partition("[cutting]")[0] + text)
@@ -297,7 +307,7 @@ def test_chatter_is_left_out_and_told(tmp_path: Path) -> None:
         files.append(saved(tmp_path / f"{k}.csv", time_s=time, fx_n=force[:, 0], fy_n=force[:, 1]))
     report = fitted(tmp_path, *files)
     stretches = report["left_out"]
-    assert {each["pass"] for each in stretches} == {1}
+    assert {each["number"] for each in stretches} == {1}
     assert min(each["from_mm"] for each in stretches) == pytest.approx(22.0, abs=1.0)
     assert max(each["to_mm"] for each in stretches) == pytest.approx(27.0, abs=1.0)
     assert abs(report["cutting"]["specific_exponent"] + 0.153) < 0.01
@@ -315,7 +325,7 @@ def test_samples_in_step_with_the_teeth_are_told(tmp_path: Path) -> None:
     side = write(tmp_path, "corner")
     time, _, force = simulated(side["passes"][0], corner_edge(side), rate=900.0, noise=0.02)
     file = saved(tmp_path / "a.csv", time_s=time, fx_n=force[:, 0], fy_n=force[:, 1])
-    assert any("5.0 samples per tooth" in note for note in fitted(tmp_path, file)["notes"])
+    assert any("5.0 samples per tooth" in note for note in fitted(tmp_path, file)["warnings"])
 
 
 def mean_rows(depth: Array, feed: float, noise: float, seed: int) -> Array:
@@ -361,6 +371,51 @@ def test_means_at_positions_are_laid_over_the_taper(tmp_path: Path) -> None:
         assert cutting[name] == pytest.approx(true, rel=5e-3)
 
 
+def test_the_api_does_what_the_command_does(tmp_path: Path) -> None:
+    """Designs, programs, side files and fits are the same, and the plots draw into axes of one's own."""
+    side = write(tmp_path, "taper", "-F", "108,432")
+    given = sg.CutConditions.of(
+        sg.Machine.load("vx500"), tmp_path / "tool.toml", 108.0, AXIAL, spindle_rev_per_min=SPINDLE
+    )
+    design = sg.write_test_cut(sg.taper_cut(given, [108.0, 432.0]), tmp_path / "API.NC")
+    assert (tmp_path / "API.NC").read_bytes() == (tmp_path / "CUT.NC").read_bytes()
+    assert json.loads((tmp_path / "API.json").read_text(encoding="utf-8")) == {**side, "program": "API.NC"}
+    assert sg.read_test_cut(tmp_path / "API.json") == design.cut
+    assert repr(design).startswith("<CutDesign: taper for VX500: 2 measuring passes, ")
+    assert design.next_step.endswith(f"pass1.csv pass2.csv --cut {tmp_path / 'API.json'}")
+    jsonschema.validate(design.to_dict(), schema(sg.CutDesign))
+    depth = np.linspace(0.4, 2.8, 40)
+    files = {}
+    for number, feed in ((2, 432.0), (1, 108.0)):
+        force = mean_rows(depth, feed, 0.03, number)
+        files[number] = saved(tmp_path / f"{number}.csv", radial_depth_mm=depth, fx_n=force[:, 0], fy_n=force[:, 1])
+    found = sg.fit_test_cut(design.cut, files)
+    assert isinstance(found, sg.TaperResult)
+    report = fitted(tmp_path, f"2={files[2]}", f"1={files[1]}", code=found.exit_code)
+    assert report == {**found.to_dict(), "program": "CUT.NC"}
+    assert tomllib.loads(found.to_toml())["cutting"]["chip_thickness"] == "mean"
+    assert max(map(len, str(found.tables()[0]).splitlines())) <= 80
+    whole = plot.figure(8.0, 4.0)
+    drawn = [draw(ax) for draw, ax in zip(found.plots().values(), whole.subplots(1, 2), strict=True)]
+    assert all(panel.figure.figure is whole for panel in drawn)
+    assert [panel.get_ylabel() for panel in drawn] == ["along the feed in N", "k1 in N/mm²"]
+    with pytest.raises(sg.ArgumentError, match="the radial depth must grow"):
+        sg.taper_cut(given, None, (0.8, 0.8))
+    with pytest.raises(sg.ArgumentError, match="state the spindle speed"):
+        sg.CutConditions.of(given.machine, given.tool, 108.0, AXIAL)
+
+
+def test_the_table_is_not_written_over_a_tool_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(tmp_path, "taper", "-F", "108,432")
+    depth = np.linspace(0.4, 2.8, 40)
+    force = mean_rows(depth, 108.0, 0.0, 0)
+    file = saved(tmp_path / "a.csv", radial_depth_mm=depth, fx_n=force[:, 0], fy_n=force[:, 1])
+    tool = tmp_path / "tool.toml"
+    assert main(["testcut", "fit", file, "--cut", str(tmp_path / "CUT.json"), "-o", str(tool)]) == 2
+    assert "holds more than [cutting] (tool), which would be lost" in capsys.readouterr().err
+    assert tool.read_text(encoding="utf-8") == TOOL
+
+
 def corner_edge(side: dict[str, Any]) -> Callable[[Array], Array]:
     each = side["passes"][0]
     return lambda x: np.interp(x, each["edge_x_mm"], each["edge_height_mm"])
@@ -403,7 +458,7 @@ def test_a_controller_that_follows_at_once_follows_every_interval(tmp_path: Path
 def test_a_lagging_controller_needs_longer_intervals(tmp_path: Path, position: bool) -> None:
     report = fitted(tmp_path, *interval_files(tmp_path, 0.1, position=position), "--plots", str(tmp_path / "plots"))
     assert report["interval_mm"] in (0.4, 0.6)
-    assert not report["passes"][0]["follows"]
+    assert not report["passes"][0]["ok"]
     for each in report["passes"]:
         assert each["lag_s"] == pytest.approx(0.1, rel=0.35)
     assert (tmp_path / "plots" / "testcut-interval.png").exists()
@@ -444,9 +499,10 @@ def test_bad_arguments_of_the_fit_are_refused(tmp_path: Path, capsys: pytest.Cap
     file = saved(tmp_path / "a.csv", radial_depth_mm=depth, fx_n=force[:, 0], fy_n=force[:, 1])
     cut = ["--cut", str(tmp_path / "CUT.json")]
     for arguments, said in (
-        ([f"3={file}", *cut], "has 2 passes"),
+        ([f"3={file}", *cut], "pass 3: the test cut has 2 passes"),
         ([file, f"1={file}", *cut], "pass 1 is given twice"),
-        ([file, *cut, "--edge-forces"], "go with a taper"),
+        ([file, *cut, "--edge-forces"], "edge forces and chip thickness go with a taper"),
+        ([file, *cut, "-o", str(tmp_path / "c.toml")], "describes a corner: -o goes with a taper"),
         ([file, "--cut", file], "no JSON"),
         ([file, *cut, "--json", file], "would overwrite"),
         ([file, *cut], "a table of means: a corner needs"),
@@ -455,9 +511,13 @@ def test_bad_arguments_of_the_fit_are_refused(tmp_path: Path, capsys: pytest.Cap
         assert said in capsys.readouterr().err
     side = json.loads((tmp_path / "CUT.json").read_text(encoding="utf-8"))
     for key, value, said in (
-        ("passes", [], "must be above 0"),
-        ("kind", "bore", "must be taper"),
-        ("format", 1, "not"),
+        ("passes", [], "passes: Tuple should have at least 1 item"),
+        ("kind", "bore", "kind: Input should be 'taper', 'corner' or 'interval'"),
+        ("kind", "taper", "the figures in 'about' are not those of a taper"),
+        ("axial_depth_mm", 0.0, "axial_depth_mm: Input should be greater than 0"),
+        ("spindle_rev_per_min", None, "spindle_rev_per_min: Input should be a valid number"),
+        ("passes", [{**side["passes"][0], "start_mm": 9.0}], "pass 1: edge, feeds and ends do not fit together"),
+        ("format", 1, "not the side file of a test cut"),
     ):
         (tmp_path / "bad.json").write_text(json.dumps({**side, key: value}), encoding="utf-8")
         assert main(["testcut", "fit", file, "--cut", str(tmp_path / "bad.json")]) == 2

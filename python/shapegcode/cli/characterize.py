@@ -60,9 +60,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write(args: argparse.Namespace, machine: Machine) -> int:
-    from shapegcode._core import ArgumentError
     from shapegcode.characterization.programs import write_characterization_tests
     from shapegcode.cli import runner
+    from shapegcode.errors import ArgumentError
 
     for option, value in (("-o", args.output), ("--units", args.units)):
         if value is not None:
@@ -72,16 +72,12 @@ def _write(args: argparse.Namespace, machine: Machine) -> int:
 
 
 def _fit(args: argparse.Namespace, machine: Machine) -> int:
-    from pathlib import Path
-
     from shapegcode.characterization.characterize import characterize
     from shapegcode.cli import runner
-    from shapegcode.cli.options import refuse_same_file
 
     with runner.progress(f"fitting {args.fit}", args) as bar:
         found = characterize(args.fit, machine, units=args.units, on_progress=bar.update)
-    targets = [Path(name) for name in (args.output, args.json) if name not in (None, "-")]
-    refuse_same_file(targets, [Path(name) for name in found.files])
+    runner.check_files(args, also_read=found.files)
     return runner.finish(
         found, args, output=(args.output, found.to_toml().encode()) if args.output is not None else None
     )

@@ -33,12 +33,15 @@ _READ = (
 _WRITTEN = ("output", "json", "csv", "npz")
 
 
-def check_files(args: argparse.Namespace, *, also_written: Sequence[str | Path] = ()) -> None:
+def check_files(
+    args: argparse.Namespace, *, also_written: Sequence[str | Path] = (), also_read: Sequence[str | Path] = ()
+) -> None:
     """Refuse to write a file that the same run reads, or writes twice; only one of them can have standard output.
 
     Args:
         args: of the command; of its options those are looked at whose names say that they are files.
         also_written: files that no option names, such as the one of a program out of tolerance.
+        also_read: the same, such as those that a folder or another file leads to.
 
     Raises:
         ArgumentError: names both files.
@@ -53,7 +56,7 @@ def check_files(args: argparse.Namespace, *, also_written: Sequence[str | Path] 
     if given.get("npz") == "-":
         raise ArgumentError("--npz -: an archive cannot go to standard output, name a file")
     targets = [Path(value) for value in (*given.values(), *also_written) if value != "-"]
-    refuse_same_file(targets, _read_files(args))
+    refuse_same_file(targets, [*_read_files(args), *map(Path, also_read)])
     for rank, target in enumerate(targets):
         refuse_same_file([target], targets[rank + 1 :])
 

@@ -8,19 +8,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode._core import ArgumentError
-from shapegcode.testcut.force import ForceLaw, mean_chip_mm
+from shapegcode.errors import ArgumentError
+from shapegcode.testcut.cut import COEFFICIENTS, CuttingLaw, CutTool
+from shapegcode.testcut.mean_forces import ForceModel, MeanForces, Thickness, chips_mm
 from shapegcode.testcut.noise import neighbour_correlation, noise_of
-from shapegcode.testcut.plan import CutTool, Engagement
 
-__all__ = ["Coefficient", "CoefficientFit", "MeanForces", "fit_coefficients"]
+__all__ = ["Coefficient", "CoefficientFit", "fit_coefficients"]
 
 Array = npt.NDArray[np.float64]
 
@@ -33,45 +31,11 @@ _HUBER = 2.5
 _OUTLIER = 4.0
 _LEAST_OUTLIER = 0.02
 _LARGEST_SHARE_OUT = 0.25
-_STEP = 1e-5
 _DONE = 1e-7
 _SETTLED = 1e-4
 _MOST_STEPS = 40
 
-_NAMES = (
-    ("specific_n_per_mm2", "N/mm²"),
-    ("specific_exponent", ""),
-    ("ratio", ""),
-    ("ratio_exponent", ""),
-    ("tangential_edge_n_per_mm", "N/mm"),
-    ("radial_edge_n_per_mm", "N/mm"),
-)
-
-
-@dataclass(frozen=True, eq=False)
-class MeanForces:
-    """Mean forces on the tool over whole revolutions, with what it met.
-
-    Attributes:
-        met: n engagements.
-        feed_mm_per_min: (n,).
-        spindle_rev_per_min: (n,).
-        force_n: (n, 2) along the feed and to its left.
-        revolutions: (n,) how many each is the mean of.
-        group: (n,) number of the pass or file, in the order in which it was cut.
-        displaced: n engagements if the place of the tool were off by its standard error, the same way for all rows of
-            a group; None: the engagements are exact.
-        torque_nm: (n,) mean torque of the spindle; None: not measured.
-    """
-
-    met: Engagement
-    feed_mm_per_min: Array
-    spindle_rev_per_min: Array
-    force_n: Array
-    revolutions: Array
-    group: npt.NDArray[np.intp]
-    displaced: Engagement | None = None
-    torque_nm: Array | None = None
+_UNITS = ("N/mm²", "", "", "", "N/mm", "N/mm")  # of COEFFICIENTS
 
 
 @dataclass(frozen=True)
@@ -111,7 +75,7 @@ class CoefficientFit:
     """
 
     coefficients: tuple[Coefficient, ...]
-    thickness: str
+    thickness: Thickness
     middle_chip_mm: float
     at_chip: tuple[Coefficient, ...]
     chip_mm: Array
@@ -121,63 +85,14 @@ class CoefficientFit:
     rms_percent: float
     correlation: float
 
-    def cutting(self) -> dict[str, Any]:
-        """The table ``[cutting]``."""
-        return {**{each.name: each.value for each in self.coefficients}, "chip_thickness": self.thickness}
-
-
-class _Model:
-    """Mean forces over the parameters: ln k1 and ln k2 at the reference chip, their exponents, edge forces."""
-
-    def __init__(
-        self, tool: CutTool, axial_depth_mm: float, data: MeanForces, thickness: str, reference_mm: float
-    ) -> None:
-        self.tool, self.depth, self.data, self.thickness = tool, axial_depth_mm, data, thickness
-        self.reference = reference_mm
-        # A torque is laid over as the force at the tool's radius that makes it.
-        self.at_radius = 1e3 / tool.radius_mm
-        torque = [] if data.torque_nm is None else [self.at_radius * data.torque_nm]
-        self.measured = np.column_stack([data.force_n, *torque])
-
-    def values(self, parameters: Array) -> dict[str, Any]:
-        """The keys of ``[cutting]``."""
-        logarithm = math.log(self.reference)
-        found = {
-            "specific_n_per_mm2": math.exp(parameters[0] - parameters[1] * logarithm),
-            "specific_exponent": float(parameters[1]),
-            "ratio": math.exp(parameters[2] - parameters[3] * logarithm),
-            "ratio_exponent": float(parameters[3]),
-            "chip_thickness": self.thickness,
-        }
-        if len(parameters) > 4:
-            found["tangential_edge_n_per_mm"], found["radial_edge_n_per_mm"] = parameters[4:]
-        return found
-
-    def forces(self, parameters: Array) -> Array:
-        return self.with_values(self.values(parameters))
-
-    def with_values(self, values: Mapping[str, Any]) -> Array:
-        found = np.zeros(self.measured.shape)
-        for speed, at, met in _by_speed(self.data):
-            law = ForceLaw(self.tool, values, speed, self.depth)
-            forces = law.forces(met, self.data.feed_mm_per_min[at])
-            found[at, :2] = forces.mean_n
-            found[at, 2:] = self.at_radius * forces.mean_torque_nm[:, None]
-        return found
-
-    def slopes(self, parameters: Array, at: Array) -> Array:
-        """(all measured values, p) change of the forces with each parameter; the edge forces act as they are."""
-        columns = []
-        for k in range(len(parameters)):
-            moved = parameters.copy()
-            step = _STEP if k < 4 else 0.1
-            moved[k] += step
-            columns.append((self.forces(moved) - at).ravel() / step)
-        return np.column_stack(columns)
+    @property
+    def law(self) -> CuttingLaw:
+        """The coefficients together."""
+        return CuttingLaw(**{each.name: each.value for each in self.coefficients}, chip_thickness=self.thickness)
 
 
 def fit_coefficients(
-    data: MeanForces, tool: CutTool, axial_depth_mm: float, *, thickness: str = "mean", edge: bool = False
+    data: MeanForces, tool: CutTool, axial_depth_mm: float, *, thickness: Thickness = "mean", edge: bool = False
 ) -> CoefficientFit:
     """Fit k1(t) and k2(t), and if asked the edge forces.
 
@@ -195,10 +110,10 @@ def fit_coefficients(
         ArgumentError: too few forces, chips too alike to tell the exponents, forces that no cut gives (sign or axes).
     """
     count = 6 if edge else 4
-    chip = _chips(tool, axial_depth_mm, data)
+    chip = chips_mm(tool, axial_depth_mm, data)
     _check(data, chip, count, edge)
     middle = math.exp(float(np.mean(np.log(chip))))
-    model = _Model(tool, axial_depth_mm, data, thickness, middle)
+    model = ForceModel(tool, axial_depth_mm, data, thickness, middle)
     parameters = _start(model, data, count)
     noise, robust = np.ones(model.measured.shape), np.ones(model.measured.shape)
     for _ in range(_ROUNDS):
@@ -239,20 +154,6 @@ def fit_coefficients(
     )
 
 
-def _chips(tool: CutTool, depth: float, data: MeanForces) -> Array:
-    found = np.zeros(len(data.feed_mm_per_min))
-    for speed, at, met in _by_speed(data):
-        found[at] = mean_chip_mm(tool, speed, depth, met, data.feed_mm_per_min[at])
-    return found
-
-
-def _by_speed(data: MeanForces) -> Iterator[tuple[float, npt.NDArray[np.intp], Engagement]]:
-    """Each spindle speed with the rows and engagements at it."""
-    for speed in np.unique(data.spindle_rev_per_min):
-        at = np.flatnonzero(data.spindle_rev_per_min == speed)
-        yield float(speed), at, Engagement(*(column[at] for column in vars(data.met).values()))
-
-
 def _check(data: MeanForces, chip: Array, count: int, edge: bool) -> None:
     rows = len(chip)
     if rows < 2 * count:
@@ -274,11 +175,10 @@ def _check(data: MeanForces, chip: Array, count: int, edge: bool) -> None:
         )
 
 
-def _start(model: _Model, data: MeanForces, count: int) -> Array:
+def _start(model: ForceModel, data: MeanForces, count: int) -> Array:
     """Constant k1 and k2 that fit best: with exponent 0 the force is linear in k1 and k1 k2."""
-    unit = {"specific_n_per_mm2": 1.0, "chip_thickness": model.thickness}
-    along = model.with_values({**unit, "ratio": 0.0})
-    across = model.with_values({**unit, "ratio": 1.0}) - along
+    along = model.forces_of(CuttingLaw(1.0, chip_thickness=model.thickness))
+    across = model.forces_of(CuttingLaw(1.0, ratio=1.0, chip_thickness=model.thickness)) - along
     columns = np.column_stack([along.ravel(), across.ravel()])
     weight = np.repeat(1.0 / np.maximum(np.linalg.norm(data.force_n, axis=1), 1e-9), model.measured.shape[1])
     (tangential, radial), *_ = np.linalg.lstsq(columns * weight[:, None], model.measured.ravel() * weight, rcond=None)
@@ -293,7 +193,7 @@ def _start(model: _Model, data: MeanForces, count: int) -> Array:
     return start
 
 
-def _solved(model: _Model, start: Array, weights: Array) -> tuple[Array, Array, Array]:
+def _solved(model: ForceModel, start: Array, weights: Array) -> tuple[Array, Array, Array]:
     """Levenberg-Marquardt steps to the weighted least squares: parameters, what they leave, slopes."""
     root = np.sqrt(weights).ravel()
     parameters = start
@@ -341,14 +241,14 @@ def _covariance(slopes: Array, left: Array, weights: Array, correlation: float) 
     return np.asarray(inner / np.outer(scale, scale) * square * (1.0 + correlation) / (1.0 - correlation))
 
 
-def _of_place(model: _Model, parameters: Array, slopes: Array, weights: Array) -> Array:
+def _of_place(model: ForceModel, parameters: Array, slopes: Array, weights: Array) -> Array:
     """Covariance that comes from not knowing exactly where the tool was in each group."""
     data, count = model.data, len(parameters)
     found = np.zeros((count, count))
     if data.displaced is None:
         return found
     there = dataclasses.replace(data, met=data.displaced)
-    moved = _Model(model.tool, model.depth, there, model.thickness, model.reference)
+    moved = ForceModel(model.tool, model.depth, there, model.thickness, model.reference)
     change = moved.forces(parameters) - model.forces(parameters)
     root = np.sqrt(weights)
     inverse = np.linalg.pinv(slopes * root.ravel()[:, None])
@@ -359,7 +259,7 @@ def _of_place(model: _Model, parameters: Array, slopes: Array, weights: Array) -
 
 
 def _with_intervals(
-    model: _Model, parameters: Array, covariance: Array, free: int, chip_mm: float
+    model: ForceModel, parameters: Array, covariance: Array, free: int, chip_mm: float
 ) -> tuple[Coefficient, ...]:
     """Values with their intervals; the factors k1 and k2 at a chip thickness."""
     from scipy.stats import t as student
@@ -367,7 +267,7 @@ def _with_intervals(
     quantile = float(student.ppf(0.975, max(free, 1)))
     way = math.log(chip_mm / model.reference)
     found = []
-    for k, (name, unit) in enumerate(_NAMES[: len(parameters)]):
+    for k, (name, unit) in enumerate(zip(COEFFICIENTS[: len(parameters)], _UNITS, strict=False)):
         factor = k in (0, 2)
         direction = np.zeros(len(parameters))
         direction[k] = 1.0

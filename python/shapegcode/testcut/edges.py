@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode._core import ArgumentError
+from shapegcode.errors import ArgumentError
 
 __all__ = ["Edge", "left_edge", "on_increments", "reduced", "tool_path", "unrolled_edge"]
 

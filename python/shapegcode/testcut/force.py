@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.testcut.plan import CutTool, Engagement
+from shapegcode.testcut.cut import CuttingLaw, CutTool, MeasuringPass, TestCut
+from shapegcode.testcut.engagement import Engagement, engagement
 
-__all__ = ["COEFFICIENTS", "CutForces", "ForceLaw", "coefficients", "mean_chip_mm"]
+__all__ = ["CutForces", "Expected", "ForceLaw", "expected", "mean_chip_mm"]
 
 Array = npt.NDArray[np.float64]
-
-COEFFICIENTS = (
-    "specific_n_per_mm2",
-    "specific_exponent",
-    "ratio",
-    "ratio_exponent",
-    "tangential_edge_n_per_mm",
-    "radial_edge_n_per_mm",
-)
+_STEP_MM = 0.1
 
 
 @dataclass(frozen=True)
@@ -44,27 +36,17 @@ class CutForces:
     mean_torque_nm: Array
 
 
-def coefficients(values: Mapping[str, Any]) -> _core.CuttingCoefficients:
-    """The core's coefficients from the keys of a tool file's ``[cutting]``; those that are left out are 0."""
-    return _core.CuttingCoefficients(
-        **{name: float(values.get(name, 0.0)) for name in COEFFICIENTS},
-        thickness=_core.ChipThickness.__members__[values.get("chip_thickness", "mean")],
-    )
-
-
 class ForceLaw:
     """A tool with coefficients at a spindle speed and an axial depth."""
 
-    def __init__(
-        self, tool: CutTool, values: Mapping[str, Any], spindle_rev_per_min: float, axial_depth_mm: float
-    ) -> None:
+    def __init__(self, tool: CutTool, law: CuttingLaw, spindle_rev_per_min: float, axial_depth_mm: float) -> None:
         """Make the tables of the core.
 
         Raises:
             ArgumentError: a tool or coefficients that the core refuses.
         """
         mill = _core.EndMill(tool.diameter_mm, tool.flutes, math.radians(tool.helix_deg), list(tool.runout_mm))
-        self._force = _core.MillingForce(mill, coefficients(values), spindle_rev_per_min)
+        self._force = _core.MillingForce(mill, law.core(), spindle_rev_per_min)
         self._depth = axial_depth_mm
 
     def forces(self, met: Engagement, feed_mm_per_min: Array | Sequence[float]) -> CutForces:
@@ -86,11 +68,43 @@ def mean_chip_mm(
 
     The law itself tells it: with the exponent 1 the force is the mean chip thickness times the force with exponent 0.
     """
-    plain = {"specific_n_per_mm2": 1.0}
     once, twice = (
-        ForceLaw(tool, {**plain, "specific_exponent": exponent}, spindle_rev_per_min, axial_depth_mm)
+        ForceLaw(tool, CuttingLaw(1.0, exponent), spindle_rev_per_min, axial_depth_mm)
         .forces(met, feed_mm_per_min)
         .mean_torque_nm
         for exponent in (0.0, 1.0)
     )
     return np.asarray(np.divide(twice, once, out=np.zeros_like(once), where=once > 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """What the force law lets expect along a pass, at stations.
+
+    Attributes:
+        x_mm: (n,) ascending, of the tool's axis.
+        mean_n: (n,) magnitude of the mean force.
+        mean_resultant_n: (n,) mean magnitude.
+        peak_resultant_n: (n,) largest magnitude.
+    """
+
+    x_mm: Array
+    mean_n: Array
+    mean_resultant_n: Array
+    peak_resultant_n: Array
+
+
+def expected(cut: TestCut, measuring: MeasuringPass, law: CuttingLaw | None = None) -> Expected:
+    """Forces along a pass at its commanded feeds.
+
+    Args:
+        cut: the test cut.
+        measuring: the pass.
+        law: coefficients; None: those known before.
+    """
+    count = math.ceil((measuring.end_mm - measuring.start_mm) / _STEP_MM) + 1
+    x = np.linspace(measuring.start_mm, measuring.end_mm, count)
+    met = engagement(cut.tool, measuring, x, up=cut.up)
+    along = ForceLaw(cut.tool, law or cut.tool.cutting, cut.spindle_rev_per_min, cut.axial_depth_mm)
+    forces = along.forces(met, measuring.commanded_feed(x))
+    return Expected(x, np.linalg.norm(forces.mean_n, axis=1), forces.mean_resultant_n, forces.peak_resultant_n)

@@ -2,54 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Mapping
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapegcode.results import plot as canvas
-from shapegcode.testcut.corner import CornerResult, IntervalResult
-from shapegcode.testcut.taper import TaperResult
+from shapegcode.results import plot
+from shapegcode.results.result import Plot
+from shapegcode.testcut.result import CornerResult, IntervalResult, TaperResult
 
-__all__ = ["plot_coefficients", "plot_corner", "plot_interval", "plot_taper", "write_cut_pictures"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
-_MEASURED, _EXPECTED = canvas.GREY, canvas.COLOURS[0]
+__all__ = ["plot_coefficients", "plot_corner", "plot_interval", "plot_taper", "plots_of"]
+
+_MEASURED, _EXPECTED, _LAGGING = plot.GREY, plot.COLOURS[0], plot.COLOURS[1]
 
 
-def write_cut_pictures(result: TaperResult | CornerResult | IntervalResult, folder: str | Path) -> list[str]:
-    """Write the pictures of a result as PNG and SVG into a folder, which is made where it is missing.
-
-    Raises:
-        OSError: the folder cannot be made or a file not be written.
-    """
-    pictures: dict[str, Callable[[Path], None]]
+def plots_of(result: TaperResult | CornerResult | IntervalResult) -> Mapping[str, Plot]:
+    """Its pictures by name."""
     if isinstance(result, TaperResult):
-        pictures = {
-            "forces": lambda file: plot_taper(file, result),
-            "coefficients": lambda file: plot_coefficients(file, result),
+        return {
+            "testcut-forces": partial(plot_taper, result),
+            "testcut-coefficients": partial(plot_coefficients, result),
         }
-    elif isinstance(result, CornerResult):
-        pictures = {"corner": lambda file: plot_corner(file, result)}
-    else:
-        pictures = {"interval": lambda file: plot_interval(file, result)}
-    return canvas.write_pictures(folder, "testcut", pictures)
+    if isinstance(result, CornerResult):
+        return {"testcut-corner": partial(plot_corner, result)}
+    return {"testcut-interval": partial(plot_interval, result)}
 
 
-def plot_taper(file: str | Path, result: TaperResult) -> None:
+def _column(ax: Axes | None, rows: int, height: float, title: str, width: float = 8.0) -> list[Axes]:
+    """Panels above each other that share their X axis."""
+    grid = plot.grid(ax, rows, 1, size_inch=(width, height), title=title, sharex="col")
+    for row in grid:
+        row[0].margins(x=0.01)
+    return [row[0] for row in grid]
+
+
+def plot_taper(result: TaperResult, ax: Axes | None = None) -> Axes:
     """Mean forces over the radial depth, measured and fitted, one colour per pass.
 
-    Raises:
-        OSError: the file cannot be written.
+    Args:
+        result: of a taper.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The upper panel: forces along the feed.
     """
-    figure = canvas.figure(8.0, 5.6)
-    column = canvas.panels(figure, 2, 1)[0]
     data, fit = result.data, result.fit
-    for axis, panel in enumerate(column):
+    title = f"Mean force on the tool, measured (points) and fitted, {fit.rms_percent:.1f} % left"
+    panels = _column(ax, 2, 5.6, title)
+    for axis, panel in enumerate(panels):
         for group in np.unique(data.group):
             at = np.flatnonzero(data.group == group)
             depth = data.met.radial_depth_mm[at]
             order = np.argsort(depth, kind="stable")
-            colour = canvas.COLOURS[int(group) % len(canvas.COLOURS)]
+            colour = plot.COLOURS[int(group) % len(plot.COLOURS)]
             panel.plot(depth, data.force_n[at, axis], ".", color=colour, markersize=4)
             label = f"{data.feed_mm_per_min[at[0]]:.0f} mm/min"
             panel.plot(depth[order], fit.predicted_n[at, axis][order], "-", color=colour, linewidth=1.0, label=label)
@@ -57,69 +66,81 @@ def plot_taper(file: str | Path, result: TaperResult) -> None:
         if out.any():
             panel.plot(data.met.radial_depth_mm[out], data.force_n[out, axis], "x", color="black", label="left out")
         panel.set_ylabel(("along the feed in N", "to its left in N")[axis])
-    column[-1].set_xlabel("radial depth in mm")
-    canvas.legend_above(column[0])
-    canvas.heading(figure, f"Mean force on the tool, measured (points) and fitted, {fit.rms_percent:.1f} % left", "")
-    canvas.save(figure, file)
+    panels[-1].set_xlabel("radial depth in mm")
+    plot.legend_above(panels[0])
+    return panels[0]
 
 
-def plot_coefficients(file: str | Path, result: TaperResult) -> None:
+def plot_coefficients(result: TaperResult, ax: Axes | None = None) -> Axes:
     """k1 and k2 over the chip thickness, with what was known before.
 
-    Raises:
-        OSError: the file cannot be written.
+    Args:
+        result: of a taper.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The upper panel: k1.
     """
-    fit = result.fit
-    chip = np.geomspace(fit.chip_mm.min(), fit.chip_mm.max(), 60)
-    figure = canvas.figure(6.4, 5.0)
-    column = canvas.panels(figure, 2, 1)[0]
-    laws = (("before", result.cut.tool.cutting, _MEASURED, "--"), ("fitted", fit.cutting(), _EXPECTED, "-"))
-    keys = (("specific_n_per_mm2", "specific_exponent"), ("ratio", "ratio_exponent"))
-    for panel, (factor, exponent), label in zip(column, keys, ("k1 in N/mm²", "k2"), strict=True):
-        for name, law, colour, style in laws:
-            panel.plot(1e3 * chip, law[factor] * chip ** law[exponent], style, color=colour, label=name)
+    chip = np.geomspace(result.chip_mm.min, result.chip_mm.max, 60)
+    panels = _column(ax, 2, 5.0, "Coefficients of the cutting force", 6.4)
+    for name, law, colour, style in (
+        ("before", result.cut.tool.cutting, _MEASURED, "--"),
+        ("fitted", result.cutting, _EXPECTED, "-"),
+    ):
+        curves = (
+            law.specific_n_per_mm2 * chip**law.specific_exponent,
+            law.ratio * chip**law.ratio_exponent,
+        )
+        for panel, curve in zip(panels, curves, strict=True):
+            panel.plot(1e3 * chip, curve, style, color=colour, label=name)
+    for panel, label in zip(panels, ("k1 in N/mm²", "k2"), strict=True):
         panel.set_ylabel(label)
-    column[-1].set_xlabel("mean chip thickness in µm")
-    canvas.legend_above(column[0])
-    canvas.heading(figure, "Coefficients of the cutting force", "")
-    canvas.save(figure, file)
+    panels[-1].set_xlabel("mean chip thickness in µm")
+    plot.legend_above(panels[0])
+    return panels[0]
 
 
-def plot_corner(file: str | Path, result: CornerResult) -> None:
+def plot_corner(result: CornerResult, ax: Axes | None = None) -> Axes:
     """Mean and largest resultant along each pass, measured and expected.
 
-    Raises:
-        OSError: the file cannot be written.
+    Args:
+        result: of a corner.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The panel of the first pass.
     """
-    figure = canvas.figure(8.0, 1.4 + 2.4 * len(result.passes))
-    column = canvas.panels(figure, len(result.passes), 1)[0]
-    for panel, (number, record, hoped) in zip(column, result.passes, strict=True):
+    panels = _column(ax, len(result.peaks), 1.4 + 2.4 * len(result.peaks), "Resultant in the unrolled corner")
+    for panel, each in zip(panels, result.peaks, strict=True):
+        record, hoped = each.record, each.hoped
         panel.plot(record.x_mm, record.resultant_n, color=_MEASURED, linewidth=2.0, label="measured, mean")
         panel.plot(record.x_mm, record.peak_n, color=_MEASURED, linewidth=0.8, label="measured, peak")
         panel.plot(hoped.x_mm, hoped.mean_resultant_n, color=_EXPECTED, linewidth=1.4, label="expected, mean")
         panel.plot(hoped.x_mm, hoped.peak_resultant_n, color=_EXPECTED, linewidth=0.8, label="expected, peak")
-        panel.set_ylabel(f"pass {number} in N")
-    column[-1].set_xlabel("X of the tool's axis in mm")
-    canvas.legend_above(column[0])
-    canvas.heading(figure, "Resultant in the unrolled corner", "")
-    canvas.save(figure, file)
+        panel.set_ylabel(f"pass {each.number} in N")
+    panels[-1].set_xlabel("X of the tool's axis in mm")
+    plot.legend_above(panels[0])
+    return panels[0]
 
 
-def plot_interval(file: str | Path, result: IntervalResult) -> None:
+def plot_interval(result: IntervalResult, ax: Axes | None = None) -> Axes:
     """Resultant over time of each pass: measured, at the commanded feeds, and with the lag that fits best.
 
-    Raises:
-        OSError: the file cannot be written.
+    Args:
+        result: of an interval test.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The panel of the shortest interval.
     """
-    figure = canvas.figure(8.0, 1.4 + 2.2 * len(result.passes))
-    column = canvas.panels(figure, len(result.passes), 1)[0]
-    for panel, each in zip(column, result.passes, strict=True):
+    title = "Mean resultant at feeds that change every so often"
+    panels = _column(ax, len(result.passes), 1.4 + 2.2 * len(result.passes), title)
+    for panel, each in zip(panels, result.passes, strict=True):
         panel.plot(each.time_s, each.force_n, color=_MEASURED, linewidth=2.0, label="measured")
         panel.plot(each.time_s, each.immediate_n, color=_EXPECTED, linewidth=1.1, label="feed as commanded")
         label = f"lag of {1e3 * each.lag_s:.0f} ms"
-        panel.plot(each.time_s, each.lagging_n, "--", color=canvas.COLOURS[1], linewidth=1.1, label=label)
+        panel.plot(each.time_s, each.lagging_n, "--", color=_LAGGING, linewidth=1.1, label=label)
         panel.set_ylabel(f"{each.interval_mm:g} mm: N")
-        canvas.legend_above(panel)
-    column[-1].set_xlabel("time in s")
-    canvas.heading(figure, "Mean resultant at feeds that change every so often", "")
-    canvas.save(figure, file)
+        plot.legend_above(panel)
+    panels[-1].set_xlabel("time in s")
+    return panels[0]

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from shapegcode.testcut.design import Design
+from shapegcode.io.atomic import write_text
+from shapegcode.results.json import to_text
+from shapegcode.testcut.cut import CornerFigures, MeasuringPass
+from shapegcode.testcut.design_result import CutDesign
 from shapegcode.testcut.edges import Edge, on_increments, tool_path
 
-if TYPE_CHECKING:
-    from shapegcode.machine import Machine
-    from shapegcode.testcut.plan import MeasuringPass
-
-__all__ = ["program_text"]
+__all__ = ["program_text", "write_test_cut"]
 
 _SKIM_MM = 0.2
 _ROUGH_SHARE = 0.1  # of the diameter: largest radial depth of the cuts that mill the edge
@@ -33,18 +33,39 @@ _PURPOSES = {
 _PER_MINUTE = 60.0
 
 
-def program_text(design: Design, machine: Machine, number: int) -> str:
+def write_test_cut(design: CutDesign, file: str | Path, number: int = 7101) -> CutDesign:
+    """Write the program of a test cut, and beside it the side file (JSON) that `fit_test_cut` reads.
+
+    Args:
+        design: what to cut.
+        file: of the program; the side file has its name and the ending ``.json``.
+        number: of the program, O.
+
+    Returns:
+        The design with the names of both files.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    output = Path(file)
+    side = output.with_suffix(".json")
+    named = replace(design, cut=replace(design.cut, program=output.name), files=(str(output), str(side)))
+    write_text(side, to_text(named.cut.data()))
+    write_text(output, program_text(named, number))
+    return named
+
+
+def program_text(design: CutDesign, number: int = 7101) -> str:
     """The program of a test cut.
 
     Args:
         design: what to cut.
-        machine: for the increments of the words, and the block time.
         number: of the program, O.
 
     Returns:
         The program.
     """
-    writer = _Writer(design, machine)
+    writer = _Writer(design)
     lines = ["%", f"O{number:04d}({_TITLES[design.cut.kind]})"]
     lines += [f"({line})" for line in writer.head()]
     lines += ["G21 G17 G90 G94 G64 G40 G49 G80", "G54"]
@@ -61,11 +82,11 @@ def _text(value: float, decimals: int = 3) -> str:
 
 
 class _Writer:
-    def __init__(self, design: Design, machine: Machine) -> None:
-        self.design, self.cut, self.machine = design, design.cut, machine
-        self.decimals = max(1, round(-math.log10(machine.controller.least_increment_mm)))
+    def __init__(self, design: CutDesign) -> None:
+        self.design, self.cut, self.controller = design, design.cut, design.machine.controller
+        self.decimals = max(1, round(-math.log10(self.controller.least_increment_mm)))
         self.radius = self.cut.tool.radius_mm
-        self.side = -1.0 if self.cut.milling == "down" else 1.0  # of the material, along Y
+        self.side = -1.0 if not self.cut.up else 1.0  # of the material, along Y
         self.walls: list[float] = []  # how far each wall lies within the raw edge
         depth = 0.0
         for each in self.cut.passes:
@@ -96,9 +117,9 @@ class _Writer:
         yield "FX ALONG +X, FY ALONG +Y, THEN CYCLE START;"
         yield "STOP THE RECORD AT THE NEXT STOP. ONE FILE PER PASS"
         yield "FIRST RUN: DRY, ABOVE THE STOCK"
-        deeper = cut.about.get("deeper_than_corner")
-        if deeper is not None:
-            yield f"X{deeper['from_mm']:.2f} TO {deeper['to_mm']:.2f}: UP TO {deeper['most_mm']:.3f} MM DEEPER"
+        if isinstance(cut.about, CornerFigures) and cut.about.deeper_than_corner is not None:
+            deeper = cut.about.deeper_than_corner
+            yield f"X{deeper.from_mm:.2f} TO {deeper.to_mm:.2f}: UP TO {deeper.most_mm:.3f} MM DEEPER"
             yield "THAN THE CORNER: THE ROUND TOOL LEAVES IT"
 
     def _y(self, within_mm: float) -> float:
@@ -111,8 +132,8 @@ class _Writer:
         wall = self.walls[k]
         before = self.walls[k - 1] if k else -_RAW_MM
         yield f"(PASS {k + 1}: MILL THE EDGE)"
-        for offset in _offsets(self.design.edges[k], before, wall, self.design.stock_mm, self.cut.tool.diameter_mm):
-            yield from self._edge(each, self.design.edges[k], wall, offset)
+        for offset in _offsets(self.design.edge, before, wall, self.design.stock_mm, self.cut.tool.diameter_mm):
+            yield from self._edge(each, self.design.edge, wall, offset)
         yield f"G00 Z{_text(_CLEAR_Z_MM)}"
         yield f"M00 (START RECORD {k + 1}: {each.name})"
         # The control may have stopped the spindle.
@@ -133,11 +154,11 @@ class _Writer:
     def _edge(self, each: MeasuringPass, edge: Edge, wall: float, offset: float) -> Iterator[str]:
         """One cut along the edge, farther out by an offset."""
         path = tool_path(edge, self.radius, each.start_mm, each.end_mm)
-        path = on_increments(path, self.machine.controller.least_increment_mm)
+        path = on_increments(path, self.controller.least_increment_mm)
         y = wall - path.height_mm - offset
         feed = min(feed for _, feed in each.feeds)
         shortest = float(np.min(np.hypot(np.diff(path.x_mm), np.diff(y))))
-        block_s = max(self.machine.controller.block_time_s, self.machine.controller.interpolation_period_s)
+        block_s = max(self.controller.block_time_s, self.controller.interpolation_period_s)
         feed = max(min(feed, shortest / (_BLOCKS_OF_EDGE * block_s) * _PER_MINUTE), 1.0)
         yield from self._begin(float(path.x_mm[0]), self._y(float(y[0])), feed)
         first = f" F{_text(math.floor(feed * 10.0) / 10.0, 1)}"

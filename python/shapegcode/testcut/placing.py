@@ -1,4 +1,4 @@
-"""From a record of a measuring pass to forces per revolution: offset, drift, spindle speed, place, chatter."""
+"""The place of each sample of a record: offset and drift of the dynamometer, spindle speed, entry and exit."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode._core import ArgumentError
-from shapegcode.testcut.plan import MeasuringPass, TestCut, fully_engaged
+from shapegcode.errors import ArgumentError
+from shapegcode.testcut.cut import MeasuringPass, TestCut
+from shapegcode.testcut.force import Expected
 from shapegcode.testcut.record import ForceRecord
 
-__all__ = ["FEWEST_SAMPLES", "PlacedRecord", "Revolutions", "Shape", "placed", "revolutions", "spindle_speed", "turned"]
+__all__ = ["FEWEST_SAMPLES", "PlacedRecord", "placed", "turned"]
 
 Array = npt.NDArray[np.float64]
 
@@ -31,21 +32,6 @@ _LARGEST_SHIFT_MM = 1.0
 _SHIFT_STEPS = 81
 #: The cut may last so much longer or shorter: at another feed override; where the place or the feeds are stated.
 _OTHER_FEED, _OTHER_LENGTH = 0.6, 0.03
-_CHATTER, _CHATTER_LEAST = 8.0, 0.02  # times the median deviation; the least that counts as one, of the median
-_CHATTER_ROUNDS = 12
-
-
-@dataclass(frozen=True)
-class Shape:
-    """The course of the mean force that is expected along a pass, to find its beginning and end in the record.
-
-    Attributes:
-        x_mm: (n,) ascending X of the tool's axis.
-        resultant_n: (n,) magnitude of the mean force, in any unit.
-    """
-
-    x_mm: Array
-    resultant_n: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +50,8 @@ class PlacedRecord:
         spindle_rev_per_min: as the record shows it, or as commanded.
         offset_n: (2,) force that was shown in the air before the cut.
         drift_n: (2,) change of it until after the cut.
-        notes: what else the user should know.
+        by_time: the place comes from the time and the feed; else it was recorded.
+        notes: what else the user should know, with the name of the file.
     """
 
     file: str
@@ -78,44 +65,11 @@ class PlacedRecord:
     spindle_rev_per_min: float
     offset_n: Array
     drift_n: Array
+    by_time: bool
     notes: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Revolutions:
-    """Means over whole revolutions of one pass.
-
-    Attributes:
-        source: the file.
-        x_mm: (n,) X of the tool's axis in the middle of each revolution.
-        mean_n: (n, 2) mean force on the tool along the feed and to its left.
-        torque_nm: (n,) mean torque; None: not recorded.
-        resultant_n: (n,) mean magnitude.
-        peak_n: (n,) largest magnitude.
-        chatter: (n,) whether the force swings more than its mean lets expect from the rest of the pass.
-        feed_mm_per_min: the feed between entry and exit, as the record shows it; of a pass with changing feeds the
-            first one.
-        spindle_rev_per_min: as the record shows it, or as commanded.
-        offset_n: (2,) force that was shown in the air before the cut.
-        drift_n: (2,) change of it until after the cut.
-        notes: what else the user should know.
-    """
-
-    source: str
-    x_mm: Array
-    mean_n: Array
-    torque_nm: Array | None
-    resultant_n: Array
-    peak_n: Array
-    chatter: npt.NDArray[np.bool_]
-    feed_mm_per_min: float
-    spindle_rev_per_min: float
-    offset_n: Array
-    drift_n: Array
-    notes: tuple[str, ...]
-
-
-def spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
+def _spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: int) -> tuple[float, bool]:
     """Spindle speed from the lines of a record at the revolution, the teeth, and their multiples.
 
     Args:
@@ -152,14 +106,14 @@ def spindle_speed(force_n: Array, period_s: float, commanded: float, flutes: int
     return (commanded, False) if best is None else (float(best[1]), True)
 
 
-def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, shape: Shape) -> PlacedRecord:
+def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, hoped: Expected) -> PlacedRecord:
     """Take offset and drift off a sampled record of one pass, and find the place of each sample.
 
     Args:
         record: with time, or with a position (then the commanded feeds give the time).
         cut: the test cut.
         measuring: which pass was recorded.
-        shape: course of the mean force that is expected.
+        hoped: forces that are expected along it.
 
     Returns:
         The forces in N with their places in mm.
@@ -177,9 +131,9 @@ def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, shape: S
             f"{12 * cut.tool.flutes}; or give means over whole revolutions, at most one row per revolution"
         )
     begin, end = _contact(record, turn / period)
-    speed, told = spindle_speed(record.force_n[begin:end], period, cut.spindle_rev_per_min, cut.tool.flutes)
+    speed, sure = _spindle_speed(record.force_n[begin:end], period, cut.spindle_rev_per_min, cut.tool.flutes)
     notes = []
-    if told and abs(speed / cut.spindle_rev_per_min - 1.0) > _TELL_SPEED:
+    if sure and abs(speed / cut.spindle_rev_per_min - 1.0) > _TELL_SPEED:
         notes.append(f"the spindle turned at {speed:.1f} rev/min, {cut.spindle_rev_per_min:g} were commanded")
     samples = _PER_MINUTE / speed / period
     per_tooth = samples / cut.tool.flutes
@@ -193,9 +147,22 @@ def placed(record: ForceRecord, cut: TestCut, measuring: MeasuringPass, shape: S
     if record.torque_nm is not None:
         torque = _without_offset(record.torque_nm[:, None], begin, end, round(_GUARD_REVS * samples))[0]
     size = np.linalg.norm(turned(force, samples), axis=1)
-    x = _placed(record, measuring, shape, size, time, moved, (begin, end), notes)
+    x = _placed(record, measuring, hoped, size, time, moved, (begin, end), notes)
+    told = tuple(f"{record.file}: {note}" for note in notes)
     return PlacedRecord(
-        record.file, cut, measuring, time, x, force, torque, samples, speed, offset, drift, tuple(notes)
+        record.file,
+        cut,
+        measuring,
+        time,
+        x,
+        force,
+        torque,
+        samples,
+        speed,
+        offset,
+        drift,
+        record.position_mm is None,
+        told,
     )
 
 
@@ -266,7 +233,7 @@ def _without_offset(force: Array, begin: int, end: int, guard: int) -> tuple[Arr
 def _placed(
     record: ForceRecord,
     measuring: MeasuringPass,
-    shape: Shape,
+    hoped: Expected,
     size: Array,
     time: Array,
     moved: Array,
@@ -274,8 +241,8 @@ def _placed(
     notes: list[str],
 ) -> Array:
     """X of the axis at each sample: entry and exit of the record laid over those that are expected."""
-    seen = np.flatnonzero(shape.resultant_n > _ABOVE_SHARE * shape.resultant_n.max())
-    wanted = shape.x_mm[seen[0]], shape.x_mm[seen[-1]]
+    seen = np.flatnonzero(hoped.mean_n > _ABOVE_SHARE * hoped.mean_n.max())
+    wanted = hoped.x_mm[seen[0]], hoped.x_mm[seen[-1]]
     if record.position_mm is None and not measuring.constant_feed:
         # The way over time is that of the blocks; only where it begins is looked for.
         moved = _way_of_blocks(measuring, time - time[contact[0]], wanted[0])
@@ -287,7 +254,7 @@ def _placed(
             f"{wanted[1] - wanted[0]:.2f} mm: is it the right pass, and was the feed override 100 %?"
         )
     x = wanted[0] + (moved - moved[contact[0]]) * (scale if free else 1.0)
-    ends = [_shift(shape, x, size, side) for side in wanted]
+    ends = [_shift(hoped, x, size, side) for side in wanted]
     if free:
         # Both ends: offset and rate.
         share = (x - wanted[0]) / (wanted[1] - wanted[0])
@@ -308,14 +275,14 @@ def _way_of_blocks(measuring: MeasuringPass, time_s: Array, entry_mm: float) -> 
     return np.asarray(np.interp(time_s + np.interp(entry_mm, ends, at), at, ends))
 
 
-def _shift(shape: Shape, x: Array, size: Array, side: float) -> float:
+def _shift(hoped: Expected, x: Array, size: Array, side: float) -> float:
     """By how much X must be moved so that the course at one end of the cut is the expected one, whatever its scale."""
     near = np.flatnonzero(np.abs(x - side) < 3.0 * _LARGEST_SHIFT_MM)
     near = near[:: max(1, len(near) // 400)]
     measured, place = size[near], x[near]
 
     def misfit(shift: float) -> float:
-        expected = np.interp(place + shift, shape.x_mm, shape.resultant_n)
+        expected = np.interp(place + shift, hoped.x_mm, hoped.mean_n)
         factor = float(expected @ measured) / max(float(expected @ expected), 1e-300)
         return float(np.sum((measured - factor * expected) ** 2))
 
@@ -325,58 +292,3 @@ def _shift(shape: Shape, x: Array, size: Array, side: float) -> float:
     left, mid, right = errors[best - 1 : best + 2]
     bent = left - 2.0 * mid + right
     return float(tried[best] + (0.5 * (left - right) / bent * (tried[1] - tried[0]) if bent > 0.0 else 0.0))
-
-
-def revolutions(record: PlacedRecord) -> Revolutions:
-    """Means over whole revolutions of a pass."""
-    cut, measuring, x = record.cut, record.measuring, record.x_mm
-    inside = np.flatnonzero((x >= measuring.start_mm) & (x <= measuring.end_mm))
-    turns = int((inside[-1] - inside[0]) / record.samples)
-    edges = inside[0] + np.arange(turns + 1) * record.samples
-    size = np.linalg.norm(record.force_n, axis=1)
-    columns = [record.force_n, size[:, None], size[:, None] ** 2, x[:, None]]
-    if record.torque_nm is not None:
-        columns.append(record.torque_nm)
-    table = np.hstack(columns)
-    sums = np.vstack([np.zeros((1, table.shape[1])), np.cumsum(table, axis=0)])
-    at = np.arange(len(sums), dtype=np.float64)
-    means = np.diff(np.column_stack([np.interp(edges, at, column) for column in sums.T]), axis=0) / record.samples
-    peaks = np.maximum.reduceat(size[: int(edges[-1])], edges[:-1].astype(np.intp))
-    middle = means[:, 4]
-    uneven = np.sqrt(np.maximum(means[:, 3] - np.sum(means[:, :2] ** 2, axis=1), 0.0))
-    full = np.flatnonzero(fully_engaged(cut, measuring, middle))[_GUARD_REVS:-_GUARD_REVS]
-    chatter = np.zeros(len(middle), dtype=bool)
-    chatter[full] = _swings(middle[full], uneven[full], means[full, 2])
-    feed = measuring.feed_mm_per_min
-    if measuring.constant_feed:
-        feed = float(np.polyfit(record.time_s[inside], x[inside], 1)[0]) * _PER_MINUTE
-    return Revolutions(
-        record.file,
-        middle,
-        means[:, :2],
-        np.abs(means[:, 5]) if record.torque_nm is not None else None,
-        means[:, 2],
-        peaks,
-        chatter,
-        feed,
-        record.spindle_rev_per_min,
-        record.offset_n,
-        record.drift_n,
-        record.notes,
-    )
-
-
-def _swings(x: Array, uneven: Array, resultant: Array) -> npt.NDArray[np.bool_]:
-    """Where the force within a revolution swings more, for its mean, than in the rest of the pass."""
-    if len(uneven) < _FEWEST_FOR_SPEED:
-        return np.zeros(len(uneven), dtype=bool)
-    share = uneven / np.maximum(resultant, 1e-300)
-    place = (x - x.mean()) / max(float(np.ptp(x)), 1e-300)
-    floor = _CHATTER_LEAST * float(np.median(share))
-    weight = np.ones(len(share))
-    for _ in range(_CHATTER_ROUNDS):
-        # Least absolute deviations: what stands out does not bend the curve of the rest.
-        off = share - np.polyval(np.polyfit(place, share, 2, w=np.sqrt(weight)), place)
-        weight = 1.0 / np.maximum(np.abs(off), floor)
-    spread = 1.4826 * float(np.median(np.abs(off))) + floor
-    return np.asarray(off > _CHATTER * spread)

@@ -1,0 +1,305 @@
+"""A test cut: tool, cutting conditions and measuring passes, and the side file that keeps them for the fit.
+
+Every measuring pass goes along +X at a constant Y and leaves a straight wall. The material in front of it has an edge
+whose height above that wall is known over X, so the radial depth is known wherever the tool's axis is.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, TypeAdapter, ValidationError
+
+from shapegcode import _core
+from shapegcode.errors import ArgumentError
+
+__all__ = [
+    "COEFFICIENTS",
+    "CornerFigures",
+    "CutTool",
+    "CuttingLaw",
+    "DeeperStretch",
+    "Deepest",
+    "IntervalFigures",
+    "MeasuringPass",
+    "TaperFigures",
+    "TestCut",
+    "read_test_cut",
+]
+
+Array = npt.NDArray[np.float64]
+_FORMAT = "shapegcode test cut 1"
+_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+@dataclass(frozen=True)
+class CuttingLaw:
+    """The seven coefficients of the force law, as in the tool file's ``[cutting]``; see docs/cutting_force.md.
+
+    Attributes:
+        specific_n_per_mm2: specific cutting force k1 at a chip 1 mm thick.
+        specific_exponent: of the chip thickness in k1.
+        ratio: of radial to tangential force, k2, at a chip 1 mm thick.
+        ratio_exponent: of the chip thickness in k2.
+        tangential_edge_n_per_mm: tangential force of the edge per length, K_te.
+        radial_edge_n_per_mm: radial force of the edge per length, K_re.
+        chip_thickness: to which the exponents belong, "mean" of the engagement or "local".
+    """
+
+    specific_n_per_mm2: float
+    specific_exponent: float = 0.0
+    ratio: float = 0.0
+    ratio_exponent: float = 0.0
+    tangential_edge_n_per_mm: float = 0.0
+    radial_edge_n_per_mm: float = 0.0
+    chip_thickness: Literal["mean", "local"] = "mean"
+
+    @classmethod
+    def of(cls, law: _core.CuttingCoefficients) -> CuttingLaw:
+        """The core's coefficients."""
+        values = {name: getattr(law, name) for name in COEFFICIENTS}
+        return cls(**values, chip_thickness="local" if law.thickness == _core.ChipThickness.local else "mean")
+
+    def core(self) -> _core.CuttingCoefficients:
+        """As the core takes them."""
+        values = {name: float(getattr(self, name)) for name in COEFFICIENTS}
+        return _core.CuttingCoefficients(**values, thickness=_core.ChipThickness.__members__[self.chip_thickness])
+
+
+COEFFICIENTS = tuple(each.name for each in fields(CuttingLaw) if each.name != "chip_thickness")
+"""Names of the numbers of a force law."""
+
+
+@dataclass(frozen=True)
+class CutTool:
+    """The end mill of a test cut.
+
+    Attributes:
+        diameter_mm: as it turns, measured.
+        flutes: their number.
+        helix_deg: right-hand helix.
+        runout_mm: how far each flute stands out; empty: not known.
+        cutting: the force law that is known before.
+    """
+
+    diameter_mm: _Positive
+    flutes: Annotated[int, Field(gt=0)]
+    helix_deg: _Finite
+    runout_mm: tuple[_Finite, ...] = ()
+    cutting: CuttingLaw = CuttingLaw(0.0)
+
+    @property
+    def radius_mm(self) -> float:
+        """Half of the diameter."""
+        return 0.5 * self.diameter_mm
+
+
+@dataclass(frozen=True)
+class MeasuringPass:
+    """One pass whose force is recorded.
+
+    Attributes:
+        name: what is special about it.
+        start_mm: X of the tool's axis at its start, in the air.
+        end_mm: X at its end, in the air.
+        edge_x_mm: ascending X of the edge's corner points, from one end of the stock to the other.
+        edge_height_mm: how high the edge stands there above the wall that the pass leaves; straight between them.
+        feeds: pairs (X up to which it holds, feed in mm/min), ascending.
+    """
+
+    name: str
+    start_mm: _Finite
+    end_mm: _Finite
+    edge_x_mm: Annotated[tuple[_Finite, ...], Field(min_length=2)]
+    edge_height_mm: Annotated[tuple[_Finite, ...], Field(min_length=2)]
+    feeds: Annotated[tuple[tuple[_Finite, _Positive], ...], Field(min_length=1)]
+
+    @property
+    def feed_mm_per_min(self) -> float:
+        """Feed of its first block."""
+        return self.feeds[0][1]
+
+    @property
+    def constant_feed(self) -> bool:
+        """Whether one feed holds from its start to its end."""
+        return len({feed for _, feed in self.feeds}) == 1
+
+    @property
+    def duration_s(self) -> float:
+        """From start to end at the commanded feeds."""
+        begins = (self.start_mm, *(end for end, _ in self.feeds))
+        return sum((end - begin) / feed * 60.0 for begin, (end, feed) in zip(begins, self.feeds, strict=False))
+
+    @property
+    def consistent(self) -> bool:
+        """Whether the edge ascends in X, the blocks do, and the pass begins and ends beyond the edge."""
+        x, ends = np.array(self.edge_x_mm), [end for end, _ in self.feeds]
+        ascending = len(x) == len(self.edge_height_mm) and bool(np.all(np.diff(x) > 0.0)) and ends == sorted(ends)
+        return ascending and bool(self.start_mm < x[0] and x[-1] < self.end_mm)
+
+    def commanded_feed(self, x_mm: Array) -> Array:
+        """Feed of the block in which the axis is at each X, mm/min."""
+        ends = np.array([end for end, _ in self.feeds])
+        values = np.array([feed for _, feed in self.feeds])
+        return np.asarray(values[np.minimum(np.searchsorted(ends, x_mm, side="left"), len(values) - 1)])
+
+
+@dataclass(frozen=True)
+class TaperFigures:
+    """What is special about a taper.
+
+    Attributes:
+        radial_depth_mm: at the begin and at the end of the stock.
+        length_mm: of the stock.
+    """
+
+    radial_depth_mm: tuple[float, float]
+    length_mm: float
+
+
+@dataclass(frozen=True)
+class Deepest:
+    """Where a pass meets most.
+
+    Attributes:
+        max: radial depth, mm.
+        at_mm: X of the tool's axis.
+    """
+
+    max: float
+    at_mm: float
+
+
+@dataclass(frozen=True)
+class DeeperStretch:
+    """Where passes meet more than the corner has, by more than 1 µm, as the tool that mills the edge is round.
+
+    Attributes:
+        from_mm: X at its begin.
+        to_mm: X at its end.
+        most_mm: how much more.
+    """
+
+    from_mm: float
+    to_mm: float
+    most_mm: float
+
+
+@dataclass(frozen=True)
+class CornerFigures:
+    """What is special about an unrolled corner.
+
+    Attributes:
+        allowance_mm: radial depth on the walls.
+        rough_radius_mm: of the rough corner.
+        finish_radius_mm: of the finished corner.
+        interval_mm: length of a block with a feed of its own.
+        corner_begins_at_mm: X.
+        radial_depth_mm: the deepest place.
+        deeper_than_corner: where more is met than the corner has; None: nowhere.
+    """
+
+    allowance_mm: float
+    rough_radius_mm: float
+    finish_radius_mm: float
+    interval_mm: float
+    corner_begins_at_mm: float
+    radial_depth_mm: Deepest
+    deeper_than_corner: DeeperStretch | None
+
+
+@dataclass(frozen=True)
+class IntervalFigures:
+    """What is special about an interval test.
+
+    Attributes:
+        radial_depth_mm: everywhere.
+        intervals_mm: length of the blocks of each pass.
+        steps_begin_at_mm: X of the first change of the feed.
+    """
+
+    radial_depth_mm: float
+    intervals_mm: tuple[_Positive, ...]
+    steps_begin_at_mm: float
+
+
+@dataclass(frozen=True)
+class TestCut:
+    """One test cut, as its side file holds it.
+
+    Attributes:
+        kind: "taper", "corner" or "interval".
+        program: name of the program file; empty before it is written.
+        machine: name of the machine.
+        tool: the end mill.
+        spindle_rev_per_min: clockwise (M03).
+        axial_depth_mm: of every pass.
+        milling: "down": the material is on the right of the feed; "up": on its left.
+        passes: in the order of the program.
+        about: figures of this kind.
+    """
+
+    __test__ = False  # not for pytest, whatever its name
+
+    kind: Literal["taper", "corner", "interval"]
+    program: str
+    machine: str
+    tool: CutTool
+    spindle_rev_per_min: _Positive
+    axial_depth_mm: _Positive
+    milling: Literal["down", "up"]
+    passes: Annotated[tuple[MeasuringPass, ...], Field(min_length=1)]
+    about: TaperFigures | CornerFigures | IntervalFigures
+
+    @property
+    def up(self) -> bool:
+        """Up milling."""
+        return self.milling == "up"
+
+    def data(self) -> dict[str, Any]:
+        """The content of the side file."""
+        return {"format": _FORMAT, **asdict(self)}
+
+
+_FIGURES = {"taper": TaperFigures, "corner": CornerFigures, "interval": IntervalFigures}
+
+
+def read_test_cut(path: str | Path) -> TestCut:
+    """Read the side file of a test cut.
+
+    Args:
+        path: the file.
+
+    Returns:
+        What was cut.
+
+    Raises:
+        ArgumentError: not such a file, or a value in it is missing or impossible.
+        OSError: the file cannot be read.
+    """
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ArgumentError(f"{path}: no JSON: {error}") from error
+    if not isinstance(data, dict) or data.get("format") != _FORMAT:
+        raise ArgumentError(f"{path}: not the side file of a test cut ('format' must be {_FORMAT!r})")
+    try:
+        cut = TypeAdapter(TestCut).validate_python(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        raise ArgumentError(f"{path}: {place}: {first['msg']}: write the test cut again") from error
+    if type(cut.about) is not _FIGURES[cut.kind]:
+        raise ArgumentError(f"{path}: the figures in 'about' are not those of a {cut.kind}: write the test cut again")
+    for number, each in enumerate(cut.passes, start=1):
+        if not each.consistent:
+            raise ArgumentError(
+                f"{path}: pass {number}: edge, feeds and ends do not fit together: write the test cut again"
+            )
+    return cut

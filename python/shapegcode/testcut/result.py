@@ -1,0 +1,413 @@
+"""What the records of a test cut tell: of a taper coefficients, of a corner forces, of an interval test the feed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode.errors import ArgumentError
+from shapegcode.io.atomic import write_text
+from shapegcode.results.json import hidden
+from shapegcode.results.result import Plot, Result
+from shapegcode.results.table import Column, Table
+from shapegcode.testcut.coefficient_fit import Coefficient, CoefficientFit
+from shapegcode.testcut.cut import CuttingLaw, TestCut
+from shapegcode.testcut.force import Expected
+from shapegcode.testcut.mean_forces import MeanForces
+from shapegcode.testcut.revolutions import Revolutions
+
+__all__ = [
+    "ChipRange",
+    "CornerPass",
+    "CornerResult",
+    "FollowedPass",
+    "ForceRatio",
+    "IntervalResult",
+    "LeftOut",
+    "TaperPass",
+    "TaperResult",
+]
+
+Array = npt.NDArray[np.float64]
+
+#: Wider intervals (half of them) are no result to build on.
+EXPONENT_LIMIT, FACTOR_LIMIT = 0.05, 0.10
+#: By how much the measured effect of the feed may differ from the expected one.
+RATIO_LIMIT = 0.10
+
+
+@dataclass(frozen=True)
+class ChipRange:
+    """Mean chip thicknesses of the mean forces.
+
+    Attributes:
+        min: thinnest, mm.
+        max: thickest, mm.
+        middle: geometric mean, mm.
+    """
+
+    min: float
+    max: float
+    middle: float
+
+
+@dataclass(frozen=True)
+class TaperPass:
+    """What the record of one pass showed.
+
+    Attributes:
+        file: where it was read.
+        feed_mm_per_min: between entry and exit.
+        spindle_rev_per_min: as the record shows it, or as commanded.
+        offset_n: force along the feed and to its left that was shown in the air before the cut.
+        drift_n: change of it until after the cut.
+    """
+
+    file: str
+    feed_mm_per_min: float
+    spindle_rev_per_min: float
+    offset_n: tuple[float, float]
+    drift_n: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A stretch with chatter.
+
+    Attributes:
+        number: of the pass, from 1.
+        from_mm: X at its begin.
+        to_mm: X at its end.
+    """
+
+    number: int
+    from_mm: float
+    to_mm: float
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class TaperResult(Result):
+    """Coefficients of the cutting force from the records of a taper.
+
+    Attributes:
+        program: of the test cut.
+        machine: name of the machine.
+        cutting: the table ``[cutting]`` for the tool file.
+        coefficients: each with its interval; the factors are those of a chip 1 mm thick.
+        at_chip: k1 and k2 in the middle of the measured chips, which are known much better.
+        chip_mm: range of the mean chip thickness.
+        mean_forces: how many were fitted to.
+        outliers: how many of them were left out, as their force is not that of the others.
+        rms_n: what the fit leaves of the others, along the feed and to its left.
+        rms_percent: the same, of both, as a share of the resultant.
+        neighbour_correlation: how far neighbours share what the fit leaves, 0 to 1; the intervals allow for it.
+        passes: what the sampled records showed; empty for files with means.
+        left_out: stretches with chatter.
+        poor: coefficients of the power laws that are not known well, in words.
+        warnings: what else the user should know.
+        cut: the test cut.
+        fit: what was fitted, row by row.
+        data: the mean forces.
+        kind: of the test cut.
+    """
+
+    program: str
+    machine: str
+    cutting: CuttingLaw
+    coefficients: tuple[Coefficient, ...]
+    at_chip: tuple[Coefficient, ...]
+    chip_mm: ChipRange
+    mean_forces: int
+    outliers: int
+    rms_n: tuple[float, float]
+    rms_percent: float
+    neighbour_correlation: float
+    passes: tuple[TaperPass, ...]
+    left_out: tuple[LeftOut, ...]
+    poor: tuple[str, ...]
+    warnings: tuple[str, ...]
+    cut: TestCut = field(metadata=hidden())
+    fit: CoefficientFit = field(metadata=hidden())
+    data: MeanForces = field(metadata=hidden())
+    kind: Literal["taper"] = "taper"
+
+    @property
+    def ok(self) -> bool:
+        """Every exponent is known to ±0.05 and every factor to ±10 %, or better."""
+        return not self.poor
+
+    @property
+    def answer(self) -> str:
+        """k1 and k2 in the middle of the chips, and what the law leaves."""
+        k1, k2 = (each.value for each in self.at_chip)
+        chip = self.chip_mm
+        said = (
+            f"k1 {k1:.4g} N/mm² and k2 {k2:.3g} at a chip of {1e3 * chip.middle:.2f} um; {self.mean_forces} mean "
+            f"forces, chips {1e3 * chip.min:.2f} to {1e3 * chip.max:.2f} um thick on average; the law leaves "
+            f"{self.rms_percent:.1f} % of the force"
+        )
+        return "; poor: ".join([said, *self.poor])
+
+    @property
+    def next_step(self) -> str:
+        """To use the coefficients, or to measure more."""
+        if self.poor:
+            return "more passes, with other feeds or a longer stock"
+        return "put [cutting] into the tool file (-o FILE writes it)"
+
+    def tables(self) -> list[Table]:
+        """One row for each coefficient."""
+        chip = f" at a chip of {1e3 * self.chip_mm.middle:.2f} um"
+        rows = [(each.name, each) for each in self.coefficients]
+        rows += [(name + chip, each) for name, each in zip(("k1", "k2"), self.at_chip, strict=True)]
+        columns = (
+            Column("key", value=lambda row: row[0], text=True),
+            Column("value", value=lambda row: f"{row[1].value:.4g}"),
+            Column("95 % interval", value=lambda row: f"{row[1].low:.4g} ... {row[1].high:.4g}"),
+            Column("unit", value=lambda row: row[1].unit, text=True),
+        )
+        return [Table("coefficients of the cutting force", columns, rows)]
+
+    def plots(self) -> Mapping[str, Plot]:
+        """`testcut-forces`: measured and fitted; `testcut-coefficients`: over the chip thickness."""
+        return self._drawn_beside()
+
+    def to_toml(self) -> str:
+        """The table ``[cutting]`` for a tool file, with the intervals as comments."""
+        tool = self.cut.tool
+        lines = [
+            "[cutting]",
+            f"# measured: taper {self.program} on {self.machine}, D{tool.diameter_mm:g} with {tool.flutes} flutes, "
+            f"{self.cut.spindle_rev_per_min:g} rev/min",
+            f"# holds for chips {self.chip_mm.min:.4f} to {self.chip_mm.max:.4f} mm thick on average",
+        ]
+        for each in self.coefficients:
+            unit = f" {each.unit}" if each.unit else ""
+            lines.append(f"{each.name} = {each.value:.6g}  # 95 %: {each.low:.5g} to {each.high:.5g}{unit}")
+        return "\n".join([*lines, f'chip_thickness = "{self.cutting.chip_thickness}"']) + "\n"
+
+    def write_cutting(self, path: str | Path) -> None:
+        """Write the table ``[cutting]`` into a file of its own.
+
+        Args:
+            path: the file.
+
+        Raises:
+            ArgumentError: the file holds more than that, which would be lost.
+            OSError: the file cannot be written.
+        """
+        refuse_whole_tool_file(path)
+        write_text(path, self.to_toml())
+
+
+def refuse_whole_tool_file(path: str | Path) -> None:
+    """Refuse to write the table [cutting] over a file that holds more than that.
+
+    Raises:
+        ArgumentError: it does.
+    """
+    import tomllib
+
+    try:
+        more = sorted(set(tomllib.loads(Path(path).read_text(encoding="utf-8"))) - {"cutting"})
+    except (OSError, ValueError):  # not there, or nothing of ours
+        return
+    if more:
+        raise ArgumentError(
+            f"{path}: holds more than [cutting] ({', '.join(more)}), which would be lost: name another file and "
+            "put its table into this one"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class CornerPass:
+    """Largest resultant of a pass within the stock, mean over a revolution and momentary.
+
+    Attributes:
+        number: of the pass, from 1.
+        measured_mean_n: largest mean, as recorded.
+        measured_peak_n: largest magnitude, as recorded.
+        expected_mean_n: largest mean of the force law.
+        expected_peak_n: largest magnitude of the force law.
+        record: what was recorded, by revolution.
+        hoped: what the force law lets expect.
+    """
+
+    number: int
+    measured_mean_n: float
+    measured_peak_n: float
+    expected_mean_n: float
+    expected_peak_n: float
+    record: Revolutions = field(metadata=hidden())
+    hoped: Expected = field(metadata=hidden())
+
+
+@dataclass(frozen=True)
+class ForceRatio:
+    """Largest mean resultant with the modified feed over that with the constant one.
+
+    Attributes:
+        measured: as recorded.
+        expected: of the force law.
+    """
+
+    measured: float
+    expected: float
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class CornerResult(Result):
+    """Measured against expected resultant of the passes of an unrolled corner.
+
+    Attributes:
+        program: of the test cut.
+        machine: name of the machine.
+        peaks: of the passes, in the order of their files.
+        ratio: what the modified feed does; None: only one of the two passes was recorded.
+        scale: measured over expected mean resultant of the first pass: how far the coefficients are off.
+        warnings: what else the user should know.
+        kind: of the test cut.
+    """
+
+    program: str
+    machine: str
+    peaks: tuple[CornerPass, ...]
+    ratio: ForceRatio | None
+    scale: float
+    warnings: tuple[str, ...]
+    kind: Literal["corner"] = "corner"
+
+    @property
+    def ok(self) -> bool:
+        """The feed changes the largest resultant as much as expected, within 10 %."""
+        return self.ratio is None or abs(self.ratio.measured / self.ratio.expected - 1.0) <= RATIO_LIMIT
+
+    @property
+    def answer(self) -> str:
+        """Scale and ratio."""
+        said = f"the measured resultant is {self.scale:.2f} times the expected one where the feed is constant"
+        if self.ratio is None:
+            return said
+        return (
+            f"{said}; largest mean resultant after over before: measured {self.ratio.measured:.2f}, expected "
+            f"{self.ratio.expected:.2f}"
+        )
+
+    @property
+    def next_step(self) -> str:
+        """The test cut that tells more."""
+        if abs(self.scale - 1.0) > RATIO_LIMIT:
+            return "shapegcode testcut taper measures the coefficients"
+        return "shapegcode testcut interval shows how often the feed may change"
+
+    def tables(self) -> list[Table]:
+        """One row for each pass."""
+        columns = (
+            Column("pass", value="number"),
+            Column("measured mean", value="measured_mean_n", digits=1),
+            Column("expected mean", value="expected_mean_n", digits=1),
+            Column("measured peak", value="measured_peak_n", digits=1),
+            Column("expected peak", value="expected_peak_n", digits=1),
+        )
+        return [Table("largest resultant, N", columns, self.peaks)]
+
+    def plots(self) -> Mapping[str, Plot]:
+        """`testcut-corner`: resultants along each pass, measured and expected."""
+        return self._drawn_beside()
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedPass:
+    """How the controller followed the feeds of one pass.
+
+    Attributes:
+        number: of the pass, from 1.
+        interval_mm: length of its blocks.
+        deviation: largest |measured - commanded| force at the end of a block, as a share of commanded.
+        at_mm: X of the end of that block.
+        noise: standard deviation of such a mean where the feed does not change, as a share of it.
+        lag_s: time constant with which the feed follows best.
+        ok: whether it is followed: the deviation is within 5 % and twice the noise.
+        time_s: (m,) of the record.
+        force_n: (m,) mean over a revolution, scaled to what is expected on the straight part.
+        immediate_n: (m,) expected if the feed follows at once.
+        lagging_n: (m,) expected with the lag.
+    """
+
+    number: int
+    interval_mm: float
+    deviation: float
+    at_mm: float
+    noise: float
+    lag_s: float
+    ok: bool
+    time_s: Array = field(metadata=hidden())
+    force_n: Array = field(metadata=hidden())
+    immediate_n: Array = field(metadata=hidden())
+    lagging_n: Array = field(metadata=hidden())
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class IntervalResult(Result):
+    """From which interval on the controller follows the commanded feeds.
+
+    Attributes:
+        program: of the test cut.
+        machine: name of the machine.
+        interval_mm: shortest interval from which on all measured ones are followed; None: none is.
+        lag_interval_mm: way in which 90 % of a step are done with the median lag, at the largest feed.
+        passes: of the measured ones, by interval.
+        warnings: what else the user should know.
+        kind: of the test cut.
+    """
+
+    program: str
+    machine: str
+    interval_mm: float | None
+    lag_interval_mm: float
+    passes: tuple[FollowedPass, ...]
+    warnings: tuple[str, ...]
+    kind: Literal["interval"] = "interval"
+
+    @property
+    def ok(self) -> bool:
+        """An interval is followed."""
+        return self.interval_mm is not None
+
+    @property
+    def answer(self) -> str:
+        """The interval, or how long a step needs."""
+        if self.interval_mm is None:
+            return (
+                "no measured interval is followed; 90 % of a step need about "
+                f"{self.lag_interval_mm:.2f} mm at the largest feed"
+            )
+        return f"the controller follows from {self.interval_mm:g} mm on"
+
+    @property
+    def next_step(self) -> str:
+        """To set the interval, or to try longer ones."""
+        if self.interval_mm is None:
+            return "shapegcode testcut interval --intervals with longer ones"
+        return f"set feed_control.interval_mm = {self.interval_mm} in the machine file"
+
+    def tables(self) -> list[Table]:
+        """One row for each pass."""
+        columns = (
+            Column("interval", "mm", value=lambda each: f"{each.interval_mm:g}"),
+            Column("largest deviation", value=lambda each: f"{100 * each.deviation:.0f} %"),
+            Column("at X", "mm", "at_mm", digits=2),
+            Column("noise", value=lambda each: f"{100 * each.noise:.1f} %"),
+            Column("lag", "ms", lambda each: f"{1e3 * each.lag_s:.0f}"),
+            Column("follows", value=lambda each: "yes" if each.ok else "no"),
+        )
+        return [Table("how the feed is followed", columns, self.passes)]
+
+    def plots(self) -> Mapping[str, Plot]:
+        """`testcut-interval`: resultant over time, measured, at the commanded feeds and with the lag."""
+        return self._drawn_beside()
