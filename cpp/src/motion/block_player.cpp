@@ -53,9 +53,17 @@ void BlockPlayer::find_crowds() {
     }
     return sum;
   };
+  // Most programs have no crowd, and most groups are seen to be none by their first block.
+  const auto is_crowd = [this](std::size_t first) {
+    double sum = 0.0;
+    for (std::size_t i = first; i < first + group_size && sum <= period_s_; ++i) {
+      sum += block_duration_s(blocks_[i]);
+    }
+    return sum <= period_s_;
+  };
   bool crowded = false;
   for (std::size_t first = 0; first + group_size <= blocks_.size() && !crowded; first += group_size) {
-    crowded = duration_of(first) <= period_s_;
+    crowded = is_crowd(first);
   }
   if (!crowded) {
     return;
