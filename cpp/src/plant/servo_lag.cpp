@@ -23,11 +23,15 @@ ServoLag::ServoLag(const Vector3& position_gain_per_s, const Vector3& feed_forwa
 void ServoLag::reset(const Vector3& position) noexcept {
   setpoint_ = position;
   error_mm_ = Vector3::Zero();
+  row_ = 0;
 }
 
 Vector3 ServoLag::step(const Vector3& setpoint) noexcept {
   error_mm_ = decay_.cwiseProduct(error_mm_) + share_.cwiseProduct(setpoint - setpoint_);
-  for (double& error : error_mm_) error = state_or_none(error);
+  // Not in every period: errors written one by one keep the next step waiting, which reads them together.
+  if (++row_ % rows_between_looks == 0) {
+    for (double& error : error_mm_) error = state_or_none(error);
+  }
   setpoint_ = setpoint;
   return setpoint - error_mm_;
 }

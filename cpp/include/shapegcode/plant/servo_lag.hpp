@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <span>
 
 #include "shapegcode/samples.hpp"
@@ -32,6 +33,7 @@ class ServoLag {
   Vector3 share_;  // of an increment that becomes error
   Vector3 setpoint_ = Vector3::Zero();
   Vector3 error_mm_ = Vector3::Zero();
+  std::int64_t row_ = 0;  // set-points since reset()
 };
 
 }  // namespace shapegcode
