@@ -95,9 +95,11 @@ void Interpreter::data_work_offset(int coordinate_system, int number) {
 void Interpreter::set_work_offset(int coordinate_system, int number, int axis, double value_mm, bool incremental) {
   const auto i = static_cast<std::size_t>(axis);
   const std::optional<double> before = offsets_.work(coordinate_system, number)[i];
-  std::optional<double> after = value_mm;
-  if (incremental) {
-    after = before ? std::optional<double>(*before + value_mm) : std::nullopt;
+  std::optional<double> after;
+  if (!incremental) {
+    after = value_mm;
+  } else if (before) {
+    after = *before + value_mm;
   }
   if (coordinate_system == state_.coordinate_system && number == state_.coordinate_number) {
     if (incremental) {
