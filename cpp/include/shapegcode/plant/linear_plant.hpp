@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 
 #include <Eigen/Core>
@@ -78,6 +79,7 @@ class LinearPlant {
   Eigen::VectorXd joint_;        // x, u of the last sample, u of the next
   Eigen::VectorXd next_;         // x under construction
   Eigen::VectorXd output_;
+  std::int64_t row_ = 0;  // samples since reset()
 };
 
 }  // namespace shapegcode
