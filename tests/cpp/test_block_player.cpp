@@ -1,10 +1,12 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <random>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -255,5 +257,19 @@ TEST_CASE("block player: thousands of blocks that end within one period are pass
               doctest::Approx(ended ? blocks.back().end_mm.x() : blocks[block].start_mm.x() + expected).epsilon(1e-9));
       }
     }
+  }
+}
+
+TEST_CASE("block player: into memory of the caller's, the same set-points") {
+  const std::vector<Segment> blocks = row_of_lines({1.0, 0.4, 2.0}, {10.0, 20.0, 30.0});
+  BlockPlayer player(blocks, 0.01, BlockEnd::ceil);
+  BlockPlayer other(blocks, 0.01, BlockEnd::ceil);
+  Vector3 position;
+  std::array<double, 3> out{};
+  bool moving = true;
+  while (moving) {
+    moving = player.step(position);
+    CHECK(other.step(std::span<double>(out)) == moving);
+    CHECK(Vector3(out[0], out[1], out[2]) == position);
   }
 }

@@ -1,11 +1,13 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <numbers>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "shapegcode/error.hpp"
@@ -211,5 +213,20 @@ TEST_CASE("interpolator: a delay is rest at the start, also of part of a period"
     CHECK(worst < 1e-12);
     CHECK(!interpolator.step(position));
     CHECK(position == Vector3(1.0 + length, 2.0, 3.0));
+  }
+}
+
+TEST_CASE("interpolator: into memory of the caller's, the same set-points") {
+  const PathPointer path = line_and_arc();
+  const ProfilePointer profile = std::make_shared<const SpeedProfile>(plan_speed(*path, shapegcode::MotionLimits{}));
+  Interpolator player(path, profile, 0.004);
+  Interpolator other(path, profile, 0.004);
+  Vector3 position;
+  std::array<double, 3> out{};
+  bool moving = true;
+  while (moving) {
+    moving = player.step(position);
+    CHECK(other.step(std::span<double>(out)) == moving);
+    CHECK(Vector3(out[0], out[1], out[2]) == position);
   }
 }

@@ -1,7 +1,9 @@
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
 #include <random>
+#include <span>
 
 #include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
@@ -111,4 +113,17 @@ TEST_CASE("rapid: set-points end in the end, and go on giving it") {
   CHECK_FALSE(player.step(position));
   const Samples none = rapid_samples({4.0, 4.0, 4.0}, {4.0, 4.0, 4.0}, model);
   CHECK(none.positions_mm.rows() == 1);
+}
+
+TEST_CASE("rapid: into memory of the caller's, the same set-points") {
+  RapidPlayer player({0.0, 1.0, 2.0}, {10.0, -5.0, 2.0}, paper_machine());
+  RapidPlayer other = player;
+  Vector3 position;
+  std::array<double, 3> out{};
+  bool moving = true;
+  while (moving) {
+    moving = player.step(position);
+    CHECK(other.step(std::span<double>(out)) == moving);
+    CHECK(Vector3(out[0], out[1], out[2]) == position);
+  }
 }

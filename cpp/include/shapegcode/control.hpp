@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -43,12 +42,7 @@ class BlockPlayer {
   /// over already or does not exist.
   void pause_after(std::size_t block, double seconds);
   /// Next set-point, X, Y and Z, the start first; false once the end was given.
-  bool step(std::span<double> out) noexcept {
-    Vector3 position = Vector3::Zero();
-    const bool moving = step(position);
-    std::copy_n(position.data(), axis_count, out.begin());
-    return moving;
-  }
+  bool step(std::span<double> out) noexcept { return step_into(out, *this); }
   bool step(Vector3& position) noexcept;
   /// Block on which the set-point last given lies.
   [[nodiscard]] std::size_t block() const noexcept { return block_; }
@@ -194,12 +188,7 @@ class RapidPlayer {
   /// Throws Error(argument) on a model that `check` refuses.
   RapidPlayer(const Vector3& start_mm, const Vector3& end_mm, const ControllerModel& model);
   /// Next set-point, X, Y and Z; false once the end was given.
-  bool step(std::span<double> out) noexcept {
-    Vector3 position = Vector3::Zero();
-    const bool moving = step(position);
-    std::copy_n(position.data(), axis_count, out.begin());
-    return moving;
-  }
+  bool step(std::span<double> out) noexcept { return step_into(out, *this); }
   bool step(Vector3& position) noexcept;
   /// Periods from rest to rest.
   [[nodiscard]] int period_count() const noexcept { return count_; }

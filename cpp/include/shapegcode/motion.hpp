@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -134,12 +133,7 @@ class Interpolator {
                double delay_s = 0.0);
 
   /// Next set-point, X, Y and Z. False once the last set-point was given; it then stays at the end.
-  bool step(std::span<double> out) noexcept {
-    Vector3 position = Vector3::Zero();
-    const bool moving = step(position);
-    std::copy_n(position.data(), axis_count, out.begin());
-    return moving;
-  }
+  bool step(std::span<double> out) noexcept { return step_into(out, *this); }
   bool step(Vector3& position) noexcept;
   /// Distance along the path at the set-point last given.
   [[nodiscard]] double distance_mm() const noexcept { return distance_mm_; }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <span>
 
 #include <Eigen/Core>
@@ -15,6 +16,15 @@ using Vector3 = Eigen::Vector3d;
 [[nodiscard]] inline std::span<double> values_of(Vector3& position) noexcept { return {position.data(), axis_count}; }
 [[nodiscard]] inline std::span<const double> values_of(const Vector3& position) noexcept {
   return {position.data(), axis_count};
+}
+
+/// `step` of a player of positions into memory of the caller's: X, Y and Z.
+template <class Player>
+bool step_into(std::span<double> out, Player& player) noexcept {
+  Vector3 position = Vector3::Zero();
+  const bool moving = player.step(position);
+  std::copy_n(position.data(), axis_count, out.begin());
+  return moving;
 }
 
 /// The currency between stages: positions in mm, one row per period, one contiguous column per axis.
