@@ -297,6 +297,9 @@ def test_without_a_period_continuous_times_and_the_best_grids() -> None:
 def test_a_machine_gives_modes_bands_and_grids() -> None:
     machine = sg.Machine.load("vx500")
     result = sg.choose_shaper(machine=machine, families=[*FEW, "si"])
+    assert result.machine == "VX500"
+    assert "-m VX500 --shaper" in result.next_step
+    assert repr(result) == f"<Recommendation: {result.answer}>"
     assert [band.mode for band in result.modes] == [Mode(46.0, 0.02), Mode(131.0, 0.02)]
     exact = next(each for each in result.designs if each.family == "non-negative")
     assert exact.period_s == pytest.approx(0.005)

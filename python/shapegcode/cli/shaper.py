@@ -14,7 +14,7 @@ from shapegcode.cli.options import (
     ratio,
     seconds,
     share,
-)
+)  # fmt: skip
 
 __all__ = ["add_arguments", "run"]
 
@@ -33,95 +33,60 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Exit code 0: it stays within the vibration limit; 1: the best one does not; 2: bad input."
     )
     parser.epilog = "example: shapegcode shaper --mode 46:0.02±5% --mode 131:0.02 --block-period 5ms"
-    parser.add_argument(
-        "--mode",
-        metavar="HZ[:DAMPING][±BAND]",
-        action="append",
-        default=[],
+    add = parser.add_argument
+    add(
+        "--mode", metavar="HZ[:DAMPING][±BAND]", action="append", default=[],
         help="a mode to cancel, such as 46:0.02±5%% or 46:0.02+-2Hz, from 0.1 to 10000 Hz; once for each mode",
-    )
+    )  # fmt: skip
     add_machine_argument(parser, required=False)
-    parser.add_argument(
-        "--uncertainty",
-        metavar="RATIO",
-        type=share,
-        default=0.0,
+    add(
+        "--uncertainty", metavar="RATIO", type=share, default=0.0,
         help="how far the frequency of a mode that states no band may be off, for example 5%% (default: 0)",
-    )
-    parser.add_argument(
-        "--block-period",
-        metavar="TIME",
-        type=seconds,
-        action="append",
-        default=[],
+    )  # fmt: skip
+    add(
+        "--block-period", metavar="TIME", type=seconds, action="append", default=[],
         help="block period on which the taps must lie, for example 5ms; may be repeated (default: the machine's, or "
         "the best few)",
-    )
-    parser.add_argument(
-        "--continuous",
-        action="store_true",
+    )  # fmt: skip
+    add(
+        "--continuous", action="store_true",
         help="designs at continuous times, with --block-period beside those on its grid (default: without a machine)",
-    )
-    parser.add_argument(
-        "--family",
-        metavar="NAME",
-        action="extend",
-        nargs="+",
-        default=None,
-        help=f"compare only these families, of {', '.join(_FAMILIES)} (default: all)",
-    )
-    parser.add_argument(
+    )  # fmt: skip
+    families = f"compare only these families, of {', '.join(_FAMILIES)} (default: all)"
+    add("--family", metavar="NAME", action="extend", nargs="+", default=None, help=families)
+    add(
         "--list-families", action="store_true", help="say what each family is and where it comes from, and nothing else"
     )
-    parser.add_argument(
-        "--max-duration",
-        metavar="TIME",
-        type=seconds,
-        default=None,
+    add(
+        "--max-duration", metavar="TIME", type=seconds, default=None,
         help="longest shaper, for example 50ms (default: three periods of the slowest mode; the machine's limit if "
         "that is not enough)",
-    )
-    parser.add_argument(
-        "--max-abs-sum",
-        metavar="N",
-        type=positive,
-        default=10.0,
+    )  # fmt: skip
+    add(
+        "--max-abs-sum", metavar="N", type=positive, default=10.0,
         help="largest sum of the taps' magnitudes (default: %(default)g)",
-    )
-    parser.add_argument(
-        "--vibration-limit",
-        metavar="RATIO",
-        type=ratio,
-        default=None,
+    )  # fmt: skip
+    add(
+        "--vibration-limit", metavar="RATIO", type=ratio, default=None,
         help="largest share of the vibration that may be left anywhere in the bands (default: the machine's "
         "shaping.vibration_limit, else 5%%)",
-    )
-    parser.add_argument(
-        "--objective",
-        choices=("shortest", "contour", "robust"),
-        default="shortest",
+    )  # fmt: skip
+    add(
+        "--objective", choices=("shortest", "contour", "robust"), default="shortest",
         help="what is least in the design to take, within the limit: duration, contour cost, or what is left of the "
         "vibration (default: %(default)s)",
-    )
-    parser.add_argument("--negative", action="store_true", help="a design with negative taps may be recommended")
-    parser.add_argument(
-        "--taps", metavar="TIME:A,...", default=None, help='compare a shaper of your own: "0:.5,10.9ms:.5"'
-    )
-    parser.add_argument(
-        "--speed",
-        metavar="MM/S",
-        type=positive,
-        default=200.0,
+    )  # fmt: skip
+    add("--negative", action="store_true", help="a design with negative taps may be recommended")
+    add("--taps", metavar="TIME:A,...", default=None, help='compare a shaper of your own: "0:.5,10.9ms:.5"')
+    add(
+        "--speed", metavar="MM/S", type=positive, default=200.0,
         help="speed at which the contour cost is shown (default: %(default)g)",
-    )
-    parser.add_argument(
-        "--radius",
-        metavar="MM",
-        type=positive,
-        default=20.0,
+    )  # fmt: skip
+    add(
+        "--radius", metavar="MM", type=positive, default=20.0,
         help="radius of the arc on which it is shown (default: %(default)g)",
-    )
-    parser.add_argument("--all", action="store_true", help="show every design in the table")
+    )  # fmt: skip
+    add("--all", action="store_true", help="show every design in the table")
     add_plots_argument(parser, "write pictures of the comparison (PNG and SVG) into this folder")
     add_json_argument(parser)
 

@@ -6,6 +6,7 @@ import contextlib
 import math
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
@@ -90,10 +91,11 @@ def choose_shaper(
         if kinds is None:
             best = candidate_periods(bands, machine, longest_s, limit)
             kinds = best if machine is not None else [None, *best]
-        return choose(
+        result = choose(
             bands, kinds, options, families=families, objective=objective, allow_negative=allow_negative,
             on_progress=on_progress,
         )  # fmt: skip
+        return result if modes or machine is None else replace(result, machine=machine.name)
 
     if max_duration_s is not None:
         return compared(max_duration_s)

@@ -50,7 +50,7 @@ class Recommendation(Result):
         vibration_limit: largest worst residual ratio of the design to take.
         max_duration_s: longest shaper that was looked for, s.
         max_abs_sum: largest sum of the taps' magnitudes.
-        machine: whose modes they are, as `convert -m` takes it; null: the modes were given.
+        machine: whose modes they are: its name, of the command as -m names it; None: the modes were given.
         warnings: none as a rule.
     """
 
