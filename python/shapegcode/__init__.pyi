@@ -82,7 +82,11 @@ from shapegcode.feed.survey import (
     survey as survey,
 )
 from shapegcode.identification.identify import identify as identify
+from shapegcode.identification.mode import Estimate as Estimate, IdentifiedMode as IdentifiedMode
+from shapegcode.identification.plan import tap_plan as tap_plan
+from shapegcode.identification.plan_result import TapPlan as TapPlan
 from shapegcode.identification.result import Identification as Identification
+from shapegcode.identification.update import MachineUpdate as MachineUpdate, update_machine as update_machine
 from shapegcode.io.read import ReadOptions as ReadOptions
 from shapegcode.io.record import Record as Record
 from shapegcode.machine import Machine as Machine

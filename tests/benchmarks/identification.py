@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracles"))
 
 from table import markdown
 
-from shapegcode.identification.fit import identify
+from shapegcode.identification.identify import identify
 from shapegcode.identification.mode import Estimate, IdentifiedMode
 from tap_truth import TrueMode, random_modes, tap
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 from scipy import signal
@@ -20,10 +22,12 @@ from shapegcode.identification.checks import (
 )
 from shapegcode.identification.hits import find_hits
 from shapegcode.identification.plan import rapid_stop_program, recording_for, tap_plan
+from shapegcode.identification.plan_result import TapPlan
 from shapegcode.identification.spectra import decay_spectrum, envelope, frf, mode_envelopes
 from shapegcode.io.record import FloatArray, Record
 from shapegcode.machine import Machine
 from shapegcode.program import Program
+from shapegcode.results.json import schema, to_text
 from shapegcode.timing.cycle_time import cycle_time
 
 RATE = 5000.0
@@ -439,7 +443,7 @@ def test_the_envelopes_fall_as_the_modes_do() -> None:
 
 def test_a_record_as_planned_passes() -> None:
     for modes in ((), ((46.0, 0.02),), ((131.0, 0.02), (20.0, 0.05)), ((1195.0, 0.013),)):
-        how = recording_for(modes)
+        how = recording_for("X", modes)
         lead = round(how.pre_trigger_s * how.samples_per_s)
         count = lead + round(how.duration_s * how.samples_per_s)
         force = half_sine(count, lead, round(how.pulse_s * how.samples_per_s), 300.0)
@@ -451,14 +455,21 @@ def test_a_record_as_planned_passes() -> None:
 def test_the_plan_speaks_of_the_machine() -> None:
     machine = Machine.load("vx500")
     plan = tap_plan(machine)
-    assert plan.startswith("TAP TEST OF VX500")
-    assert "46 Hz" in plan
-    assert "131 Hz" in plan
-    assert "G00 X120." in plan, "twice the way in which a rapid of 24 m/min is reached in 0.15 s"
-    assert max(len(line) for line in plan.splitlines()) <= 110
-    assert "TAP TEST OF A MACHINING CENTRE" in tap_plan()
+    assert "tap test of VX500" in plan.answer
+    assert [(row.axis, row.modes_hz) for row in plan.recordings] == [("X", (46.0,)), ("Y", (131.0,)), ("Z", ())]
+    assert [stop.axis for stop in plan.stops] == ["X", "Y", "Z"]
+    assert plan.stops[0].distance_mm == 120.0, "twice the way in which a rapid of 24 m/min is reached in 0.15 s"
+    assert plan.stops[0].program == rapid_stop_program("X", 120.0, plan.stops[0].dwell_s)
+    assert "G00 X120." in plan.instructions
+    assert max(len(line) for line in plan.instructions.splitlines()) <= 80
+    (table,) = plan.tables()
+    assert max(len(line) for line in str(table).splitlines()) <= 80
     for text in ("double hit", "overload", "pre-trigger", "coherence", "time_s,force_N,acc_x_m/s^2"):
-        assert text in plan.lower() or text in plan
+        assert text in plan.instructions.lower() or text in plan.instructions
+    other = tap_plan()
+    assert (other.machine, [row.axis for row in other.recordings]) == (None, ["X Y Z"])
+    for each in (plan, other):
+        jsonschema.validate(json.loads(to_text(each.to_dict())), schema(TapPlan))
 
 
 @pytest.mark.parametrize("axis", ["X", "Y", "Z"])

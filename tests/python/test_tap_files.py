@@ -113,10 +113,10 @@ def test_every_dialect_reads_the_same(name: str, tmp_path: Path) -> None:
 
 
 def test_a_preamble_is_counted(tmp_path: Path) -> None:
-    (note,) = only(read(tmp_path, DIALECTS["logger"])).warnings
-    assert note.startswith("note: ")
+    (note,) = only(read(tmp_path, DIALECTS["logger"])).notes
     assert note.endswith(".csv: 4 lines before the header in line 5 left out")
-    assert not only(read(tmp_path, DIALECTS["plain"])).warnings
+    assert not only(read(tmp_path, DIALECTS["logger"])).warnings
+    assert not only(read(tmp_path, DIALECTS["plain"])).notes
 
 
 @pytest.mark.parametrize(
@@ -393,7 +393,7 @@ def test_times_of_the_day(tmp_path: Path) -> None:
     record = only(read(tmp_path, text, period_s=5e-4))
     assert (record.period_s, record.start_s, record.axis) == (5e-4, 0.0, "y")
     np.testing.assert_array_equal(record.response, np.arange(COUNT) + 0.5)
-    assert any("the stated period of 0.0005 s is taken" in text for text in record.warnings)
+    assert any("the stated period of 0.0005 s is taken" in text for text in record.notes)
 
 
 @pytest.mark.parametrize("name", BAD)

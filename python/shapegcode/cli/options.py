@@ -249,6 +249,23 @@ def seconds(text: str) -> float:
     return _with_unit(text, "time", _TIME_UNITS, "5ms")
 
 
+def start_time(text: str) -> float:
+    """A time with its unit, or 0, which needs none."""
+    return 0.0 if text in ("0", "0s", "0ms") else seconds(text)
+
+
+def frequency_band(text: str) -> tuple[float, float]:
+    """Two frequencies in Hz such as ``20:400``, ascending."""
+    low, _, high = text.partition(":")
+    try:
+        band = float(low), float(high)
+    except ValueError:
+        band = math.nan, math.nan
+    if not 0.0 <= band[0] < band[1] < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be two frequencies in Hz, for example 20:400")
+    return band
+
+
 def micrometres(text: str) -> float:
     """A length with its unit, such as ``5um`` or ``0.005mm``, in µm.
 
@@ -313,6 +330,14 @@ def positive(text: str) -> float:
     value = number(text)
     if not (math.isfinite(value) and value > 0.0):
         raise argparse.ArgumentTypeError(f"{text!r}: must be above 0")
+    return value
+
+
+def nonzero(text: str) -> float:
+    """A number other than 0."""
+    value = number(text)
+    if not math.isfinite(value) or value == 0.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a number other than 0")
     return value
 
 

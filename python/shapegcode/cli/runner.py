@@ -28,7 +28,7 @@ __all__ = ["check_files", "finish", "progress"]
 
 # Options that name a file which a command reads, and those that name one which it writes.
 _READ = (
-    "input", "inputs", "machine", "tool", "stock", "against", "records", "cut", "update", "dump", "base",
+    "input", "inputs", "files", "machine", "tool", "stock", "against", "records", "cut", "update", "dump", "base",
 )  # fmt: skip
 _WRITTEN = ("output", "json", "csv", "npz")
 

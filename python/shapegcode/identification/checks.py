@@ -10,6 +10,7 @@ import numpy as np
 from shapegcode.errors import RecordError
 from shapegcode.identification.decay import find_decay
 from shapegcode.identification.hits import Hit, find_hits, split_hits
+from shapegcode.identification.prepared import Prepared, Refused
 from shapegcode.identification.quality import DECAYED, excited_hz, is_clipped, refuse_short
 from shapegcode.io.record import UNITS, FloatArray, Record
 
@@ -51,42 +52,6 @@ _OFFSET_TOLD = 0.05
 _OPPOSED = -0.7
 #: Sampling periods may differ by this share: a file of six digits is off by less than a sample in a whole record.
 _SAME_PERIOD = 1e-5
-
-
-@dataclass(frozen=True)
-class Refused:
-    """A record that is not used.
-
-    Attributes:
-        source: which.
-        reason: what was found and what is needed.
-    """
-
-    source: str
-    reason: str
-
-
-@dataclass(frozen=True, eq=False)
-class Prepared:
-    """Records that can be used, and what is known of them; tuples have one entry per record.
-
-    Attributes:
-        records: without offset; the force is 0 outside the pulse; a free decay from where it begins.
-        refused: the others.
-        warnings: what the user should know.
-        force_noise_n: RMS noise of the force off the pulse; None: no force.
-        response_noise: RMS noise of the response before the hit, in its unit; None: not measured.
-        excited_hz: frequency up to which the force excites (-20 dB); None: no force.
-        hits: the pulse; None: no force.
-    """
-
-    records: tuple[Record, ...]
-    refused: tuple[Refused, ...]
-    warnings: tuple[str, ...]
-    force_noise_n: tuple[float | None, ...]
-    response_noise: tuple[float | None, ...]
-    excited_hz: tuple[float | None, ...]
-    hits: tuple[Hit | None, ...]
 
 
 def _mean_to_remove(values: FloatArray) -> float:
@@ -272,6 +237,7 @@ def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s:
         raise RecordError("no record: needed is at least one tap or decay")
     _refuse_mixture(records)
     warnings = list(dict.fromkeys(text for record in records for text in record.warnings))
+    notes = tuple(dict.fromkeys(text for record in records for text in record.notes))
     usable: list[_Usable] = []
     refused: list[Refused] = []
     for record in (part for each in records for part in split_hits(each)):
@@ -288,6 +254,7 @@ def prepare(records: Sequence[Record], *, band_hz: float | None = None, start_s:
         records=tuple(each.record for each in usable),
         refused=tuple(refused),
         warnings=tuple(warnings),
+        notes=notes,
         force_noise_n=tuple(each.force_noise_n for each in usable),
         response_noise=tuple(each.response_noise for each in usable),
         excited_hz=tuple(each.excited_hz for each in usable),

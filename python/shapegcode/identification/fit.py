@@ -12,12 +12,11 @@ from scipy.signal import resample_poly
 from shapegcode import _core
 from shapegcode.errors import RecordError
 from shapegcode.identification.chart import stabilisation_chart
-from shapegcode.identification.checks import Prepared, prepare
+from shapegcode.identification.checks import Prepared
 from shapegcode.identification.mode import IdentifiedMode
 from shapegcode.identification.model_search import Fit, Search, Starts, chart_poles, evidence_of, search, starts_of
-from shapegcode.identification.result import Identification
+from shapegcode.identification.result import Identification, MassCheck
 from shapegcode.identification.support import (
-    ACCEPTED_PERCENT,
     LEAST_SWINGS,
     Doubts,
     estimates_of,
@@ -25,11 +24,10 @@ from shapegcode.identification.support import (
     refusal_of,
     rivals_of,
 )
-from shapegcode.io.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 
-__all__ = ["ACCEPTED_PERCENT", "identify"]
+__all__ = ["find_modes"]
 
 _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which they are not taken for white
 _HIGHEST_SHARE = 0.45  # of the sampling rate: the force between samples is known up to there
@@ -122,40 +120,37 @@ class _Decays:
         return replace(self, responses=[self.responses[index]])
 
 
-def identify(
-    records: Sequence[Record],
+def find_modes(
+    ready: Prepared,
+    files: tuple[str, ...],
     *,
-    band_hz: tuple[float, float] | None = None,
-    most_modes: int = 8,
-    modes: int | None = None,
-    accepted_percent: float = ACCEPTED_PERCENT,
-    prepared: Prepared | None = None,
+    band_hz: tuple[float, float] | None,
+    most_modes: int,
+    modes: int | None,
+    accepted_percent: float,
 ) -> Identification:
-    """Find the modes that one or several records of the same point support.
+    """Find the modes that checked records of the same point support; see `identify.identify`.
 
     Args:
-        records: taps (all with force) or free decays (all without), of the same quantity and sampling period.
+        ready: taps (all with force) or free decays (all without), of the same quantity and sampling period.
+        files: where they come from.
         band_hz: look for modes in this band only; None: from two swings per record to .45 of the sampling rate.
         most_modes: largest number of modes of a model.
         modes: number of modes; None: chosen by evidence.
         accepted_percent: a mode is refused whose damping ratio or stiffness is less certain than this (95 %).
-        prepared: the same records checked already; None: they are checked here.
 
     Returns:
         The modes, those refused and why, and how well they fit.
 
     Raises:
-        RecordError: no record can be used, or they do not belong together; the message says what is needed.
+        RecordError: a band beyond half the sampling rate, or more modes than the records hold.
     """
-    ready = prepare(records) if prepared is None else prepared
-    if not ready.records:
-        raise RecordError("; ".join(f"{refused.source}: {refused.reason}" for refused in ready.refused))
     problem = _problem(ready, band_hz)
     models = _search(problem, most_modes, modes)
     others: list[Fit] = []
     if isinstance(problem, _Taps) and models.fits:
         problem, models, others = _held(problem, models, most_modes, modes)
-    return _result(ready, problem, models, modes or models.order, others, accepted_percent)
+    return _result(ready, files, problem, models, modes or models.order, others, accepted_percent)
 
 
 def _held(problem: _Taps, models: Search, most_modes: int, modes: int | None) -> tuple[_Taps, Search, list[Fit]]:
@@ -217,6 +212,7 @@ def _search(problem: _Taps | _Decays, most_modes: int, modes: int | None) -> Sea
 
 def _result(
     ready: Prepared,
+    files: tuple[str, ...],
     problem: _Taps | _Decays,
     models: Search,
     order: int,
@@ -229,9 +225,19 @@ def _result(
     squares = sum(float(np.sum(response**2)) for response in problem.responses)
     used = tuple((0, len(response)) for response in problem.responses)
     if order == 0:
-        silent = tuple(np.zeros(len(response)) for response in problem.responses)
-        noise = float(np.sqrt(squares / sum(len(response) for response in problem.responses)))
-        return Identification((), (), 0, evidence, chart, 0.0, noise, silent, used, {}, tuple(warnings))
+        return Identification(
+            files=files,
+            evidence=evidence,
+            fit_percent=0.0,
+            noise_rms=float(np.sqrt(squares / sum(len(response) for response in problem.responses))),
+            reason="no mode stands out of the noise",
+            warnings=tuple(warnings),
+            notes=ready.notes,
+            prepared=ready,
+            chart=chart,
+            fitted=tuple(np.zeros(len(response)) for response in problem.responses),
+            used=used,
+        )
     fit = models.fits[order - 1]
     coloured = abs(fit.residual_autocorrelation) * np.sqrt(fit.samples) > _COLOURED
     if coloured:
@@ -265,17 +271,32 @@ def _result(
         (refused if reason else supported).append(mode)
     left = float(np.sqrt(fit.sum_of_squares / squares)) if squares > 0.0 else 1.0
     return Identification(
+        files=files,
         modes=tuple(sorted(supported, key=lambda mode: mode.frequency_hz.value)),
         refused=tuple(sorted(refused, key=lambda mode: mode.frequency_hz.value)),
         order=order,
         evidence=evidence,
-        chart=chart,
         fit_percent=100.0 * (1.0 - left),
         noise_rms=float(np.sqrt(fit.sum_of_squares / (fit.samples - fit.parameters))),
+        mass_check=_mass_check(problem, fit),
+        reason=_reason(supported, refused),
+        warnings=tuple(warnings),
+        notes=ready.notes,
+        prepared=ready,
+        chart=chart,
         fitted=tuple(fit.fitted),
         used=used,
-        checks=_checks(problem, fit),
-        warnings=tuple(warnings),
+    )
+
+
+def _reason(supported: Sequence[IdentifiedMode], refused: Sequence[IdentifiedMode]) -> str:
+    """Why there is no mode; empty: there is."""
+    if supported:
+        return ""
+    if not refused:
+        return "no mode stands out of the noise"
+    return "what stands out is not supported by the data: " + "; ".join(
+        f"{mode.frequency_hz.value:.4g} Hz: {mode.refusal}" for mode in refused
     )
 
 
@@ -319,13 +340,13 @@ def _alone(problem: _Taps | _Decays, fit: Fit) -> list[Fit]:
     return fits
 
 
-def _checks(problem: _Taps | _Decays, fit: _core.ModalFit | _core.DecayFit) -> dict[str, float]:
+def _mass_check(problem: _Taps | _Decays, fit: _core.ModalFit | _core.DecayFit) -> MassCheck | None:
     """The equivalent mass by paper 003's way, from the first tap, where the model has one mode.
 
     Wilson's method shortens the frequency unless its steps are short: force and response are resampled.
     """
     if isinstance(problem, _Decays) or len(fit.omega_rad_s) != 1 or problem.hold == "impulse":
-        return {}
+        return None
     args = (
         _finer(problem.forces[0], problem.hold),
         _finer(problem.responses[0], "band_limited"),
@@ -335,11 +356,7 @@ def _checks(problem: _Taps | _Decays, fit: _core.ModalFit | _core.DecayFit) -> d
     )
     closed = _core.equivalent_mass_closed_form(*args, quantity=problem.quantity)
     halved = _core.equivalent_mass_bisection(*args, quantity=problem.quantity)
-    return {
-        "mass_closed_form_kg": closed.mass_kg,
-        "mass_bisection_kg": halved.mass_kg,
-        "bisection_halvings": float(halved.halvings),
-    }
+    return MassCheck(closed.mass_kg, halved.mass_kg, halved.halvings)
 
 
 def _finer(signal: FloatArray, hold: str) -> FloatArray:

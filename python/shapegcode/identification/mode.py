@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+
+__all__ = ["Estimate", "IdentifiedMode", "estimate_cell", "mode_line"]
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,14 @@ class Estimate:
         return 100.0 * max(self.high - self.value, self.value - self.low) / abs(self.value)
 
     def map(self, function: Callable[[float], float]) -> Estimate:
-        """The estimate of a monotonic function of the value."""
+        """The estimate of a monotonic function of the value.
+
+        Args:
+            function: of the value; rising or falling.
+
+        Returns:
+            Its value and the ends of its interval.
+        """
         ends = sorted((function(self.low), function(self.high)))
         return Estimate(function(self.value), *ends)
 
@@ -58,39 +66,25 @@ class IdentifiedMode:
     stiffness_n_per_m: Estimate | None = None
     refusal: str = ""
 
-    def as_dict(self) -> dict[str, Any]:
-        """Each value under its name, and its interval [low, high] under the name with `_ci95`."""
-        found: dict[str, Any] = {}
-        for name in ("frequency_hz", "damping_ratio", "mass_kg", "damping_n_s_per_m", "stiffness_n_per_m"):
-            estimate: Estimate | None = getattr(self, name)
-            found[name] = None if estimate is None else estimate.value
-            found[f"{name}_ci95"] = None if estimate is None else [estimate.low, estimate.high]
-        if self.refusal:
-            found["refusal"] = self.refusal
-        return found
-
 
 _SKEWED = 1.2
-
-
-# heading, attribute, factor to the unit of the heading
-MODE_COLUMNS: tuple[tuple[str, str, float], ...] = (
-    ("frequency Hz", "frequency_hz", 1.0),
-    ("damping %", "damping_ratio", 100.0),
-    ("m kg", "mass_kg", 1.0),
-    ("c N s/m", "damping_n_s_per_m", 1.0),
-    ("k N/µm", "stiffness_n_per_m", 1e-6),
-)
 
 
 def mode_line(mode: IdentifiedMode) -> str:
     """A mode in one line: each value with half of its 95 % interval, or why the data do not support it."""
     if mode.refusal:
         return f"{mode.frequency_hz.value:.4g} Hz not supported: {mode.refusal}"
+    named = (
+        ("frequency", mode.frequency_hz, 1.0, "Hz"),
+        ("damping", mode.damping_ratio, 100.0, "%"),
+        ("m", mode.mass_kg, 1.0, "kg"),
+        ("c", mode.damping_n_s_per_m, 1.0, "N s/m"),
+        ("k", mode.stiffness_n_per_m, 1e-6, "N/µm"),
+    )
     parts = (
-        f"{heading.partition(' ')[0]} {estimate_cell(estimate, factor)} {heading.partition(' ')[2]}"
-        for heading, name, factor in MODE_COLUMNS
-        if (estimate := getattr(mode, name)) is not None
+        f"{name} {estimate_cell(estimate, factor)} {unit}"
+        for name, estimate, factor, unit in named
+        if estimate is not None
     )
     return ", ".join(parts)
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 import textwrap
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from shapegcode.identification.checks import DOUBLE_HIT, LEAST_FORCE, LEAST_LEAD, LEAST_PULSE
+from shapegcode.identification.plan_result import AxisRecording, RapidStop, TapPlan
 from shapegcode.identification.quality import EXCITED_HALF_SINE, FOLDING, LEAST_PERIODS
 
 if TYPE_CHECKING:
     from shapegcode.machine import Axis, Machine
 
-__all__ = ["Recording", "rapid_stop_program", "recording_for", "tap_plan"]
+__all__ = ["rapid_stop_program", "recording_for", "tap_plan"]
 
 #: Modes of a machining centre that its own motion excites, Hz; for a plan without a machine file.
 _USUAL_HZ = (20.0, 200.0)
@@ -43,31 +43,8 @@ _TIPS = (
 _AXES = ("X", "Y", "Z")
 _STOPS = 5
 _LONG_STOP_S = 2.0
-_WIDTH = 100
+_WIDTH = 80
 _EXAMPLE_ROWS = ((0, "0.02", "-0.004"), (1, "0.01", "0.003"), (2, "35.6", "0.412"), (3, "118.3", "1.378"))
-
-
-@dataclass(frozen=True)
-class Recording:
-    """How to record modes.
-
-    Attributes:
-        modes_hz: those known, ascending; empty: the usual range is taken.
-        highest_hz: modes are looked for up to here.
-        samples_per_s: sampling rate.
-        duration_s: of one tap, from the trigger on.
-        pre_trigger_s: before it.
-        pulse_s: longest pulse of the force that still excites the highest frequency.
-        tip: of the hammer.
-    """
-
-    modes_hz: tuple[float, ...]
-    highest_hz: float
-    samples_per_s: float
-    duration_s: float
-    pre_trigger_s: float
-    pulse_s: float
-    tip: str
 
 
 def _round_up(value: float) -> float:
@@ -75,10 +52,11 @@ def _round_up(value: float) -> float:
     return next(step * power for step in _RATES if step * power >= value * (1.0 - 1e-9))
 
 
-def recording_for(modes: tuple[tuple[float, float], ...]) -> Recording:
+def recording_for(axis: str, modes: tuple[tuple[float, float], ...]) -> AxisRecording:
     """How to record.
 
     Args:
+        axis: its name.
         modes: (frequency in Hz, damping ratio) of those known; empty: the usual range of machining centres.
 
     Returns:
@@ -93,7 +71,9 @@ def recording_for(modes: tuple[tuple[float, float], ...]) -> Recording:
     fallen = max(math.log(1.0 / _FALLEN_TO) / (2.0 * math.pi * f * (z or _USUAL_DAMPING)) for f, z in known)
     duration = _round_up(max(fallen, _PERIODS / min(f for f, _ in known)))
     lead = max(_PRE_TRIGGER_SHARE * duration, _PRE_TRIGGER_SAMPLES / rate)
-    return Recording(tuple(sorted({frequency for frequency, _ in modes})), highest, rate, duration, lead, pulse, tip)
+    return AxisRecording(
+        axis, tuple(sorted({frequency for frequency, _ in modes})), highest, rate, duration, lead, pulse, tip
+    )
 
 
 def _modes(axis: Axis) -> tuple[tuple[float, float], ...]:
@@ -103,31 +83,6 @@ def _modes(axis: Axis) -> tuple[tuple[float, float], ...]:
         frequencies = over.frequency_hz if over is not None else (mode.frequency_hz,)
         found += [(frequency, mode.damping_ratio) for frequency in frequencies]
     return tuple(found)
-
-
-def _milliseconds(seconds: float) -> str:
-    return f"{1000.0 * seconds:.2g} ms" if seconds < 0.1 else f"{seconds:.3g} s"
-
-
-def _table(rows: list[tuple[str, Recording]]) -> list[str]:
-    cells = [["axis", "modes known", "look up to", "samples/s", "record", "pre-trigger", "pulse at most", "tip"]]
-    for name, how in rows:
-        cells.append(
-            [
-                name,
-                ", ".join(f"{each:g}" for each in how.modes_hz) + " Hz" if how.modes_hz else "none",
-                f"{how.highest_hz:g} Hz",
-                f"{how.samples_per_s:g}",
-                _milliseconds(how.duration_s),
-                _milliseconds(how.pre_trigger_s),
-                _milliseconds(how.pulse_s),
-                how.tip,
-            ]
-        )
-    widths = [max(len(row[k]) for row in cells) for k in range(len(cells[0]))]
-    return [
-        "  " + "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in cells
-    ]
 
 
 def rapid_stop_program(axis: str, distance_mm: float, dwell_s: float) -> str:
@@ -182,7 +137,7 @@ def _machine_part() -> list[str]:
     ]
 
 
-def _sensor_part(how: Recording) -> list[str]:
+def _sensor_part(how: AxisRecording) -> list[str]:
     return [
         "2. SENSOR AND HAMMER, FOR EACH AXIS",
         *_bullets(
@@ -217,8 +172,16 @@ def _recording_part() -> list[str]:
     ]
 
 
-def _stop_part(machine: Machine | None, dwell_s: float) -> list[str]:
-    program = rapid_stop_program("X", _stop_distance_mm(machine, 0), dwell_s)
+def _stops(machine: Machine | None, dwell_s: float) -> tuple[RapidStop, ...]:
+    """The decays of all axes."""
+    ways = [_stop_distance_mm(machine, index) for index in range(len(_AXES))]
+    return tuple(
+        RapidStop(axis, way, dwell_s, rapid_stop_program(axis, way, dwell_s))
+        for axis, way in zip(_AXES, ways, strict=True)
+    )
+
+
+def _stop_part(stops: tuple[RapidStop, ...]) -> list[str]:
     return [
         "4. WITHOUT A HAMMER: DECAY AFTER A RAPID STOP",
         *_bullets(
@@ -227,18 +190,18 @@ def _stop_part(machine: Machine | None, dwell_s: float) -> list[str]:
             "air, nothing near the tool. Record all of it, or each stop from the end of the motion on:",
         ),
         "",
-        *("    " + line for line in program.splitlines()),
+        *("    " + line for line in stops[0].program.splitlines()),
         "",
         *(
-            f"    {name}: the same with {name} and {_stop_distance_mm(machine, index):g} mm, O{7201 + index}"
-            for index, name in enumerate(_AXES[1:], start=1)
+            f"    {stop.axis}: the same with {stop.axis} and {stop.distance_mm:g} mm, O{7201 + index}"
+            for index, stop in enumerate(stops[1:], start=1)
         ),
         "",
         *_bullets("Where the decay begins is found by itself; --start says it."),
     ]
 
 
-def _file_part(how: Recording) -> list[str]:
+def _file_part(how: AxisRecording) -> list[str]:
     return [
         "5. THE FILE",
         *_bullets(
@@ -275,37 +238,45 @@ def _refusal_part() -> list[str]:
     ]
 
 
-def tap_plan(machine: Machine | None = None) -> str:
+def tap_plan(machine: Machine | None = None) -> TapPlan:
     """How to do the test: where to tap, with what, how to record, how to write the file, and what is refused.
 
     Args:
         machine: gives the axes and the modes known; None: the usual range of machining centres.
+
+    Returns:
+        Rates and lengths by axis, programs for decays, and the instructions for the operator.
+
+    Source: this project; limits are those of `identification.checks`.
     """
     usual = f"{_USUAL_HZ[0]:g} to {_USUAL_HZ[1]:g} Hz"
     if machine is None:
-        rows = [("X Y Z", recording_for(()))]
-        title = "TAP TEST OF A MACHINING CENTRE"
+        recordings: tuple[AxisRecording, ...] = (recording_for("X Y Z", ()),)
         about = (
             f"No machine file is given: lengths are for modes from {usual}, where the motion of its axes excites a "
             f"machining centre, rates for modes up to {_LOOK_LEAST_HZ:g} Hz. With -m MACHINE they follow from its "
             "modes."
         )
     else:
-        rows = [(name, recording_for(_modes(axis))) for name, axis in zip(_AXES, machine.axes.as_tuple(), strict=True)]
-        title = f"TAP TEST OF {machine.name}"
+        named = zip(_AXES, machine.axes.as_tuple(), strict=True)
+        recordings = tuple(recording_for(name, _modes(axis)) for name, axis in named)
         about = (
             f"Lengths follow from the modes of the machine file (an axis without modes: {usual}); every axis is looked "
             f"at up to {_LOOK_LEAST_HZ:g} Hz or more, as there may be modes that the file does not state."
         )
-    hardest = max((how for _, how in rows), key=lambda how: how.highest_hz)
-    dwell = max(_LONG_STOP_S, 2.0 * max(how.duration_s for _, how in rows))
+    stops = _stops(machine, max(_LONG_STOP_S, 2.0 * max(how.duration_s for how in recordings)))
     parts = [
-        [title, "", *textwrap.wrap(about, _WIDTH), "", *_table(rows)],
+        textwrap.wrap(about, _WIDTH),
         _machine_part(),
-        _sensor_part(hardest),
+        _sensor_part(max(recordings, key=lambda how: how.highest_hz)),
         _recording_part(),
-        _stop_part(machine, dwell),
-        _file_part(rows[0][1]),
+        _stop_part(stops),
+        _file_part(recordings[0]),
         _refusal_part(),
     ]
-    return "\n\n".join("\n".join(part) for part in parts) + "\n"
+    return TapPlan(
+        None if machine is None else machine.name,
+        recordings,
+        stops,
+        "\n\n".join("\n".join(part) for part in parts),
+    )

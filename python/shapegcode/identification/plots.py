@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapegcode.identification.identify import TapTest
-from shapegcode.identification.mode import IdentifiedMode
 from shapegcode.identification.result import Identification
 from shapegcode.identification.spectra import decay_spectrum, frf, mode_envelopes
 from shapegcode.io.record import UNITS, FloatArray, Record
-from shapegcode.results import plot as canvas
+from shapegcode.results import plot
+from shapegcode.results.result import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = [
-    "plot_decay",
-    "plot_response",
-    "plot_spectrum",
-    "plot_stabilisation",
-    "plot_traces",
-    "write_tap_pictures",
-]
+__all__ = ["plot_decay", "plot_response", "plot_spectrum", "plot_stabilisation", "plot_traces", "plots_of"]
 
 _MOST_TRACES = 3
 _SEEN = 0.02
@@ -38,51 +31,43 @@ _CLEAR = 3.0  # times the noise: down to here the model's envelope is the mode's
 _BELOW_NOISE = 0.3
 _BEYOND_NOISE = 1.25  # of the decay's duration, so that the noise is seen
 _MOST_ENVELOPES = 4
-_MEASURED, _FITTED = canvas.GREY, canvas.COLOURS[0]
+_MEASURED, _FITTED = plot.GREY, plot.COLOURS[0]
 
 
-def write_tap_pictures(test: TapTest, folder: str | Path) -> list[str]:
-    """Write the pictures as PNG and SVG into a folder, which is made where it is missing.
-
-    Args:
-        test: with a result.
-        folder: where.
-
-    Returns:
-        The files written.
-
-    Raises:
-        ValueError: there is no result.
-        OSError: the folder cannot be made or a file not be written.
-    """
-    if test.found is None:
-        raise ValueError(f"no model of {', '.join(test.files)}: nothing to draw")
-    pictures: dict[str, Callable[[Path], None]] = {
-        "traces": lambda file: plot_traces(file, test),
-        "stabilisation": lambda file: plot_stabilisation(file, test),
+def plots_of(found: Identification) -> dict[str, Plot]:
+    """Its pictures by name."""
+    pictures: dict[str, Plot] = {
+        "identify-traces": partial(plot_traces, found),
+        "identify-stabilisation": partial(plot_stabilisation, found),
     }
-    if test.modes:
-        pictures["decay"] = lambda file: plot_decay(file, test)
-    if test.is_decay:
-        pictures["spectrum"] = lambda file: plot_spectrum(file, test)
+    if found.modes:
+        pictures["identify-decay"] = partial(plot_decay, found)
+    if found.decay:
+        pictures["identify-spectrum"] = partial(plot_spectrum, found)
     else:
-        pictures["response"] = lambda file: plot_response(file, test)
-    return canvas.write_pictures(folder, "identify", pictures)
+        pictures["identify-response"] = partial(plot_response, found)
+    return pictures
 
 
-def plot_traces(file: str | Path, test: TapTest) -> None:
+def plot_traces(found: Identification, ax: Axes | None = None) -> Axes:
     """Force and response over time, with the model's response; of many taps the first ones.
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Args:
+        found: what was identified.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The first panel.
     """
-    found = _found(test)
-    shown = list(zip(test.records, found.used, found.fitted, strict=True))[:_MOST_TRACES]
-    rows = 1 if test.is_decay else 2
-    figure = canvas.figure(4.0 + 3.6 * len(shown), 2.6 + 2.2 * rows)
-    for column, (record, (begin, end), fitted) in zip(canvas.panels(figure, rows, len(shown)), shown, strict=True):
-        time_s = record.time_s if test.is_decay else record.time_s - record.start_s
+    shown = list(zip(found.taps, found.used, found.fitted, strict=True))[:_MOST_TRACES]
+    rows = 1 if found.decay else 2
+    many = f", {len(shown)} of {len(found.taps)} records" if len(found.taps) > len(shown) else ""
+    panels = plot.grid(
+        ax, rows, len(shown), size_inch=(4.0 + 3.6 * len(shown), 2.6 + 2.2 * rows), sharex="col",
+        title=f"Records and model ({found.fit_percent:.1f} % fit{many})",
+    )  # fmt: skip
+    for column, (record, (begin, end), fitted) in zip(zip(*panels, strict=True), shown, strict=True):
+        time_s = record.time_s if found.decay else record.time_s - record.start_s
         if record.force_n is not None:
             column[0].plot(time_s, record.force_n, color="black", linewidth=1.0)
             column[0].set_ylabel("force in N")
@@ -91,27 +76,31 @@ def plot_traces(file: str | Path, test: TapTest) -> None:
         panel.plot(time_s[begin:end], fitted, "--", color=_FITTED, linewidth=1.1, label="model")
         panel.set_xlim(time_s[0], time_s[begin + _last_seen(np.asarray(fitted))])
         panel.set_ylabel(_quantity(record))
-        panel.set_xlabel(_FILE_TIME if test.is_decay else "time in s")
+        panel.set_xlabel(_FILE_TIME if found.decay else "time in s")
         column[0].set_title(Path(record.source).name, fontsize=9, loc="right")
-        canvas.legend_above(panel)
-    many = f", {len(shown)} of {len(test.records)} records" if len(test.records) > len(shown) else ""
-    canvas.heading(figure, f"Records and model ({found.fit_percent:.1f} % fit{many})", "")
-    canvas.save(figure, file)
+        plot.legend_above(panel)
+    return panels[0][0]
 
 
-def plot_response(file: str | Path, test: TapTest) -> None:
+def plot_response(found: Identification, ax: Axes | None = None) -> Axes:
     """Frequency response, measured and of the model: magnitude, phase, coherence.
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Args:
+        found: what was identified, from taps.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The panel of the magnitude.
     """
-    found = _found(test)
-    measured, model = frf(_fitted_part(test)), frf(_as_fitted(test))
-    seen = _seen(measured.frequency_hz, test)
+    measured, model = frf(_fitted_part(found)), frf(_as_fitted(found))
+    seen = _seen(measured.frequency_hz, found)
     rows = 2 if measured.coherence is None else 3
-    figure = canvas.figure(9.0, 2.1 + 1.8 * rows)
-    column = canvas.panels(figure, rows, 1)[0]
+    taps = len(found.taps)
+    panels = plot.grid(
+        ax, rows, 1, size_inch=(9.0, 2.1 + 1.8 * rows), sharex="col",
+        title=f"Frequency response, {taps} {'tap' if taps == 1 else 'taps averaged'}",
+    )  # fmt: skip
+    column = [row[0] for row in panels]
     magnitude, phase = column[:2]
     for each, style, colour, width, label in (
         (measured, "-", _MEASURED, 2.2, "measured"),
@@ -122,43 +111,42 @@ def plot_response(file: str | Path, test: TapTest) -> None:
         # From -90 to 270 degrees: below a mode the phase of an acceleration is 180 and noise would wrap it.
         phase.plot(frequency, 90.0 + np.degrees(np.angle(-1j * ratio)), style, color=colour, linewidth=width)
     if measured.coherence is not None:
-        column[2].plot(measured.frequency_hz[seen], measured.coherence[seen], color=canvas.COLOURS[1], linewidth=1.0)
+        column[2].plot(measured.frequency_hz[seen], measured.coherence[seen], color=plot.COLOURS[1], linewidth=1.0)
         column[2].set_ylabel("coherence")
         column[2].set_ylim(0.0, 1.05)
-    magnitude.set_ylabel(f"({UNITS[test.records[0].quantity]})/N")
+    magnitude.set_ylabel(f"({UNITS[found.taps[0].quantity]})/N")
     phase.set_ylabel("phase in degrees")
     phase.set_yticks([-90, 0, 90, 180, 270])
     column[-1].set_xlabel("frequency in Hz")
+    column[-1].margins(x=0.01)
     bottom, top = magnitude.get_ylim()
     magnitude.set_ylim(bottom, 4.0 * top)  # room for the labels
     _mark_modes(column, found)
-    canvas.legend_above(magnitude)
-    taps = len(test.records)
-    canvas.heading(figure, f"Frequency response, {taps} {'tap' if taps == 1 else 'taps averaged'}", "")
-    canvas.save(figure, file)
+    plot.legend_above(magnitude)
+    return magnitude
 
 
-def plot_stabilisation(file: str | Path, test: TapTest) -> None:
+def plot_stabilisation(found: Identification, ax: Axes | None = None) -> Axes:
     """Poles by the order of the model over the spectrum, and the order that was chosen.
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Args:
+        found: what was identified.
+        ax: where to draw; None: a new figure.
     """
-    found = _found(test)
-    frequency, amplitude = _spectrum(test)
-    seen = _seen(frequency, test)
-    figure = canvas.figure(9.0, 5.5)
-    panel = canvas.panels(figure, 1, 1)[0][0]
+    frequency, amplitude = _spectrum(found)
+    seen = _seen(frequency, found)
+    panel = plot.axes(ax, size_inch=(9.0, 5.5))
+    # The legend stands between the panel and the title.
+    panel.set_title("Stabilisation chart: poles by the order of the model", loc="left", fontsize=11, pad=26)
     background = panel.twinx()
     background.semilogy(frequency[seen], amplitude[seen], color="#c8c8c8", linewidth=1.0)
     background.set_axis_off()
     panel.set_zorder(background.get_zorder() + 1)
     panel.patch.set_visible(False)
     kinds = (
-        ("new", "x", canvas.GREY, "none"),
-        ("frequency within 1 %", "o", canvas.COLOURS[1], "none"),
-        ("and damping within 5 %", "o", canvas.COLOURS[2], canvas.COLOURS[2]),
+        ("new", "x", plot.GREY, "none"),
+        ("frequency within 1 %", "o", plot.COLOURS[1], "none"),
+        ("and damping within 5 %", "o", plot.COLOURS[2], plot.COLOURS[2]),
     )
     highest = frequency[seen][-1]
     for stable, (label, marker, edge, face) in enumerate(kinds):
@@ -181,32 +169,35 @@ def plot_stabilisation(file: str | Path, test: TapTest) -> None:
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5, frameon=False, borderaxespad=0.2, fontsize=9,
         columnspacing=1.2, handletextpad=0.4,
     )  # fmt: skip
-    canvas.heading(figure, "Stabilisation chart: poles by the order of the model", "")
-    canvas.save(figure, file)
+    return panel
 
 
-def plot_decay(file: str | Path, test: TapTest) -> None:
+def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
     """Envelope of each mode's band of the first record while it decays, measured and of the model.
 
     The model is drawn down to the noise, which is what it leaves of the response in the band. Below it the curve would
     show how the band's filter rings.
 
-    Raises:
-        ValueError: a wrong ending, or no mode.
-        OSError: the file cannot be written.
+    Args:
+        found: what was identified, with a mode or more.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The upper panel.
     """
-    found = _found(test)
     frequencies = [mode.frequency_hz.value for mode in found.modes][:_MOST_ENVELOPES]
-    if not frequencies:
-        raise ValueError(f"no mode in {', '.join(test.files)}: no decay to draw")
-    record, model = _fitted_part(test)[0], _as_fitted(test)[0]
+    record, model = _fitted_part(found)[0], _as_fitted(found)[0]
     begin = _after_hit(record)
     record, model = (replace(each, response=each.response[begin:], force_n=None) for each in (record, model))
-    figure = canvas.figure(9.0, 1.4 + 2.0 * len(frequencies))
-    column = canvas.panels(figure, len(frequencies), 1)[0]
+    name = f": {Path(record.source).name}" if len(found.taps) > 1 else ""
+    panels = plot.grid(
+        ax, len(frequencies), 1, size_inch=(9.0, 1.4 + 2.0 * len(frequencies)), sharex="col",
+        title=f"Decay: envelope of the {record.quantity} in the band of each mode{name}",
+    )  # fmt: skip
+    column = [row[0] for row in panels]
     left = replace(record, response=record.response - model.response)
     bands = (mode_envelopes(each, frequencies) for each in (record, model, left))
-    time_s = record.time_s if test.is_decay else record.time_s - record.time_s[0]
+    time_s = record.time_s if found.decay else record.time_s - record.time_s[0]
     longest = 1
     for panel, frequency, measured, fitted, rest in zip(column, frequencies, *bands, strict=True):
         top = float(measured.envelope.max())
@@ -220,50 +211,41 @@ def plot_decay(file: str | Path, test: TapTest) -> None:
         panel.set_ylabel(f"{frequency:.4g} Hz, {UNITS[record.quantity]}")
     for panel in column:
         panel.set_xlim(time_s[0], time_s[min(round(_BEYOND_NOISE * longest), len(time_s) - 1)])
-    column[-1].set_xlabel(_FILE_TIME if test.is_decay else "time since the hit in s")
-    canvas.legend_above(column[0])
-    name = f": {Path(record.source).name}" if len(test.records) > 1 else ""
-    canvas.heading(figure, f"Decay: envelope of the {record.quantity} in the band of each mode{name}", "")
-    canvas.save(figure, file)
+    column[-1].set_xlabel(_FILE_TIME if found.decay else "time since the hit in s")
+    plot.legend_above(column[0])
+    return column[0]
 
 
-def plot_spectrum(file: str | Path, test: TapTest) -> None:
-    """Amplitude spectrum of a decay with its peaks labelled, as in paper 000.
+def plot_spectrum(found: Identification, ax: Axes | None = None) -> Axes:
+    """Amplitude spectrum of a decay with its peaks labelled.
 
-    Raises:
-        ValueError: a wrong ending.
-        OSError: the file cannot be written.
+    Args:
+        found: what was identified, from decays.
+        ax: where to draw; None: a new figure.
     """
-    spectrum = decay_spectrum(_fitted_part(test)[0])
-    seen = _seen(spectrum.frequency_hz, test, [peak.frequency_hz for peak in spectrum.peaks])
-    figure = canvas.figure(9.0, 4.5)
-    panel = canvas.panels(figure, 1, 1)[0][0]
+    spectrum = decay_spectrum(_fitted_part(found)[0])
+    seen = _seen(spectrum.frequency_hz, found, [peak.frequency_hz for peak in spectrum.peaks])
+    panel = plot.axes(ax, size_inch=(9.0, 4.5), title="Spectrum of the free decay")
     amplitude = spectrum.amplitude[seen]
     top = float(amplitude.max())
-    panel.semilogy(spectrum.frequency_hz[seen], amplitude, color=canvas.COLOURS[1], linewidth=1.2)
+    panel.semilogy(spectrum.frequency_hz[seen], amplitude, color=plot.COLOURS[1], linewidth=1.2)
+    panel.margins(x=0.01)
     panel.set_xlabel("frequency in Hz")
-    panel.set_ylabel(_quantity(test.records[0]))
+    panel.set_ylabel(_quantity(found.taps[0]))
     panel.set_ylim(max(_BELOW_NOISE * float(np.median(amplitude)), _LEAST_SHOWN * top), 3.0 * top)
     for peak in spectrum.peaks:
         if peak.frequency_hz <= spectrum.frequency_hz[seen][-1]:
             panel.annotate(
                 peak.label, (peak.frequency_hz, peak.amplitude), (0, 6), textcoords="offset points", ha="center"
             )
-    canvas.heading(figure, "Spectrum of the free decay", "")
-    canvas.save(figure, file)
-
-
-def _found(test: TapTest) -> Identification:
-    if test.found is None:
-        raise ValueError(f"no model of {', '.join(test.files)}: nothing to draw")
-    return test.found
+    return panel
 
 
 def _quantity(record: Record) -> str:
     return f"{record.quantity} in {UNITS[record.quantity]}"
 
 
-def _fitted_part(test: TapTest) -> list[Record]:
+def _fitted_part(found: Identification) -> list[Record]:
     """The records as far as they were fitted."""
     return [
         replace(
@@ -272,21 +254,21 @@ def _fitted_part(test: TapTest) -> list[Record]:
             force_n=None if record.force_n is None else record.force_n[begin:end],
             start_s=record.start_s + begin * record.period_s,
         )
-        for record, (begin, end) in zip(test.records, _found(test).used, strict=True)
+        for record, (begin, end) in zip(found.taps, found.used, strict=True)
     ]
 
 
-def _as_fitted(test: TapTest) -> list[Record]:
+def _as_fitted(found: Identification) -> list[Record]:
     """The same with the model's response."""
     return [
         replace(record, response=np.asarray(fitted))
-        for record, fitted in zip(_fitted_part(test), _found(test).fitted, strict=True)
+        for record, fitted in zip(_fitted_part(found), found.fitted, strict=True)
     ]
 
 
-def _spectrum(test: TapTest) -> tuple[FloatArray, FloatArray]:
+def _spectrum(found: Identification) -> tuple[FloatArray, FloatArray]:
     """Frequencies and root mean square over the records of their amplitude spectra, 2/n |FFT|."""
-    parts = _fitted_part(test)
+    parts = _fitted_part(found)
     count = 1 << max(len(part.response) for part in parts).bit_length()
     squares = [
         (2.0 / len(part.response) * np.abs(np.fft.rfft(part.response - part.response.mean(), count))) ** 2
@@ -298,18 +280,15 @@ def _spectrum(test: TapTest) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def _seen(frequency_hz: FloatArray, test: TapTest, peaks_hz: Sequence[float] = ()) -> slice:
+def _seen(frequency_hz: FloatArray, found: Identification, peaks_hz: Sequence[float] = ()) -> slice:
     """From the first bin above 0 to well above the highest mode."""
-    found = _found(test)
     marked = [*peaks_hz, *(mode.frequency_hz.value for mode in (*found.modes, *found.refused))]
     return slice(1, int(np.searchsorted(frequency_hz, _ROOM * max(marked, default=frequency_hz[-1] / _ROOM))))
 
 
 def _mark_modes(column: list[Axes], found: Identification) -> None:
     """Thin lines at the modes, refused ones dotted, their frequencies above."""
-    marked: list[tuple[IdentifiedMode, str]] = [(mode, "--") for mode in found.modes]
-    marked += [(mode, ":") for mode in found.refused]
-    for mode, style in marked:
+    for mode, style in [*((mode, "--") for mode in found.modes), *((mode, ":") for mode in found.refused)]:
         hertz = mode.frequency_hz.value
         for panel in column:
             panel.axvline(hertz, color="black", linewidth=0.6, linestyle=style)

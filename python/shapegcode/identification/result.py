@@ -1,16 +1,25 @@
-"""What an identification found, with its uncertainty."""
+"""What an identification found, with its uncertainty: figures, tables, the next step."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.identification.mode import IdentifiedMode, mode_line
+from shapegcode.identification.mode import IdentifiedMode, estimate_cell, mode_line
+from shapegcode.identification.prepared import Prepared
+from shapegcode.io.record import Quantity, Record
+from shapegcode.results.json import hidden
+from shapegcode.results.result import Plot, Result
+from shapegcode.results.table import Column, Table
 
 FloatArray = npt.NDArray[np.float64]
+
+__all__ = ["ChartPole", "Identification", "MachineFile", "MassCheck", "RecordUse"]
 
 
 @dataclass(frozen=True)
@@ -32,41 +41,237 @@ class ChartPole:
     stable_damping: bool
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Identification:
+@dataclass(frozen=True)
+class MassCheck:
+    """The equivalent mass by the method of Back, Ko and Kim, 2003 (paper 003 in docs/references.md).
+
+    Attributes:
+        closed_form_kg: one simulation; the RMS of the response is proportional to 1/m.
+        bisection_kg: the paper's search.
+        halvings: of the search.
+    """
+
+    closed_form_kg: float
+    bisection_kg: float
+    halvings: int
+
+
+@dataclass(frozen=True)
+class RecordUse:
+    """What became of one tap or decay.
+
+    Attributes:
+        source: file, and which hit or channel of it.
+        used: whether the modes come from it too.
+        reason: why it is not used; empty: it is.
+        samples: that were recorded; null where it is not used, as for the others.
+        period_s: time between two samples.
+        start_s: time of the first sample in the file.
+        quantity: what the sensor measured.
+        excited_hz: up to where the hit excites (-20 dB); null for a decay.
+    """
+
+    source: str
+    used: bool
+    reason: str = ""
+    samples: int | None = None
+    period_s: float | None = None
+    start_s: float | None = None
+    quantity: Quantity | None = None
+    excited_hz: float | None = None
+
+    @property
+    def duration_s(self) -> float | None:
+        """How long it lasts; None where it is not used."""
+        return None if self.samples is None or self.period_s is None else self.samples * self.period_s
+
+
+@dataclass(frozen=True)
+class MachineFile:
+    """A machine file that took the modes.
+
+    Attributes:
+        path: as named.
+        axis: "x", "y" or "z".
+        notes: what was replaced, kept, removed and added, one sentence each.
+    """
+
+    path: str
+    axis: str
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Identification(Result):
     """Modes found in one or several records of the same point.
 
     Attributes:
+        files: as named, or the sources of records.
         modes: those that the data support, by ascending frequency.
         refused: those that stand out of the noise but are not supported, each with its refusal.
-        order: number of modes of the chosen model.
+        order: number of modes of the chosen model; 0: there is none.
         evidence: information criterion (lower is better) by number of modes.
+        fit_percent: 100 * (1 - |measured - fitted| / |measured|), over all records together; null without a model.
+        noise_rms: of the response's measurement noise, in the unit of the records; null without a model.
+        mass_check: where the model has one mode.
+        reason: why there is no mode; empty: there is.
+        machine_file: where the modes were put; null: nowhere.
+        warnings: what the user should know of the records and of the result.
+        notes: what was left out of the files and the like.
+        prepared: the records that were used, and those that were not; None: the files hold none that can be.
         chart: poles of the stabilisation chart.
-        fit_percent: 100 * (1 - |measured - fitted| / |measured|), over all records together.
-        noise_rms: of the response's measurement noise, in the unit of the records.
         fitted: response of the model per record, (n,), at the samples that were used.
         used: first and last + 1 sample per record that was fitted.
-        checks: figures that confirm the result by another way, by name.
-        warnings: what the user should know.
     """
 
-    modes: tuple[IdentifiedMode, ...]
-    refused: tuple[IdentifiedMode, ...]
-    order: int
-    evidence: Mapping[int, float]
-    chart: tuple[ChartPole, ...]
-    fit_percent: float
-    noise_rms: float
-    fitted: tuple[FloatArray, ...]
-    used: tuple[tuple[int, int], ...]
-    checks: Mapping[str, float] = field(default_factory=dict)
+    json_extra: ClassVar[dict[str, Any]] = {
+        **Result.json_extra,
+        "axis": str | None,
+        "decay": bool,
+        "records": tuple[RecordUse, ...],
+    }
+
+    files: tuple[str, ...]
+    modes: tuple[IdentifiedMode, ...] = ()
+    refused: tuple[IdentifiedMode, ...] = ()
+    order: int = 0
+    evidence: Mapping[int, float] = field(default_factory=dict)
+    fit_percent: float | None = None
+    noise_rms: float | None = None
+    mass_check: MassCheck | None = None
+    reason: str = ""
+    machine_file: MachineFile | None = None
     warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    prepared: Prepared | None = field(default=None, metadata=hidden())
+    chart: tuple[ChartPole, ...] = field(default=(), metadata=hidden())
+    fitted: tuple[FloatArray, ...] = field(default=(), metadata=hidden())
+    used: tuple[tuple[int, int], ...] = field(default=(), metadata=hidden())
+
+    @property
+    def taps(self) -> tuple[Record, ...]:
+        """Taps or decays that were used."""
+        return () if self.prepared is None else self.prepared.records
+
+    @property
+    def axis(self) -> str | None:
+        """Axis along which it was measured, "x", "y" or "z"; null: the files do not say."""
+        return self.taps[0].axis if self.taps else None
+
+    @property
+    def decay(self) -> bool:
+        """Whether no force was measured."""
+        return bool(self.taps) and self.taps[0].force_n is None
+
+    @property
+    def source(self) -> str:
+        """Where the modes come from, for the machine file."""
+        names = ", ".join(Path(file).name for file in self.files)
+        return f"free decay {names}" if self.decay else f"tap test {names}, {self._counted()}"
+
+    def _counted(self) -> str:
+        kind = "decay" if self.decay else "tap"
+        return f"{len(self.taps)} {kind}{'' if len(self.taps) == 1 else 's'}"
+
+    @property
+    def records(self) -> tuple[RecordUse, ...]:
+        """Each tap or decay: those that were used, then those that were not."""
+        if self.prepared is None:
+            return ()
+        used = [
+            RecordUse(
+                record.source, True, "", len(record.response), record.period_s, record.start_s, record.quantity, excited
+            )
+            for record, excited in zip(self.taps, self.prepared.excited_hz, strict=True)
+        ]
+        return (*used, *(RecordUse(each.source, False, each.reason) for each in self.prepared.refused))
+
+    @property
+    def ok(self) -> bool:
+        """Whether there are modes, and all that stands out of the noise is supported."""
+        return bool(self.modes) and not self.refused
+
+    @property
+    def exit_code(self) -> int:
+        """0: all that stands out is supported; 1: some of it is not; 2: nothing is."""
+        return super().exit_code if self.modes else 2
+
+    @property
+    def answer(self) -> str:
+        """The frequencies, and how well the model explains the records; or why there is none."""
+        if not self.modes:
+            why = "what stands out is not supported by the data, the table says why" if self.refused else self.reason
+            return f"no mode in {', '.join(self.files)}: {why}"
+        count = f"{len(self.modes)} mode{'' if len(self.modes) == 1 else 's'}"
+        axis = "" if self.axis is None else f" of the {self.axis.upper()} axis"
+        hertz = ", ".join(f"{mode.frequency_hz.value:.4g}" for mode in self.modes)
+        said = f"{count}{axis} in {self._counted()}: {hertz} Hz; the model explains {self.fit_percent:.1f} %"
+        if not self.refused:
+            return said
+        return f"{said}; {len(self.refused)} more {'is' if len(self.refused) == 1 else 'are'} NOT supported by the data"
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next."""
+        if not self.modes:
+            return "shapegcode identify --tap-plan says how to do the test"
+        if self.refused:
+            return "tap again, longer or more often, for what is not supported (shapegcode identify --tap-plan)"
+        if self.machine_file is not None:
+            return f"shapegcode shaper -m {self.machine_file.path}"
+        return f"shapegcode identify {' '.join(self.files)} --axis {self.axis or 'x'} --update mine.toml"
 
     def __repr__(self) -> str:
         """One line per mode; what else there is stays in the attributes."""
-        count = f"{self.order} mode{'' if self.order == 1 else 's'}"
-        lines = [f"Identification: model of {count}, {self.fit_percent:.1f} % of the response"]
-        lines += [f"  {mode_line(mode)}" for mode in (*self.modes, *self.refused)]
+        lines = [super().__repr__(), *(f"  {mode_line(mode)}" for mode in (*self.modes, *self.refused))]
         if self.warnings:
             lines.append(f"  {len(self.warnings)} warning{'' if len(self.warnings) == 1 else 's'}: see .warnings")
         return "\n".join(lines)
+
+    def tables(self) -> list[Table]:
+        """Modes with their intervals; what is not supported; the records."""
+        found = []
+        if self.modes:
+            found.append(Table("modes, each ± 95 %", _MODE_COLUMNS, self.modes, caption=self._check_line()))
+        if self.refused:
+            found.append(Table("not supported by the data", _REFUSAL_COLUMNS, self.refused))
+        if self.records:
+            found.append(Table("records", _RECORD_COLUMNS, self.records))
+        return found
+
+    def _check_line(self) -> str:
+        check = self.mass_check
+        if check is None:
+            return ""
+        return (
+            f"check, equivalent mass as in paper 003: closed form {check.closed_form_kg:.4g} kg, bisection "
+            f"{check.bisection_kg:.4g} kg after {check.halvings} halving{'' if check.halvings == 1 else 's'}"
+        )
+
+    def plots(self) -> Mapping[str, Plot]:
+        """`identify-traces`, `-stabilisation`, `-decay`, and `-response` or `-spectrum`; none without a model."""
+        return self._drawn_beside() if self.fitted else {}
+
+
+def _estimate(name: str, factor: float = 1.0) -> Any:
+    return lambda mode: estimate_cell(getattr(mode, name), factor)
+
+
+_MODE_COLUMNS = (
+    Column("frequency", "Hz", _estimate("frequency_hz")),
+    Column("damping", "%", _estimate("damping_ratio", 100.0)),
+    Column("m", "kg", _estimate("mass_kg")),
+    Column("c", "N s/m", _estimate("damping_n_s_per_m")),
+    Column("k", "N/µm", _estimate("stiffness_n_per_m", 1e-6)),
+)
+_REFUSAL_COLUMNS = (
+    Column("frequency", "Hz", lambda mode: f"{mode.frequency_hz.value:.4g}"),
+    Column("why", value="refusal", text=True),
+)
+_RECORD_COLUMNS = (
+    Column("record", value="source", text=True),
+    Column("samples"),
+    Column("lasts", "s", "duration_s", digits=3),
+    Column("excited up to", "Hz", "excited_hz", digits=0),
+    Column("not used", value="reason", text=True),
+)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from shapegcode.errors import ArgumentError
 from shapegcode.identification.mode import IdentifiedMode
 from shapegcode.identification.mode_tables import ModeTables
+from shapegcode.identification.result import Identification, MachineFile
 from shapegcode.machine import Machine
 
-__all__ = ["MachineUpdate", "check_updatable", "update_machine_file", "update_modes"]
+__all__ = ["MachineUpdate", "check_updatable", "update_machine", "update_machine_file", "update_modes"]
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,39 @@ class MachineUpdate:
     text: str
     machine: Machine
     notes: tuple[str, ...]
+
+    def noted_in(self, found: Identification, path: str | Path) -> Identification:
+        """The identification that says where its modes were put.
+
+        Args:
+            found: whose modes are in the text.
+            path: of the file that was written.
+
+        Returns:
+            The same with `machine_file`.
+        """
+        assert found.axis is not None
+        return replace(found, machine_file=MachineFile(str(path), found.axis, self.notes))
+
+
+def update_machine(path: str | Path, found: Identification) -> MachineUpdate:
+    """A machine file with the modes of an identification in it; see `update_machine_file`.
+
+    Args:
+        path: of the machine file, which is not touched.
+        found: with modes, and the axis along which they were measured.
+
+    Returns:
+        The text to write, what it says, and notes of what changed.
+
+    Raises:
+        ArgumentError: no axis; see `update_machine_file` too.
+        MachineError: the file is bad, or would be.
+        OSError: it cannot be read.
+    """
+    if found.axis is None:
+        raise ArgumentError(f"{found.files[0]} does not say along which axis it was measured: add --axis x, y or z")
+    return update_machine_file(path, found.axis, found.modes, source=found.source, refused=found.refused)
 
 
 def update_machine_file(

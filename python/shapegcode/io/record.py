@@ -29,6 +29,7 @@ class Record:
         axis: "x", "y" or "z" where the file says it.
         start_s: time of the first sample in the file.
         warnings: what reading the file had to assume.
+        notes: what reading the file left out.
     """
 
     source: str
@@ -39,6 +40,7 @@ class Record:
     axis: str | None = None
     start_s: float = 0.0
     warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.period_s) and self.period_s > 0.0):

@@ -42,6 +42,7 @@ class _Chooser:
         self.labels = table.labels(tap_label)
         self.where = table.where
         self.warnings: list[str] = []
+        self.notes: list[str] = []
 
     def _named(self, wanted: str, option: str) -> int:
         """Index of the column that an option names."""
@@ -194,16 +195,14 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
     layout, reader = table.layout, _Chooser(table, options)
     if layout.skipped:
         lines = "line" if layout.skipped == 1 else "lines"
-        reader.warnings.append(
-            f"note: {path}: {layout.skipped} {lines} before the header in line {layout.header_line} left out"
-        )
+        reader.notes.append(f"{path}: {layout.skipped} {lines} before the header in line {layout.header_line} left out")
     time = reader.time()
     force = reader.force()
     taken = {column.index for column in (time, force) if column is not None}
     responses = reader.responses(taken)
     if time is not None and options.period_s is not None and is_clock_time(table.first_cell(time.index)):
-        reader.warnings.append(
-            f"note: {path}: {time.label.text!r} holds times of the day, which are not read: the stated period of "
+        reader.notes.append(
+            f"{path}: {time.label.text!r} holds times of the day, which are not read: the stated period of "
             f"{options.period_s:.6g} s is taken"
         )
         time = None
@@ -242,6 +241,7 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
             axis=column.label.axis or (options.axis if not several else None),
             start_s=start_s,
             warnings=tuple(reader.warnings),
+            notes=tuple(reader.notes),
         )
         for k, column in enumerate(responses)
     ]
