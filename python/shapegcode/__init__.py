@@ -29,8 +29,8 @@ def __getattr__(name: str) -> Any:
     """Load a public name on first use."""
     if name == "__all__":
         return sorted(_home())
-    # Python itself asks for names such as __path__ and __file__, before anybody uses a public one.
-    if (name != "__version__" and name.startswith("__")) or name not in _home():
+    # Python itself asks for names such as __path__ and _core, before anybody uses a public one.
+    if (name != "__version__" and name.startswith("_")) or name not in _home():
         raise AttributeError(f"module 'shapegcode' has no attribute {name!r}")
     value = getattr(importlib.import_module(_home()[name]), name)
     if _home()[name] == "shapegcode._core":

@@ -263,6 +263,30 @@ def test_machine_init_and_show(folder: Path) -> None:
     assert (folder / "a.nc").read_bytes() == (folder / "b.nc").read_bytes()
 
 
+def test_expand(folder: Path) -> None:
+    (folder / "main.nc").write_text("%\nO1\nG21G17G90G94\nG0X0Y0Z0\nM98P2\nM30\nO2\nG1X10.F600\nM99\n%\n")
+    machine = sg.Machine.load("vx500")
+    done = run(folder, "expand", "main.nc", "-m", "vx500", "-o", "plain.nc", "--json", "e.json")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "expanded" in done.stdout.splitlines()[0]
+    plain = (folder / "plain.nc").read_bytes()
+    assert b"M98" not in plain
+    assert plain == sg.expand(folder / "main.nc", machine).text == sg.Program.read(folder / "main.nc").expanded_text
+    report = json.loads((folder / "e.json").read_text())
+    jsonschema.validate(report, schema(sg.Expansion))
+    assert report["size_bytes"] == len(plain)
+    assert [8, ""] in report["origins"]
+    piped = run_process(folder, "expand", "main.nc", "-m", "vx500", "-o", "-")
+    assert (piped.returncode, piped.stdout) == (0, plain.decode())
+    unchanged = run(folder, "expand", "part.nc", "-m", "vx500", "-o", "same.nc")
+    assert "unchanged" in unchanged.stdout
+    assert (folder / "same.nc").read_text() == GOOD
+    for words in (("-o", "main.nc"), ("-o", "-", "--json", "-"), ("-o", "x.nc", "--json", "x.nc")):
+        refused = run(folder, "expand", "main.nc", "-m", "vx500", *words)
+        assert (refused.returncode, refused.stdout) == (2, ""), words
+    assert files(folder) == ["e.json", "main.nc", "part.nc", "plain.nc", "same.nc"]
+
+
 def test_demo_path(folder: Path) -> None:
     done = run(folder, "demo", "path", "--json", "-")
     assert (done.returncode, done.stderr) == (0, "")

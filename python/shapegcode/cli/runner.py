@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,7 +51,7 @@ def check_files(
     from shapegcode.cli.options import refuse_same_file
 
     given = {name: value for name in _WRITTEN if (value := getattr(args, name, None)) is not None}
-    piped = [f"--{name} -" for name, value in given.items() if value == "-" and name != "output"]
+    piped = ["-o -" if name == "output" else f"--{name} -" for name, value in given.items() if value == "-"]
     if len(piped) > 1:
         raise ArgumentError(f"{' and '.join(piped)}: only one of them can have standard output")
     if given.get("npz") == "-":
@@ -69,7 +70,7 @@ def _read_files(args: argparse.Namespace) -> list[Path]:
 
 def standard_output(args: argparse.Namespace) -> str | None:
     """ "-" where a file goes to standard output, which then holds nothing else; else None."""
-    return "-" if "-" in (getattr(args, "json", None), getattr(args, "csv", None)) else None
+    return "-" if "-" in [getattr(args, name, None) for name in _WRITTEN] else None
 
 
 @contextlib.contextmanager
@@ -88,6 +89,13 @@ def progress(description: str, args: argparse.Namespace, *, endless: bool = Fals
         if endless:
             bar.wait()
         yield bar
+
+
+def _write_program(target: str | Path, content: bytes) -> None:
+    if str(target) == "-":
+        sys.stdout.buffer.write(content)
+    else:
+        write_bytes(target, content)
 
 
 def finish(
@@ -109,7 +117,7 @@ def finish(
         warnings: to show; None: those of the result.
         notes: further lines, below the warnings.
         wrote: files that the command has written already.
-        output: name and content of a program to write.
+        output: name and content of a program to write; "-" is standard output.
 
     Returns:
         The exit code.
@@ -132,7 +140,7 @@ def finish(
         terminal.write_json(report, target)
     if output is not None:
         # Last of all, so that no program stands there when something else could not be written.
-        write_bytes(*output)
+        _write_program(*output)
     if target == "-":
         terminal.write_json(report, target)
     console = terminal.output_console(standard_output(args))

@@ -1,0 +1,51 @@
+"""The plain program that calls, macros and coordinate modes come to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from shapegcode.machine import Machine
+from shapegcode.program.program import Program
+from shapegcode.program.result import Expansion
+
+__all__ = ["expand"]
+
+
+def expand(
+    program: Program | str | Path,
+    machine: Machine,
+    *,
+    compensation: Literal["expand", "keep"] = "expand",
+    program_number: int | None = None,
+) -> Expansion:
+    """Work out subprogram calls, custom macros, coordinate modes, corner words and cutter compensation.
+
+    Args:
+        program: what to expand, or its file; of a `Program` counts how it was read.
+        machine: whose controller reads it.
+        compensation: "expand": G41/G42 become plain moves of the tool's centre; "keep": they stay as they stand.
+        program_number: O number to play of a file that holds several; None: the first.
+
+    Returns:
+        The plain program, and where each of its lines comes from.
+
+    Raises:
+        ProgramError: the text is no program that can be read; the message starts with ``file:line:column``.
+        OSError: the file cannot be read.
+    """
+    if not isinstance(program, Program):
+        whole = compensation == "expand"
+        program = Program.read(program, machine, program_number=program_number, expand_compensation=whole)
+    core = program.core
+    return Expansion(
+        program.source,
+        machine.name,
+        program.expanded_text,
+        core.expanded,
+        core.line_count,
+        core.size,
+        {f"D{number}": radius for number, radius in core.expanded_radii_mm.items()},
+        tuple(core.origin(line) for line in range(1, core.line_count + 1)) if core.expanded else (),
+        tuple(program.warnings),
+    )
