@@ -153,7 +153,7 @@ class Demonstration(Result):
     def tables(self) -> list[Table]:
         """The statements, and the remark below them."""
         columns = (
-            Column("place", text=True),
+            Column("place", value=lambda row: row.place.replace(" ", "\N{NO-BREAK SPACE}"), text=True),
             Column("what", text=True),
             Column("paper", value="published", text=True),
             Column("here", value="ours", text=True),
