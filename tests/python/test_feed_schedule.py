@@ -248,12 +248,29 @@ def test_feeds_and_shaping_in_one_go_keep_the_limit_of_the_shaped_motion(tmp_pat
     arguments = ["convert", *write_files(tmp_path), "--feed-schedule", "-o", str(out), "--json", str(report)]
     assert main(arguments) == 0
     result = json.loads(report.read_text())
+    jsonschema.validate(result, schema(sg.ScheduledConversion))
     feed = result["feed_schedule"]
     assert feed["ok"]
     assert 0.9 * STRAIGHT_N < feed["resultant_force_n"]["emitted"]["max"] <= STRAIGHT_N
     assert result["within_tolerance"]
     assert feed["blocks"]["emitted"] == result["blocks"]["emitted"]
     assert b"SHAPEGCODE" in out.read_bytes()
+
+
+def test_a_missed_limit_of_the_cut_is_no_missed_tolerance_but_no_success_either() -> None:
+    machine = sg.Machine.load("vx500")
+    program = sg.Program.from_text(CORNER, machine, source="part.nc")
+    low = tool("resultant_n = 20\nfeed_per_tooth_min_mm = 0.012")
+    scheduled = sg.convert_scheduled(program, machine, low, sg.Stock.from_toml(ALLOWANCE))
+    assert (scheduled.within_tolerance, scheduled.feed_schedule.ok, scheduled.ok) == (True, False, False)
+    assert scheduled.answer.startswith("within tolerance: ")
+    assert "NOT within limits: peak resultant" in scheduled.answer
+    assert scheduled.next_step.startswith("do not run it: take less material at once")
+    assert b"(OUT OF TOLERANCE - DO NOT RUN  )" in scheduled.text
+    assert [table.title for table in scheduled.tables()][:2] == [
+        "part.nc on VX500, tool E8", "what holds the feed",
+    ]  # fmt: skip
+    assert {"path", "feed", "vibration", "feed-along-path"} <= scheduled.plots().keys()
 
 
 def test_a_tool_without_limits_is_told_so() -> None:

@@ -92,7 +92,7 @@ class Conversion(PlayedFigures, Result):
         target = getattr(self.contour_error_um, self.limits.contour_target)
         change = change_percent(self.cycle_time_s.original, self.cycle_time_s.emitted)
         return (
-            f"{'within tolerance' if self.ok else 'OUT OF TOLERANCE'}: residual vibration {axis.upper()} "
+            f"{'within tolerance' if self.within_tolerance else 'OUT OF TOLERANCE'}: residual vibration {axis.upper()} "
             f"{vibration.original[axis]:.1f} → {vibration.emitted[axis]:.1f} µm, "
             f"contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, time {percent(change)}"
         )

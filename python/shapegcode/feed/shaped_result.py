@@ -37,7 +37,9 @@ class ScheduledConversion(Conversion):
     @property
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
-        return super().next_step if self.feed_schedule.ok else self.feed_schedule.next_step
+        if self.within_tolerance and not self.feed_schedule.ok:
+            return f"do not run it: {self.feed_schedule.next_step}"
+        return super().next_step
 
     def tables(self) -> list[Table]:
         """Those of the schedule, then those of the conversion."""
