@@ -352,6 +352,19 @@ def test_every_public_name_of_the_extension_is_documented() -> None:
     assert silent == []
 
 
+def test_no_two_classes_share_a_name() -> None:
+    """Those that the package takes from the core into its public names count as its own."""
+    import shapegcode as sg
+
+    classes = [value for name in sg.__all__ if inspect.isclass(value := getattr(sg, name))]
+    homes = {value.__name__: ["core"] for value in classes if value.__module__ == "shapegcode._core"}
+    for file in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                homes.setdefault(node.name, []).append(file.relative_to(PACKAGE).as_posix())
+    assert {name: files for name, files in homes.items() if len(files) > 1} == {}
+
+
 def public_functions(file: Path) -> Iterator[tuple[str, ast.FunctionDef]]:
     """The functions of a module and the methods of its classes that anybody may call, without properties."""
     for node in ast.parse(file.read_text(encoding="utf-8")).body:

@@ -18,7 +18,7 @@ from acceptance import Judged, close, convert, machine_with
 from judge import Mode, Move, contour_error_um, durations, play, residual_um, response, starts
 from judge.player import BlockEnd, moving_average
 from shapegcode.cli import main
-from shapegcode.conversion.cases import CaseFigures, Limits, judge_region, stated_cases
+from shapegcode.conversion.cases import CaseFigures, RegionLimits, judge_region, stated_cases
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.results.figures import Deviation
 from shapegcode.shaping import choose_shaper
@@ -394,13 +394,13 @@ def test_gouge_is_what_lies_on_the_side_of_the_material(side: str) -> None:
 
 def test_the_contour_limit_is_for_the_targeted_deviation() -> None:
     figures = CaseFigures(np.array([0.001, 0.0, 0.0]), Deviation(0.03, 0.03, 0.0), Deviation(0.06, 0.0, 0.06), 1.0)
-    limits = {target: Limits(np.full(3, 4.0), 50.0, target) for target in ("command", "response")}
+    limits = {target: RegionLimits(np.full(3, 4.0), 50.0, target) for target in ("command", "response")}
     assert [each.is_missed for each in judge_region(figures, limits["command"])] == [False] * 4
     *residuals, contour = judge_region(figures, limits["response"])
     assert contour.is_missed and str(contour) == "contour error of the response 60.0 um, limit 50.0 um"
     assert [each.share for each in residuals] == pytest.approx([0.25, 0.0, 0.0])
     # Nothing allowed: whatever there is misses it by more than any number says.
-    tight = judge_region(figures, Limits(np.zeros(3), 0.0, "command"))
+    tight = judge_region(figures, RegionLimits(np.zeros(3), 0.0, "command"))
     assert [each.share for each in tight] == [math.inf, 0.0, 0.0, math.inf]
 
 
@@ -416,7 +416,7 @@ def test_what_has_to_be_measured_depends_on_the_target() -> None:
 def test_table_shows_what_only_stands_beside_in_brackets(judged: Judged) -> None:
     table = judged.conversion.tables()[1]
     lines = str(table).splitlines()
-    assert sum("<- worst" in line for line in lines) == 1
+    assert sum("worst" in line for line in lines) == 1
     rows = {case.name: line for case in judged.conversion.cases for line in lines if case.name in line}
     assert "(out)" in rows["starved 20 ms"]
     assert "within" in rows["all modes low"] and "(" not in rows["all modes low"]

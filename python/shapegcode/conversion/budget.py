@@ -13,7 +13,7 @@ from shapegcode.conversion.write import EmittedRegion
 from shapegcode.results.result import Xyz
 from shapegcode.shaping.grid import Grid
 
-__all__ = ["Budget", "BudgetOutcome", "GivenUp", "Load", "TextNeeds", "busiest_per_s", "measure_load"]
+__all__ = ["Budget", "BudgetOutcome", "GivenUp", "TextNeeds", "TransferLoad", "busiest_per_s", "measure_load"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -48,7 +48,7 @@ class Budget:
         """Whether blocks may come too fast for it."""
         return self.baud is not None or self.max_blocks_per_second is not None
 
-    def excess(self, load: Load) -> float:
+    def excess(self, load: TransferLoad) -> float:
         """How many times as fast as allowed a region's blocks come.
 
         Args:
@@ -59,7 +59,7 @@ class Budget:
         """
         return max((value / limit for _, value, limit in self._rates(load)), default=0.0)
 
-    def too_fast(self, load: Load) -> str:
+    def too_fast(self, load: TransferLoad) -> str:
         """What of a region comes too fast.
 
         Args:
@@ -73,7 +73,7 @@ class Budget:
                 return f"needs {value:.0f} {unit}, limit {limit:g}"
         return ""
 
-    def _rates(self, load: Load) -> list[tuple[str, float, float]]:
+    def _rates(self, load: TransferLoad) -> list[tuple[str, float, float]]:
         pairs = (
             ("baud", load.baud, self.baud),
             ("blocks per second", load.blocks_per_second, self.max_blocks_per_second),
@@ -82,7 +82,7 @@ class Budget:
 
 
 @dataclass(frozen=True)
-class Load:
+class TransferLoad:
     """What a shaped region asks of memory, line and control.
 
     Attributes:
@@ -172,7 +172,7 @@ def busiest_per_s(durations_s: npt.ArrayLike, amounts: npt.ArrayLike, stretch_s:
     return float(amount.max()) / stretch
 
 
-def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> Load:
+def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
     """The load of a shaped region; a stretch lasts as long as the shaper: no transition is shorter.
 
     Args:
@@ -184,7 +184,7 @@ def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_p
     durations = shaped.periods * grid.block_period_s
     stretch = max(grid.duration_s, grid.block_period_s)
     characters = busiest_per_s(durations, _block_bytes(shaped), stretch)
-    return Load(
+    return TransferLoad(
         len(shaped.text) - (region.text_end - region.text_begin),
         characters * bits_per_character,
         busiest_per_s(durations, np.ones(len(durations)), stretch),

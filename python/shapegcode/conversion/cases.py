@@ -22,7 +22,7 @@ __all__ = [
     "Case",
     "CaseFigures",
     "Judged",
-    "Limits",
+    "RegionLimits",
     "Target",
     "judge_region",
     "region_misses",
@@ -94,7 +94,7 @@ class CaseFigures:
 
 
 @dataclass(frozen=True)
-class Limits:
+class RegionLimits:
     """What a region is judged by.
 
     Attributes:
@@ -194,7 +194,7 @@ def stated_cases(machine: Machine) -> list[Case]:
     return cases
 
 
-def judge_region(figures: CaseFigures, limits: Limits) -> list[Judged]:
+def judge_region(figures: CaseFigures, limits: RegionLimits) -> list[Judged]:
     """Every judged figure of a region in one case, beside its limit: residuals, and the targeted deviation."""
     judged = [
         Judged(f"residual vibration {axis}", float(now), float(limit))
@@ -206,7 +206,7 @@ def judge_region(figures: CaseFigures, limits: Limits) -> list[Judged]:
     return judged
 
 
-def region_misses(cases: Sequence[Case], figures: Sequence[CaseFigures], limits: Limits) -> list[str]:
+def region_misses(cases: Sequence[Case], figures: Sequence[CaseFigures], limits: RegionLimits) -> list[str]:
     """Every figure of a region that leaves its limit in a case that counts: the worst case of each, in words."""
     worst: dict[str, tuple[Judged, Case]] = {}
     for case, played in zip(cases, figures, strict=True):

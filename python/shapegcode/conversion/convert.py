@@ -122,7 +122,7 @@ class _Settled:
 
 
 @dataclass
-class _Tried:
+class _Attempt:
     """The last room of a region that left the tolerance, what it then reached, µm, and whether less room helps."""
 
     room_um: float
@@ -190,7 +190,7 @@ class _Run:
     def _settle(self) -> _Settled:
         """Write, read back and play; again, slower, where a region left the contour tolerance."""
         originals = [play for play, reason in zip(self.originals, self.reasons, strict=True) if not reason]
-        tried: dict[int, _Tried] = {}
+        tried: dict[int, _Attempt] = {}
         for attempt in range(_ATTEMPTS):
             stage = partial(self.on_progress, "shaping" if attempt == 0 else "shaping again, slower")
             written = self._write(self.grid, stage)
@@ -202,7 +202,7 @@ class _Run:
                 break
         return _Settled(written, emitted, figures)
 
-    def _tighten(self, tried: dict[int, _Tried], written: Written, figures: list[RegionFigures]) -> bool:
+    def _tighten(self, tried: dict[int, _Attempt], written: Written, figures: list[RegionFigures]) -> bool:
         """Give regions that left the contour tolerance less room, so that they run slower. False if there is none.
 
         The bound on feed counts corners and arcs one by one; where several fall into one shaper they add up. Where the
@@ -223,7 +223,7 @@ class _Run:
                 room_um[index] = before.room_um
                 before.helps = False
             else:
-                tried[index] = _Tried(room_um[index], reached)
+                tried[index] = _Attempt(room_um[index], reached)
                 room_um[index] = min(room_um[index], written.planned_um.get(index, math.inf))
                 room_um[index] *= _CONTOUR_MARGIN * limit / reached
         return tightened

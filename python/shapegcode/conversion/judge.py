@@ -15,7 +15,7 @@ from shapegcode.conversion.cases import (
     ALL_MODES,
     Case,
     CaseFigures,
-    Limits,
+    RegionLimits,
     Target,
     judge_region,
     region_misses,
@@ -195,13 +195,15 @@ class Judge:
         ranks = [self.cases.index(case) for case in cases]
         return largest_xyz_um(region.cases[rank].residual_mm for region in figures for rank in ranks)
 
-    def _limits(self, figures: RegionFigures, place: Placed) -> Limits:
+    def _limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
         """What a region is judged by: its residual beside that of the original as programmed, in whatever case."""
         tolerance = self._machine.tolerance
         increment_um = least_increment_mm(self._machine, place.region.exit.units) * 1e3
         floor_um = max(tolerance.residual_floor_um, tolerance.residual_floor_increments * increment_um)
         before_um = figures.original.residual_mm * 1e3
-        return Limits(np.maximum(tolerance.residual_ratio * before_um, floor_um), tolerance.contour_um, self.target)
+        return RegionLimits(
+            np.maximum(tolerance.residual_ratio * before_um, floor_um), tolerance.contour_um, self.target
+        )
 
     def _verdict(self, figures: RegionFigures, place: Placed, block_period_s: float) -> RegionVerdict:
         limits = self._limits(figures, place)
@@ -232,7 +234,7 @@ class Judge:
 def case_verdict(
     case: Case,
     played: Sequence[CaseFigures],
-    limits: Sequence[Limits],
+    limits: Sequence[RegionLimits],
     lines: Sequence[tuple[int, int]],
     material_side: str | None,
 ) -> CaseVerdict:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from shapegcode import _core
-from shapegcode.conversion.budget import Budget, BudgetOutcome, GivenUp, Load, TextNeeds
+from shapegcode.conversion.budget import Budget, BudgetOutcome, GivenUp, TextNeeds, TransferLoad
 from shapegcode.conversion.figures import RegionVerdict
 from shapegcode.machine import Machine
 from shapegcode.program import Program, least_increment_mm
@@ -46,7 +46,7 @@ class WrittenText(Protocol):
         """The whole text."""
 
     @property
-    def loads(self) -> Mapping[int, Load]:
+    def loads(self) -> Mapping[int, TransferLoad]:
         """In the order of the regions."""
 
 
@@ -169,17 +169,19 @@ class Spending:
             )
         return f"{self._program.source}: given up for the budget: {'; '.join(said)}" if said else ""
 
-    def _factors(self, loads: Mapping[int, Load]) -> list[float]:
+    def _factors(self, loads: Mapping[int, TransferLoad]) -> list[float]:
         """How many times too fast the regions are that are."""
         factors = (self.budget.excess(load) for load in loads.values())
         return [factor for factor in factors if factor > 1.0 + _ROUNDING]
 
-    def _worth(self, grid: Grid, loads: Mapping[int, Load], weights: Sequence[float]) -> tuple[float, int, int]:
+    def _worth(self, grid: Grid, loads: Mapping[int, TransferLoad], weights: Sequence[float]) -> tuple[float, int, int]:
         """Gain of the regions that are not too fast, how many they are, and how short the shaper is, in ticks."""
         slow = [index for index, load in loads.items() if not self.budget.too_fast(load)]
         return math.fsum(weights[index] for index in slow), len(slow), -round(grid.duration_s / self._tick_s)
 
-    def _too_large(self, size: int, loads: Mapping[int, Load], played: Mapping[int, RegionVerdict]) -> dict[int, str]:
+    def _too_large(
+        self, size: int, loads: Mapping[int, TransferLoad], played: Mapping[int, RegionVerdict]
+    ) -> dict[int, str]:
         """Regions to keep so that the text fits: least gain per byte first."""
         limit = self.budget.max_bytes
         if limit is None or not loads or size <= limit:
@@ -211,7 +213,7 @@ class Spending:
         both = region.residual_vibration_um
         return (max(both.original) - max(both.emitted)) / self._unit_um[index]
 
-    def _nothing_shaped(self, size: int, loads: Mapping[int, Load]) -> dict[int, str]:
+    def _nothing_shaped(self, size: int, loads: Mapping[int, TransferLoad]) -> dict[int, str]:
         limit = self.budget.max_bytes
         possible = all(self._keepable[index] for index in loads)
         if limit is None or not possible or self._program.core.size > limit:

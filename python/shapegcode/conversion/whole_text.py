@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from shapegcode import _core
-from shapegcode.conversion.budget import Load, measure_load
+from shapegcode.conversion.budget import TransferLoad, measure_load
 from shapegcode.conversion.readback import Placed
 from shapegcode.conversion.spending import keepable
 from shapegcode.conversion.write import EmittedRegion, RegionWriter
@@ -67,7 +67,7 @@ class Written:
     blocks: int
     kept_warnings: list[str]
     planned_um: dict[int, float]
-    loads: dict[int, Load]
+    loads: dict[int, TransferLoad]
 
 
 class TextWriter:

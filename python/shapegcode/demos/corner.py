@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from shapegcode.demos.corner_figures import DIAMETER_MM, CornerFigures, corner_figures
+from shapegcode.demos.corner_figures import DIAMETER_MM, PaperCorner, corner_figures
 from shapegcode.demos.corner_program import BLOCK_MM, CASES, STRAIGHT_MM
 from shapegcode.demos.corner_study import CornerStudy, study_corner
 from shapegcode.demos.result import Demonstration, Statement, stated
@@ -35,7 +35,7 @@ class CornerDemo(Demonstration):
     """
 
     machine: str
-    cases: tuple[CornerFigures, ...]
+    cases: tuple[PaperCorner, ...]
     studies: tuple[CornerStudy, ...] = field(metadata=hidden())
 
     @property
@@ -106,7 +106,7 @@ def corner_demo(on_progress: Callable[[float], None] = lambda _done: None) -> Co
     )
 
 
-def _arc_statements(of: CornerFigures) -> list[Statement]:
+def _arc_statements(of: PaperCorner) -> list[Statement]:
     """Case 1, the one whose forces and feeds the paper computes."""
     depth, ratio, feed = of.radial_depth_mm, of.radial_depth_ratio, of.feed_mm_per_min
     blocks, above, constant = of.blocks.length_mm, of.above_straight_percent, of.constant_force_mm_per_min
@@ -146,7 +146,7 @@ def _arc_statements(of: CornerFigures) -> list[Statement]:
     ]  # fmt: skip
 
 
-def _vertex_statements(of: CornerFigures) -> list[Statement]:
+def _vertex_statements(of: PaperCorner) -> list[Statement]:
     """Cases 2 and 3, whose path has a vertex."""
     place, depth, feed = f"case {of.case}", of.radial_depth_mm, of.feed_mm_per_min
     circle = (of.full_circle_radial_depth_mm or 0.0) / DIAMETER_MM

@@ -12,7 +12,7 @@ from shapegcode.demos.corner_study import AlongCorner, CornerStudy, Scheduled
 from shapegcode.feed.result import FeedRange, ResultantForce
 from shapegcode.results.result import Pair
 
-__all__ = ["DIAMETER_MM", "CornerFigures", "CornerScheduled", "corner_figures"]
+__all__ = ["DIAMETER_MM", "CornerScheduled", "PaperCorner", "corner_figures"]
 
 DIAMETER_MM = 2.0 * TOOL_RADIUS_MM
 _LEAST_GAIN_PERCENT = 15.0
@@ -135,7 +135,7 @@ class CornerScheduled:
 
 
 @dataclass(frozen=True)
-class CornerFigures:
+class PaperCorner:
     """A corner of the paper; `original` is the programmed feed, `emitted` that of equation 7.
 
     Attributes:
@@ -175,13 +175,13 @@ class CornerFigures:
     wall_error_um: WallErrors
 
 
-def corner_figures(study: CornerStudy) -> CornerFigures:
+def corner_figures(study: CornerStudy) -> PaperCorner:
     """The figures of a case."""
     case, length = study.case, study.length_mm
     programmed, after, blocks = study.programmed, study.equation7, np.diff(study.blocks_mm)
     deepest = study.deepest()
     target = float(programmed.peak_n[0])
-    return CornerFigures(
+    return PaperCorner(
         case=case.number,
         spindle_rev_per_min=case.spindle_rev_per_min,
         rough_radius_mm=case.rough_radius_mm,

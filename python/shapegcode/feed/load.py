@@ -10,7 +10,7 @@ import numpy as np
 from shapegcode import _core
 from shapegcode.cutting.tool import Tool
 from shapegcode.feed.plan import FeedPlan, goes_on, limits_of
-from shapegcode.feed.travel import Motion, Travelled, Vector
+from shapegcode.feed.travel import Mover, Travelled, Vector
 from shapegcode.feed.walk import SurveyedMove, SurveyedRegion
 from shapegcode.machine import Machine
 from shapegcode.results.result import Pair
@@ -71,7 +71,7 @@ class PathLoad(Pair[Load]):
 
 
 def region_load(
-    part: SurveyedRegion, plan: FeedPlan | None, written: _core.Path, machine: Machine, *, before: Motion, after: Motion
+    part: SurveyedRegion, plan: FeedPlan | None, written: _core.Path, machine: Machine, *, before: Mover, after: Mover
 ) -> PathLoad | None:
     """Load along a region as programmed and as written; None where engagement or spindle speed are not known.
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.cutting.tool import Tool
-from shapegcode.feed.travel import Motion, Vector
+from shapegcode.feed.travel import Mover, Vector
 from shapegcode.feed.walk import SurveyedRegion
 from shapegcode.machine import Machine
 
@@ -97,7 +97,7 @@ def limits_of(tool: Tool, machine: Machine, margin: float) -> _core.FeedLimits:
     )
 
 
-def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Motion, divisible: list[bool], margin: float,
+def plan_region(surveyed: SurveyedRegion, machine: Machine, motion: Mover, divisible: list[bool], margin: float,
                 feed_unit_mm_per_min: float) -> FeedPlan:  # fmt: skip
     """Choose the feeds of a region whose feeds may change.
 
@@ -256,7 +256,7 @@ def _near_material(s_mm: Vector, air: npt.NDArray[np.bool_], approach_mm: float)
     return near
 
 
-def _stretches_that_keep(task: _Task, machine: Machine, motion: Motion) -> list[_core.FeedStretch]:
+def _stretches_that_keep(task: _Task, machine: Machine, motion: Mover) -> list[_core.FeedStretch]:
     """Plan, travel, and slow down earlier or more where the travel is still too fast."""
     control = machine.feed_control
     most_change = math.inf if control.max_change_mm_per_min is None else control.max_change_mm_per_min

@@ -17,7 +17,7 @@ from shapegcode.feed.load import PathLoad, region_load
 from shapegcode.feed.plan import FeedPlan, plan_region
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.survey import Survey, survey
-from shapegcode.feed.travel import Motion, OrdinaryMotion
+from shapegcode.feed.travel import Mover, OrdinaryMotion
 from shapegcode.machine import Machine
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.results.result import Pair
@@ -43,7 +43,7 @@ def schedule_feed(
     tools: Tool | Sequence[Tool],
     stock: Stock,
     *,
-    motion: Motion | None = None,
+    motion: Mover | None = None,
     margin: float = MARGIN,
     resolution_mm: float | None = None,
     on_progress: Progress = lambda _done: None,
@@ -92,7 +92,7 @@ def schedule_survey(
     surveyed: Survey,
     machine: Machine,
     *,
-    motion: Motion | None = None,
+    motion: Mover | None = None,
     margin: float = MARGIN,
     on_progress: Progress = lambda _done: None,
 ) -> FeedSchedule:
@@ -134,7 +134,7 @@ def schedule_survey(
 
 
 def _plan_all(
-    surveyed: Survey, machine: Machine, motion: Motion, margin: float, on_progress: Callable[[int], None]
+    surveyed: Survey, machine: Machine, motion: Mover, margin: float, on_progress: Callable[[int], None]
 ) -> list[FeedPlan | None]:
     """Plans of the regions, each on its own: two at a time, as they share nothing."""
     program = surveyed.program

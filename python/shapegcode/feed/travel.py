@@ -14,7 +14,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping.grid import Grid
 
-__all__ = ["Motion", "OrdinaryMotion", "ShapedMotion", "Travelled", "travel_emitted"]
+__all__ = ["Mover", "OrdinaryMotion", "ShapedMotion", "Travelled", "travel_emitted"]
 
 Vector = npt.NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class Travelled:
         return cls(np.asarray(travel.highest_mm_per_s) * 60.0, np.asarray(travel.time_s))
 
 
-class Motion(Protocol):
+class Mover(Protocol):
     """What makes a motion of the blocks of a region."""
 
     @property
@@ -61,7 +61,7 @@ class OrdinaryMotion:
         return 0.5 * period_s * sum(filter_.duration_samples for filter_ in self._controller.filters)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
-        """See `Motion`."""
+        """See `Mover`."""
         return Travelled.of(self._controller.travel(path, along, stations_mm, window_s))
 
 
@@ -89,7 +89,7 @@ class ShapedMotion:
         return 0.5 * self._period_s * sum(filter_.duration_samples for filter_ in self._filters)
 
     def travel(self, path: _core.Path, along: _core.Path, stations_mm: Vector, window_s: float) -> Travelled:
-        """See `Motion`."""
+        """See `Mover`."""
         profile = _core.plan_speed(path, self._limits, self._tolerance)
         return Travelled.of(
             _core.travel_path(path, profile, along, stations_mm, self._period_s, self._filters, window_s)
@@ -99,7 +99,7 @@ class ShapedMotion:
 def travel_emitted(
     blocks: _core.Path, path: _core.Path, machine: Machine, stations_mm: Vector, window_s: float
 ) -> Travelled:
-    """Travel of shaped blocks as the controller plays them, along the programmed path; else as `Motion.travel`."""
+    """Travel of shaped blocks as the controller plays them, along the programmed path; else as `Mover.travel`."""
     model = MachineModel(machine)
     options = model.options(time_constant_s=model.shaped_time_constant_s)
     return Travelled.of(

@@ -1,6 +1,6 @@
 """How many modes the data hold: models of growing order, each started where the last one left something unexplained.
 
-A search knows nothing of taps or decays: a `Problem` fits a number of modes to its records, or quickly (without what
+A search knows nothing of taps or decays: a `FitProblem` fits a number of modes to its records, or quickly (without what
 only the last digits need) to them or to what is left of them.
 """
 
@@ -35,7 +35,7 @@ _PATIENCE = 2
 Fit = _core.ModalFit | _core.DecayFit
 
 
-class Problem(Protocol):
+class FitProblem(Protocol):
     """Records of one point."""
 
     @property
@@ -74,7 +74,7 @@ class Search:
         return int(np.argmin(self.evidence))
 
 
-def search(problem: Problem, most_modes: int) -> Search:
+def search(problem: FitProblem, most_modes: int) -> Search:
     """Fit models of 0, 1, 2, ... modes until the data ask for no more.
 
     Args:
@@ -116,13 +116,13 @@ def _evidence(squares: float, samples: int, parameters: int, modes: int) -> floa
     return float(samples * np.log(max(squares / samples, tiny)) + (parameters + modes) * np.log(samples))
 
 
-def chart_poles(problem: Problem) -> Sequence[npt.NDArray[np.complex128]]:
+def chart_poles(problem: FitProblem) -> Sequence[npt.NDArray[np.complex128]]:
     """Poles of the models of a stabilisation chart, by number of modes from 1."""
     shortest = min(len(response) for response in problem.responses)
     return problem.poles(max(1, min(_CHART_ORDERS, (shortest - 8) // 8)))
 
 
-def _pool(problem: Problem) -> Starts:
+def _pool(problem: FitProblem) -> Starts:
     """Poles of the stabilisation chart that lie in the band: each mode is among them several times."""
     low, high = problem.band_hz
     found: Starts = []
@@ -132,7 +132,7 @@ def _pool(problem: Problem) -> Starts:
     return [(w, z) for w, z in found if low <= w / (2.0 * np.pi) <= high]
 
 
-def _next_fit(problem: Problem, last: Fit | None, pool: Starts) -> Fit | None:
+def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None:
     """The best fit with one mode more than `last`.
 
     The further mode is begun at the peaks of what `last` leaves, and at the pole of the pool that explains most of it.
@@ -184,7 +184,7 @@ def _attempt(task: Callable[[], Fit]) -> Fit | None:
     return fit if np.isfinite(fit.sum_of_squares) else None
 
 
-def _peaks(residuals: Sequence[FloatArray], problem: Problem) -> list[float]:
+def _peaks(residuals: Sequence[FloatArray], problem: FitProblem) -> list[float]:
     """Frequencies (rad/s) of the highest peaks of the residuals' spectrum within the band, the highest first."""
     length = 2 * max(len(residual) for residual in residuals)
     power = np.zeros(length // 2 + 1)
