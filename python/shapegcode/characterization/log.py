@@ -49,6 +49,12 @@ class ServoLog:
 def parse_units(text: str) -> tuple[float, float]:
     """Read ``TIME,LENGTH``, for example ``ms,um``: the factors to s and mm.
 
+    Args:
+        text: of the option ``--units``.
+
+    Returns:
+        Factors to s and to mm.
+
     Raises:
         ArgumentError: a unit is not known.
     """

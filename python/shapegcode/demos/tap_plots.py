@@ -21,7 +21,14 @@ _SHOWN_HZ = 20.0
 
 
 def plots_of(demo: TapDemo) -> dict[str, Plot]:
-    """Its pictures by name."""
+    """Its pictures by name.
+
+    Args:
+        demo: what was worked out.
+
+    Returns:
+        What draws each picture, by the name of its file without ending.
+    """
     return {
         "paper003-figures2-3-acceleration": partial(plot_acceleration, demo),
         "paper003-deflection": partial(plot_deflection, demo),

@@ -105,6 +105,13 @@ class ModeTables:
     def put(self, modes: Sequence[IdentifiedMode], refused: Sequence[IdentifiedMode]) -> str:
         """The text with modes in it; see `update.update_modes`.
 
+        Args:
+            modes: that the data support.
+            refused: that the data show without supporting them.
+
+        Returns:
+            The new text of the file.
+
         Raises:
             ArgumentError: the result would not say what is meant, because of a layout that is not known here.
         """

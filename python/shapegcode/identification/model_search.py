@@ -107,7 +107,14 @@ def search(problem: FitProblem, most_modes: int) -> Search:
 
 
 def evidence_of(fit: Fit) -> float:
-    """Evidence of a fit, as in `Search.evidence`."""
+    """Evidence of a fit, as in `Search.evidence`.
+
+    Args:
+        fit: a model.
+
+    Returns:
+        The criterion; lower is better.
+    """
     return _evidence(fit.sum_of_squares, fit.samples, fit.parameters, len(fit.omega_rad_s))
 
 
@@ -117,7 +124,14 @@ def _evidence(squares: float, samples: int, parameters: int, modes: int) -> floa
 
 
 def chart_poles(problem: FitProblem) -> Sequence[npt.NDArray[np.complex128]]:
-    """Poles of the models of a stabilisation chart, by number of modes from 1."""
+    """Poles of the models of a stabilisation chart, by number of modes from 1.
+
+    Args:
+        problem: records.
+
+    Returns:
+        Discrete poles by number of modes.
+    """
     shortest = min(len(response) for response in problem.responses)
     return problem.poles(max(1, min(_CHART_ORDERS, (shortest - 8) // 8)))
 
@@ -171,7 +185,14 @@ def _has_twins(fit: Fit, record_s: float) -> bool:
 
 
 def starts_of(fit: Fit) -> Starts:
-    """The modes of a fit, for another one to begin with."""
+    """The modes of a fit, for another one to begin with.
+
+    Args:
+        fit: a model.
+
+    Returns:
+        (omega in rad/s, damping ratio) of each mode.
+    """
     return [(float(omega), float(zeta)) for omega, zeta in zip(fit.omega_rad_s, fit.damping_ratio, strict=True)]
 
 

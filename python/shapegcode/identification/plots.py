@@ -35,7 +35,14 @@ _MEASURED, _FITTED = plot.GREY, plot.COLOURS[0]
 
 
 def plots_of(found: Identification) -> dict[str, Plot]:
-    """Its pictures by name."""
+    """Its pictures by name.
+
+    Args:
+        found: what was identified.
+
+    Returns:
+        What draws each picture, by the name of its file without ending.
+    """
     pictures: dict[str, Plot] = {
         "identify-traces": partial(plot_traces, found),
         "identify-stabilisation": partial(plot_stabilisation, found),
@@ -132,6 +139,9 @@ def plot_stabilisation(found: Identification, ax: Axes | None = None) -> Axes:
     Args:
         found: what was identified.
         ax: where to draw; None: a new figure.
+
+    Returns:
+        The panel.
     """
     frequency, amplitude = _spectrum(found)
     seen = _seen(frequency, found)
@@ -222,6 +232,9 @@ def plot_spectrum(found: Identification, ax: Axes | None = None) -> Axes:
     Args:
         found: what was identified, from decays.
         ax: where to draw; None: a new figure.
+
+    Returns:
+        The panel.
     """
     spectrum = decay_spectrum(_fitted_part(found)[0])
     seen = _seen(spectrum.frequency_hz, found, [peak.frequency_hz for peak in spectrum.peaks])

@@ -44,6 +44,12 @@ def is_clipped(values: FloatArray) -> bool:
 
     A run of three or more samples at the extreme, next to which the signal falls more steeply than a smooth peak of the
     same width at this resolution would.
+
+    Args:
+        values: (n,) samples.
+
+    Returns:
+        True for an overload.
     """
     centred = values - np.median(values)
     largest = float(np.max(np.abs(centred)))
@@ -90,7 +96,15 @@ def _run_around(inside: npt.NDArray[np.bool_], at: int) -> int:
 
 
 def excited_hz(force_n: FloatArray, period_s: float) -> float:
-    """Frequency up to which a pulse excites: where its spectrum has fallen by 20 dB, at most half the sampling rate."""
+    """Frequency up to which a pulse excites: where its spectrum has fallen by 20 dB, at most half the sampling rate.
+
+    Args:
+        force_n: (n,) the pulse, 0 outside of it.
+        period_s: time between two samples.
+
+    Returns:
+        The frequency in Hz; 0 without a pulse.
+    """
     pulse = np.trim_zeros(force_n)
     if pulse.size == 0:
         return 0.0

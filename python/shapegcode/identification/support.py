@@ -178,6 +178,13 @@ def rivals_of(order: int, fits: Sequence[Fit]) -> list[Rival]:
     """Models beside the chosen one that the data do not clearly refuse.
 
     That is the one with a mode more, if chance alone would seldom make it fit so much better.
+
+    Args:
+        order: number of modes of the chosen model.
+        fits: models with 1, 2, ... modes.
+
+    Returns:
+        None, or the one with a mode more.
     """
     chosen = fits[order - 1]
     if len(fits) <= order:
@@ -190,13 +197,29 @@ def rivals_of(order: int, fits: Sequence[Fit]) -> list[Rival]:
 
 
 def is_background(mode: Estimates, doubts: Doubts) -> bool:
-    """Whether a part of the model is drift or lies outside the band: it helps the fit, and is no mode to speak of."""
+    """Whether a part of the model is drift or lies outside the band: it helps the fit, and is no mode to speak of.
+
+    Args:
+        mode: of the model.
+        doubts: what was searched.
+
+    Returns:
+        True where it is no mode to speak of.
+    """
     low, high = doubts.band_hz
     return mode.damping_ratio.value > _NO_VIBRATION or not low <= mode.frequency_hz.value <= high
 
 
 def refusal_of(mode: Estimates, doubts: Doubts) -> str:
-    """Why the data do not support a mode; empty if they do."""
+    """Why the data do not support a mode; empty if they do.
+
+    Args:
+        mode: of the model.
+        doubts: limits and rivals.
+
+    Returns:
+        The reason, or an empty text.
+    """
     frequency, damping, stiffness = mode.frequency_hz, mode.damping_ratio, mode.stiffness_n_per_m
     if frequency.value * doubts.record_s < LEAST_SWINGS:
         return (

@@ -73,6 +73,16 @@ def update_machine_file(
 ) -> MachineUpdate:
     """Read a machine file and put identified modes into it; see `update_modes`. The file itself is not touched.
 
+    Args:
+        path: of the machine file.
+        axis: "x", "y" or "z".
+        modes: what the data support.
+        source: where they come from.
+        refused: modes that the data show without supporting their values.
+
+    Returns:
+        The text to write, what it says, and notes of what changed.
+
     Raises:
         ArgumentError: a built-in machine; see `update_modes` too.
         MachineError: the file is bad, or would be.
@@ -85,6 +95,9 @@ def update_machine_file(
 
 def check_updatable(path: str | Path) -> None:
     """Tell before the work what would make `update_machine_file` fail whatever the modes.
+
+    Args:
+        path: of the machine file, or name of a built-in machine.
 
     Raises:
         ArgumentError: a built-in machine, or no regular file.

@@ -18,6 +18,12 @@ __all__ = ["named_errors", "replaced_file", "write_bytes", "write_lines", "write
 def named_errors(path: str | Path) -> Iterator[None]:
     """Errors of the file system get the name of *path*: a failed write() has none, that of a temporary file misleads.
 
+    Args:
+        path: named in the errors.
+
+    Yields:
+        A context.
+
     Raises:
         OSError: with the name of *path* and the reason.
     """
@@ -32,6 +38,12 @@ def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
     """A stream whose content takes the place of a file when the block ends well; otherwise the file stays as it was.
 
     A symbolic link is followed; a device or pipe is written to directly.
+
+    Args:
+        path: of the file.
+
+    Yields:
+        The stream to write to.
 
     Raises:
         OSError: the file cannot be written, for example a full disk or a missing folder.
@@ -74,6 +86,10 @@ def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:
 def write_lines(path: str | Path, lines: Iterable[str]) -> None:
     """As `write_text`, line by line, without holding all of them; ``-`` is standard output.
 
+    Args:
+        path: of the file, or ``-``.
+        lines: with their line ends.
+
     Raises:
         OSError: with the name of *path* and the reason.
     """
@@ -87,6 +103,11 @@ def write_lines(path: str | Path, lines: Iterable[str]) -> None:
 
 def write_bytes(path: str | Path, data: bytes, *, overwrite: bool = True) -> None:
     """As :func:`write_text`, for bytes.
+
+    Args:
+        path: of the file.
+        data: its content.
+        overwrite: False: an existing file is an error.
 
     Raises:
         FileExistsError: the file exists and *overwrite* is False.

@@ -65,7 +65,14 @@ class Label:
 
 
 def words_of(name: str) -> list[str]:
-    """The words of a name, in lower case."""
+    """The words of a name, in lower case.
+
+    Args:
+        name: of a column.
+
+    Returns:
+        Its words, in order.
+    """
     return re.findall(r"[^\W\d_]+", name.lower())
 
 

@@ -83,6 +83,12 @@ class Layout:
 def utf8_text(path: Path) -> bytes:
     """The text as ASCII-compatible bytes with line feeds.
 
+    Args:
+        path: of the file.
+
+    Returns:
+        The whole file, one byte per ASCII character.
+
     Raises:
         RecordError: it is not text.
     """
@@ -102,7 +108,15 @@ def utf8_text(path: Path) -> bytes:
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
-    """The cells of a line, without quotes and surrounding blanks."""
+    """The cells of a line, without quotes and surrounding blanks.
+
+    Args:
+        line: of the file.
+        delimiter: between cells; " " stands for any run of blanks.
+
+    Returns:
+        One text per cell.
+    """
     if delimiter == " ":
         return line.split()
     if '"' in line:
@@ -112,22 +126,51 @@ def cells_of(line: str, delimiter: str) -> list[str]:
 
 
 def is_number(cell: str, decimal_comma: bool) -> bool:
-    """Whether a cell is a number, NaN and infinity included."""
+    """Whether a cell is a number, NaN and infinity included.
+
+    Args:
+        cell: its text.
+        decimal_comma: numbers have a comma for the point.
+
+    Returns:
+        True for a number.
+    """
     return (_COMMA_NUMBER if decimal_comma else _NUMBER).fullmatch(cell) is not None
 
 
 def is_clock_time(cell: str) -> bool:
-    """Whether a cell is a time of the day, with a date or without: ``10:15:00,000391``."""
+    """Whether a cell is a time of the day, with a date or without: ``10:15:00,000391``.
+
+    Args:
+        cell: its text.
+
+    Returns:
+        True for a time of the day.
+    """
     return re.search(r"\d{1,2}:\d{2}", cell) is not None
 
 
 def has_thousands(cell: str) -> bool:
-    """Whether a number with a decimal comma has points for thousands: ``1.265,02``."""
+    """Whether a number with a decimal comma has points for thousands: ``1.265,02``.
+
+    Args:
+        cell: its text.
+
+    Returns:
+        True for such a number.
+    """
     return "." in cell and is_number(cell, True)
 
 
 def without_thousands(data: bytes) -> bytes:
-    """Text of numbers with decimal commas, points for thousands left out."""
+    """Text of numbers with decimal commas, points for thousands left out.
+
+    Args:
+        data: text with such numbers.
+
+    Returns:
+        The same text without these points.
+    """
     if b"." not in data:
         return data
     return re.sub(rb"(?<![\d.,])" + _THOUSANDS.encode(), lambda found: found[0].replace(b".", b""), data)

@@ -65,6 +65,14 @@ class ReadOptions:
 
 
 def stated_unit(text: str | None, allowed: tuple[Measured, ...]) -> Unit | None:
-    """The unit of an option, if it is one of the quantities allowed."""
+    """The unit of an option, if it is one of the quantities allowed.
+
+    Args:
+        text: of the option; None: not given.
+        allowed: kinds of quantity.
+
+    Returns:
+        The unit; None where the text is none of an allowed quantity.
+    """
     unit = find_unit(text) if text else None
     return unit if unit is not None and unit.measures in allowed else None

@@ -16,6 +16,10 @@ _BYTES_TO_KNOW = 4096
 def read_records(path: str | Path, options: ReadOptions | None = None) -> list[Record]:
     """Read a file: CSV or other text columns, UFF (dataset 58, text or binary) or WAV, told apart by its content.
 
+    Args:
+        path: of the file.
+        options: what the file does not say.
+
     Returns:
         One record per response and measurement; recordings with several hits are not divided (`checks.split_hits`).
 

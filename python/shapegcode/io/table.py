@@ -140,13 +140,27 @@ class TextTable:
                 yield number, text
 
     def first_cell(self, index: int) -> str:
-        """The cell of a column in the first row; empty where there is none."""
+        """The cell of a column in the first row; empty where there is none.
+
+        Args:
+            index: of the column, from 0.
+
+        Returns:
+            Its text.
+        """
         _, text = next((line for piece in self._pieces() for line in self._lines(*piece)), (0, ""))
         cells = cells_of(text, self.layout.delimiter)
         return cells[index] if index < len(cells) else ""
 
     def line_of(self, row: int) -> int:
-        """Line number of a row."""
+        """Line number of a row.
+
+        Args:
+            row: of numbers, from 0.
+
+        Returns:
+            The line, from 1.
+        """
         lines = (number for piece in self._pieces() for number, _ in self._lines(*piece))
         return next(islice(lines, row, None))
 

@@ -182,6 +182,10 @@ class _Chooser:
 def read_csv(path: Path, options: ReadOptions) -> list[Record]:
     """Read a text file with columns.
 
+    Args:
+        path: of the file.
+        options: what the file does not say.
+
     Returns:
         One record per response column.
 

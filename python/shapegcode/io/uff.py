@@ -262,6 +262,10 @@ def _force_of(path: Path, response: _Channel, forces: list[_Channel], responses:
 def read_uff(path: Path, options: ReadOptions) -> list[Record]:
     """Read the time records of a universal file.
 
+    Args:
+        path: of the file.
+        options: what the file does not say.
+
     Returns:
         One record per response; several measurements at one place are several records.
 

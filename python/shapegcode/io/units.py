@@ -79,12 +79,26 @@ _UNITS = {
 
 
 def units_of(*measures: Measured) -> str:
-    """The units known for quantities, for messages."""
+    """The units known for quantities, for messages.
+
+    Args:
+        measures: one or several quantities.
+
+    Returns:
+        Names of units, between commas; quantities between semicolons.
+    """
     return "; ".join(", ".join(name for name in _FACTORS[each] if name[0] != "u") for each in measures)
 
 
 def find_unit(text: str) -> Unit | None:
-    """The unit that a text means, upper or lower case; None: not known."""
+    """The unit that a text means, upper or lower case; None: not known.
+
+    Args:
+        text: such as "m/s^2", "kgf" or "[ms]".
+
+    Returns:
+        The unit with its factor to SI.
+    """
     plain = text.strip().lower().replace("μ", "µ").replace("_per_", "/")
     plain = re.sub(r"[\s*·⋅()\[\]]", "", plain.replace("**", "^"))
     plain = plain.replace("⁻", "-").replace("¹", "1").replace("²", "2").replace("^", "")
@@ -114,6 +128,14 @@ def factor_between(unit: Unit, wanted: str) -> float:
 
 
 def is_foreign_unit(text: str, measures: str | None) -> bool:
-    """Whether a text is a unit that is not converted, such as V, where a quantity of this kind is measured."""
+    """Whether a text is a unit that is not converted, such as V, where a quantity of this kind is measured.
+
+    Args:
+        text: behind a name.
+        measures: kind of the quantity; None: not known.
+
+    Returns:
+        True for V, counts, lb and the like.
+    """
     plain = re.sub(r"[\s^]", "", text.lower()).replace("²", "2").replace("μ", "µ")
     return plain in _FOREIGN or (measures == "time" and plain in _FOREIGN_TIMES)

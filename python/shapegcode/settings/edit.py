@@ -54,17 +54,38 @@ def parse_exactly(text: str, file: str) -> tomlkit.TOMLDocument:
 
 
 def entry_of(line: str) -> Entry:
-    """A line with a key as an entry, its comment and line end included."""
+    """A line with a key as an entry, its comment and line end included.
+
+    Args:
+        line: with its line end.
+
+    Returns:
+        Key and item.
+    """
     return tomlkit.parse(line).body[0]
 
 
 def commented_key(entry: Entry) -> str:
-    """The name in a comment ``# name = ...``, which stands for a key that is left out; empty for everything else."""
+    """The name in a comment ``# name = ...``, which stands for a key that is left out; empty for everything else.
+
+    Args:
+        entry: of a table.
+
+    Returns:
+        The name of the key.
+    """
     return _said(entry, _COMMENTED_KEY)
 
 
 def commented_table(entry: Entry) -> str:
-    """The name in a comment ``# [[name]]``, which stands for a list without tables; empty for everything else."""
+    """The name in a comment ``# [[name]]``, which stands for a list without tables; empty for everything else.
+
+    Args:
+        entry: of a table.
+
+    Returns:
+        The dotted name of the table.
+    """
     return _said(entry, _COMMENTED_TABLE)
 
 
@@ -74,7 +95,14 @@ def _said(entry: Entry, pattern: re.Pattern[str]) -> str:
 
 
 def own_end(entries: list[Entry]) -> int:
-    """One behind the last key, and behind the commented keys that follow it at once: what is there is of others."""
+    """One behind the last key, and behind the commented keys that follow it at once: what is there is of others.
+
+    Args:
+        entries: of a table.
+
+    Returns:
+        A place in them.
+    """
     end = max((place + 1 for place, (key, _) in enumerate(entries) if key is not None), default=0)
     for place in range(end, len(entries)):
         if not isinstance(entries[place][1], Comment) or commented_table(entries[place]):
@@ -85,7 +113,14 @@ def own_end(entries: list[Entry]) -> int:
 
 
 def take_tail(table: Table) -> list[Entry]:
-    """Take away what stands behind the last key of a table and of the tables in it: it is of what follows."""
+    """Take away what stands behind the last key of a table and of the tables in it: it is of what follows.
+
+    Args:
+        table: is changed.
+
+    Returns:
+        The entries that were taken away.
+    """
     entries = table.value.body
     last = next((item for key, item in reversed(entries) if key is not None), None)
     if isinstance(last, AoT):
@@ -103,5 +138,12 @@ def _cut(entries: list[Entry]) -> list[Entry]:
 
 
 def is_blank(entry: Entry) -> bool:
-    """Whether it is a blank line."""
+    """Whether it is a blank line.
+
+    Args:
+        entry: of a table.
+
+    Returns:
+        True for a blank line.
+    """
     return isinstance(entry[1], Whitespace)
