@@ -416,7 +416,7 @@ def test_what_has_to_be_measured_depends_on_the_target() -> None:
 def test_table_shows_what_only_stands_beside_in_brackets(judged: Judged) -> None:
     table = judged.conversion.tables()[1]
     lines = str(table).splitlines()
-    assert sum("worst" in line for line in lines) == 1
+    assert sum("<- worst" in line for line in lines) == 1
     rows = {case.name: line for case in judged.conversion.cases for line in lines if case.name in line}
     assert "(out)" in rows["starved 20 ms"]
     assert "within" in rows["all modes low"] and "(" not in rows["all modes low"]

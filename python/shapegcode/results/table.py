@@ -150,7 +150,8 @@ def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int
     """
     least, most = [], []
     for rank, column in enumerate(columns):
-        words = [*column.heading.split(), *(word for cells in rows for word in cells[rank].split(" "))]
+        parts = [[cells[rank]] if column.left else cells[rank].split(" ") for cells in rows]
+        words = [*column.heading.split(), *(word for words in parts for word in words)]
         # A path may be longer than the terminal is wide, and folds.
         least.append(min(max(map(len, words), default=1), 24 if column.text else 60))
         most.append(max([len(column.heading), *(len(cells[rank]) for cells in rows)]))
@@ -172,7 +173,7 @@ def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int
 
 def _whole(column: Column, cell: str) -> str:
     """A figure with its interval or unit is one word."""
-    return cell if column.text else cell.replace(" ", _NO_BREAK)
+    return cell if column.text or column.left else cell.replace(" ", _NO_BREAK)
 
 
 def xyz_columns(cell: Callable[[str, Any], object], *, digits: int | None = None) -> tuple[Column, ...]:
