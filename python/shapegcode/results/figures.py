@@ -107,7 +107,18 @@ class ContourError:
         Returns:
             The figures in µm.
         """
-        return cls(**deviation_um(stats, material_side))
+        rows = list(stats)
+        count = sum(row.count for row in rows)
+        squares = sum(row.sum_of_squares_mm2 for row in rows)
+        largest = Deviation.of(rows) if rows else Deviation(0.0, 0.0, 0.0)
+        beside = {} if material_side is None else largest.gouge_and_excess_um(material_side)
+        return cls(
+            largest.largest_mm * 1e3,
+            math.sqrt(squares / count) * 1e3 if count else 0.0,
+            largest.left_mm * 1e3,
+            largest.right_mm * 1e3,
+            **beside,
+        )
 
 
 def largest_xyz_um(vectors: Iterable[Vector]) -> Xyz[float]:
@@ -119,38 +130,6 @@ def largest_xyz_um(vectors: Iterable[Vector]) -> Xyz[float]:
     Returns:
         The largest in µm.
     """
-    return Xyz(**largest_um(vectors))
-
-
-def xyz(values: Iterable[float]) -> dict[str, float]:
-    """One value per axis under its letter."""
-    return {axis: float(value) for axis, value in zip("xyz", values, strict=True)}
-
-
-def largest_um(vectors: Iterable[Vector]) -> dict[str, float]:
-    """Largest of each axis, mm to µm."""
     rows = list(vectors)
-    return xyz(np.max(rows, axis=0) * 1e3 if rows else np.zeros(3))
-
-
-def deviation_um(stats: Iterable[_core.DeviationStats], material_side: str | None = None) -> dict[str, float]:
-    """Largest magnitude, RMS over all samples and largest on either side of the path, µm.
-
-    Args:
-        stats: of one or several runs.
-        material_side: "left" or "right" of the travel, where the workpiece is: adds `gouge` and `excess`.
-
-    Returns:
-        The figures in µm, by name.
-    """
-    rows = list(stats)
-    count = sum(row.count for row in rows)
-    squares = sum(row.sum_of_squares_mm2 for row in rows)
-    largest = Deviation.of(rows) if rows else Deviation(0.0, 0.0, 0.0)
-    found = {
-        "max": largest.largest_mm * 1e3,
-        "rms": math.sqrt(squares / count) * 1e3 if count else 0.0,
-        "left": largest.left_mm * 1e3,
-        "right": largest.right_mm * 1e3,
-    }
-    return found if material_side is None else found | largest.gouge_and_excess_um(material_side)
+    x, y, z = np.max(rows, axis=0) * 1e3 if rows else np.zeros(3)
+    return Xyz(float(x), float(y), float(z))
