@@ -67,7 +67,7 @@ class PathCondition:
         ideal: the paper's shaper in continuous time.
         emitted: the program that `convert` writes.
         blocks: of the emitted program.
-        within_tolerance: whether `convert` says so of the emitted program.
+        ok: whether `convert` says so of the emitted program.
         published_orbit_error_percent: table 2 of the paper.
     """
 
@@ -77,7 +77,7 @@ class PathCondition:
     ideal: PathRun
     emitted: PathRun
     blocks: int
-    within_tolerance: bool
+    ok: bool
     published_orbit_error_percent: float
 
 
@@ -96,7 +96,7 @@ class PathDemo(Demonstration):
     @property
     def ok(self) -> bool:
         """Whether every statement agrees or is explained, and every emitted program is within tolerance."""
-        return super().ok and all(each.within_tolerance for each in self.conditions)
+        return super().ok and all(each.ok for each in self.conditions)
 
     @property
     def next_step(self) -> str:
@@ -203,7 +203,7 @@ def _condition(feed: int, reduction: int, machine: Machine) -> PathCondition:
             region.residual_vibration_um.emitted,
         ),
         blocks=conversion.blocks.emitted,
-        within_tolerance=conversion.ok,
+        ok=conversion.ok,
         published_orbit_error_percent=_PAPER_ORBIT_PERCENT[feed, reduction],
     )
 

@@ -12,17 +12,17 @@ from dataclasses import dataclass, replace
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.shaping.bands import ModeBand
-from shapegcode.shaping.grid_designs import check_modes_and_times, ms, shortest_non_negative
+from shapegcode.shaping.grid_designs import check_modes_and_times, shortest_non_negative
 from shapegcode.shaping.robust.minimax import VIBRATION_LIMIT
 from shapegcode.shaping.robust.search import (
     RobustDesign,
     Task,
     best_within,
-    names,
     refusal,
     shortest_below,
     unreachable,
 )
+from shapegcode.shaping.words import ON_GRID, band_names, ms, whole_periods
 
 __all__ = [
     "BlockPeriodCandidate",
@@ -32,7 +32,6 @@ __all__ = [
 ]
 
 _SAME = 0.02  # designs whose durations (or worst residuals) differ by less are equal, relative
-_ON_GRID = 1e-9  # periods; forgives the rounding of a quotient
 
 
 @dataclass(frozen=True)
@@ -132,7 +131,7 @@ def choose_block_period(
             return _choice(max(near, key=lambda each: each.period_s), candidates)
     raise DesignError(
         f"no block period from {ms(periods_s[0])} to {ms(periods_s[-1])} in steps of {ms(interpolation_period_s)} has "
-        f"a shaper without negative taps within {ms(max_duration_s)} for {names(bands)}; the first says: "
+        f"a shaper without negative taps within {ms(max_duration_s)} for {band_names(bands)}; the first says: "
         f"{candidates[0].refusal}"
     )
 
@@ -189,8 +188,8 @@ def _periods(
     )
     if not (math.isfinite(block_time_s) and block_time_s >= 0.0):
         raise ArgumentError(f"block_time_s is {block_time_s} s: it must be finite and at least 0")
-    fewest = max(1, math.ceil(block_time_s / interpolation_period_s - _ON_GRID))
-    most = math.floor(max_block_period_s / interpolation_period_s + _ON_GRID)
+    fewest = max(1, math.ceil(block_time_s / interpolation_period_s - ON_GRID))
+    most = whole_periods(max_block_period_s, interpolation_period_s)
     if fewest > most:
         raise ArgumentError(
             f"no block period between the block time of {ms(block_time_s)} and the limit of "
@@ -249,8 +248,8 @@ def _fallback(
     if found is None:
         return refused
     note = (
-        f"no shaper within {ms(max_duration_s)} keeps {names(bands)} below {100.0 * limit:.3g} % of the vibration on a "
-        f"{ms(refused.period_s)} grid: the one with the least worst residual, {100.0 * found.worst_residual:.3g} %, "
+        f"no shaper within {ms(max_duration_s)} keeps {band_names(bands)} below {100.0 * limit:.3g} % of the vibration "
+        f"on a {ms(refused.period_s)} grid: the one with the least worst residual, {100.0 * found.worst_residual:.3g} %, "
         "is used"
     )
     return replace(_candidate(found), note=note)

@@ -15,10 +15,11 @@ from dataclasses import replace
 from shapegcode._core import ArgumentError, DesignError, ShapegcodeError
 from shapegcode.shaping.bands import ModeBand
 from shapegcode.shaping.designs import Design, evaluate
-from shapegcode.shaping.ranking import OBJECTIVES, is_within, pareto_front, reason_for, recommend, spoken
+from shapegcode.shaping.ranking import OBJECTIVES, is_within, pareto_front, reason_for, recommend
 from shapegcode.shaping.registry import FAMILIES, DesignOptions, Family, design, family_named
 from shapegcode.shaping.result import Recommendation, Refusal
 from shapegcode.shaping.robust.minimax import least_worst
+from shapegcode.shaping.words import ms, spoken
 
 __all__ = ["choose"]
 
@@ -83,7 +84,7 @@ def choose(
     refusals = [each for each in refusals if (each.family, each.period_s) not in shown_anyway]
     if not found:
         reasons = "; ".join(dict.fromkeys(f"{refusal.family}: {refusal.reason}" for refusal in refusals))
-        raise DesignError(f"no family has a shaper for {spoken(bands)} within {_ms(options.max_duration_s)}: {reasons}")
+        raise DesignError(f"no family has a shaper for {spoken(bands)} within {ms(options.max_duration_s)}: {reasons}")
     compared = tuple(replace(each, pareto=on) for each, on in zip(found, pareto_front(found), strict=True))
     index = recommend(compared, options.vibration_limit, objective, allow_negative)
     return Recommendation(
@@ -126,7 +127,7 @@ def _check(
     finest_s = min((period_s for period_s in periods_s if period_s is not None), default=math.inf)
     if options.max_duration_s > _MOST_PERIODS * finest_s:
         raise ArgumentError(
-            f"a shaper of {_ms(options.max_duration_s)} on a grid of {_ms(finest_s)} has up to "
+            f"a shaper of {ms(options.max_duration_s)} on a grid of {ms(finest_s)} has up to "
             f"{options.max_duration_s / finest_s:.3g} taps, at most {_MOST_PERIODS} can be searched: take a longer "
             "period or a shorter duration"
         )
@@ -153,7 +154,7 @@ def _aliases(bands: Sequence[ModeBand], period_s: float) -> str:
         swings = abs(band.mode.pole.imag) * period_s / (2.0 * math.pi)
         if swings > 0.5 and abs(cmath.exp(band.mode.pole * period_s) - 1.0) < _NEAR_ONE:
             return (
-                f"the mode at {band.mode.frequency_hz:g} Hz cannot be cancelled on a grid of {_ms(period_s)}: its "
+                f"the mode at {band.mode.frequency_hz:g} Hz cannot be cancelled on a grid of {ms(period_s)}: its "
                 f"{swings:.4g} swings per period look like standing still there; take another period"
             )
     return ""
@@ -193,7 +194,3 @@ def _never_tried(rows: Sequence[Family], usable: Sequence[float | None]) -> Iter
             yield Refusal(row.name, usable[0], "is designed at continuous times only")
         if not row.continuous and usable == [None]:
             yield Refusal(row.name, None, "is designed on a grid: give a period")
-
-
-def _ms(time_s: float) -> str:
-    return f"{time_s * 1e3:.6g} ms"

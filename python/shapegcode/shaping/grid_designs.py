@@ -18,10 +18,10 @@ from scipy.optimize import linprog, nnls
 
 from shapegcode._core import ArgumentError, DesignError, Mode, ShapegcodeError, Shaper, grid_polynomial
 from shapegcode.shaping.bands import ModeBand
+from shapegcode.shaping.words import mode_names, ms, whole_periods
 
 __all__ = [
-    "RESIDUAL_LIMIT", "check_modes_and_times", "exact_conditions", "lower_hull", "ms", "shortest_non_negative",
-    "vertex",
+    "RESIDUAL_LIMIT", "check_modes_and_times", "exact_conditions", "lower_hull", "shortest_non_negative", "vertex",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
@@ -34,7 +34,6 @@ _FEASIBLE = 1e-11  # residual of the non-negative least-squares problem that cou
 _SUPPORT_THRESHOLDS = (1e-9, 1e-13)  # amplitudes above one of these are taps of the optimiser's vertex
 _SAME_OBJECTIVE = 1e-9  # of the squared duration
 _SAME_DURATION = 0.02  # designs whose durations differ by less are equal, relative
-_ON_GRID = 1e-9  # periods; forgives the rounding of a quotient
 
 
 def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s: float = 0.25) -> Shaper:
@@ -62,7 +61,7 @@ def shortest_non_negative(modes: Sequence[Mode], period_s: float, max_duration_s
     Source: this project.
     """
     check_modes_and_times(modes, period_s=period_s, max_duration_s=max_duration_s)
-    most = math.floor(max_duration_s / period_s + _ON_GRID)
+    most = whole_periods(max_duration_s, period_s)
     last = _smallest_feasible(modes, period_s, most)
     while last is not None and last <= most:
         for vertex in _vertices(modes, period_s, last):
@@ -259,14 +258,5 @@ def _none_exists(modes: Sequence[Mode], period_s: float, max_duration_s: float) 
         what_exists = f"nor is there a polynomial: {error}"
     return (
         f"no non-negative design within {ms(max_duration_s)} on a {ms(period_s)} grid for modes "
-        f"{_names(modes)}; {what_exists}; try another period"
+        f"{mode_names(modes)}; {what_exists}; try another period"
     )
-
-
-def ms(time_s: float) -> str:
-    """A time for a message."""
-    return f"{time_s * 1e3:.6g} ms"
-
-
-def _names(modes: Sequence[Mode]) -> str:
-    return ", ".join(f"{mode.frequency_hz:g} Hz (zeta {mode.damping_ratio:g})" for mode in modes)

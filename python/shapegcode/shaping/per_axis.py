@@ -14,11 +14,11 @@ import numpy as np
 from shapegcode._core import ArgumentError, Fir, Mode, Shaper
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT
 from shapegcode.shaping.track import mean_range, taps_of_mean
+from shapegcode.shaping.words import whole_periods
 
 __all__ = ["design_per_axis"]
 
 _MEANS = 9  # mean delays that are compared
-_ON_GRID = 1e-9  # periods
 _POINT = 1e-8  # periods: means that differ by less are one
 
 
@@ -46,7 +46,7 @@ def design_per_axis(axis_modes: Sequence[Sequence[Mode]], period_s: float, max_d
     if not (math.isfinite(period_s) and period_s > 0.0):
         raise ArgumentError(f"period_s is {period_s} s: it must be finite and above 0")
     shaken = [list(modes) for modes in axis_modes if modes]
-    for periods in range(1, math.floor(max_duration_s / period_s + _ON_GRID) + 1):
+    for periods in range(1, whole_periods(max_duration_s, period_s) + 1):
         ranges = [mean_range(modes, period_s, periods) for modes in shaken]
         least, largest = max(low for low, _ in ranges), min(high for _, high in ranges)
         if least > largest + _POINT:

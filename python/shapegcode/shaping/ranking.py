@@ -15,8 +15,9 @@ from shapegcode._core import ArgumentError
 from shapegcode.shaping.bands import ModeBand
 from shapegcode.shaping.designs import Design
 from shapegcode.shaping.registry import FAMILIES
+from shapegcode.shaping.words import ms, spoken
 
-__all__ = ["NO_RESIDUAL", "OBJECTIVES", "SAME", "is_within", "pareto_front", "reason_for", "recommend", "spoken"]
+__all__ = ["NO_RESIDUAL", "OBJECTIVES", "SAME", "is_within", "pareto_front", "reason_for", "recommend"]
 
 NO_RESIDUAL = 1e-9
 """A residual ratio below this is none: what is left is the rounding of the solver."""
@@ -165,23 +166,9 @@ def reason_for(
         others = [each for each in designs if each.negative and is_within(each, limit)]
         if others and not allow_negative:
             other = min(others, key=_shortest)
-            text += f"; with negative taps {other.family} ({_ms(other.duration_s)}) would leave less"
+            text += f"; with negative taps {other.family} ({ms(other.duration_s)}) would leave less"
     return text + ("; every design has negative taps" if only_negative else "")
-
-
-def spoken(bands: Sequence[ModeBand]) -> str:
-    """Modes with their bands in a sentence."""
-
-    def one(band: ModeBand) -> str:
-        text = f"{band.mode.frequency_hz:g} Hz"
-        return f"{text} ±{100.0 * band.uncertainty:g} %" if band.uncertainty else text
-
-    return " and ".join(map(one, bands))
 
 
 def _percent(ratio: float) -> str:
     return "nothing" if ratio < NO_RESIDUAL else f"{100.0 * ratio:.3g} %"
-
-
-def _ms(time_s: float) -> str:
-    return f"{time_s * 1e3:.6g} ms"

@@ -13,6 +13,7 @@ from shapegcode.shaping.families.minimal import solve_minimal
 from shapegcode.shaping.grid_designs import shortest_non_negative
 from shapegcode.shaping.options import DesignOptions
 from shapegcode.shaping.robust.minimax import minimax_robust
+from shapegcode.shaping.words import ms
 
 __all__ = ["FAMILIES", "DesignOptions", "Family", "design", "distinct", "family_named"]
 
@@ -213,6 +214,6 @@ def _require_within(name: str, found: Sequence[Shaper], options: DesignOptions) 
     if found and not any(_is_within(shaper, options) for shaper in found):
         nearest = min(found, key=lambda shaper: shaper.duration_s)
         raise DesignError(
-            f"{name} lasts {nearest.duration_s * 1e3:.6g} ms with sum|a| {nearest.abs_sum:.4g}: the limits are "
-            f"{options.max_duration_s * 1e3:.6g} ms and {options.max_abs_sum:.4g}"
+            f"{name} lasts {ms(nearest.duration_s)} with sum|a| {nearest.abs_sum:.4g}: the limits are "
+            f"{ms(options.max_duration_s)} and {options.max_abs_sum:.4g}"
         )

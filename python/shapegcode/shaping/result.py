@@ -10,8 +10,9 @@ from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
 from shapegcode.shaping.bands import ModeBand
 from shapegcode.shaping.designs import Design
-from shapegcode.shaping.ranking import NO_RESIDUAL, is_within, recommend, spoken
+from shapegcode.shaping.ranking import NO_RESIDUAL, is_within, recommend
 from shapegcode.shaping.registry import FAMILIES
+from shapegcode.shaping.words import spoken
 
 __all__ = ["Recommendation", "Refusal", "families_table", "times_name"]
 

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from shapegcode._core import ArgumentError, DesignError, Shaper
+from shapegcode.shaping.words import ON_GRID, ms
 
 __all__ = ["on_grid", "parse_taps"]
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _TAP = re.compile(rf"\s*({_NUMBER})\s*(ms|s)?\s*:\s*({_NUMBER})\s*")
 _FORM = "TIME:AMPLITUDE,TIME:AMPLITUDE with times in s or with ms behind them, for example 0:0.5,10.87ms:0.5"
-_ON_GRID = 1e-9  # periods; forgives the rounding of a quotient
 
 
 def parse_taps(given: str | Sequence[Any] | dict[str, Any]) -> Shaper:
@@ -57,10 +57,10 @@ def on_grid(shaper: Shaper, period_s: float) -> Shaper:
     """
     for time_s in shaper.times_s.tolist():
         steps = time_s / period_s
-        if abs(steps - round(steps)) > _ON_GRID * max(1.0, steps):
+        if abs(steps - round(steps)) > ON_GRID * max(1.0, steps):
             raise DesignError(
-                f"the tap at {time_s * 1e3:.6g} ms is not on the {period_s * 1e3:.6g} ms grid, nearest "
-                f"{round(steps) * period_s * 1e3:.6g} ms; rounding would undo the zeros: design on the grid"
+                f"the tap at {ms(time_s)} is not on the {ms(period_s)} grid, nearest "
+                f"{ms(round(steps) * period_s)}; rounding would undo the zeros: design on the grid"
             )
     return shaper
 

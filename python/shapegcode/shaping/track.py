@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode, ModeTable, Shaper, VaryingFir
 from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, shortest_non_negative, vertex
+from shapegcode.shaping.words import whole_periods
 
 __all__ = [
     "MovingMode",
@@ -36,7 +37,6 @@ _LOOKS = 16  # positions between two nodes at which the residual is looked at
 _SUPPORT = 1e-9  # amplitudes above this are taps
 _LONGER = 1.3  # how much longer shapers may become for a common mean delay
 _SAME_MEAN = 1e-9  # periods
-_ON_GRID = 1e-9  # periods
 
 NodeDesign = Callable[[Sequence[Mode]], Shaper]
 
@@ -249,7 +249,7 @@ def _equal_means(found: Sequence[Sequence[Mode]], period_s: float, max_duration_
     """One shaper for each set of modes, with equal mean delays where the grid permits it, else as close as it does."""
     shortest = [shortest_non_negative(modes, period_s, max_duration_s) for modes in found]
     fewest = max(round(shaper.duration_s / period_s) for shaper in shortest)
-    most = min(math.floor(max_duration_s / period_s + _ON_GRID), math.ceil(_LONGER * fewest))
+    most = min(whole_periods(max_duration_s, period_s), math.ceil(_LONGER * fewest))
     for periods in range(fewest, most + 1):
         ranges = [mean_range(modes, period_s, periods) for modes in found]
         least = max(low for low, _ in ranges)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from shapegcode._core import DesignError, MinimalShapers, Mode, Shaper, convolved_zv, minimal_shapers
 from shapegcode.shaping.bands import ModeBand
+from shapegcode.shaping.words import ms
 
 if TYPE_CHECKING:
     from shapegcode.shaping.options import DesignOptions
@@ -49,9 +50,8 @@ def _search(modes: Sequence[Mode], max_duration_s: float, max_abs_sum: float) ->
 def _none_found(modes: Sequence[Mode], found: MinimalShapers) -> str:
     names = ", ".join(f"{mode.frequency_hz:g} Hz" for mode in modes)
     what = (
-        f"no minimal shaper of {names} lasts up to {found.max_duration_s * 1e3:.6g} ms "
-        f"with sum|a| up to {found.max_abs_sum:g}"
+        f"no minimal shaper of {names} lasts up to {ms(found.max_duration_s)} with sum|a| up to {found.max_abs_sum:g}"
     )
     if found.complete:
         return what + ": proven; allow a longer one"
-    return f"{what} was found from {found.starts} starts, proven up to {found.complete_up_to_s * 1e3:.6g} ms"
+    return f"{what} was found from {found.starts} starts, proven up to {ms(found.complete_up_to_s)}"

@@ -10,12 +10,10 @@ frequency and direction, and the ones that matter are found as the linear progra
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from shapegcode._core import (
     ArgumentError,
     DesignError,
-    Mode,
     ShapegcodeError,
     Shaper,
     convolve,
@@ -23,11 +21,11 @@ from shapegcode._core import (
 )
 from shapegcode.shaping.families.conditions import Conditions
 from shapegcode.shaping.families.grid_search import GridSearch
+from shapegcode.shaping.words import ms, whole_periods
 
-__all__ = ["joint_title", "shortest_on_grid"]
+__all__ = ["shortest_on_grid"]
 
 
-_ON_GRID = 1e-9  # periods; forgives the rounding of a quotient
 _LONGER = 4  # times the longest duration: how far a refusal looks for what would do
 _HINT_PERIODS = 400  # longest grid that a refusal searches, periods
 
@@ -57,22 +55,18 @@ def shortest_on_grid(conditions: Conditions, period_s: float, max_duration_s: fl
         if not (math.isfinite(value) and value > 0.0):
             raise ArgumentError(f"{name} is {value} s: it must be finite and above 0")
     search = GridSearch(conditions, period_s)
-    most = _periods(max_duration_s, period_s)
+    most = whole_periods(max_duration_s, period_s)
     shaper = search.shortest(most)
     if shaper is not None:
         return shaper
-    text = f"no {title} within {max_duration_s * 1e3:.6g} ms on a {period_s * 1e3:.6g} ms grid"
+    text = f"no {title} within {ms(max_duration_s)} on a {ms(period_s)} grid"
     further = min(_LONGER * most, _HINT_PERIODS)
     if further > most:
         longer = search.shortest(further)
         if longer is not None:
-            raise DesignError(f"{text}; the shortest lasts {longer.duration_s * 1e3:.6g} ms")
-        text += f", nor within {further * period_s * 1e3:.6g} ms"
+            raise DesignError(f"{text}; the shortest lasts {ms(longer.duration_s)}")
+        text += f", nor within {ms(further * period_s)}"
     raise DesignError(f"{text}; {_polynomial(conditions, period_s)}; try another period")
-
-
-def _periods(duration_s: float, period_s: float) -> int:
-    return math.floor(duration_s / period_s + _ON_GRID)
 
 
 def _polynomial(conditions: Conditions, period_s: float) -> str:
@@ -86,9 +80,4 @@ def _polynomial(conditions: Conditions, period_s: float) -> str:
                 shaper = convolve(shaper, grid_polynomial([zero.mode], period_s))
     except ShapegcodeError as error:
         return f"nor is there a polynomial: {error}"
-    return f"the polynomial with its zeros lasts {shaper.duration_s * 1e3:.6g} ms with sum|a| {shaper.abs_sum:.4g}"
-
-
-def joint_title(name: str, modes: Sequence[Mode]) -> str:
-    """The family and its modes, for messages."""
-    return f"{name} for " + ", ".join(f"{mode.frequency_hz:g} Hz (zeta {mode.damping_ratio:g})" for mode in modes)
+    return f"the polynomial with its zeros lasts {ms(shaper.duration_s)} with sum|a| {shaper.abs_sum:.4g}"

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from shapegcode._core import DesignError, Mode, Shaper, convolved_zv
 from shapegcode.shaping.families.conditions import Conditions, Zero
-from shapegcode.shaping.families.on_grid import joint_title, shortest_on_grid
+from shapegcode.shaping.families.on_grid import shortest_on_grid
+from shapegcode.shaping.words import mode_names, ms
 
 __all__ = ["simultaneous_zv"]
 
@@ -46,7 +47,7 @@ def simultaneous_zv(modes: Sequence[Mode], max_duration_s: float) -> Shaper:
     Source: this project (numerical optimum over all modes at once).
     """
     fastest_hz = max(mode.frequency_hz for mode in modes)
-    title = joint_title("simultaneous shaper without negative taps", modes)
+    title = f"simultaneous shaper without negative taps for {mode_names(modes)}"
     conditions = Conditions(zeros=tuple(Zero(mode) for mode in modes))
     for per_period in _PER_PERIOD:
         step_s = 1.0 / (per_period * fastest_hz)
@@ -56,15 +57,14 @@ def simultaneous_zv(modes: Sequence[Mode], max_duration_s: float) -> Shaper:
         except DesignError as error:
             one_by_one_s = convolved_zv(modes).duration_s
             raise DesignError(
-                f"no {title} within {max_duration_s * 1e3:.6g} ms; one ZV after the other lasts "
-                f"{one_by_one_s * 1e3:.6g} ms"
+                f"no {title} within {ms(max_duration_s)}; one ZV after the other lasts {ms(one_by_one_s)}"
             ) from error
         shaper = _polished(*_merged(start, _NEIGHBOURS * step_s), modes)
         if shaper is not None and shaper.duration_s <= max_duration_s * (1.0 + 1e-9):
             return shaper
     raise DesignError(
-        f"no {title} within {max_duration_s * 1e3:.6g} ms: on a grid of {1e3 * step_s:.3g} ms there is one of "
-        f"{start.duration_s * 1e3:.6g} ms, but no exact one was found near it"
+        f"no {title} within {ms(max_duration_s)}: on a grid of {1e3 * step_s:.3g} ms there is one of "
+        f"{ms(start.duration_s)}, but no exact one was found near it"
     )
 
 

@@ -20,10 +20,11 @@ from shapegcode._core import (
 )
 from shapegcode.shaping.bands import ModeBand
 from shapegcode.shaping.families.conditions import Conditions, ResidualLimit, Zero
-from shapegcode.shaping.families.on_grid import joint_title, shortest_on_grid
+from shapegcode.shaping.families.on_grid import shortest_on_grid
 from shapegcode.shaping.families.simultaneous import simultaneous_zv
 from shapegcode.shaping.options import DesignOptions
 from shapegcode.shaping.taps import on_grid
+from shapegcode.shaping.words import mode_names
 
 __all__ = ["Solve", "hump_ei", "modified", "negative", "repeated", "simultaneous", "specified", "user_taps"]
 
@@ -44,7 +45,10 @@ def _one_after_the_other(
         if options.period_s is None:
             return continuous(mode, options)
         return shortest_on_grid(
-            conditions(mode, options), options.period_s, options.max_duration_s, title=joint_title(name, [mode])
+            conditions(mode, options),
+            options.period_s,
+            options.max_duration_s,
+            title=f"{name} for {mode_names([mode])}",
         )
 
     def solve(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
@@ -101,7 +105,7 @@ def specified(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]
     period_s = options.period_s
     if period_s is None:
         period_s = 1.0 / (_STEPS_PER_PERIOD * max(each.highest_hz for each in conditions.limits))
-    title = joint_title(f"SI shaper with {options.vibration_limit:.4g} left", [band.mode for band in bands])
+    title = f"SI shaper with {options.vibration_limit:.4g} left for {mode_names([band.mode for band in bands])}"
     return [shortest_on_grid(conditions, period_s, options.max_duration_s, title=title)]
 
 

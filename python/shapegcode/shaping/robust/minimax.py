@@ -15,19 +15,18 @@ from collections.abc import Sequence
 
 from shapegcode._core import ArgumentError, DesignError
 from shapegcode.shaping.bands import ModeBand
-from shapegcode.shaping.grid_designs import ms
 from shapegcode.shaping.robust.search import (
     RobustDesign,
     Task,
     best_within,
     check_time,
-    names,
     no_exact,
     refusal,
     shortest_below,
     smallest_below,
     unreachable,
 )
+from shapegcode.shaping.words import band_names, ms
 
 __all__ = ["VIBRATION_LIMIT", "RobustDesign", "least_worst", "minimax_robust"]
 
@@ -77,7 +76,7 @@ def least_worst(
     check_time("duration_s", duration_s)
     if not task.wide:
         raise ArgumentError(
-            f"no mode states a band ({names(bands)}): nothing to make least; ask for the shortest exact design"
+            f"no mode states a band ({band_names(bands)}): nothing to make least; ask for the shortest exact design"
         )
     last = task.periods(duration_s)
     found = best_within(task, last)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from shapegcode._core import ArgumentError, DesignError, Mode, Shaper
 from shapegcode.shaping.bands import ModeBand
-from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, exact_conditions, lower_hull, ms, shortest_non_negative
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, exact_conditions, lower_hull, shortest_non_negative
 from shapegcode.shaping.robust.cutting_planes import (
     NO_RESIDUAL,
     SAME_RESIDUAL,
@@ -20,15 +20,15 @@ from shapegcode.shaping.robust.cutting_planes import (
     TapProblem,
     proven_worst,
 )
+from shapegcode.shaping.words import band_names, mode_names, ms, whole_periods
 
 __all__ = [
-    "RobustDesign", "Task", "best_within", "check_time", "names", "no_exact", "shortest_below",
+    "RobustDesign", "Task", "best_within", "check_time", "no_exact", "shortest_below",
     "smallest_below", "unreachable",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
 
-_ON_GRID = 1e-9  # periods; forgives the rounding of a quotient
 _NO_TAP = 1e-9  # smaller amplitudes are the solver's dust
 _GROWTH = 1.4  # of the number of periods while it is searched
 _WHOLE = 1e-3  # swings per period from a whole number
@@ -102,7 +102,7 @@ class Task:
 
     def periods(self, duration_s: float) -> int:
         """Whole periods within a duration."""
-        return math.floor(duration_s / self.period_s + _ON_GRID)
+        return whole_periods(duration_s, self.period_s)
 
     def problem(self, last: int, last_tap: float = 0.0) -> TapProblem:
         """The taps at 0 ... `last` periods, the last one at least `last_tap`."""
@@ -178,7 +178,7 @@ def best_within(task: Task, last: int) -> RobustDesign | None:
     if found is None:
         raise DesignError(
             f"the design of {ms(last * task.period_s)} on a {ms(task.period_s)} grid does not survive being "
-            f"solved in full precision for modes {names(task.bands)}; try another period"
+            f"solved in full precision for modes {band_names(task.bands)}; try another period"
         )
     reached = max((1.0 + SAME_RESIDUAL) * bounds.upper, NO_RESIDUAL)
     if found.worst_residual > reached:
@@ -255,16 +255,10 @@ def check_time(name: str, value_s: float) -> None:
         raise ArgumentError(f"{name} is {value_s} s: it must be finite and above 0")
 
 
-def names(bands: Sequence[ModeBand]) -> str:
-    """Modes with their bands for a message."""
-    return ", ".join(f"{band} Hz" for band in bands)
-
-
 def no_exact(task: Task, duration_s: float) -> str:
     """Why the modes without a band have no design of a duration, for a message."""
-    modes = ", ".join(f"{mode.frequency_hz:g} Hz (zeta {mode.damping_ratio:g})" for mode in task.exact)
     taps = "non-negative taps" if task.max_abs_sum is None else f"taps with sum|a| up to {task.max_abs_sum:g}"
-    return f"{taps} up to {ms(duration_s)} on a {ms(task.period_s)} grid do not cancel {modes} exactly"
+    return f"{taps} up to {ms(duration_s)} on a {ms(task.period_s)} grid do not cancel {mode_names(task.exact)} exactly"
 
 
 def refusal(task: Task, limit: float, max_duration_s: float) -> str:
@@ -272,7 +266,7 @@ def refusal(task: Task, limit: float, max_duration_s: float) -> str:
     reason = unreachable(task)
     return (
         f"no design within {ms(max_duration_s)} on a {ms(task.period_s)} grid leaves at most {100.0 * limit:.3g} % of "
-        f"{names(task.bands)}" + (f"; {reason}" if reason else "")
+        f"{band_names(task.bands)}" + (f"; {reason}" if reason else "")
     )
 
 
