@@ -249,8 +249,8 @@ def _fallback(
         return refused
     note = (
         f"no shaper within {ms(max_duration_s)} keeps {band_names(bands)} below {100.0 * limit:.3g} % of the vibration "
-        f"on a {ms(refused.period_s)} grid: the one with the least worst residual, {100.0 * found.worst_residual:.3g} %, "
-        "is used"
+        f"on a {ms(refused.period_s)} grid: the one with the least worst residual, {100.0 * found.worst_residual:.3g} "
+        "%, is used"
     )
     return replace(_candidate(found), note=note)
 
