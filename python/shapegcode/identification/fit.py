@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,10 +14,10 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.chart import stabilisation_chart
 from shapegcode.identification.checks import Prepared
 from shapegcode.identification.mode import IdentifiedMode
-from shapegcode.identification.model_search import Fit, Search, Starts, chart_poles, evidence_of, search, starts_of
+from shapegcode.identification.model_search import Fit, Search, chart_poles, evidence_of, search, starts_of
+from shapegcode.identification.problem import HIGHEST_SHARE, Decays, Taps, problem_of
 from shapegcode.identification.result import Identification, MassCheck
 from shapegcode.identification.support import (
-    LEAST_SWINGS,
     Doubts,
     estimates_of,
     is_background,
@@ -30,94 +30,10 @@ FloatArray = npt.NDArray[np.float64]
 __all__ = ["find_modes"]
 
 _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which they are not taken for white
-_HIGHEST_SHARE = 0.45  # of the sampling rate: the force between samples is known up to there
 _SPECTRUM = 4096  # points of the force's transform
 _FOLDED = 2.0 / 3.0
 _FINER = 16  # steps of the check by Wilson's method in a sampling period
-_STEPS = 60  # of a fit
-_QUICK_STEPS = 15  # of one that only shows where a mode may be
 _POSSIBLY = 15.0  # by so much (twice the logarithm of the odds) another course of the force may be less evident
-
-
-@dataclass(frozen=True, eq=False)
-class _Taps:
-    """Records with force."""
-
-    forces: list[FloatArray]
-    responses: list[FloatArray]
-    period_s: float
-    band_hz: tuple[float, float]
-    quantity: str
-    force_noise_n: float
-    hold: str
-
-    def fit(self, starts: Starts, coloured: bool = False) -> _core.ModalFit:
-        return self._fit(self.responses, starts, coloured, self.force_noise_n, _STEPS)
-
-    def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> _core.ModalFit:
-        return self._fit(self.responses if responses is None else responses, starts, False, 0.0, _QUICK_STEPS)
-
-    def _fit(
-        self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, force_noise_n: float, steps: int
-    ) -> _core.ModalFit:
-        omega, zeta = np.array(starts).T
-        return _core.fit_modes(
-            self.forces,
-            list(responses),
-            self.period_s,
-            omega,
-            zeta,
-            quantity=self.quantity,
-            hold=self.hold,
-            force_noise_n=force_noise_n,
-            coloured_residuals=coloured,
-            most_iterations=steps,
-        )
-
-    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
-        return _core.stabilisation_poles(self.responses, most, self.forces)
-
-    def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
-        omega, zeta = np.array(candidates).T
-        ranking = _core.rank_modes(
-            self.responses, self.period_s, omega, zeta, kept + 1, self.forces, self.quantity, kept
-        )
-        return [int(index) for index in ranking.chosen]
-
-    def record(self, index: int) -> _Taps:
-        return replace(self, forces=[self.forces[index]], responses=[self.responses[index]])
-
-
-@dataclass(frozen=True, eq=False)
-class _Decays:
-    """Records without force."""
-
-    responses: list[FloatArray]
-    period_s: float
-    band_hz: tuple[float, float]
-
-    def fit(self, starts: Starts, coloured: bool = False) -> _core.DecayFit:
-        return self._fit(self.responses, starts, coloured, _STEPS)
-
-    def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> _core.DecayFit:
-        return self._fit(self.responses if responses is None else responses, starts, False, _QUICK_STEPS)
-
-    def _fit(self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, steps: int) -> _core.DecayFit:
-        omega, zeta = np.array(starts).T
-        return _core.fit_decay(
-            list(responses), self.period_s, omega, zeta, coloured_residuals=coloured, most_iterations=steps
-        )
-
-    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
-        return _core.stabilisation_poles(self.responses, most)
-
-    def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
-        omega, zeta = np.array(candidates).T
-        ranking = _core.rank_modes(self.responses, self.period_s, omega, zeta, kept + 1, kept=kept)
-        return [int(index) for index in ranking.chosen]
-
-    def record(self, index: int) -> _Decays:
-        return replace(self, responses=[self.responses[index]])
 
 
 def find_modes(
@@ -145,15 +61,15 @@ def find_modes(
     Raises:
         RecordError: a band beyond half the sampling rate, or more modes than the records hold.
     """
-    problem = _problem(ready, band_hz)
+    problem = problem_of(ready, band_hz)
     models = _search(problem, most_modes, modes)
     others: list[Fit] = []
-    if isinstance(problem, _Taps) and models.fits:
+    if isinstance(problem, Taps) and models.fits:
         problem, models, others = _held(problem, models, most_modes, modes)
     return _result(ready, files, problem, models, modes or models.order, others, accepted_percent)
 
 
-def _held(problem: _Taps, models: Search, most_modes: int, modes: int | None) -> tuple[_Taps, Search, list[Fit]]:
+def _held(problem: Taps, models: Search, most_modes: int, modes: int | None) -> tuple[Taps, Search, list[Fit]]:
     """The course of the force between its samples for which the data speak, and fits of what else it may have been.
 
     A recorder with an anti-aliasing filter gives a band-limited force; a simulation may have one that is linear between
@@ -178,32 +94,7 @@ def _held(problem: _Taps, models: Search, most_modes: int, modes: int | None) ->
     return *best, others
 
 
-def _problem(ready: Prepared, band_hz: tuple[float, float] | None) -> _Taps | _Decays:
-    first = ready.records[0]
-    responses = [record.response for record in ready.records]
-    longest_s = max(len(response) for response in responses) * first.period_s
-    band = band_hz or (LEAST_SWINGS / longest_s, _HIGHEST_SHARE / first.period_s)
-    if not 0.0 <= band[0] < band[1] <= 0.5 / first.period_s:
-        raise RecordError(
-            f"band of {band[0]:g} to {band[1]:g} Hz: must ascend and end below half the sampling rate, "
-            f"{0.5 / first.period_s:g} Hz"
-        )
-    if first.force_n is None:
-        return _Decays(responses, first.period_s, band)
-    forces = [record.force_n for record in ready.records if record.force_n is not None]
-    noise = [value for value in ready.force_noise_n if value is not None]
-    return _Taps(
-        forces,
-        responses,
-        first.period_s,
-        band,
-        first.quantity,
-        float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0,
-        "band_limited",
-    )
-
-
-def _search(problem: _Taps | _Decays, most_modes: int, modes: int | None) -> Search:
+def _search(problem: Taps | Decays, most_modes: int, modes: int | None) -> Search:
     models = search(problem, modes or most_modes)
     if modes is not None and len(models.fits) < modes:
         raise RecordError(f"{modes} modes are asked for, and the records hold no more than {len(models.fits)}")
@@ -213,80 +104,79 @@ def _search(problem: _Taps | _Decays, most_modes: int, modes: int | None) -> Sea
 def _result(
     ready: Prepared,
     files: tuple[str, ...],
-    problem: _Taps | _Decays,
+    problem: Taps | Decays,
     models: Search,
     order: int,
     others: Sequence[Fit],
     accepted_percent: float,
 ) -> Identification:
     warnings = [*ready.warnings, *(f"{refused.source}: not used: {refused.reason}" for refused in ready.refused)]
-    evidence = dict(enumerate(models.evidence))
-    chart = stabilisation_chart(chart_poles(problem), problem.period_s)
     squares = sum(float(np.sum(response**2)) for response in problem.responses)
-    used = tuple((0, len(response)) for response in problem.responses)
+    without = Identification(
+        files=files,
+        evidence=dict(enumerate(models.evidence)),
+        fit_percent=0.0,
+        noise_rms=float(np.sqrt(squares / sum(len(response) for response in problem.responses))),
+        reason="no mode stands out of the noise",
+        warnings=tuple(warnings),
+        notes=ready.notes,
+        prepared=ready,
+        chart=stabilisation_chart(chart_poles(problem), problem.period_s),
+        fitted=tuple(np.zeros(len(response)) for response in problem.responses),
+        used=tuple((0, len(response)) for response in problem.responses),
+    )
     if order == 0:
-        return Identification(
-            files=files,
-            evidence=evidence,
-            fit_percent=0.0,
-            noise_rms=float(np.sqrt(squares / sum(len(response) for response in problem.responses))),
-            reason="no mode stands out of the noise",
-            warnings=tuple(warnings),
-            notes=ready.notes,
-            prepared=ready,
-            chart=chart,
-            fitted=tuple(np.zeros(len(response)) for response in problem.responses),
-            used=used,
-        )
+        return without
     fit = models.fits[order - 1]
-    coloured = abs(fit.residual_autocorrelation) * np.sqrt(fit.samples) > _COLOURED
-    if coloured:
+    if abs(fit.residual_autocorrelation) * np.sqrt(fit.samples) > _COLOURED:
         fit = problem.fit(starts_of(fit), coloured=True)
         warnings.append(
             f"what the model leaves is no white noise (autocorrelation {fit.residual_autocorrelation:.2f}): the "
             "intervals allow for it; other causes than modes, or a mode that is not linear"
         )
-    aliased = _aliased(problem) if isinstance(problem, _Taps) else _never_aliased
-    doubts = Doubts(
-        limit_percent=accepted_percent,
-        band_hz=problem.band_hz,
-        record_s=max(len(response) for response in problem.responses) * problem.period_s,
-        rivals=rivals_of(order, models.fits),
-        aliased=aliased,
-    )
-    supported: list[IdentifiedMode] = []
-    refused: list[IdentifiedMode] = []
-    for estimates in estimates_of(fit, _alone(problem, fit), others, aliased):
-        if is_background(estimates, doubts):
-            continue
-        reason = refusal_of(estimates, doubts)
-        mode = IdentifiedMode(
-            estimates.frequency_hz,
-            estimates.damping_ratio,
-            estimates.mass_kg,
-            estimates.damping_n_s_per_m,
-            estimates.stiffness_n_per_m,
-            reason,
-        )
-        (refused if reason else supported).append(mode)
+    found = _judged(problem, fit, models, others, accepted_percent)
+    supported = tuple(mode for mode in found if not mode.refusal)
+    refused = tuple(mode for mode in found if mode.refusal)
     left = float(np.sqrt(fit.sum_of_squares / squares)) if squares > 0.0 else 1.0
-    return Identification(
-        files=files,
-        modes=tuple(sorted(supported, key=lambda mode: mode.frequency_hz.value)),
-        refused=tuple(sorted(refused, key=lambda mode: mode.frequency_hz.value)),
+    return replace(
+        without,
+        modes=supported,
+        refused=refused,
         order=order,
-        evidence=evidence,
         fit_percent=100.0 * (1.0 - left),
         noise_rms=float(np.sqrt(fit.sum_of_squares / (fit.samples - fit.parameters))),
         mass_check=_mass_check(problem, fit),
         reason=_reason(supported, refused),
         warnings=tuple(warnings),
-        notes=ready.notes,
-        prepared=ready,
-        chart=chart,
         fitted=tuple(fit.fitted),
-        used=used,
     )
+
+
+def _judged(
+    problem: Taps | Decays, fit: Fit, models: Search, others: Sequence[Fit], accepted_percent: float
+) -> list[IdentifiedMode]:
+    """The modes of a fit by ascending frequency, without background, each with its refusal where there is one."""
+    aliased = _aliased(problem) if isinstance(problem, Taps) else _never_aliased
+    doubts = Doubts(
+        limit_percent=accepted_percent,
+        band_hz=problem.band_hz,
+        record_s=max(len(response) for response in problem.responses) * problem.period_s,
+        rivals=rivals_of(len(fit.omega_rad_s), models.fits),
+        aliased=aliased,
+    )
+    found = [
+        IdentifiedMode(
+            each.frequency_hz,
+            each.damping_ratio,
+            each.mass_kg,
+            each.damping_n_s_per_m,
+            each.stiffness_n_per_m,
+            refusal_of(each, doubts),
+        )
+        for each in estimates_of(fit, _alone(problem, fit), others, aliased)
+        if not is_background(each, doubts)
+    ]
+    return sorted(found, key=lambda mode: mode.frequency_hz.value)
 
 
 def _reason(supported: Sequence[IdentifiedMode], refused: Sequence[IdentifiedMode]) -> str:
@@ -304,7 +194,7 @@ def _never_aliased(_frequency_hz: float) -> float:
     return 0.0
 
 
-def _aliased(problem: _Taps) -> Callable[[float], float]:
+def _aliased(problem: Taps) -> Callable[[float], float]:
     """Share of the force's spectrum at a frequency that may have been folded down from above half the sampling rate.
 
     Without an anti-aliasing filter the spectrum does not end before half the rate: what it still has there, beyond
@@ -318,7 +208,7 @@ def _aliased(problem: _Taps) -> Callable[[float], float]:
     pulse = np.trim_zeros(problem.forces[0])
     spectrum = np.abs(np.fft.rfft(pulse, _SPECTRUM))
     share = np.fft.rfftfreq(_SPECTRUM)
-    highest = float(np.sqrt(np.mean(spectrum[share > _HIGHEST_SHARE] ** 2)))
+    highest = float(np.sqrt(np.mean(spectrum[share > HIGHEST_SHARE] ** 2)))
     noise = problem.force_noise_n * np.sqrt(len(pulse))
     folded = _FOLDED * np.sqrt(max(highest**2 - 2.0 * noise**2, 0.0))
 
@@ -329,7 +219,7 @@ def _aliased(problem: _Taps) -> Callable[[float], float]:
     return at
 
 
-def _alone(problem: _Taps | _Decays, fit: Fit) -> list[Fit]:
+def _alone(problem: Taps | Decays, fit: Fit) -> list[Fit]:
     """The same modes fitted to each record by itself; none if there is but one, or a record does not hold them."""
     if len(problem.responses) < 2:
         return []
@@ -340,12 +230,12 @@ def _alone(problem: _Taps | _Decays, fit: Fit) -> list[Fit]:
     return fits
 
 
-def _mass_check(problem: _Taps | _Decays, fit: _core.ModalFit | _core.DecayFit) -> MassCheck | None:
+def _mass_check(problem: Taps | Decays, fit: _core.ModalFit | _core.DecayFit) -> MassCheck | None:
     """The equivalent mass by paper 003's way, from the first tap, where the model has one mode.
 
     Wilson's method shortens the frequency unless its steps are short: force and response are resampled.
     """
-    if isinstance(problem, _Decays) or len(fit.omega_rad_s) != 1 or problem.hold == "impulse":
+    if isinstance(problem, Decays) or len(fit.omega_rad_s) != 1 or problem.hold == "impulse":
         return None
     args = (
         _finer(problem.forces[0], problem.hold),

@@ -8,13 +8,12 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import tomlkit
-from scipy.optimize import linear_sum_assignment
 from tomlkit.items import AoT, SingleKey, Table
 
 from shapegcode.errors import ArgumentError
 from shapegcode.identification.mode import Estimate, IdentifiedMode
+from shapegcode.identification.pairing import matches, shares_of
 from shapegcode.settings.edit import (
     Entry,
     commented_key,
@@ -27,15 +26,10 @@ from shapegcode.settings.edit import (
 )
 from shapegcode.settings.keys import toml
 
-__all__ = ["SAME_MODE", "ModeTables"]
-
-SAME_MODE = 0.1
-"""Two frequencies, relative to the old one, within which a mode is taken as the one that the file has."""
+__all__ = ["ModeTables"]
 
 _MEASURED = "half of the 95 % interval"
 _DIGITS = 7
-_NO_PAIR = 1e3
-_SHARE_DIGITS = 4
 _SUM_SLACK = 1e-3  # of the participations: rounding
 _KEYS = (
     "frequency_hz",
@@ -116,12 +110,12 @@ class ModeTables:
             ArgumentError: the result would not say what is meant, because of a layout that is not known here.
         """
         old_hz = [each["frequency_hz"] for each in self.old]
-        taken = _matches(modes, old_hz)
+        taken = matches(modes, old_hz)
         kept = {old: modes[mode] for mode, old in taken.items()}
-        seen = {old: refused[mode] for mode, old in _matches(refused, old_hz).items()}
+        seen = {old: refused[mode] for mode, old in matches(refused, old_hz).items()}
         fresh = [mode for number, mode in enumerate(modes) if number not in taken]
         stay, left = self._old_tables(kept, seen)
-        shares, meaning = _shares(modes)
+        shares, meaning = shares_of(modes)
         share_of = dict(zip(map(id, modes), shares, strict=True))
         added = [self._table(mode, share_of[id(mode)], meaning) for mode in fresh]
         self._insert(stay, added, left)
@@ -247,7 +241,7 @@ class ModeTables:
         """Warn of modes that together would move further than the axis does."""
         total = sum(float(mode.get("participation", 1.0)) for mode in self.expected)
         if total > 1.0 + _SUM_SLACK:
-            shares = ", ".join(f"{share:g}" for share in _shares(modes)[0])
+            shares = ", ".join(f"{share:g}" for share in shares_of(modes)[0])
             self.notes.append(
                 f"warning: the participations of the {self.axis.upper()} axis sum to {total:.4g}: those of all modes "
                 f"of one point sum to 1 when the axis moves; by the shares of the modes found they would be {shares}"
@@ -286,32 +280,6 @@ class ModeTables:
 def _text(entries: Sequence[Entry]) -> str:
     """Comments and blank lines as they stand in the file."""
     return "".join(item.as_string() for _, item in entries)
-
-
-def _shares(modes: Sequence[IdentifiedMode]) -> tuple[list[float], str]:
-    """Participations that sum to 1, and what they are: shares of the residues 1/m, or of the number of modes.
-
-    Those of one point under a motion of its base do so, sum of phi_i Gamma_i = 1, for mode shapes that span the motion.
-    """
-    masses = [mode.mass_kg.value for mode in modes if mode.mass_kg is not None]
-    if len(masses) < len(modes):
-        return [_share(1.0 / len(modes))] * len(modes), "equal shares"
-    total = sum(1.0 / mass for mass in masses)
-    return [_share(1.0 / mass / total) for mass in masses], "share of the residues 1/m"
-
-
-def _share(value: float) -> float:
-    return float(f"{value:.{_SHARE_DIGITS}g}")
-
-
-def _matches(modes: Sequence[IdentifiedMode], old_hz: Sequence[float]) -> dict[int, int]:
-    """Number of the old mode by that of the new: as many pairs within 10 % as there can be, the nearest ones."""
-    if not old_hz or not modes:
-        return {}
-    new_hz = np.array([mode.frequency_hz.value for mode in modes])
-    distance = np.abs(new_hz[:, None] / np.asarray(old_hz) - 1.0)
-    pairs = zip(*linear_sum_assignment(np.where(distance <= SAME_MODE, distance, _NO_PAIR)), strict=True)
-    return {int(new): int(old) for new, old in pairs if distance[new, old] <= SAME_MODE}
 
 
 def _rounded(value: float) -> float:

@@ -2,40 +2,24 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from shapegcode.errors import RecordError
+from shapegcode.io.cells import cells_of, is_number
 from shapegcode.io.columns import tap_label
 from shapegcode.io.units import find_unit
 
-__all__ = [
-    "Layout",
-    "cells_of",
-    "find_layout",
-    "has_thousands",
-    "is_clock_time",
-    "is_number",
-    "utf8_text",
-    "without_thousands",
-]
+__all__ = ["Layout", "find_layout"]
 
 #: The header of loggers with long preambles stays within this.
 _HEAD_BYTES = 262_144
 _HEAD_LINES = 400
 #: So many rows of numbers on end are data; a preamble may hold one or two.
 _ROWS_TO_KNOW = 3
-_TEXT_BYTES = frozenset(range(32, 256)) | {9, 10, 12, 13}
 _DELIMITERS = ("\t", ";", ",", " ")
 _NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
-#: Behind a point for thousands stand three digits; the comma behind the last of them tells it from a decimal point.
-_THOUSANDS = r"\d{1,3}(?:\.\d{3})+(?=,\d)"
-_COMMA_NUMBER = re.compile(
-    rf"[+-]?({_THOUSANDS},\d+|\d+(,\d+)?|,\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE
-)
 _RATE = re.compile(
     r"(?:sampl\w*[ _-]*(?:rate|freq\w*)|abtast(?:rate|frequenz)|sample_rate|\bfs\b)"
     r"[^\d\w]*(k?hz)?[^\d\w]*([\d.,]+(?:e[+-]?\d+)?)\s*(k?hz)?",
@@ -78,102 +62,6 @@ class Layout:
     def delimiter_name(self) -> str:
         """For messages."""
         return _NAMES[self.delimiter]
-
-
-def utf8_text(path: Path) -> bytes:
-    """The text as ASCII-compatible bytes with line feeds.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        The whole file, one byte per ASCII character.
-
-    Raises:
-        RecordError: it is not text.
-    """
-    data = path.read_bytes()
-    if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
-        data = data.decode("utf-16", errors="replace").encode("utf-8")
-    data = data.removeprefix(b"\xef\xbb\xbf")
-    strange = sorted(set(data[:65536]) - _TEXT_BYTES)
-    if strange:
-        raise RecordError(
-            f"{path}: a binary file (byte 0x{strange[0]:02x} at {data.index(bytes([strange[0]]))}); needed is text "
-            "with columns, UFF (dataset 58) or WAV"
-        )
-    if b"\n" not in data[:65536] and b"\r" in data[:65536]:
-        data = data.replace(b"\r", b"\n")
-    return data
-
-
-def cells_of(line: str, delimiter: str) -> list[str]:
-    """The cells of a line, without quotes and surrounding blanks.
-
-    Args:
-        line: of the file.
-        delimiter: between cells; " " stands for any run of blanks.
-
-    Returns:
-        One text per cell.
-    """
-    if delimiter == " ":
-        return line.split()
-    if '"' in line:
-        row = next(iter(csv.reader([line], delimiter=delimiter, skipinitialspace=True)), [])
-        return [cell.strip() for cell in row]
-    return [cell.strip() for cell in line.split(delimiter)]
-
-
-def is_number(cell: str, decimal_comma: bool) -> bool:
-    """Whether a cell is a number, NaN and infinity included.
-
-    Args:
-        cell: its text.
-        decimal_comma: numbers have a comma for the point.
-
-    Returns:
-        True for a number.
-    """
-    return (_COMMA_NUMBER if decimal_comma else _NUMBER).fullmatch(cell) is not None
-
-
-def is_clock_time(cell: str) -> bool:
-    """Whether a cell is a time of the day, with a date or without: ``10:15:00,000391``.
-
-    Args:
-        cell: its text.
-
-    Returns:
-        True for a time of the day.
-    """
-    return re.search(r"\d{1,2}:\d{2}", cell) is not None
-
-
-def has_thousands(cell: str) -> bool:
-    """Whether a number with a decimal comma has points for thousands: ``1.265,02``.
-
-    Args:
-        cell: its text.
-
-    Returns:
-        True for such a number.
-    """
-    return "." in cell and is_number(cell, True)
-
-
-def without_thousands(data: bytes) -> bytes:
-    """Text of numbers with decimal commas, points for thousands left out.
-
-    Args:
-        data: text with such numbers.
-
-    Returns:
-        The same text without these points.
-    """
-    if b"." not in data:
-        return data
-    return re.sub(rb"(?<![\d.,])" + _THOUSANDS.encode(), lambda found: found[0].replace(b".", b""), data)
 
 
 @dataclass

@@ -19,16 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from shapegcode.errors import RecordError
+from shapegcode.io.cells import cells_of, has_thousands, is_clock_time, is_number, utf8_text, without_thousands
 from shapegcode.io.columns import Label
-from shapegcode.io.layout import (
-    cells_of,
-    find_layout,
-    has_thousands,
-    is_clock_time,
-    is_number,
-    utf8_text,
-    without_thousands,
-)
+from shapegcode.io.layout import find_layout
 from shapegcode.io.record import FloatArray
 
 __all__ = ["TextTable"]

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 
 from shapegcode.errors import RecordError
+from shapegcode.io.cells import is_clock_time
 from shapegcode.io.columns import Label, tap_label, unit_of
-from shapegcode.io.layout import is_clock_time
 from shapegcode.io.options import ReadOptions, stated_unit
 from shapegcode.io.record import UNITS, Quantity, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period

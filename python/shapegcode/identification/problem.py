@@ -1,0 +1,168 @@
+"""What is fitted: taps with force, or free decays, each as the core's fits want them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.errors import RecordError
+from shapegcode.identification.model_search import Starts
+from shapegcode.identification.prepared import Prepared
+from shapegcode.identification.support import LEAST_SWINGS
+
+FloatArray = npt.NDArray[np.float64]
+
+__all__ = ["HIGHEST_SHARE", "Decays", "Taps", "problem_of"]
+
+#: Of the sampling rate: the force between samples is known up to there.
+HIGHEST_SHARE = 0.45
+_STEPS = 60  # of a fit
+_QUICK_STEPS = 15  # of one that only shows where a mode may be
+
+
+@dataclass(frozen=True, eq=False)
+class Taps:
+    """Records with force.
+
+    Attributes:
+        forces: (n,) each, N.
+        responses: (n,) each, in the unit of the quantity.
+        period_s: time between two samples.
+        band_hz: modes are looked for in it.
+        quantity: what the sensor measured.
+        force_noise_n: RMS of the force off the pulse.
+        hold: course of the force between samples: "band_limited", "linear" or "impulse".
+    """
+
+    forces: list[FloatArray]
+    responses: list[FloatArray]
+    period_s: float
+    band_hz: tuple[float, float]
+    quantity: str
+    force_noise_n: float
+    hold: str
+
+    def fit(self, starts: Starts, coloured: bool = False) -> _core.ModalFit:
+        """The best model near some modes, its residual white or coloured."""
+        return self._fit(self.responses, starts, coloured, self.force_noise_n, _STEPS)
+
+    def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> _core.ModalFit:
+        """A model in a few steps, of other responses where they are given."""
+        return self._fit(self.responses if responses is None else responses, starts, False, 0.0, _QUICK_STEPS)
+
+    def _fit(
+        self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, force_noise_n: float, steps: int
+    ) -> _core.ModalFit:
+        omega, zeta = np.array(starts).T
+        return _core.fit_modes(
+            self.forces,
+            list(responses),
+            self.period_s,
+            omega,
+            zeta,
+            quantity=self.quantity,
+            hold=self.hold,
+            force_noise_n=force_noise_n,
+            coloured_residuals=coloured,
+            most_iterations=steps,
+        )
+
+    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
+        """Discrete poles of models with 1 to `most` modes."""
+        return _core.stabilisation_poles(self.responses, most, self.forces)
+
+    def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
+        """Ranks of the candidates that explain most, beside those that are kept."""
+        omega, zeta = np.array(candidates).T
+        ranking = _core.rank_modes(
+            self.responses, self.period_s, omega, zeta, kept + 1, self.forces, self.quantity, kept
+        )
+        return [int(index) for index in ranking.chosen]
+
+    def record(self, index: int) -> Taps:
+        """One record alone."""
+        return replace(self, forces=[self.forces[index]], responses=[self.responses[index]])
+
+
+@dataclass(frozen=True, eq=False)
+class Decays:
+    """Records without force.
+
+    Attributes:
+        responses: (n,) each.
+        period_s: time between two samples.
+        band_hz: modes are looked for in it.
+    """
+
+    responses: list[FloatArray]
+    period_s: float
+    band_hz: tuple[float, float]
+
+    def fit(self, starts: Starts, coloured: bool = False) -> _core.DecayFit:
+        """The best model near some modes, its residual white or coloured."""
+        return self._fit(self.responses, starts, coloured, _STEPS)
+
+    def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> _core.DecayFit:
+        """A model in a few steps, of other responses where they are given."""
+        return self._fit(self.responses if responses is None else responses, starts, False, _QUICK_STEPS)
+
+    def _fit(self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, steps: int) -> _core.DecayFit:
+        omega, zeta = np.array(starts).T
+        return _core.fit_decay(
+            list(responses), self.period_s, omega, zeta, coloured_residuals=coloured, most_iterations=steps
+        )
+
+    def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]:
+        """Discrete poles of models with 1 to `most` modes."""
+        return _core.stabilisation_poles(self.responses, most)
+
+    def rank(self, candidates: Starts, kept: int) -> Sequence[int]:
+        """Ranks of the candidates that explain most, beside those that are kept."""
+        omega, zeta = np.array(candidates).T
+        ranking = _core.rank_modes(self.responses, self.period_s, omega, zeta, kept + 1, kept=kept)
+        return [int(index) for index in ranking.chosen]
+
+    def record(self, index: int) -> Decays:
+        """One record alone."""
+        return replace(self, responses=[self.responses[index]])
+
+
+def problem_of(ready: Prepared, band_hz: tuple[float, float] | None) -> Taps | Decays:
+    """The records of a fit, and the band to look in.
+
+    Args:
+        ready: records that were looked through.
+        band_hz: as asked for; None: from two swings per record to .45 of the sampling rate.
+
+    Returns:
+        Taps or decays.
+
+    Raises:
+        RecordError: a band that does not ascend, or ends above half the sampling rate.
+    """
+    first = ready.records[0]
+    responses = [record.response for record in ready.records]
+    longest_s = max(len(response) for response in responses) * first.period_s
+    band = band_hz or (LEAST_SWINGS / longest_s, HIGHEST_SHARE / first.period_s)
+    if not 0.0 <= band[0] < band[1] <= 0.5 / first.period_s:
+        raise RecordError(
+            f"band of {band[0]:g} to {band[1]:g} Hz: must ascend and end below half the sampling rate, "
+            f"{0.5 / first.period_s:g} Hz"
+        )
+    if first.force_n is None:
+        return Decays(responses, first.period_s, band)
+    forces = [record.force_n for record in ready.records if record.force_n is not None]
+    noise = [value for value in ready.force_noise_n if value is not None]
+    return Taps(
+        forces,
+        responses,
+        first.period_s,
+        band,
+        first.quantity,
+        float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0,
+        "band_limited",
+    )
