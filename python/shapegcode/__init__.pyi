@@ -59,6 +59,13 @@ from shapegcode.conversion.convert import convert as convert
 from shapegcode.conversion.result import Conversion as Conversion
 from shapegcode.cutting.stock import Stock as Stock
 from shapegcode.cutting.tool import Tool as Tool
+from shapegcode.demos.corner import corner_demo as corner_demo
+from shapegcode.demos.cycle_time import cycle_time_demo as cycle_time_demo
+from shapegcode.demos.metrology import metrology_demo as metrology_demo
+from shapegcode.demos.path import path_demo as path_demo
+from shapegcode.demos.result import Demonstration as Demonstration
+from shapegcode.demos.shaper import shaper_demo as shaper_demo
+from shapegcode.demos.tap import tap_demo as tap_demo
 from shapegcode.errors import (
     ArgumentError as ArgumentError,
     DesignError as DesignError,
@@ -73,6 +80,11 @@ from shapegcode.errors import (
     StockError as StockError,
     ToolError as ToolError,
 )
+from shapegcode.feed.plots import (
+    plot_feed_along_path as plot_feed_along_path,
+    plot_force_path as plot_force_path,
+    plot_wall_error as plot_wall_error,
+)
 from shapegcode.feed.result import FeedSchedule as FeedSchedule
 from shapegcode.feed.schedule import schedule_feed as schedule_feed
 from shapegcode.feed.shaped import convert_scheduled as convert_scheduled
@@ -85,6 +97,13 @@ from shapegcode.identification.identify import identify as identify
 from shapegcode.identification.mode import Estimate as Estimate, IdentifiedMode as IdentifiedMode
 from shapegcode.identification.plan import tap_plan as tap_plan
 from shapegcode.identification.plan_result import TapPlan as TapPlan
+from shapegcode.identification.plots import (
+    plot_decay as plot_decay,
+    plot_response as plot_response,
+    plot_spectrum as plot_spectrum,
+    plot_stabilisation as plot_stabilisation,
+    plot_traces as plot_traces,
+)
 from shapegcode.identification.result import Identification as Identification
 from shapegcode.identification.update import MachineUpdate as MachineUpdate, update_machine as update_machine
 from shapegcode.io.read import ReadOptions as ReadOptions
@@ -111,6 +130,7 @@ from shapegcode.program.result import Expansion as Expansion
 from shapegcode.results.motion_plots import View as View, plot_feed as plot_feed, plot_vibration as plot_vibration
 from shapegcode.results.path_plots import plot_path as plot_path
 from shapegcode.results.result import Pair as Pair, Result as Result, Xyz as Xyz
+from shapegcode.results.table import Column as Column, Table as Table
 from shapegcode.results.trace import Trace as Trace
 from shapegcode.shaping import (
     ModeBand as ModeBand,
@@ -120,6 +140,13 @@ from shapegcode.shaping import (
     shortest_non_negative as shortest_non_negative,
 )
 from shapegcode.shaping.grid import choose_grid as choose_grid
+from shapegcode.shaping.plots import (
+    plot_branches as plot_branches,
+    plot_impulses as plot_impulses,
+    plot_pareto as plot_pareto,
+    plot_sensitivity as plot_sensitivity,
+    plot_steps as plot_steps,
+)
 from shapegcode.simulation.plots import plot_motion as plot_motion
 from shapegcode.simulation.result import (
     Motion as Motion,
@@ -144,6 +171,12 @@ from shapegcode.testcut.cuts import (
 )
 from shapegcode.testcut.design_result import CutDesign as CutDesign
 from shapegcode.testcut.fit import fit_test_cut as fit_test_cut
+from shapegcode.testcut.plots import (
+    plot_coefficients as plot_coefficients,
+    plot_corner as plot_corner,
+    plot_interval as plot_interval,
+    plot_taper as plot_taper,
+)
 from shapegcode.testcut.program import write_test_cut as write_test_cut
 from shapegcode.testcut.result import (
     CornerResult as CornerResult,
@@ -151,4 +184,5 @@ from shapegcode.testcut.result import (
     TaperResult as TaperResult,
 )
 from shapegcode.timing.cycle_time import cycle_time as cycle_time
+from shapegcode.timing.plots import plot_time as plot_time
 from shapegcode.timing.result import CycleTime as CycleTime

@@ -14,7 +14,7 @@ from shapegcode import _core
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
 from shapegcode.feed.load import LOADS
-from shapegcode.feed.plots import plot_along_path, plot_path, plot_walls, plots_of
+from shapegcode.feed.plots import plot_feed_along_path, plot_force_path, plot_wall_error, plots_of
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.schedule import schedule_feed
 from shapegcode.feed.traces import envelope, groups
@@ -101,7 +101,7 @@ def test_the_files(pocket: FeedSchedule, tmp_path: Path, monkeypatch: pytest.Mon
     assert "Form error of the wall" in surface
 
 
-@pytest.mark.parametrize("draw", [plot_along_path, plot_path, plot_walls])
+@pytest.mark.parametrize("draw", [plot_feed_along_path, plot_force_path, plot_wall_error])
 def test_plots_draw_into_the_axes_of_the_caller(pocket: FeedSchedule, draw: Callable[..., Axes]) -> None:
     whole = plot.figure(12.0, 8.0)
     mine, other = whole.subplots(1, 2)
@@ -116,6 +116,6 @@ def test_without_known_forces_there_are_no_pictures(pocket: FeedSchedule, tmp_pa
     unknown = replace(pocket, loads=(None,) * len(pocket.loads))
     assert unknown.save_plots(tmp_path / "plots") == []
     assert not (tmp_path / "plots").exists()
-    for draw in (plot_along_path, plot_path, plot_walls):
+    for draw in (plot_feed_along_path, plot_force_path, plot_wall_error):
         with pytest.raises(_core.ArgumentError, match="nothing to draw"):
             draw(unknown)

@@ -255,7 +255,17 @@ def start_time(text: str) -> float:
 
 
 def frequency_band(text: str) -> tuple[float, float]:
-    """Two frequencies in Hz such as ``20:400``, ascending."""
+    """Two frequencies in Hz such as ``20:400``, ascending.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        Lowest and highest, in Hz.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
     low, _, high = text.partition(":")
     try:
         band = float(low), float(high)
@@ -334,7 +344,17 @@ def positive(text: str) -> float:
 
 
 def nonzero(text: str) -> float:
-    """A number other than 0."""
+    """A number other than 0.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The number.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
     value = number(text)
     if not math.isfinite(value) or value == 0.0:
         raise argparse.ArgumentTypeError(f"{text!r}: must be a number other than 0")

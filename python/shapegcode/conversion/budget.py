@@ -180,6 +180,9 @@ def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_p
         shaped: its replacement.
         grid: on which it is written.
         bits_per_character: on the serial line.
+
+    Returns:
+        Bytes, bit/s and blocks/s that it asks for.
     """
     durations = shaped.periods * grid.block_period_s
     stretch = max(grid.duration_s, grid.block_period_s)

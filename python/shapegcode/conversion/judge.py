@@ -97,6 +97,9 @@ class Judge:
             originals: the originals' playbacks under way, one per region.
             pool: runs the playbacks.
             on_step: called with regions done and regions in all.
+
+        Returns:
+            The figures of each region, in the order of the text.
         """
         limits = self._model.limits()
         running = []
@@ -143,6 +146,9 @@ class Judge:
             figures: per region, as played.
             placed: the regions.
             block_period_s: of the emitted blocks, s.
+
+        Returns:
+            A verdict for each region.
         """
         return tuple(
             self._verdict(region, place, block_period_s) for region, place in zip(figures, placed, strict=True)
@@ -246,6 +252,9 @@ def case_verdict(
         limits: per region.
         lines: of the original program, per region.
         material_side: "left" or "right" of the travel; None: not known.
+
+    Returns:
+        The worst of the regions in this case.
     """
     judged = [
         (each, where)

@@ -54,6 +54,9 @@ def read_back(text: bytes, placed: Sequence[Placed], machine: Machine) -> Progra
         placed: its regions.
         machine: whose controller reads it.
 
+    Returns:
+        The emitted program as it was read.
+
     Raises:
         RoundTripError: something differs; the message names the line and both values.
     """

@@ -86,6 +86,9 @@ class Spending:
             residuals_mm: residual vibration of each of the original's regions: what shaping it is worth.
             design: grid of a block period.
             write: writes all regions on a grid.
+
+        Returns:
+            The grid of that period.
         """
         weights = [residual * 1e3 / unit for unit, residual in zip(self._unit_um, residuals_mm, strict=True)]
         written = write(grid)
@@ -122,6 +125,9 @@ class Spending:
             grid: on which the text is written.
             written: the whole text with its loads.
             verdicts: of the shaped regions.
+
+        Returns:
+            Whether any was given up.
 
         Raises:
             ArgumentError: no choice fits; with value and limit.

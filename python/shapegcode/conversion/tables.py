@@ -74,6 +74,9 @@ def before_after_table(groups: Sequence[Sequence[BeforeAfter]]) -> Table:
 
     Args:
         groups: from top to bottom; a line stands between them.
+
+    Returns:
+        The table.
     """
     filled = [group for group in groups if group]
     sections = [sum(len(group) for group in filled[:rank]) for rank in range(1, len(filled))]
@@ -86,6 +89,9 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
     Args:
         cases: as played.
         worst: the one that decides; None: no case counts.
+
+    Returns:
+        The table.
     """
     columns = (
         Column("case", value="name", text=True),

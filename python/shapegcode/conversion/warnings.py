@@ -25,6 +25,9 @@ def played_warnings(program: Program, figures: PlayedFigures, machine: Machine) 
         program: the original.
         figures: of its regions.
         machine: whose tolerances were applied.
+
+    Returns:
+        The warnings, each with its remedy where there is one.
     """
     expanded = " expanded" if program.core.expanded else ""
     misses = [
@@ -48,6 +51,9 @@ def text_warnings(
         machine: that shall run it.
         size: of the text in bytes.
         blocks: shaped blocks in it.
+
+    Returns:
+        The warnings, each with its remedy where there is one.
     """
     fastest = max(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple())
     return [

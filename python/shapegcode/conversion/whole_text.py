@@ -107,6 +107,9 @@ class TextWriter:
                 None: there is no budget.
             on_progress: called with regions done and regions in all.
 
+        Returns:
+            The text, and where its shaped regions stand.
+
         Raises:
             ProgramError: a region cannot be written.
         """

@@ -57,6 +57,9 @@ def filter_tolerance(grid: Grid, own_filter_s: float, contour_tolerance_um: floa
         grid: what follows the look-ahead; its spread limits the speed.
         own_filter_s: time constant with which the controller smooths the shaped program once more, s.
         contour_tolerance_um: deviation allowed to it, µm.
+
+    Returns:
+        The tolerance, in mm.
     """
     tolerance = _core.FilterTolerance()
     tolerance.variance_s2 = max(shaper.variance_s2 for shaper in grid.shapers) + own_filter_s * own_filter_s / 12.0
@@ -124,6 +127,9 @@ class RegionWriter:
             tolerance: see `filter_tolerance`.
             offset: from the region's positions to the machine's; where it is not known of the axis that the grid's
                 track follows, the grid's one shaper is used.
+
+        Returns:
+            The options of the core.
         """
         grid, plant = self._grid, self._model.options(offset=offset)
         options = _core.ShapingOptions()
@@ -159,6 +165,9 @@ class RegionWriter:
             region: what is replaced.
             limits: of the look-ahead.
             tolerance: see `tolerance`.
+
+        Returns:
+            The text of the region and the blocks in it.
 
         Raises:
             ArgumentError: it cannot be shaped or written.

@@ -167,6 +167,9 @@ def metrology_demo(on_progress: Callable[[float], None] = lambda _done: None) ->
         on_progress: called with the share that is done, 0 to 1.
 
     Source: Ko, Lim and Hong, 2023 (paper 000), tables 3 and 4, figures 21 to 26.
+
+    Returns:
+        Each statement of the paper beside ours.
     """
     machine = _machine("off")
     cases: list[SpecimenCase] = []

@@ -126,7 +126,14 @@ class Demonstration(Result):
 
     @staticmethod
     def cited(number: str) -> str:
-        """The `paper` of a demonstration: "Park, Hong and Danielson, 2009 (paper 002 in docs/references.md)"."""
+        """The `paper` of a demonstration: "Park, Hong and Danielson, 2009 (paper 002 in docs/references.md)".
+
+        Args:
+            number: as docs/references.md counts them, for example "002".
+
+        Returns:
+            Authors, year and number.
+        """
         return f"{PAPERS[number]} (paper {number} in docs/references.md)"
 
     @property

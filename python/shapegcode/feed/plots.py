@@ -19,7 +19,7 @@ from shapegcode.results.result import Plot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_along_path", "plot_path", "plot_walls", "plots_of"]
+__all__ = ["plot_feed_along_path", "plot_force_path", "plot_wall_error", "plots_of"]
 
 Vector = npt.NDArray[np.float64]
 
@@ -49,10 +49,10 @@ def plots_of(schedule: FeedSchedule) -> dict[str, Plot]:
     if schedule.traces is None:
         return {}
     found: dict[str, Plot] = {
-        "feed-along-path": partial(plot_along_path, schedule),
-        "feed-path": partial(plot_path, schedule),
+        "feed-along-path": partial(plot_feed_along_path, schedule),
+        "feed-path": partial(plot_force_path, schedule),
     }
-    return found | ({} if schedule.walls is None else {"feed-surface": partial(plot_walls, schedule)})
+    return found | ({} if schedule.walls is None else {"feed-surface": partial(plot_wall_error, schedule)})
 
 
 def _traces(schedule: FeedSchedule) -> FeedTraces:
@@ -69,7 +69,7 @@ def _summary(schedule: FeedSchedule) -> str:
     )
 
 
-def plot_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
+def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     """What does the tool meet, how fast does it go, and what does it bear, before and after?
 
     Long programs are drawn as bands between the least and the largest value of each stretch, so that no peak is lost.
@@ -162,7 +162,7 @@ class _Along:
         panel.stairs(high, self._edges, baseline=None, color=colour, linewidth=width, linestyle=style, label=name)
 
 
-def plot_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
+def plot_force_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     """Where is the force large? The path from above, before and after in one scale; behind it what is left standing.
 
     Pieces with the largest force are drawn last, so that passes below them do not hide them.
@@ -255,7 +255,7 @@ def _ground(panel: Axes, material: _core.Material, low: Vector, high: Vector) ->
     )  # fmt: skip
 
 
-def plot_walls(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
+def plot_wall_error(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
     """How far off is the wall? Error over distance and axial height before and after, in one scale.
 
     Args:

@@ -105,6 +105,9 @@ class FittedCircle:
             arc: what was fitted.
             nominal_mm: radius.
             centre_mm: the programmed one, (2,).
+
+        Returns:
+            The circle in mm, or None.
         """
         if arc is None:
             return None

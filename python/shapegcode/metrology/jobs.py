@@ -33,7 +33,21 @@ class Job:
 def jobs_of(
     program: Program, nominal: Program, machine: Machine, shaped: bool, lines: Sequence[tuple[int, int]] | None
 ) -> list[Job]:
-    """Pairs of regions that are measured, those without a section left out."""
+    """Pairs of regions that are measured, those without a section left out.
+
+    Args:
+        program: what is measured.
+        nominal: whose path it is measured against.
+        machine: whose modes say what a short section is.
+        shaped: shapegcode wrote the program.
+        lines: sections by lines of the nominal program, first and last; None: by direction and centre.
+
+    Returns:
+        The pairs, in the order of the program.
+
+    Raises:
+        ArgumentError: no cut in the given lines.
+    """
     jobs = []
     for played, region in _paired(program, nominal):
         path = region.path

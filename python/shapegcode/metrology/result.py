@@ -85,6 +85,9 @@ class MeasuredProgram:
             measured_against: name of the nominal program.
             limit_um: contour error that is allowed; None: it is not judged.
             warnings: about the program and the machine.
+
+        Returns:
+            The program with the worst of its figures.
         """
         kept = tuple(regions)
         figures = [region.figures for region in kept]
@@ -127,6 +130,9 @@ class MeasuredProgram:
 
         Args:
             limit_um: contour error that is allowed.
+
+        Returns:
+            The sentence.
         """
         largest = self.contour_error_um.response.max
         within = f"leaves the path by {largest:.2f} µm at most"

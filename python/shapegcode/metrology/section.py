@@ -114,6 +114,9 @@ class MeasuredSection:
 
         Args:
             number: of the section in its program, from 1.
+
+        Returns:
+            The words.
         """
         kind = self.kind if self.arc is None else f"arc R{self.arc.nominal_radius_mm:g}"
         return f"{number} {kind}, {self.place}"

@@ -71,6 +71,9 @@ def summary_table(
         programs: the sections of each by its name, all along the same path.
         whole: time in s and contour error in µm of each.
         band_um: settled is what stays within it.
+
+    Returns:
+        The table.
     """
     rows = [
         _Row("cutting time s", tuple(f"{time_s:.2f}" for time_s, _ in whole.values())),
@@ -155,6 +158,9 @@ def section_table(
         limit_um: contour error that is allowed; None: nothing is judged.
         band_um: settled is what stays within it.
         every: show all sections; False: of many those with the largest contour error.
+
+    Returns:
+        The table.
     """
     count = min(len(sections) for sections in programs.values())
     worst = [max(each[index].contour_error_um.response.max for each in programs.values()) for index in range(count)]

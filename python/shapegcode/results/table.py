@@ -52,7 +52,14 @@ class Column:
         return f"{self.name} {self.unit}".strip()
 
     def cell(self, row: object) -> str:
-        """What stands in a row; empty where there is nothing."""
+        """What stands in a row; empty where there is nothing.
+
+        Args:
+            row: of the table.
+
+        Returns:
+            The text of the cell.
+        """
         take = attrgetter(self.value or self.name) if isinstance(self.value, str) else self.value
         value = take(row)
         if value is None:

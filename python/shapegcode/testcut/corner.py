@@ -28,6 +28,9 @@ def fit_corner(cut: TestCut, measured: Mapping[int, ForceRecord]) -> CornerResul
         cut: the test cut.
         measured: sampled records by the number of their pass, from 1.
 
+    Returns:
+        How the two agree, and where.
+
     Raises:
         ArgumentError: a record does not fit the cut.
     """

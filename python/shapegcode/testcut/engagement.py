@@ -38,6 +38,9 @@ def engagement(tool: CutTool, measuring: MeasuringPass, x_mm: Array, *, up: bool
         measuring: the pass.
         x_mm: (n,) positions of the tool's axis.
         up: up milling, the material on the left.
+
+    Returns:
+        Angles in rad and depths in mm at each X.
     """
     radius = tool.radius_mm
     edge_x, edge_y = np.array(measuring.edge_x_mm), np.array(measuring.edge_height_mm)

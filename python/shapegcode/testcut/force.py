@@ -101,6 +101,9 @@ def expected(cut: TestCut, measuring: MeasuringPass, law: CuttingLaw | None = No
         cut: the test cut.
         measuring: the pass.
         law: coefficients; None: those known before.
+
+    Returns:
+        The forces in N at each place.
     """
     count = math.ceil((measuring.end_mm - measuring.start_mm) / _STEP_MM) + 1
     x = np.linspace(measuring.start_mm, measuring.end_mm, count)

@@ -34,6 +34,9 @@ def fit_interval(cut: TestCut, measured: Mapping[int, ForceRecord]) -> IntervalR
         cut: the test cut.
         measured: sampled records by the number of their pass, from 1.
 
+    Returns:
+        The shortest interval that is followed, and the figures of each.
+
     Raises:
         ArgumentError: a record does not fit the cut.
     """

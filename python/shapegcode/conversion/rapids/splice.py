@@ -33,6 +33,9 @@ def splice(text: bytes, placed: Sequence[Placed], choices: Sequence[Choice]) -> 
         text: with shaped regions.
         placed: the regions.
         choices: what is replaced, in the order of the text.
+
+    Returns:
+        The new text, and where its replacements stand.
     """
     parts, at = [], 0
     shifts = []  # (line behind which it holds, lines that were added)
