@@ -374,9 +374,7 @@ def test_means_at_positions_are_laid_over_the_taper(tmp_path: Path) -> None:
 def test_the_api_does_what_the_command_does(tmp_path: Path) -> None:
     """Designs, programs, side files and fits are the same, and the plots draw into axes of one's own."""
     side = write(tmp_path, "taper", "-F", "108,432")
-    given = sg.CutConditions.of(
-        sg.Machine.load("vx500"), tmp_path / "tool.toml", 108.0, AXIAL, spindle_rev_per_min=SPINDLE
-    )
+    given = sg.CutConditions(sg.Machine.load("vx500"), sg.Tool.from_toml(TOOL), 108.0, AXIAL, SPINDLE)
     design = sg.write_test_cut(sg.taper_cut(given, [108.0, 432.0]), tmp_path / "API.NC")
     assert (tmp_path / "API.NC").read_bytes() == (tmp_path / "CUT.NC").read_bytes()
     assert json.loads((tmp_path / "API.json").read_text(encoding="utf-8")) == {**side, "program": "API.NC"}
@@ -402,7 +400,7 @@ def test_the_api_does_what_the_command_does(tmp_path: Path) -> None:
     with pytest.raises(sg.ArgumentError, match="the radial depth must grow"):
         sg.taper_cut(given, None, (0.8, 0.8))
     with pytest.raises(sg.ArgumentError, match="state the spindle speed"):
-        sg.CutConditions.of(given.machine, given.tool, 108.0, AXIAL)
+        sg.taper_cut(sg.CutConditions(given.machine, given.tool, 108.0, AXIAL))
 
 
 def test_the_table_is_not_written_over_a_tool_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,7 +12,7 @@ from shapegcode.characterization.facts import Facts
 from shapegcode.characterization.plan import AirTest
 from shapegcode.characterization.timing import NO_PERIOD_S, ControllerTiming, part_time_s
 
-__all__ = ["TimedRapids", "fit_timed_rapids"]
+__all__ = ["TimedTest", "fit_timed_rapids"]
 
 Array = npt.NDArray[np.float64]
 _WIDE = 0.5  # of the value: an interval of so much either way determines nothing
@@ -22,35 +22,25 @@ _INSIDE = 3.84  # chi² of a 95 % interval of one parameter
 _WAIT_UNKNOWN_S = 0.1
 
 
-@dataclass(frozen=True, eq=False)
-class TimedRapids:
-    """The tests of an axis' rapids that were timed.
+@dataclass(frozen=True)
+class TimedTest:
+    """A test that was timed.
 
     Attributes:
-        axis: X, Y or Z.
-        tests: n of them.
-        time_s: (n,) as the stopwatch shows them.
-        sigma_s: (n,) their standard deviations.
+        test: what it does.
+        time_s: mean of the readings.
+        sigma_s: its standard deviation.
     """
 
-    axis: str
-    tests: list[AirTest]
-    time_s: Array
-    sigma_s: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _Tried:
-    """For each time constant of `_RAMPS_S`: the error, and what comes after the motion, s."""
-
-    chi2: Array
-    after: Array
-    sigma: Array
+    test: AirTest
+    time_s: float
+    sigma_s: float
 
 
 def fit_timed_rapids(
     facts: Facts,
-    timed: TimedRapids,
+    axis: str,
+    timed: list[TimedTest],
     period: float | None,
     overhead: tuple[float, float],
     wait: tuple[float, float],
@@ -59,7 +49,8 @@ def fit_timed_rapids(
 
     Args:
         facts: what is found goes there.
-        timed: the tests.
+        axis: X, Y or Z.
+        timed: its rapids.
         period: interpolation period, s; None: not known.
         overhead: what the stopwatch sees besides the program, s, with its half-width.
         wait: in-position time after exact stops, s, with its half-width.
@@ -67,59 +58,57 @@ def fit_timed_rapids(
     Returns:
         How the times contradict each other, in words; empty: they do not.
     """
-    axis, names = timed.axis, (f"rapid time constant {timed.axis}", f"rapid bell time {timed.axis}")
-    if len(timed.tests) < 2:
+    names = (f"rapid time constant {axis}", f"rapid bell time {axis}")
+    if len(timed) < 2:
         for name in names:
             facts.unknown(name, f"needs two of the rapid_{axis.lower()} tests or more")
         return ""
-    tried = _tried(timed, period, overhead, wait)
-    floor = float(tried.chi2.min())
-    if floor > _CONTRADICTS**2 + 3.0 * len(timed.tests):
+    parts = [each.test.parts[0] for each in timed]
+    count = np.array([part.count for part in parts])
+    sigma = np.hypot([each.sigma_s for each in timed], overhead[1] / 1.96) / count
+    if period is None:
+        sigma = np.hypot(sigma, 0.002)
+    weight = 1.0 / sigma**2
+    seen = (np.array([each.time_s for each in timed]) - overhead[0]) / count
+    # After a rapid comes at least the in-position wait, if that is known.
+    least = max(0.0, wait[0] - wait[1]) if wait[1] < _WAIT_UNKNOWN_S else 0.0
+    chi2, after = np.empty(len(_RAMPS_S)), np.empty(len(_RAMPS_S))
+    zero = {axis: 0.0}
+    for k, ramp in enumerate(_RAMPS_S):
+        timing = ControllerTiming(period or NO_PERIOD_S, "ceil", 0.0, 0.0, {axis: float(ramp)}, zero, zero)
+        moving = np.array([part_time_s(replace(part, count=1), timing) for part in parts])
+        after[k] = max(least, float(weight @ (seen - moving)) / float(weight.sum()))
+        chi2[k] = float((((seen - moving - after[k]) / sigma) ** 2).sum())
+    floor = float(chi2.min())
+    if floor > _CONTRADICTS**2 + 3.0 * len(timed):
         for name in names:
             facts.unknown(name, "the times contradict each other")
-        tests = ", ".join(test.name for test in timed.tests)
+        tests = ", ".join(each.test.name for each in timed)
         return (
             f"{tests}: no time constant gives these times (chi² {floor:.0f}); is the rapid rate of the machine file "
             "right, and the rapid override 100 %?"
         )
-    inside = tried.chi2 <= floor + _INSIDE
-    likely = np.exp(-0.5 * (tried.chi2[inside] - floor))
-    ramps, sums = _RAMPS_S[inside], tried.after[inside]
+    inside = chi2 <= floor + _INSIDE
+    likely = np.exp(-0.5 * (chi2[inside] - floor))
+    _ramp(facts, axis, _RAMPS_S[inside], likely)
+    sums = after[inside]
+    slack = math.hypot(wait[1], 1.96 / math.sqrt(float(weight.sum())))
+    ends = float(sums.min()) - wait[0] - slack, float(sums.max()) - wait[0] + slack
+    _bell(facts, axis, float(likely @ sums / likely.sum()), wait, ends, slack)
+    return ""
+
+
+def _ramp(facts: Facts, axis: str, ramps: Array, likely: Array) -> None:
+    """The time constant: mean and ends of those that fit."""
+    name = f"rapid time constant {axis}"
     step = float(_RAMPS_S[1] - _RAMPS_S[0])
     low, high = float(ramps.min()) - step, float(ramps.max()) + step
     value = float(likely @ ramps / likely.sum())
     if high - low > 2.0 * _WIDE * value:
         why = f"from {low * 1e3:.0f} to {high * 1e3:.0f} ms all fit; longer moves would tell more"
-        facts.unknown(names[0], why, high=high)
+        facts.unknown(name, why, high=high)
     else:
-        facts.between(names[0], value, low, high, f"controller.rapid_time_constant_s.{axis.lower()}")
-    slack = math.hypot(wait[1], 1.96 / math.sqrt(float((1.0 / tried.sigma**2).sum())))
-    total = float(likely @ sums / likely.sum())
-    ends = float(sums.min()) - wait[0] - slack, float(sums.max()) - wait[0] + slack
-    _bell(facts, axis, total, wait, ends, slack)
-    return ""
-
-
-def _tried(
-    timed: TimedRapids, period: float | None, overhead: tuple[float, float], wait: tuple[float, float]
-) -> _Tried:
-    parts = [test.parts[0] for test in timed.tests]
-    count = np.array([part.count for part in parts])
-    sigma = np.hypot(timed.sigma_s, overhead[1] / 1.96) / count
-    seen = (timed.time_s - overhead[0]) / count
-    if period is None:
-        sigma = np.hypot(sigma, 0.002)
-    # After a rapid comes at least the in-position wait, if that is known.
-    least = max(0.0, wait[0] - wait[1]) if wait[1] < _WAIT_UNKNOWN_S else 0.0
-    chi2, after = np.empty(len(_RAMPS_S)), np.empty(len(_RAMPS_S))
-    zero = {timed.axis: 0.0}
-    weight = 1.0 / sigma**2
-    for k, ramp in enumerate(_RAMPS_S):
-        timing = ControllerTiming(period or NO_PERIOD_S, "ceil", 0.0, 0.0, {timed.axis: float(ramp)}, zero, zero)
-        moving = np.array([part_time_s(replace(part, count=1), timing) for part in parts])
-        after[k] = max(least, float(weight @ (seen - moving)) / float(weight.sum()))
-        chi2[k] = float((((seen - moving - after[k]) / sigma) ** 2).sum())
-    return _Tried(chi2, after, sigma)
+        facts.between(name, value, low, high, f"controller.rapid_time_constant_s.{axis.lower()}")
 
 
 def _bell(

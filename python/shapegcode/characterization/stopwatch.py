@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.characterization.facts import CUTTING_SUM, PERIODS_S, Facts
-from shapegcode.characterization.plan import AXES, AirTest, BlockEnd
-from shapegcode.characterization.rapidwatch import TimedRapids, fit_timed_rapids
+from shapegcode.characterization.plan import AXES, BlockEnd
+from shapegcode.characterization.rapidwatch import TimedTest, fit_timed_rapids
 from shapegcode.characterization.sheet import FilledSheet
 from shapegcode.characterization.timing import NO_PERIOD_S, ControllerTiming, part_time_s, program_time_s
 
@@ -52,13 +52,6 @@ class WatchFacts(Facts):
             self.unknown(name, why)
         else:
             self.known(name, value, half, key, note)
-
-
-@dataclass(frozen=True)
-class _Timed:
-    test: AirTest
-    time_s: float
-    sigma_s: float
 
 
 @dataclass(frozen=True)
@@ -108,19 +101,13 @@ def fit_stopwatch(results: FilledSheet) -> WatchFacts:
             )
     for axis in AXES:
         mine = [row for row in rows.values() if row.test.parts[0].pattern == "rapid" and row.test.parts[0].axis == axis]
-        timed = TimedRapids(
-            axis,
-            [row.test for row in mine],
-            np.array([row.time_s for row in mine]),
-            np.array([row.sigma_s for row in mine]),
-        )
-        contradiction = fit_timed_rapids(facts, timed, period, best.get("overhead"), best.get(axis))
+        contradiction = fit_timed_rapids(facts, axis, mine, period, best.get("overhead"), best.get(axis))
         facts.contradictions += [contradiction] if contradiction else []
     _override(best, rows, facts)
     return facts
 
 
-def _rows(results: FilledSheet) -> dict[str, _Timed]:
+def _rows(results: FilledSheet) -> dict[str, TimedTest]:
     """The mean time of each test that was timed, and its standard deviation."""
     rounding = results.resolution_s / math.sqrt(12.0)
     single = math.hypot(rounding, results.reaction_s)
@@ -131,11 +118,11 @@ def _rows(results: FilledSheet) -> dict[str, _Timed]:
         spread = float(np.std(times, ddof=1)) if len(times) > 2 else 0.0
         if spread > 2.0 * single:
             sigma = max(sigma, spread / math.sqrt(len(times)))
-        out[name] = _Timed(results.tests[name], float(np.mean(times)), sigma)
+        out[name] = TimedTest(results.tests[name], float(np.mean(times)), sigma)
     return out
 
 
-def _used(rows: dict[str, _Timed], exponential: float) -> list[_Timed]:
+def _used(rows: dict[str, TimedTest], exponential: float) -> list[TimedTest]:
     """What the least squares are of: no rapids, no overrides, and no stops that say the same again."""
     left_out = {*_SLOW, "stop_above"} if exponential else {"stop_slow" if "stop_slower" in rows else ""}
     used = [
@@ -160,7 +147,7 @@ def _timing(values: Array, period: float, end: BlockEnd) -> ControllerTiming:
     return ControllerTiming(period, end, block, cutting, in_position_s=waits, overhead_s=overhead)
 
 
-def _least_squares(rows: Sequence[_Timed], period: float, end: BlockEnd) -> _Fit:
+def _least_squares(rows: Sequence[TimedTest], period: float, end: BlockEnd) -> _Fit:
     """All unknowns but the rapids', for one period and rule."""
     from scipy.optimize import least_squares
 
@@ -179,7 +166,7 @@ def _least_squares(rows: Sequence[_Timed], period: float, end: BlockEnd) -> _Fit
     return _Fit(period, end, found.x, covariance, float(found.fun @ found.fun))
 
 
-def _shape(rows: dict[str, _Timed], facts: WatchFacts) -> float:
+def _shape(rows: dict[str, TimedTest], facts: WatchFacts) -> float:
     """Time constant of an exponential, whose way to a stop lasts longer from a higher feed; 0 if it does not."""
     fast = rows.get("stop_below")
     slow = [rows[name] for name in _SLOW if name in rows]
@@ -246,7 +233,7 @@ def _cutting(best: _Fit, exponential: bool, facts: WatchFacts) -> None:
         facts.if_narrow(f"in-position time {axis}", *best.get(axis), key, needs, note)
 
 
-def _block_time(best: _Fit, tiny: _Timed | None, facts: WatchFacts) -> None:
+def _block_time(best: _Fit, tiny: TimedTest | None, facts: WatchFacts) -> None:
     value, half = best.get("block")
     if tiny is None:
         facts.unknown("block time", "needs blocks_tiny")
@@ -261,7 +248,7 @@ def _block_time(best: _Fit, tiny: _Timed | None, facts: WatchFacts) -> None:
     facts.known("block time", value, half, "controller.block_time_s")
 
 
-def _override(best: _Fit, rows: dict[str, _Timed], facts: WatchFacts) -> None:
+def _override(best: _Fit, rows: dict[str, TimedTest], facts: WatchFacts) -> None:
     for row in [row for name, row in rows.items() if name.startswith("override")]:
         part = row.test.parts[0]
         # without block overlap there is one ramp, whatever the override

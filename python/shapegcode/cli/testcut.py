@@ -16,6 +16,46 @@ if TYPE_CHECKING:
 __all__ = ["add_arguments", "run"]
 
 
+def _list(text: str) -> tuple[float, ...]:
+    """Numbers above 0, divided by commas."""
+    return tuple(positive(part.strip()) for part in text.split(","))
+
+
+def _pair(text: str) -> tuple[float, float]:
+    low, sign, high = text.partition(":")
+    pair = (positive(low), positive(high)) if sign else (math.nan, math.nan)
+    if not pair[0] < pair[1]:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be two lengths in mm, ascending, for example 0.4:2.8")
+    return pair
+
+
+# Options of the actions: names, metavar, type, meaning, default; no default: it must be given.
+_NEEDED = object()
+_CUT = (
+    ("--tool", "T.toml", None, "tool file", _NEEDED),
+    ("-o --output", "OUT.NC", None, "program; the side file is OUT.json", _NEEDED),
+    ("-S --spindle", "REV", positive, "rev/min (default: feed.spindle_rev_per_min of the tool file)", None),
+    ("-a --axial-depth", "MM", positive, "axial depth", _NEEDED),
+    ("--program", "O1234", program_number, "number of the program (default: O7101)", 7101),
+)
+_SHAPE = (
+    ("-F --feed", "F", positive, "feed in mm/min", _NEEDED),
+    ("--allowance", "MM", positive, "radial depth on the walls (default: 0.1 D)", None),
+    ("--rough-radius", "MM", positive, "of the rough corner (default: D)", None),
+    ("--finish-radius", "MM", positive, "of the finished corner (default: D)", None),
+)
+_TAPER = (
+    ("-F --feeds", "F,F,...", _list, "in mm/min; one is passed at its half, once and double", _NEEDED),
+    ("--radial-depth", "MM:MM", _pair, "at begin and end of the stock (default: 0.05 to 0.35 of the diameter)", None),
+    ("--length", "MM", positive, "of the stock along X (default: %(default)s)", 60.0),
+)
+_CORNER = (("--interval", "MM", positive, "of a block (default: feed_control.interval_mm of the machine)", None),)
+_INTERVAL = (
+    ("--intervals", "MM,MM,...", _list, "lengths of the blocks, one pass each (default: 0.2,0.4,0.6)", (0.2, 0.4, 0.6)),
+    ("--feeds", "F,F,...", _list, "of the blocks, the same for every pass (default: the corner's by equation 7)", None),
+)
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the actions."""
     parser.description = (
@@ -25,90 +65,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.epilog = "example: shapegcode testcut taper -m vx500 --tool em8.toml -S 1800 -F 216 -a 15 -o TAPER.NC"
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True, title="actions")
-    _add_taper(actions)
-    _add_corner(actions)
-    _add_interval(actions)
+    for name, act, options, meaning, description in (
+        (
+            "taper", _taper, _TAPER, "growing radial depth: for the coefficients of the cutting force (figure 4)",
+            "Mills a tapered edge, then passes along it with one feed each: for k1 and k2.",
+        ),
+        (
+            "corner", _corner, (*_SHAPE, *_CORNER),
+            "a corner unrolled on a straight line: constant feed, then modified (figure 7)",
+            "Mills an edge on which a straight pass meets the radial depth of a corner, and passes it with constant "
+            "feed, then with the feed of equation 7.",
+        ),
+        (
+            "interval", _interval, (*_SHAPE, *_INTERVAL),
+            "feeds that change every 0.2, 0.4 and 0.6 mm: which the controller follows (figure 8)",
+            "Passes of constant radial depth whose feed changes as in a corner, each at another interval.",
+        ),
+    ):  # fmt: skip
+        cut = actions.add_parser(name, help=meaning, description=description)
+        cut.set_defaults(act=act)
+        add_machine_argument(cut)
+        for names, metavar, kind, said, default in (*_CUT, *options):
+            needed: dict[str, Any] = {"required": True} if default is _NEEDED else {"default": default}
+            cut.add_argument(*names.split(), metavar=metavar, type=kind, help=said, **needed)
+        cut.add_argument("--up", action="store_true", help="up milling, material on the left (default: down milling)")
+        add_json_argument(cut)
     _add_fit(actions)
-
-
-def _add_taper(actions: Any) -> None:
-    taper = actions.add_parser(
-        "taper",
-        help="growing radial depth: for the coefficients of the cutting force (figure 4)",
-        description="Mills a tapered edge, then passes along it with one feed each: for k1 and k2.",
-    )
-    _add_cut_arguments(taper, _taper)
-    taper.add_argument(
-        "-F", "--feeds", metavar="F,F,...", type=_list, required=True,
-        help="feed in mm/min; one is passed at its half, once and double",
-    )  # fmt: skip
-    taper.add_argument(
-        "--radial-depth", metavar="MM:MM", type=_pair,
-        help="radial depth at begin and end of the stock (default: 0.05 to 0.35 of the diameter)",
-    )  # fmt: skip
-    _add_length(taper, "--length", "length of the stock along X (default: %(default)s)", 60.0)
-
-
-def _add_corner(actions: Any) -> None:
-    corner = actions.add_parser(
-        "corner",
-        help="a corner unrolled on a straight line: constant feed, then modified (figure 7)",
-        description="Mills an edge on which a straight pass meets the radial depth of a corner, and passes it with "
-        "constant feed, then with the feed of equation 7.",
-    )
-    _add_cut_arguments(corner, _corner)
-    _add_shape_arguments(corner)
-    _add_length(
-        corner, "--interval", "of a block with a feed of its own (default: feed_control.interval_mm of the machine)"
-    )
-
-
-def _add_interval(actions: Any) -> None:
-    interval = actions.add_parser(
-        "interval",
-        help="feeds that change every 0.2, 0.4 and 0.6 mm: which the controller follows (figure 8)",
-        description="Passes of constant radial depth whose feed changes as in a corner, each at another interval.",
-    )
-    _add_cut_arguments(interval, _interval)
-    _add_shape_arguments(interval)
-    interval.add_argument(
-        "--intervals", metavar="MM,MM,...", type=_list, default=(0.2, 0.4, 0.6),
-        help="lengths of the blocks, one pass each (default: 0.2,0.4,0.6)",
-    )  # fmt: skip
-    interval.add_argument(
-        "--feeds", metavar="F,F,...", type=_list,
-        help="feeds of the blocks in mm/min, the same for every pass (default: the corner's by equation 7)",
-    )  # fmt: skip
-
-
-def _add_cut_arguments(parser: argparse.ArgumentParser, act: Any) -> None:
-    parser.set_defaults(act=act)
-    add_machine_argument(parser)
-    parser.add_argument("--tool", metavar="T.toml", required=True, help="tool file")
-    parser.add_argument("-o", "--output", metavar="OUT.NC", required=True, help="program; the side file is OUT.json")
-    parser.add_argument(
-        "-S", "--spindle", metavar="REV", type=positive,
-        help="spindle speed in rev/min (default: feed.spindle_rev_per_min of the tool file)",
-    )  # fmt: skip
-    parser.add_argument("-a", "--axial-depth", metavar="MM", type=positive, required=True, help="axial depth")
-    parser.add_argument(
-        "--up", action="store_true", help="up milling, the material on the left (default: down milling)"
-    )
-    parser.add_argument(
-        "--program", metavar="O1234", type=program_number, default=7101, help="number of the program (default: O7101)"
-    )
-    add_json_argument(parser)
-
-
-def _add_shape_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("-F", "--feed", metavar="F", type=positive, required=True, help="feed in mm/min")
-    _add_length(parser, "--allowance", "radial depth on the walls (default: 0.1 D)")
-    _add_length(parser, "--rough-radius", "of the rough corner (default: D)")
-    _add_length(parser, "--finish-radius", "of the finished corner (default: D)")
-
-
-def _add_length(parser: argparse.ArgumentParser, name: str, meaning: str, default: float | None = None) -> None:
-    parser.add_argument(name, metavar="MM", type=positive, default=default, help=meaning)
 
 
 def _add_fit(actions: Any) -> None:
@@ -161,28 +143,26 @@ def _taper(args: argparse.Namespace) -> int:
 def _corner(args: argparse.Namespace) -> int:
     from shapegcode.testcut.cuts import corner_cut
 
-    given = _conditions(args, args.feed)
-    return _written(args, corner_cut(given, _shape(args, given), args.interval))
+    return _written(args, corner_cut(_conditions(args, args.feed), _shape(args), args.interval))
 
 
 def _interval(args: argparse.Namespace) -> int:
     from shapegcode.testcut.cuts import interval_cut
 
-    given = _conditions(args, args.feed)
-    return _written(args, interval_cut(given, _shape(args, given), args.intervals, args.feeds))
+    return _written(args, interval_cut(_conditions(args, args.feed), _shape(args), args.intervals, args.feeds))
 
 
 def _conditions(args: argparse.Namespace, feed: float) -> CutConditions:
+    from shapegcode.cutting.tool import Tool
     from shapegcode.testcut.conditions import CutConditions
 
-    machine = load_machine(args)
-    return CutConditions.of(machine, args.tool, feed, args.axial_depth, spindle_rev_per_min=args.spindle, up=args.up)
+    return CutConditions(load_machine(args), Tool.load(args.tool), feed, args.axial_depth, args.spindle, args.up)
 
 
-def _shape(args: argparse.Namespace, given: CutConditions) -> CornerShape:
+def _shape(args: argparse.Namespace) -> CornerShape:
     from shapegcode.testcut.conditions import CornerShape
 
-    return CornerShape.of(given.diameter_mm, args.allowance, args.rough_radius, args.finish_radius)
+    return CornerShape(args.allowance, args.rough_radius, args.finish_radius)
 
 
 def _written(args: argparse.Namespace, design: CutDesign) -> int:
@@ -201,13 +181,13 @@ def _fit(args: argparse.Namespace) -> int:
     from shapegcode.errors import ArgumentError
     from shapegcode.testcut.cut import read_test_cut
     from shapegcode.testcut.fit import fit_test_cut
-    from shapegcode.testcut.result import TaperResult, refuse_whole_tool_file
+    from shapegcode.testcut.result import TaperResult
 
     cut = read_test_cut(args.cut)
     if args.output is not None:
         if cut.kind != "taper":
             raise ArgumentError(f"{args.cut} describes a {cut.kind}: -o goes with a taper")
-        refuse_whole_tool_file(args.output)
+        _refuse_whole_tool_file(args.output)
     records = _records(args.files)
     runner.check_files(args, also_read=list(records.values()))
     with runner.progress(f"fitting {args.cut}", args, endless=True):
@@ -232,14 +212,23 @@ def _records(texts: list[str]) -> dict[int, str]:
     return found
 
 
-def _list(text: str) -> tuple[float, ...]:
-    """Numbers above 0, divided by commas."""
-    return tuple(positive(part.strip()) for part in text.split(","))
+def _refuse_whole_tool_file(name: str) -> None:
+    """Refuse to write the table [cutting] over a file that holds more than that.
 
+    Raises:
+        ArgumentError: it does.
+    """
+    import tomllib
+    from pathlib import Path
 
-def _pair(text: str) -> tuple[float, float]:
-    low, sign, high = text.partition(":")
-    pair = (positive(low), positive(high)) if sign else (math.nan, math.nan)
-    if not pair[0] < pair[1]:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be two lengths in mm, ascending, for example 0.4:2.8")
-    return pair
+    from shapegcode.errors import ArgumentError
+
+    try:
+        more = sorted(set(tomllib.loads(Path(name).read_text(encoding="utf-8"))) - {"cutting"})
+    except (OSError, ValueError):  # not there, or nothing of ours
+        return
+    if more:
+        raise ArgumentError(
+            f"-o {name}: holds more than [cutting] ({', '.join(more)}), which would be lost: name another file and "
+            "put its table into this one"
+        )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from shapegcode import _core
 from shapegcode.cutting.tool import Tool
@@ -22,58 +21,35 @@ _LARGEST_SHARE = 0.95  # of the radius, up to which a radial depth is taken
 
 @dataclass(frozen=True)
 class CutConditions:
-    """What every test cut needs to know.
+    """What every test cut needs to know; what machine and tool cannot do is refused when a cut is drawn up.
 
     Attributes:
         machine: whose controller runs the program.
         tool: the tool file.
-        spindle_rev_per_min: of every pass.
         feed_mm_per_min: of the measuring passes; of a corner that of its straight part.
         axial_depth_mm: of every pass.
+        spindle_rev_per_min: of every pass; None: `feed.spindle_rev_per_min` of the tool.
         up: up milling, the material on the left of the feed.
     """
 
     machine: Machine
     tool: Tool
-    spindle_rev_per_min: float
     feed_mm_per_min: float
     axial_depth_mm: float
+    spindle_rev_per_min: float | None = None
     up: bool = False
 
-    @classmethod
-    def of(
-        cls,
-        machine: Machine,
-        tool: Tool | str | Path,
-        feed_mm_per_min: float,
-        axial_depth_mm: float,
-        *,
-        spindle_rev_per_min: float | None = None,
-        up: bool = False,
-    ) -> CutConditions:
-        """The conditions, with the spindle speed of the tool file where none is given.
-
-        Args:
-            machine: whose controller runs the program.
-            tool: the tool, or its file.
-            feed_mm_per_min: of the measuring passes; of a corner that of its straight part.
-            axial_depth_mm: of every pass.
-            spindle_rev_per_min: None: `feed.spindle_rev_per_min` of the tool.
-            up: up milling, the material on the left of the feed.
-
-        Returns:
-            The conditions; what the machine and the tool cannot do is refused when a cut is drawn up.
+    @property
+    def spindle(self) -> float:
+        """Spindle speed, rev/min.
 
         Raises:
-            ArgumentError: neither states a spindle speed.
-            ToolError, OSError: a tool file that cannot be used.
+            ArgumentError: neither conditions nor tool state one.
         """
-        known = tool if isinstance(tool, Tool) else Tool.load(tool)
-        spindle = spindle_rev_per_min if spindle_rev_per_min is not None else known.feed.spindle_rev_per_min
-        if spindle is None:
-            name = "the tool" if isinstance(tool, Tool) else tool
-            raise ArgumentError(f"{name} has no feed.spindle_rev_per_min: state the spindle speed (-S)")
-        return cls(machine, known, spindle, feed_mm_per_min, axial_depth_mm, up)
+        known = self.tool.feed.spindle_rev_per_min if self.spindle_rev_per_min is None else self.spindle_rev_per_min
+        if known is None:
+            raise ArgumentError("the tool has no feed.spindle_rev_per_min: state the spindle speed (-S)")
+        return known
 
     @property
     def diameter_mm(self) -> float:
@@ -96,7 +72,7 @@ class CutConditions:
         Returns:
             Millimetres beyond the tool's radius.
         """
-        return max(_LEAST_AIR_MM, math.ceil(_AIR_REVS * feed_mm_per_min / self.spindle_rev_per_min))
+        return max(_LEAST_AIR_MM, math.ceil(_AIR_REVS * feed_mm_per_min / self.spindle))
 
     def check_feeds(self, feeds: Sequence[float]) -> None:
         """Refuse what the machine or the tool cannot do.
@@ -140,36 +116,25 @@ class CornerShape:
     """An inside corner between two straight walls at a right angle (paper 001, figure 1; see docs/references.md).
 
     Attributes:
-        allowance_mm: radial depth on the walls.
-        rough_radius_mm: of the corner that roughing left.
-        finish_radius_mm: of the finished corner.
+        allowance_mm: radial depth on the walls; None: 0.1 D of the tool.
+        rough_radius_mm: of the corner that roughing left; None: D.
+        finish_radius_mm: of the finished corner; None: D.
     """
 
-    allowance_mm: float
-    rough_radius_mm: float
-    finish_radius_mm: float
+    allowance_mm: float | None = None
+    rough_radius_mm: float | None = None
+    finish_radius_mm: float | None = None
 
-    @classmethod
-    def of(
-        cls,
-        diameter_mm: float,
-        allowance_mm: float | None = None,
-        rough_radius_mm: float | None = None,
-        finish_radius_mm: float | None = None,
-    ) -> CornerShape:
-        """A corner for a tool.
+    def sizes_mm(self, diameter_mm: float) -> tuple[float, float, float]:
+        """The three values for a tool.
 
         Args:
             diameter_mm: of the tool, D.
-            allowance_mm: radial depth on the walls; None: 0.1 D.
-            rough_radius_mm: of the corner that roughing left; None: D.
-            finish_radius_mm: of the finished corner; None: D.
 
         Returns:
-            The corner; of what is not given, case 1 of the paper.
+            Allowance, rough and finish radius; of what is not given, case 1 of the paper.
         """
-        return cls(
-            0.1 * diameter_mm if allowance_mm is None else allowance_mm,
-            diameter_mm if rough_radius_mm is None else rough_radius_mm,
-            diameter_mm if finish_radius_mm is None else finish_radius_mm,
-        )
+        given = (self.allowance_mm, self.rough_radius_mm, self.finish_radius_mm)
+        usual = (0.1 * diameter_mm, diameter_mm, diameter_mm)
+        allowance, rough, finish = (other if own is None else own for own, other in zip(given, usual, strict=True))
+        return allowance, rough, finish

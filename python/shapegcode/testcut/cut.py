@@ -20,14 +20,14 @@ from shapegcode.errors import ArgumentError
 
 __all__ = [
     "COEFFICIENTS",
-    "CornerFigures",
+    "CornerDetails",
     "CutTool",
     "CuttingLaw",
     "DeeperStretch",
     "Deepest",
-    "IntervalFigures",
+    "IntervalDetails",
     "MeasuringPass",
-    "TaperFigures",
+    "TaperDetails",
     "TestCut",
     "read_test_cut",
 ]
@@ -151,7 +151,7 @@ class MeasuringPass:
 
 
 @dataclass(frozen=True)
-class TaperFigures:
+class TaperDetails:
     """What is special about a taper.
 
     Attributes:
@@ -192,7 +192,7 @@ class DeeperStretch:
 
 
 @dataclass(frozen=True)
-class CornerFigures:
+class CornerDetails:
     """What is special about an unrolled corner.
 
     Attributes:
@@ -215,7 +215,7 @@ class CornerFigures:
 
 
 @dataclass(frozen=True)
-class IntervalFigures:
+class IntervalDetails:
     """What is special about an interval test.
 
     Attributes:
@@ -255,7 +255,7 @@ class TestCut:
     axial_depth_mm: _Positive
     milling: Literal["down", "up"]
     passes: Annotated[tuple[MeasuringPass, ...], Field(min_length=1)]
-    about: TaperFigures | CornerFigures | IntervalFigures
+    about: TaperDetails | CornerDetails | IntervalDetails
 
     @property
     def up(self) -> bool:
@@ -267,7 +267,7 @@ class TestCut:
         return {"format": _FORMAT, **asdict(self)}
 
 
-_FIGURES = {"taper": TaperFigures, "corner": CornerFigures, "interval": IntervalFigures}
+_FIGURES = {"taper": TaperDetails, "corner": CornerDetails, "interval": IntervalDetails}
 
 
 def read_test_cut(path: str | Path) -> TestCut:

@@ -15,12 +15,12 @@ from shapegcode import _core
 from shapegcode.errors import ArgumentError
 from shapegcode.testcut.conditions import CornerShape, CutConditions
 from shapegcode.testcut.cut import (
-    CornerFigures,
+    CornerDetails,
     DeeperStretch,
     Deepest,
-    IntervalFigures,
+    IntervalDetails,
     MeasuringPass,
-    TaperFigures,
+    TaperDetails,
     TestCut,
 )
 from shapegcode.testcut.design_result import CutDesign
@@ -36,6 +36,7 @@ _STATION_MM = 0.01
 _FEW_UM = 1e-3  # mm
 _SAME_MM = 1e-6
 
+_Sizes = tuple[float, float, float]  # of a corner: allowance, rough and finish radius
 _Block = tuple[float | None, float]  # X up to which a feed holds (None: the end of the pass), feed in mm/min
 
 
@@ -71,7 +72,7 @@ def taper_cut(
         )
     edge = Edge(np.array([0.0, length_mm]), np.array([_rounded(low), _rounded(high)]))
     passes = [(f"F{feed:g}", [(None, feed)]) for feed in feeds]
-    return _drawn(given, edge, length_mm, passes, TaperFigures((low, high), length_mm))
+    return _drawn(given, edge, length_mm, passes, TaperDetails((low, high), length_mm))
 
 
 def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval_mm: float | None = None) -> CutDesign:
@@ -79,7 +80,7 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
 
     Args:
         given: tool, spindle, axial depth, feed on the straight walls.
-        corner: to unroll; None: `CornerShape.of` the tool's diameter.
+        corner: to unroll; None: case 1 of the paper.
         interval_mm: length of the blocks with a feed of their own; None: as the machine's feed control has it.
 
     Returns:
@@ -88,13 +89,13 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     Raises:
         ArgumentError: the corner cannot be unrolled, or is more than the tool or the machine can do.
     """
-    corner = corner or CornerShape.of(given.diameter_mm)
+    sizes = (corner or CornerShape()).sizes_mm(given.diameter_mm)
     interval = given.machine.feed_control.interval_mm if interval_mm is None else interval_mm
     constant: _Block = (None, given.feed_mm_per_min)
     given.check_feeds([given.feed_mm_per_min])
     radius = given.tool.radius_mm
     straight = max(10.0, 3.0 * radius)
-    s, depth = _corner_depth(given, corner)
+    s, depth = _corner_depth(given, sizes)
     stock = math.ceil(2.0 * straight + float(s[-1]) + radius)
     wanted_edge = unrolled_edge(s, depth, radius, stock, straight)
     # What the round tool leaves is the edge that the passes meet: where the wanted one is hollow more sharply than
@@ -105,14 +106,12 @@ def corner_cut(given: CutConditions, corner: CornerShape | None = None, interval
     x = np.arange(0.0, stock - radius, _STATION_MM)
     probe = _measuring_pass(given, edge, stock, "probe", [constant])
     met = engagement(given.cut_tool(), probe, x, up=given.up).radial_depth_mm
-    off = np.flatnonzero(np.abs(met - corner.allowance_mm) > _FEW_UM)
+    off = np.flatnonzero(np.abs(met - sizes[0]) > _FEW_UM)
     begin, end = _rounded(min(straight, float(x[off[0]]))), max(straight + float(s[-1]), float(x[off[-1]]))
     blocks = _blocks(x, _corner_feeds(given, met), interval, begin, end)
     given.check_feeds([feed for _, feed in blocks])
-    about = CornerFigures(
-        allowance_mm=corner.allowance_mm,
-        rough_radius_mm=corner.rough_radius_mm,
-        finish_radius_mm=corner.finish_radius_mm,
+    about = CornerDetails(
+        *sizes,
         interval_mm=interval,
         corner_begins_at_mm=straight,
         radial_depth_mm=Deepest(float(met.max()), float(x[int(np.argmax(met))])),
@@ -133,7 +132,7 @@ def interval_cut(
 
     Args:
         given: tool, spindle, axial depth, feed before and after.
-        corner: its allowance is the radial depth; None: `CornerShape.of` the tool's diameter.
+        corner: its allowance is the radial depth; None: case 1 of the paper.
         intervals_mm: length of the blocks of each pass.
         feeds_mm_per_min: of the blocks, the same for every pass; None: those of the corner (eq. 7).
 
@@ -143,9 +142,9 @@ def interval_cut(
     Raises:
         ArgumentError: what the tool or the machine cannot do.
     """
-    corner = corner or CornerShape.of(given.diameter_mm)
-    depth, feed = corner.allowance_mm, given.feed_mm_per_min
-    sequences = [feeds_mm_per_min or _corner_feed_sequence(given, corner, step) for step in intervals_mm]
+    sizes = (corner or CornerShape()).sizes_mm(given.diameter_mm)
+    depth, feed = sizes[0], given.feed_mm_per_min
+    sequences = [feeds_mm_per_min or _corner_feed_sequence(given, sizes, step) for step in intervals_mm]
     given.check_feeds([feed, *(each for sequence in sequences for each in sequence)])
     given.check_depths(depth, depth)
     straight = max(10.0, 4.0 * given.tool.radius_mm)
@@ -156,7 +155,7 @@ def interval_cut(
     for feeds, step in zip(sequences, intervals_mm, strict=True):
         steps = [(_rounded(straight + (k + 1) * step), round(each, 1)) for k, each in enumerate(feeds)]
         passes.append((f"FEED CHANGES EVERY {step:g} MM", [(straight, feed), *steps, (None, feed)]))
-    return _drawn(given, edge, stock, passes, IntervalFigures(depth, tuple(intervals_mm), straight))
+    return _drawn(given, edge, stock, passes, IntervalDetails(depth, tuple(intervals_mm), straight))
 
 
 def _drawn(
@@ -164,7 +163,7 @@ def _drawn(
     edge: Edge,
     stock_mm: float,
     passes: Sequence[tuple[str, Sequence[_Block]]],
-    about: TaperFigures | CornerFigures | IntervalFigures,
+    about: TaperDetails | CornerDetails | IntervalDetails,
     *,
     met: Edge | None = None,
 ) -> CutDesign:
@@ -178,9 +177,9 @@ def _drawn(
         about: figures of this kind of cut.
         met: the edge that the round tool leaves; None: the same.
     """
-    kinds = {TaperFigures: "taper", CornerFigures: "corner", IntervalFigures: "interval"}
+    kinds = {TaperDetails: "taper", CornerDetails: "corner", IntervalDetails: "interval"}
     warnings = []
-    if isinstance(about, CornerFigures) and about.deeper_than_corner is not None:
+    if isinstance(about, CornerDetails) and about.deeper_than_corner is not None:
         deeper = about.deeper_than_corner
         warnings.append(
             f"X {deeper.from_mm:.2f} to {deeper.to_mm:.2f} mm: the passes meet up to {deeper.most_mm:.3f} mm more than "
@@ -191,7 +190,7 @@ def _drawn(
         program="",
         machine=given.machine.name,
         tool=given.cut_tool(),
-        spindle_rev_per_min=given.spindle_rev_per_min,
+        spindle_rev_per_min=given.spindle,
         axial_depth_mm=given.axial_depth_mm,
         milling="up" if given.up else "down",
         passes=tuple(_measuring_pass(given, met or edge, stock_mm, name, blocks) for name, blocks in passes),
@@ -226,7 +225,7 @@ def _corner_feeds(given: CutConditions, radial_depth_mm: Array) -> Array:
         radial_depth_mm: (n,).
     """
     tool = given.cut_tool()
-    law = ForceLaw(tool, tool.cutting, given.spindle_rev_per_min, given.axial_depth_mm)
+    law = ForceLaw(tool, tool.cutting, given.spindle, given.axial_depth_mm)
     met = straight_engagement(tool, radial_depth_mm, up=given.up)
     force = law.forces(met, np.full(len(radial_depth_mm), given.feed_mm_per_min)).mean_resultant_n
     return np.asarray(given.feed_mm_per_min * force[0] / force)
@@ -243,21 +242,15 @@ def _blocks(x_mm: Array, feed: Array, interval_mm: float, begin: float, end: flo
     return blocks
 
 
-def _corner_depth(given: CutConditions, corner: CornerShape) -> tuple[Array, Array]:
+def _corner_depth(given: CutConditions, sizes: _Sizes) -> tuple[Array, Array]:
     """Distance along the corner's path from the beginning of S2 on, and the radial depth until it is constant again.
 
     Raises:
         ArgumentError: not a corner, or none that changes the radial depth.
     """
-    before = 2.0 * (corner.rough_radius_mm + corner.finish_radius_mm)
-    cut = _core.CornerCut(
-        given.tool.radius_mm,
-        corner.rough_radius_mm,
-        corner.finish_radius_mm,
-        corner.allowance_mm,
-        before_mm=before,
-        after_mm=before,
-    )
+    allowance, rough, finish = sizes
+    before = 2.0 * (rough + finish)
+    cut = _core.CornerCut(given.tool.radius_mm, rough, finish, allowance, before_mm=before, after_mm=before)
     low, high = 0.0, before
     while high - low > _SAME_MM:
         middle = 0.5 * (low + high)
@@ -271,9 +264,9 @@ def _corner_depth(given: CutConditions, corner: CornerShape) -> tuple[Array, Arr
     return s[:last], depth[:last]
 
 
-def _corner_feed_sequence(given: CutConditions, corner: CornerShape, interval_mm: float) -> list[float]:
+def _corner_feed_sequence(given: CutConditions, sizes: _Sizes, interval_mm: float) -> list[float]:
     """Feeds of a corner in blocks of one length, mm/min."""
-    s, depth = _corner_depth(given, corner)
+    s, depth = _corner_depth(given, sizes)
     return [feed for _, feed in _blocks(s, _corner_feeds(given, depth), interval_mm, 0.0, float(s[-1]))]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode.errors import ArgumentError
-from shapegcode.testcut.cut import IntervalFigures, MeasuringPass, TestCut
+from shapegcode.testcut.cut import IntervalDetails, MeasuringPass, TestCut
 from shapegcode.testcut.engagement import fully_engaged, straight_engagement
 from shapegcode.testcut.force import ForceLaw, expected
 from shapegcode.testcut.placing import PlacedRecord, placed, turned
@@ -65,7 +65,7 @@ def _placed(cut: TestCut, number: int, record: ForceRecord) -> PlacedRecord:
 
 
 def _followed(cut: TestCut, number: int, record: PlacedRecord) -> FollowedPass:
-    assert isinstance(cut.about, IntervalFigures)
+    assert isinstance(cut.about, IntervalDetails)
     measuring, interval = cut.passes[number - 1], cut.about.intervals_mm[number - 1]
     first, last = measuring.feeds[0][0], measuring.feeds[-2][0]
     feeds, levels = _levels(cut, measuring, cut.about.radial_depth_mm)

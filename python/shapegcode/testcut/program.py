@@ -11,7 +11,7 @@ import numpy as np
 
 from shapegcode.io.atomic import write_text
 from shapegcode.results.json import to_text
-from shapegcode.testcut.cut import CornerFigures, MeasuringPass
+from shapegcode.testcut.cut import CornerDetails, MeasuringPass
 from shapegcode.testcut.design_result import CutDesign
 from shapegcode.testcut.edges import Edge, on_increments, tool_path
 
@@ -117,7 +117,7 @@ class _Writer:
         yield "FX ALONG +X, FY ALONG +Y, THEN CYCLE START;"
         yield "STOP THE RECORD AT THE NEXT STOP. ONE FILE PER PASS"
         yield "FIRST RUN: DRY, ABOVE THE STOCK"
-        if isinstance(cut.about, CornerFigures) and cut.about.deeper_than_corner is not None:
+        if isinstance(cut.about, CornerDetails) and cut.about.deeper_than_corner is not None:
             deeper = cut.about.deeper_than_corner
             yield f"X{deeper.from_mm:.2f} TO {deeper.to_mm:.2f}: UP TO {deeper.most_mm:.3f} MM DEEPER"
             yield "THAN THE CORNER: THE ROUND TOOL LEAVES IT"

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.errors import ArgumentError
-from shapegcode.io.atomic import write_text
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
@@ -190,38 +187,6 @@ class TaperResult(Result):
             unit = f" {each.unit}" if each.unit else ""
             lines.append(f"{each.name} = {each.value:.6g}  # 95 %: {each.low:.5g} to {each.high:.5g}{unit}")
         return "\n".join([*lines, f'chip_thickness = "{self.cutting.chip_thickness}"']) + "\n"
-
-    def write_cutting(self, path: str | Path) -> None:
-        """Write the table ``[cutting]`` into a file of its own.
-
-        Args:
-            path: the file.
-
-        Raises:
-            ArgumentError: the file holds more than that, which would be lost.
-            OSError: the file cannot be written.
-        """
-        refuse_whole_tool_file(path)
-        write_text(path, self.to_toml())
-
-
-def refuse_whole_tool_file(path: str | Path) -> None:
-    """Refuse to write the table [cutting] over a file that holds more than that.
-
-    Raises:
-        ArgumentError: it does.
-    """
-    import tomllib
-
-    try:
-        more = sorted(set(tomllib.loads(Path(path).read_text(encoding="utf-8"))) - {"cutting"})
-    except (OSError, ValueError):  # not there, or nothing of ours
-        return
-    if more:
-        raise ArgumentError(
-            f"{path}: holds more than [cutting] ({', '.join(more)}), which would be lost: name another file and "
-            "put its table into this one"
-        )
 
 
 @dataclass(frozen=True, eq=False)
