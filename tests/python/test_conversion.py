@@ -283,7 +283,7 @@ def test_compensation_that_is_kept_stays_to_the_letter() -> None:
     lines = converted.text.decode().split("\n")
     for line in ("G41D1G1X10.F600", "Y10.", "G40G1X0"):
         assert line in lines
-    assert any("compensation" in warning for warning in converted.report["warnings"])
+    assert any("compensation" in warning for warning in converted.to_dict()["warnings"])
 
 
 @pytest.mark.parametrize("guard", ["alarm", "stop"])
@@ -298,7 +298,7 @@ def test_expanded_compensation_says_so_and_guards_its_radius(guard: str) -> None
     )
     converted = sg.convert(sg.Program.from_text(COMPENSATED, machine), machine)
     text = converted.text.decode()
-    assert converted.report["expanded_radii_mm"] == {"D1": 2.98}
+    assert converted.to_dict()["expanded_radii_mm"] == {"D1": 2.98}
     assert "(D1 RADIUS 2.98 MM EXPANDED - OFFSET DOES NOT ACT)\n" in text
     assert not re.search(r"G4[12](?!\d)|D1G|,R", text)
     if guard == "stop":
@@ -395,7 +395,7 @@ def test_conversion_is_the_same_every_time() -> None:
     machine = machine_with(CALCULATOR)
     first, second = (sg.convert(sg.Program.from_text(text, machine), machine) for _ in range(2))
     assert first.text == second.text
-    assert first.report == second.report
+    assert first.to_dict() == second.to_dict()
 
 
 # ---- programs nobody thought of ----------------------------------------------------------------------------

@@ -221,22 +221,22 @@ def test_it_is_off_by_default_and_changes_nothing_else() -> None:
     plain = convert(Program.from_text(PROGRAM, machine), machine)
     assert "rapids" not in plain.to_dict()
     shaped = converted(PROGRAM)
-    assert plain.to_dict()["regions"] != [] and len(plain.to_dict()["regions"]) == len(shaped.report["regions"])
-    for one, other in zip(plain.to_dict()["regions"], shaped.report["regions"], strict=True):
+    assert plain.to_dict()["regions"] != [] and len(plain.to_dict()["regions"]) == len(shaped.to_dict()["regions"])
+    for one, other in zip(plain.to_dict()["regions"], shaped.to_dict()["regions"], strict=True):
         assert one["residual_vibration_um"] == other["residual_vibration_um"]
     lines = shaped.text.decode().split("\n")
-    for move in reversed(shaped.report["rapids"]["moves"]):
+    for move in reversed(shaped.to_dict()["rapids"]["moves"]):
         first, last = move["emitted_lines"]
         lines[first - 1 : last] = [PROGRAM.split("\n")[move["lines"][0] - 1]]
     assert "\n".join(lines) == plain.text.decode()
-    clock = shaped.report["cycle_time_s"]["emitted"] - plain.to_dict()["cycle_time_s"]["emitted"]
-    moves = shaped.report["rapids"]["moves"]
+    clock = shaped.to_dict()["cycle_time_s"]["emitted"] - plain.to_dict()["cycle_time_s"]["emitted"]
+    moves = shaped.to_dict()["rapids"]["moves"]
     added = sum(m[key]["emitted"] - m[key]["original"] for m in moves for key in ("time_s", "in_position_s"))
     assert clock == pytest.approx(added, abs=1e-6)
 
 
 def test_every_rapid_is_accounted_for() -> None:
-    rapids = converted(PROGRAM).report["rapids"]
+    rapids = converted(PROGRAM).to_dict()["rapids"]
     assert rapids["found"] == sum(
         line.startswith(("G00", "N10", "X20. Y5", "Z2", "Z50")) for line in PROGRAM.split("\n")
     )
@@ -344,14 +344,14 @@ def test_compensated_rapids_stay() -> None:
     text = one_rapid("G00 X80.", before="G41 D1\n", after="G40\n")
     machine = with_tables(Machine.load("vx500"), input={"compensation": "keep"}, emission={"header": False},
                           shaping={"rapids": True})  # fmt: skip
-    rapids = convert(Program.from_text(text, machine, expand_compensation=False), machine).report["rapids"]
+    rapids = convert(Program.from_text(text, machine, expand_compensation=False), machine).to_dict()["rapids"]
     assert rapids["kept"]["cutter compensation"] == 1
     assert rapids["shaped"] == 0
 
 
 def test_nothing_is_shaped_where_no_cut_is() -> None:
     text = one_rapid("G00 X80.").replace("F500", "F.5")
-    rapids = converted(text).report["rapids"]
+    rapids = converted(text).to_dict()["rapids"]
     assert rapids["shaped"] == 0
     assert rapids["kept"]["no cut of the program is shaped"] >= 1
 
@@ -359,7 +359,7 @@ def test_nothing_is_shaped_where_no_cut_is() -> None:
 def test_a_long_approach_leaves_nothing_to_gain() -> None:
     # The vibration of X has decayed before Z arrives, and before the dwell is over.
     for after in ("Z300.\nZ2.\n", "G04 P1500\n"):
-        rapids = converted(one_rapid("G00 X80.", after=after)).report["rapids"]
+        rapids = converted(one_rapid("G00 X80.", after=after)).to_dict()["rapids"]
         assert rapids["shaped"] == 0
         assert rapids["time_saved_s"] == 0.0
 
@@ -387,7 +387,7 @@ def test_rapids_one_after_the_other_are_judged_together(blocks: list[str], shape
 
 def test_the_warnings_say_what_is_different() -> None:
     text = one_rapid("G00 X80. Y30.")
-    warnings = " ".join(converted(text).report["warnings"])
+    warnings = " ".join(converted(text).to_dict()["warnings"])
     assert "rapid override no longer acts" in warnings
     assert "parameters 1422, 1430" in warnings
     assert "15000" in warnings
@@ -398,7 +398,7 @@ def test_the_warnings_say_what_is_different() -> None:
     assert "check that the straight way is free" in " ".join(conversion.to_dict()["warnings"])
     check_straight(conversion)
     per_axis = converted(text, with_tables(Machine.load("vx500"), shaping={"per_axis": True}))
-    assert per_axis.report["rapids"]["shaped"] == 1
+    assert per_axis.to_dict()["rapids"]["shaped"] == 1
     check_straight(per_axis)
 
 
@@ -445,9 +445,9 @@ def test_modes_that_vary_with_position_are_looked_up_where_the_rapid_is() -> Non
     table = 'frequency_over = { axis = "x", position_mm = [0, 150, 500, 900], frequency_hz = [36, 36, 46, 46] }'
     toml = re.sub(r"(?m)^# frequency_over = .*$", table, Machine.load("vx500").to_toml(), count=1)
     machine = Machine.from_toml(toml)
-    (here,) = converted(one_rapid("G00 X80."), machine).report["rapids"]["moves"]
+    (here,) = converted(one_rapid("G00 X80."), machine).to_dict()["rapids"]["moves"]
     plain = re.sub(r"(?m)^frequency_hz = 46.0", "frequency_hz = 36.0", Machine.load("vx500").to_toml())
-    (same,) = converted(one_rapid("G00 X80."), Machine.from_toml(plain)).report["rapids"]["moves"]
+    (same,) = converted(one_rapid("G00 X80."), Machine.from_toml(plain)).to_dict()["rapids"]["moves"]
     assert here["settling_s"]["original"] == pytest.approx(same["settling_s"]["original"], abs=0.002)
     assert here["residual_vibration_um"]["original"]["x"] == pytest.approx(
         same["residual_vibration_um"]["original"]["x"], rel=0.01
@@ -457,16 +457,16 @@ def test_modes_that_vary_with_position_are_looked_up_where_the_rapid_is() -> Non
 def test_a_budget_comes_first() -> None:
     text = one_rapid("G00 X80.")
     full = converted(text)
-    assert full.report["rapids"]["shaped"] == 1
+    assert full.to_dict()["rapids"]["shaped"] == 1
     off = with_tables(Machine.load("vx500"), emission={"header": False})
     plain = convert(Program.from_text(text, off), off)
     tight = converted(text, budget=Budget(max_bytes=len(full.text) - 1))
     assert tight.text == plain.text
-    assert tight.report["rapids"]["kept"]["budget"] == 1
-    assert tight.report["rapids"]["time_saved_s"] == 0.0
+    assert tight.to_dict()["rapids"]["kept"]["budget"] == 1
+    assert tight.to_dict()["rapids"]["time_saved_s"] == 0.0
     assert converted(text, budget=Budget(max_bytes=len(full.text))).text == full.text
     slow = converted(text, block_period_s=0.005, budget=Budget(max_blocks_per_second=150))
-    assert slow.report["rapids"]["shaped"] in (0, 1)
+    assert slow.to_dict()["rapids"]["shaped"] in (0, 1)
 
 
 def test_a_band_of_zero_is_refused() -> None:
