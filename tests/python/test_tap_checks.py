@@ -12,17 +12,13 @@ import pytest
 from scipy import signal
 
 from shapegcode.errors import RecordError
-from shapegcode.identification.checks import (
-    Prepared,
-    excited_hz,
-    find_decay,
-    is_clipped,
-    prepare,
-    split_hits,
-)
-from shapegcode.identification.hits import find_hits
+from shapegcode.identification.checks import prepare
+from shapegcode.identification.decay import find_decay
+from shapegcode.identification.hits import find_hits, split_hits
 from shapegcode.identification.plan import rapid_stop_program, recording_for, tap_plan
 from shapegcode.identification.plan_result import TapPlan
+from shapegcode.identification.prepared import Prepared
+from shapegcode.identification.quality import excited_hz, is_clipped
 from shapegcode.identification.spectra import decay_spectrum, envelope, frf, mode_envelopes
 from shapegcode.io.record import FloatArray, Record
 from shapegcode.machine import Machine

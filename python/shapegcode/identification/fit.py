@@ -12,9 +12,9 @@ from scipy.signal import resample_poly
 from shapegcode import _core
 from shapegcode.errors import RecordError
 from shapegcode.identification.chart import stabilisation_chart
-from shapegcode.identification.checks import Prepared
 from shapegcode.identification.mode import IdentifiedMode
 from shapegcode.identification.model_search import Fit, Search, chart_poles, evidence_of, search, starts_of
+from shapegcode.identification.prepared import Prepared
 from shapegcode.identification.problem import HIGHEST_SHARE, Decays, Taps, problem_of
 from shapegcode.identification.result import Identification, MassCheck
 from shapegcode.identification.support import (

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from shapegcode.errors import ArgumentError, NumericError
-from shapegcode.identification.checks import Prepared, prepare
+from shapegcode.identification.checks import prepare
 from shapegcode.identification.fit import find_modes
+from shapegcode.identification.prepared import Prepared
 from shapegcode.identification.result import Identification
 from shapegcode.identification.support import ACCEPTED_PERCENT
 from shapegcode.io.read import ReadOptions, read_records

@@ -29,10 +29,8 @@ __all__ = [
     "heading",
     "legend_above",
     "legend_below",
-    "panels",
     "save",
     "save_all",
-    "write_pictures",
 ]
 
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
@@ -119,17 +117,6 @@ def _style(panel: Axes) -> None:
     panel.spines[["top", "right"]].set_visible(False)
 
 
-def panels(figure: Figure, rows: int, columns: int) -> list[list[Axes]]:
-    """Columns of panels that share their time axis."""
-    grid: Any = figure.subplots(rows, columns, sharex="col", squeeze=False)
-    for panel in grid.flat:
-        panel.grid(True, color="#e4e4e4", linewidth=0.6)
-        panel.set_axisbelow(True)
-        panel.margins(x=0.01)
-        panel.spines[["top", "right"]].set_visible(False)
-    return [list(grid[:, column]) for column in range(columns)]
-
-
 def heading(figure: Figure, text: str, part: str) -> None:
     """Title of the whole picture, and which part of the program it shows."""
     figure.suptitle(text + (f"\n{part}" if part else ""), x=0.01, ha="left", fontsize=11)
@@ -162,30 +149,6 @@ def legend_below(panel: Axes, *, of: Axes | None = None, columns: int = 4) -> No
         handles, labels, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=columns, frameon=False, fontsize=9,
         borderaxespad=4.5,
     )  # fmt: skip
-
-
-def write_pictures(folder: str | Path, prefix: str, pictures: Mapping[str, Callable[[Path], None]]) -> list[str]:
-    """Write pictures in every format into a folder, which is made where it is missing.
-
-    Args:
-        folder: into which.
-        prefix: of the files' names, before a minus.
-        pictures: what draws one into a file, by the rest of its name.
-
-    Returns:
-        The files written.
-
-    Raises:
-        OSError: the folder cannot be made or a file not be written.
-    """
-    place = Path(folder)
-    place.mkdir(parents=True, exist_ok=True)
-    files = []
-    for name, plot in pictures.items():
-        for suffix in FORMATS:
-            files.append(place / f"{prefix}-{name}{suffix}")
-            plot(files[-1])
-    return [str(file) for file in files]
 
 
 def save_all(plots: Mapping[str, Callable[..., Axes]], folder: str | Path) -> list[str]:
