@@ -20,8 +20,9 @@ import numpy as np
 from table import markdown
 
 import shapegcode as sg
-from shapegcode import _core, converter
+from shapegcode import _core
 from shapegcode.cli.console import progress
+from shapegcode.conversion import convert as converter
 from shapegcode.conversion.readback import Placed
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.shaping import design, machine_bands
@@ -126,7 +127,7 @@ def shifted(machine: sg.Machine, share: float) -> sg.Machine:
 
 
 def rounded_minimal(machine: sg.Machine) -> Grid:
-    """Paper 002's shaper as paper 000 writes it: designed at continuous times, each then taken to the block grid."""
+    """The minimal shaper (paper 002) as paper 000 writes it: designed at continuous times, then rounded to the block grid."""
     period_s = choose_grid(machine).block_period_s
     ideal = design("minimal", machine_bands(machine))[0].shaper
     times_s = (np.round(ideal.times_s / period_s) * period_s).tolist()

@@ -160,7 +160,7 @@ class Demonstration(Result):
     def tables(self) -> list[Table]:
         """The statements, and the remark below them."""
         columns = (
-            Column("place", value=lambda row: row.place.replace(" ", "\N{NO-BREAK SPACE}"), text=True),
+            Column("place", left=True),
             Column("what", text=True),
             Column("paper", value="published", text=True),
             Column("here", value="ours", text=True),

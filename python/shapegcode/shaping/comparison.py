@@ -72,12 +72,7 @@ def choose(
             designs, refusal = _designs(row, bands, replace(options, period_s=period_s))
             found += designs
             refusals += [Refusal(row.name, period_s, refusal)] if refusal else []
-    refusals += _never_tried(rows, usable)
-    refusals += [
-        Refusal(row.name, period_s, _aliases(bands, period_s))
-        for row, period_s in itertools.product(rows, periods_s)
-        if period_s is not None and period_s not in usable and row.on_grid
-    ]
+    refusals += _never_tried(rows, usable, bands, periods_s)
     least = _least_worst(rows, usable, bands, options, found)
     found += least
     shown_anyway = {(each.family, each.period_s) for each in least}
@@ -188,9 +183,14 @@ def _least_worst(
     return designs
 
 
-def _never_tried(rows: Sequence[Family], usable: Sequence[float | None]) -> Iterator[Refusal]:
+def _never_tried(
+    rows: Sequence[Family], usable: Sequence[float | None], bands: Sequence[ModeBand], periods_s: Sequence[float | None]
+) -> Iterator[Refusal]:
     for row in rows:
         if not row.on_grid and None not in usable:
             yield Refusal(row.name, usable[0], "is designed at continuous times only")
         if not row.continuous and usable == [None]:
             yield Refusal(row.name, None, "is designed on a grid: give a period")
+    for row, period_s in itertools.product(rows, periods_s):
+        if period_s is not None and period_s not in usable and row.on_grid:
+            yield Refusal(row.name, period_s, _aliases(bands, period_s))
