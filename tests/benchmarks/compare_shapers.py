@@ -127,7 +127,7 @@ def shifted(machine: sg.Machine, share: float) -> sg.Machine:
 
 
 def rounded_minimal(machine: sg.Machine) -> Grid:
-    """The minimal shaper (paper 002) as paper 000 writes it: designed at continuous times, rounded to the block grid."""
+    """The minimal shaper (paper 002) as paper 000 writes it: of continuous times, rounded to the block grid."""
     period_s = choose_grid(machine).block_period_s
     ideal = design("minimal", machine_bands(machine))[0].shaper
     times_s = (np.round(ideal.times_s / period_s) * period_s).tolist()
