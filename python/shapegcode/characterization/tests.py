@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from shapegcode.characterization.plan import AXES, AirBox, AirTest, Kind, Part, Pattern, check
@@ -163,19 +163,26 @@ def make_tests(machine: Machine, box: AirBox) -> list[AirTest]:
     for percent in (50, 100, 120):
         stopwatch(f"override_{percent}", "FEED OVERRIDE", override_run, percent, same=percent != 50)
 
+    for name, purpose, parts in _log_tests(make):
+        add("log", name, purpose, parts)
+    return tests
+
+
+def _log_tests(make: _Maker) -> Iterator[tuple[str, str, list[Part]]]:
+    """Name, purpose and parts of the tests for a servo log; a pause stands behind each part."""
     pause = Part("pause", dwell_s=_LOG_PAUSE_S)
 
-    def log(name: str, purpose: str, parts: Iterable[Part]) -> None:
-        add("log", name, purpose, [each for part in parts for each in (part, pause)])
+    def paused(parts: Iterable[Part]) -> list[Part]:
+        return [each for part in parts for each in (part, pause)]
 
-    log("log_cutting", "TIME CONSTANT, PERIOD", [make.stops("dwell", "X", 10, side, log=True) for side in (-1, +1)])
-    log("log_exact", "IN-POSITION TIMES", [make.stops("exact", axis, 10, -1, log=True) for axis in AXES])
-    log("log_run", "CEIL OR CARRY", [make.run("X", 160, _STOP_S, +1)])
-    log("log_blocks", "BLOCK TIME", [make.run("X", 1200, 0.0002)])
+    stops = [make.stops("dwell", "X", 10, side, log=True) for side in (-1, +1)]
+    yield "log_cutting", "TIME CONSTANT, PERIOD", paused(stops)
+    yield "log_exact", "IN-POSITION TIMES", paused(make.stops("exact", axis, 10, -1, log=True) for axis in AXES)
+    yield "log_run", "CEIL OR CARRY", paused([make.run("X", 160, _STOP_S, +1)])
+    yield "log_blocks", "BLOCK TIME", paused([make.run("X", 1200, 0.0002)])
     for axis in AXES:
-        log(f"log_rapid_{axis.lower()}", f"RAPID OF {axis}", make.rapid_series(axis))
+        yield f"log_rapid_{axis.lower()}", f"RAPID OF {axis}", paused(make.rapid_series(axis))
     lengths = (20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2)
     parts = [part for length in lengths for part in make.feed_steps("X", length * make.feed / 3000.0)]
     if parts:
-        add("log", "log_feed_steps", "FEED-CONTROL INTERVAL", parts)
-    return tests
+        yield "log_feed_steps", "FEED-CONTROL INTERVAL", parts

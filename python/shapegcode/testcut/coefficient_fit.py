@@ -124,14 +124,7 @@ def fit_coefficients(
         robust = np.minimum(1.0, _HUBER / np.maximum(scaled, 1e-12))
         if np.all(np.abs(parameters - before) < _SETTLED * np.maximum(np.abs(parameters), 1.0)):
             break
-    # Noise may be so small that the law itself is off by more than it: that alone makes no outlier.
-    size = np.linalg.norm(model.measured, axis=1)[:, None]
-    outlier = np.any((np.abs(left) > _OUTLIER * noise) & (np.abs(left) > _LEAST_OUTLIER * size), axis=1)
-    if outlier.mean() > _LARGEST_SHARE_OUT:
-        raise ArgumentError(
-            f"{100 * outlier.mean():.0f} % of the forces do not follow one law: was the tool worn, did it chatter, or "
-            "is the work piece not the one described?"
-        )
+    outlier = _outliers(model.measured, left, noise)
     weights = np.where(outlier[:, None], 0.0, 1.0 / noise**2)
     parameters, left, slopes = _solved(model, parameters, weights)
     correlation = neighbour_correlation(left / noise, data.group, outlier)
@@ -152,6 +145,19 @@ def fit_coefficients(
         100.0 * float(np.sqrt(np.sum(kept**2) / np.sum(size**2))),
         correlation,
     )
+
+
+def _outliers(measured: Array, left: Array, noise: Array) -> npt.NDArray[np.bool_]:
+    """(n,) rows whose force is not that of the others."""
+    # Noise may be so small that the law itself is off by more than it: that alone makes no outlier.
+    size = np.linalg.norm(measured, axis=1)[:, None]
+    outlier = np.any((np.abs(left) > _OUTLIER * noise) & (np.abs(left) > _LEAST_OUTLIER * size), axis=1)
+    if outlier.mean() > _LARGEST_SHARE_OUT:
+        raise ArgumentError(
+            f"{100 * outlier.mean():.0f} % of the forces do not follow one law: was the tool worn, did it chatter, or "
+            "is the work piece not the one described?"
+        )
+    return np.asarray(outlier)
 
 
 def _check(data: MeanForces, chip: Array, count: int, edge: bool) -> None:
