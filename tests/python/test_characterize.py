@@ -106,9 +106,7 @@ def test_stopwatch_tests_are_short_enough_and_long_enough() -> None:
 
 
 def test_feeds_stay_below_the_limits_of_a_slow_machine(tmp_path: Path) -> None:
-    data = MACHINE.model_dump(exclude_none=True)
-    data["axes"]["y"]["max_feed_mm_per_min"] = 900.0
-    slow = sg.Machine.from_data(data)
+    slow = MACHINE.with_values("axes.y.max_feed_mm_per_min", 900.0)
     feeds = [part.feed_mm_per_min for t in make_tests(slow, AirBox()) for part in t.parts if part.pattern != "rapid"]
     assert max(feeds) <= 450.0
 

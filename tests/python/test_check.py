@@ -22,9 +22,7 @@ END = "M30\n%\n"
 
 
 def machine(**controller: Any) -> sg.Machine:
-    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
-    data["controller"].update(controller)
-    return sg.Machine.from_data(data)
+    return sg.Machine.load("vx500").with_values({f"controller.{key}": value for key, value in controller.items()})
 
 
 def checked(body: str, end: str = END, **controller: Any) -> sg.Check:

@@ -103,9 +103,8 @@ def test_the_text_says_the_feeds_of_the_report(corner: sg.FeedSchedule) -> None:
 
 @pytest.mark.parametrize("time_constant_s", [0.0, 0.1])
 def test_the_feed_that_the_machine_runs_keeps_the_limit(time_constant_s: float) -> None:
-    values = sg.Machine.load("vx500").model_dump()
-    values["controller"] |= {"motion": "after_interpolation", "time_constant_s": time_constant_s}
-    machine = sg.Machine.from_data(values)
+    values = {"controller.motion": "after_interpolation", "controller.time_constant_s": time_constant_s}
+    machine = sg.Machine.load("vx500").with_values(values)
     text = CORNER.replace("S1800", "S12000").replace("F216.", "F1440.")
     result = scheduled(text, machine=machine)
     assert result.ok
@@ -141,9 +140,8 @@ def test_air_is_crossed_faster_but_not_up_to_the_material() -> None:
 
 
 def test_feeds_change_by_no_more_than_the_machine_says() -> None:
-    values = sg.Machine.load("vx500").model_dump()
-    values["feed_control"] |= {"max_change_mm_per_min": 25.0, "interval_mm": 0.5}
-    result = scheduled(CORNER, machine=sg.Machine.from_data(values))
+    values = {"feed_control.max_change_mm_per_min": 25.0, "feed_control.interval_mm": 0.5}
+    result = scheduled(CORNER, machine=sg.Machine.load("vx500").with_values(values))
     feeds = [move.feed for move in interpret(result.text.decode()).cuts if move.start[2] < -14.0]
     assert np.abs(np.diff(feeds)).max() <= 25.0 + 1e-9
     assert result.ok

@@ -69,8 +69,8 @@ M30
 
 
 def with_tables(machine: Machine, **tables: dict[str, Any]) -> Machine:
-    return machine.model_copy(
-        update={name: getattr(machine, name).model_copy(update=keys) for name, keys in tables.items()}
+    return machine.with_values(
+        {f"{table}.{key}": value for table, keys in tables.items() for key, value in keys.items()}
     )
 
 

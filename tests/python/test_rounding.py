@@ -59,8 +59,7 @@ def test_without_modes_on_an_axis_its_words_are_the_nearest() -> None:
     words = {}
     for rounding in ("nearest", "vibration"):
         owner = machine(rounding, 0.005)
-        axes = owner.axes.model_copy(update={"y": owner.axes.y.model_copy(update={"modes": ()})})
-        owner = owner.model_copy(update={"axes": axes})
+        owner = owner.with_values("axes.y.modes", ())
         program = sg.Program.from_text(path(11).encode(), owner, source="path")
         result = convert(program, owner)
         (place,) = result.placed

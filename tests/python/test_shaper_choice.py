@@ -320,9 +320,9 @@ def test_a_machine_gives_modes_bands_and_grids() -> None:
 
 
 def test_long_shapers_only_where_no_short_one_is_good() -> None:
-    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
-    data["emission"]["block_period_s"] = 0.008  # the shortest non-negative one lasts 96 ms
-    result = sg.choose_shaper(machine=sg.Machine.from_data(data, "test"), families=["zvd", "non-negative"])
+    # The shortest non-negative one lasts 96 ms.
+    machine = sg.Machine.load("vx500").with_values("emission.block_period_s", 0.008)
+    result = sg.choose_shaper(machine=machine, families=["zvd", "non-negative"])
     assert result.max_duration_s == 0.25
     assert min(each.duration_s for each in result.designs) == pytest.approx(0.096)
     usual = sg.choose_shaper(machine=sg.Machine.load("vx500"), families=["non-negative"])
@@ -330,24 +330,20 @@ def test_long_shapers_only_where_no_short_one_is_good() -> None:
 
 
 def test_equal_modes_of_two_axes_count_once_with_the_wider_band() -> None:
-    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
-    for name, percent in (("x", 2.0), ("y", 5.0)):
-        data["axes"][name]["modes"] = [
-            {"frequency_hz": 46.0, "damping_ratio": 0.02, "frequency_uncertainty_percent": percent}
-        ]
-    data["axes"]["z"]["modes"] = [{"frequency_hz": 90.0, "damping_ratio": 0.02}]
-    machine = sg.Machine.from_data(data, "test")
+    values = {
+        f"axes.{name}.modes": [{"frequency_hz": 46.0, "damping_ratio": 0.02, "frequency_uncertainty_percent": percent}]
+        for name, percent in (("x", 2.0), ("y", 5.0))
+    }
+    values["axes.z.modes"] = [{"frequency_hz": 90.0, "damping_ratio": 0.02}]
+    machine = sg.Machine.load("vx500").with_values(values)
     assert machine_bands(machine, 0.03) == [ModeBand(Mode(46.0, 0.02), 0.05), ModeBand(Mode(90.0, 0.02), 0.03)]
-    for name in "xyz":
-        data["axes"][name]["modes"] = []
     with pytest.raises(ArgumentError, match="no vibration mode"):
-        machine_bands(sg.Machine.from_data(data, "test"))
+        machine_bands(machine.with_values({f"axes.{name}.modes": [] for name in "xyz"}))
 
 
 def test_candidate_periods() -> None:
-    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
-    data["emission"]["block_period_s"] = 0.007
-    assert candidate_periods(PAPER, sg.Machine.from_data(data, "test"), 0.25) == [0.007]
+    machine = sg.Machine.load("vx500").with_values("emission.block_period_s", 0.007)
+    assert candidate_periods(PAPER, machine, 0.25) == [0.007]
     periods_s = candidate_periods(PAPER, sg.Machine.load("vx500"), 0.25)
     assert periods_s[0] == pytest.approx(0.005)
     assert periods_s == sorted(periods_s)

@@ -68,14 +68,8 @@ Vector = npt.NDArray[np.float64]
 
 def machine_with(drive: dict[str, Any] | None = None, **tables: dict[str, Any]) -> sg.Machine:
     """The built-in vx500 with values of its tables, and the drive on every axis."""
-    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
-    for table, values in tables.items():
-        data[table] |= values
-    for axis in "xyz":
-        data["axes"][axis].pop("drive", None)
-        if drive is not None:
-            data["axes"][axis]["drive"] = drive
-    return sg.Machine.from_data(data, "test")
+    changed = {f"{table}.{key}": value for table, values in tables.items() for key, value in values.items()}
+    return sg.Machine.load("vx500").with_values(changed | {f"axes.{axis}.drive": drive for axis in "xyz"})
 
 
 def toml_file(folder: Path, machine: sg.Machine) -> str:
@@ -312,15 +306,10 @@ def test_machine_without_drives_is_refused_with_the_table(folder: Path, capsys: 
 def test_modes_that_vary_see_the_machine_s_position() -> None:
     """A work offset that puts the whole program beyond the table of the mode is the mode of the table's end."""
     over = {"axis": "x", "position_mm": [100.0, 400.0], "frequency_hz": [46.0, 30.0]}
-    data = sg.Machine.load("vx500").model_dump(exclude_none=True)
-    data["axes"]["x"]["modes"][0]["frequency_over"] = over
-    data["input"]["work_offsets"] = {"G54": [500.0, 0.0, 0.0]}
-    far = streamed(WHOLE, sg.Machine.from_data(data, "far"))
-    data["axes"]["x"]["modes"][0].pop("frequency_over")
-    data["axes"]["x"]["modes"][0]["frequency_hz"] = 30.0
-    slow = streamed(WHOLE, sg.Machine.from_data(data, "slow"))
-    data["axes"]["x"]["modes"][0]["frequency_hz"] = 46.0
-    fast = streamed(WHOLE, sg.Machine.from_data(data, "fast"))
+    machine = sg.Machine.load("vx500").with_values("input.work_offsets", {"G54": [500.0, 0.0, 0.0]})
+    far = streamed(WHOLE, machine.with_values("axes.x.modes.1.frequency_over", over))
+    slow = streamed(WHOLE, machine.with_values("axes.x.modes.1.frequency_hz", 30.0))
+    fast = streamed(WHOLE, machine.with_values("axes.x.modes.1.frequency_hz", 46.0))
     np.testing.assert_array_equal(far.command_mm, slow.command_mm)
     np.testing.assert_allclose(far.response_mm, slow.response_mm, rtol=0.0, atol=1e-9)
     assert np.abs(far.response_mm - fast.response_mm).max() > 1e-3

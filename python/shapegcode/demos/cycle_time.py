@@ -105,13 +105,11 @@ def piece_text() -> str:
 
 def paper_004_machine(rapid_time_constant_s: float, rapid_bell_time_s: float, time_constant_s: float) -> Machine:
     """The paper's testbed (``kimm004``) with other constants."""
-    data = Machine.load("kimm004").model_dump(exclude_none=True)
-    data["controller"] |= {
-        "rapid_time_constant_s": rapid_time_constant_s,
-        "rapid_bell_time_s": rapid_bell_time_s,
-        "time_constant_s": time_constant_s,
-    }
-    return Machine.from_data(data, "kimm004")
+    return Machine.load("kimm004").with_values({
+        "controller.rapid_time_constant_s": rapid_time_constant_s,
+        "controller.rapid_bell_time_s": rapid_bell_time_s,
+        "controller.time_constant_s": time_constant_s,
+    })  # fmt: skip
 
 
 def cycle_time_demo(on_progress: Callable[[float], None] = lambda _: None) -> CycleTimeDemo:

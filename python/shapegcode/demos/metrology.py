@@ -221,10 +221,8 @@ def _statements(cases: list[SpecimenCase]) -> Iterator[Statement]:
 
 
 def _machine(contour: str) -> Machine:
-    data = Machine.load("vx500").model_dump(exclude_none=True)
-    data["shaping"]["contour"] = contour
-    data["tolerance"]["contour_um"] = _TOLERANCE_UM
-    return Machine.from_data(data, "vx500")
+    values = {"shaping.contour": contour, "tolerance.contour_um": _TOLERANCE_UM}
+    return Machine.load("vx500").with_values(values)
 
 
 def _measured(original: Program, machine: Machine) -> Measurement:

@@ -6,10 +6,9 @@ from shapegcode.program.program import (
     given_program,
     least_increment_mm,
     located_error,
-    program_loader,
-    reader_options,
     written_by_shapegcode,
 )
+from shapegcode.program.reading import program_loader, reader_options
 
 __all__ = [
     "MM_PER_INCH",
