@@ -16,7 +16,7 @@ from shapegcode._core import ArgumentError, Mode, Shaper, convolved_zv
 from shapegcode.cli import main
 from shapegcode.results import plot as canvas
 from shapegcode.results.json import schema
-from shapegcode.shaping import FAMILIES, Design, Recommendation, choose_shaper
+from shapegcode.shaping import FAMILIES, Design, Recommendation, choose_shaper, families_table
 from shapegcode.shaping.modal_run import respond, shaped_step
 from shapegcode.shaping.plots import plots_of, selected
 from shapegcode.shaping.shaper_plots import residual_curve
@@ -145,6 +145,14 @@ def test_the_table_shows_some_and_all(capsys: pytest.CaptureFixture[str]) -> Non
     assert len(rows[1]) == len(result["designs"]) > len(rows[0])
     families = {row["family"] for row in result["designs"]}
     assert {line.removeprefix("=>").removeprefix("->").split()[0] for line in rows[0]} == families
+
+
+def test_tables_fit_80_columns_and_cut_no_word() -> None:
+    result = choose_shaper(["46:0.02±5%", "131:0.02"], families=FEW[1:])
+    for table in (*result.tables(), families_table()):
+        text = str(table)
+        assert max(map(len, text.splitlines())) <= 80
+        assert {word for cells in table.cells() for cell in cells for word in cell.split()} <= set(text.split())
 
 
 def test_the_families_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
