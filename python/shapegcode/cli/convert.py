@@ -15,12 +15,9 @@ from shapegcode.cli.options import (
     add_program_argument,
     load_machine,
     output_file,
-    positive,
-    ratio,
-    seconds,
-    size,
 )
 from shapegcode.cli.overrides import add_override_arguments, overridden
+from shapegcode.cli.typed import positive, ratio, seconds, size
 
 if TYPE_CHECKING:
     from shapegcode.cli.console import ProgressBar

@@ -6,14 +6,8 @@ import argparse
 from typing import Any
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import (
-    add_input_arguments,
-    add_plots_argument,
-    load_machine,
-    micrometres,
-    output_file,
-    share,
-)
+from shapegcode.cli.options import add_input_arguments, add_plots_argument, load_machine, output_file
+from shapegcode.cli.typed import micrometres, share
 
 __all__ = ["add_arguments", "add_cutting_arguments", "read_cutting_arguments", "run"]
 

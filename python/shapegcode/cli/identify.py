@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from shapegcode.cli import options
+from shapegcode.cli import options, typed
 from shapegcode.cli.console import add_json_argument
 
 __all__ = ["add_arguments", "run"]
@@ -22,17 +22,17 @@ _OF_FILES: tuple[tuple[str, str, dict[str, Any], str], ...] = (
     ("--time-unit", "time_unit", {"metavar": "UNIT"}, "s, ms or us"),
     ("--force-unit", "force_unit", {"metavar": "UNIT"}, "N, kN, kgf or lbf"),
     ("--response-unit", "response_unit", {"metavar": "UNIT"}, "for example m/s^2, g, mm/s or um"),
-    ("--sample-period", "period_s", {"metavar": "TIME", "type": options.seconds}, "between samples, such as 0.1ms"),
+    ("--sample-period", "period_s", {"metavar": "TIME", "type": typed.seconds}, "between samples, such as 0.1ms"),
     (
         "--quantity", "quantity", {"choices": ("acceleration", "velocity", "displacement")},
         "what the sensor measured",
     ),
     (
-        "--force-scale", "force_scale", {"metavar": "N", "type": options.nonzero},
+        "--force-scale", "force_scale", {"metavar": "N", "type": typed.nonzero},
         "N for 1 in the file (integer WAV: full scale)",
     ),
     (
-        "--response-scale", "response_scale", {"metavar": "X", "type": options.nonzero},
+        "--response-scale", "response_scale", {"metavar": "X", "type": typed.nonzero},
         "m/s^2, m/s or m for 1 in the file (integer WAV: full scale)",
     ),
     (
@@ -57,14 +57,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--update", metavar="MACHINE.toml", default=None, help="put the supported modes into this machine file")
     add("--tap-plan", action="store_true", help="say how to do the test (for the modes of -m MACHINE), nothing else")
     options.add_machine_argument(parser, required=False)
-    add("--modes", metavar="N", type=options.count, default=None, help="how many (default: chosen by evidence)")
+    add("--modes", metavar="N", type=typed.count, default=None, help="how many (default: chosen by evidence)")
     most = "largest number of modes that is tried (default: %(default)s)"
-    add("--most-modes", metavar="N", type=options.count, default=_MOST_MODES, help=most)
+    add("--most-modes", metavar="N", type=typed.count, default=_MOST_MODES, help=most)
     within = "look for modes between these frequencies, Hz"
-    add("--frequencies", metavar="LOW:HIGH", type=options.frequency_band, default=None, help=within)
+    add("--frequencies", metavar="LOW:HIGH", type=typed.frequency_band, default=None, help=within)
     ignore = "take it as a free decay: do not use the force, even if there is one"
     add("--decay", "--ignore-force", dest="ignore_force", action="store_true", help=ignore)
-    add("--start", metavar="TIME", type=options.start_time, default=None, help=_HELP_TIME)
+    add("--start", metavar="TIME", type=typed.start_time, default=None, help=_HELP_TIME)
     group = parser.add_argument_group("what a file does not say")
     for name, field, how, said in _OF_FILES:
         group.add_argument(name, dest=field, help=said, **({"default": None} | how))

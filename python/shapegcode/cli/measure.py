@@ -6,14 +6,8 @@ import argparse
 from functools import partial
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import (
-    add_machine_argument,
-    add_plots_argument,
-    add_program_argument,
-    line_range,
-    load_machine,
-    micrometres,
-)
+from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_program_argument, load_machine
+from shapegcode.cli.typed import line_range, micrometres
 
 __all__ = ["add_arguments", "run"]
 

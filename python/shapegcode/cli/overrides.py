@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
-from shapegcode.cli.options import micrometres, number, seconds
+from shapegcode.cli.typed import micrometres, number, seconds
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine

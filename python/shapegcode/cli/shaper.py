@@ -6,15 +6,8 @@ import argparse
 from dataclasses import replace
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import (
-    add_machine_argument,
-    add_plots_argument,
-    load_machine,
-    positive,
-    ratio,
-    seconds,
-    share,
-)  # fmt: skip
+from shapegcode.cli.options import add_machine_argument, add_plots_argument, load_machine
+from shapegcode.cli.typed import positive, ratio, seconds, share
 
 __all__ = ["add_arguments", "run"]
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_input_arguments, add_plots_argument, count, line_range, load_machine
+from shapegcode.cli.options import add_input_arguments, add_plots_argument, load_machine
+from shapegcode.cli.typed import count, line_range
 
 __all__ = ["add_arguments", "run"]
 

@@ -7,7 +7,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, add_plots_argument, load_machine, positive, program_number
+from shapegcode.cli.options import add_machine_argument, add_plots_argument, load_machine
+from shapegcode.cli.typed import positive, program_number
 
 if TYPE_CHECKING:
     from shapegcode.testcut.conditions import CornerShape, CutConditions

@@ -1,0 +1,270 @@
+"""What is typed for an option as a value: numbers with units, shares, ranges. One rule for each kind on every command.
+
+Each function takes the text as it is typed and raises `argparse.ArgumentTypeError`, whose message says what it must be.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from collections.abc import Mapping
+
+_LARGEST_OVERRIDE = 2.54
+_SIZE_UNITS = {"": 1, "k": 1024, "M": 1024 * 1024}
+_LENGTH_UNITS = {"um": 1.0, "µm": 1.0, "mm": 1e3}
+_TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+
+
+def program_number(text: str) -> int:
+    """An O number with or without its letter.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The number.
+
+    Raises:
+        ArgumentTypeError: no number from 1 to 99999999.
+    """
+    match = re.fullmatch(r"[Oo]?0*([1-9][0-9]{0,7})", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a program number, O1 ... O99999999")
+    return int(match[1])
+
+
+def line_range(text: str) -> tuple[int, int]:
+    """Lines such as ``120-180`` or ``120``, first and last, from 1.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        First and last line.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
+    match = re.fullmatch(r"0*([1-9][0-9]{0,9})(?:-0*([1-9][0-9]{0,9}))?", text)
+    first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
+    if first > last:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be lines, first to last, for example 120-180")
+    return first, last
+
+
+def count(text: str) -> int:
+    """A whole number, 1 or more.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The number.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
+    match = re.fullmatch(r"0*([1-9][0-9]{0,11})", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 1 or more")
+    return int(match[1])
+
+
+def ratio(text: str) -> float:
+    """A share such as ``60%`` or ``0.6``, above 0 and at most 1.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The share, 0.6 for ``60%``.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
+    value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    if not 0.0 < value <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be above 0 and at most 100%")
+    return value
+
+
+def share(text: str) -> float:
+    """A share such as ``3%`` or ``0.03``, at least 0 and below 1.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The share, 0.03 for ``3%``.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
+    value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    if not 0.0 <= value < 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be at least 0 and below 100%")
+    return value
+
+
+def override(text: str) -> float:
+    """A feed override such as ``80%`` or ``0.8``, above 0 and at most 254 % (what a control takes).
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The override, 0.8 for ``80%``.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
+    value = number(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    if not 0.0 < value <= _LARGEST_OVERRIDE:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be above 0 and at most {_LARGEST_OVERRIDE:.0%}")
+    return value
+
+
+def seconds(text: str) -> float:
+    """A time with its unit, such as ``5ms`` or ``0.005s``.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The time in s.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
+    return _with_unit(text, "time", _TIME_UNITS, "5ms")
+
+
+def start_time(text: str) -> float:
+    """A time with its unit, or 0, which needs none."""
+    return 0.0 if text in ("0", "0s", "0ms") else seconds(text)
+
+
+def frequency_band(text: str) -> tuple[float, float]:
+    """Two frequencies in Hz such as ``20:400``, ascending.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        Lowest and highest, in Hz.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
+    low, _, high = text.partition(":")
+    try:
+        band = float(low), float(high)
+    except ValueError:
+        band = math.nan, math.nan
+    if not 0.0 <= band[0] < band[1] < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be two frequencies in Hz, for example 20:400")
+    return band
+
+
+def micrometres(text: str) -> float:
+    """A length with its unit, such as ``5um`` or ``0.005mm``, in µm.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The length in µm.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
+    return _with_unit(text, "length", _LENGTH_UNITS, "5um")
+
+
+def _with_unit(text: str, what: str, units: Mapping[str, float], example: str) -> float:
+    """A number above 0 with one of the units, times what the unit stands for."""
+    match = re.fullmatch(rf"([-+.\d]+(?:[eE][-+]?\d+)?)\s*({'|'.join(units)})", text)
+    try:
+        value = float(match[1]) * units[match[2]] if match else 0.0
+    except ValueError:
+        value = 0.0
+    if not (math.isfinite(value) and value > 0.0):
+        typed = ", ".join(unit for unit in units if unit.isascii())
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: must be a {what} above 0 with its unit ({typed}), for example {example}"
+        )
+    return value
+
+
+def size(text: str) -> int:
+    """A number of bytes such as ``262144``, ``256k`` or ``1M`` (1024 bytes, 1024 k), above 0.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The number of bytes.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)([kM]?)", text)
+    value = math.floor(float(match[1]) * _SIZE_UNITS[match[2]]) if match else 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a number of bytes above 0, for example 65536, 64k or 1M")
+    return value
+
+
+def positive(text: str) -> float:
+    """A number above 0.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The number.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
+    value = number(text)
+    if not (math.isfinite(value) and value > 0.0):
+        raise argparse.ArgumentTypeError(f"{text!r}: must be above 0")
+    return value
+
+
+def nonzero(text: str) -> float:
+    """A number other than 0.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The number.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
+    value = number(text)
+    if not math.isfinite(value) or value == 0.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: must be a number other than 0")
+    return value
+
+
+def number(text: str) -> float:
+    """A number.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The number.
+
+    Raises:
+        ArgumentTypeError: the text is none.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number") from None
