@@ -103,7 +103,7 @@ def _region_rows(repetitions: int) -> list[list[str]]:
             grid = choose_grid(machine, period_s)
             path = sg.Program.from_text(arcs_and_corners().encode(), machine, source="path").regions[0].path
             model = MachineModel(machine)
-            writer = RegionWriter(machine, model, grid)
+            writer = RegionWriter(model, grid)
             options = writer.options(model.limits(), writer.tolerance(machine.tolerance.contour_um))
 
             def shape(path: Any = path, grid: Grid = grid, options: Any = options) -> int:

@@ -208,7 +208,7 @@ def exact(target: str, smoothness: float, block_period_s: float) -> tuple[float,
     machine = machine_with({"shaping.contour": target, "controller.block_time_s": block_period_s})
     grid = choose_grid(machine, block_period_s)
     model = MachineModel(machine)
-    writer = RegionWriter(machine, model, grid)
+    writer = RegionWriter(model, grid)
     options = writer.options(model.limits(arc_feed_ratio=ARC_FEED_RATIO), writer.tolerance(1e6))
     options.contour_smoothness = smoothness
     shaper = _core.RegionShaper(path_program(200.0, machine).regions[-1].path, grid.fir, [], options)

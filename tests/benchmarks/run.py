@@ -92,7 +92,7 @@ def _program_rows(folder: Path, program: Path, lines: int, repetitions: int) -> 
     machine = sg.Machine.load("vx500")
     grid = choose_grid(machine)
     model = MachineModel(machine)
-    limits, writer = model.limits(), RegionWriter(machine, model, grid)
+    limits, writer = model.limits(), RegionWriter(model, grid)
     tolerance = writer.tolerance(machine.tolerance.contour_um)
     reading, look_ahead, shaping, emission = [], [], [], []
     peers, conversions = [], []

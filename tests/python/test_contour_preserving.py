@@ -111,7 +111,7 @@ def test_the_feed_on_a_binding_arc_is_the_highest() -> None:
     deviations = []
     for tolerance_um in (3.0, 1e6):
         model = MachineModel(machine)
-        writer = RegionWriter(machine, model, grid)
+        writer = RegionWriter(model, grid)
         options = writer.options(model.limits(), writer.tolerance(tolerance_um))
         shaper = _core.RegionShaper(program.regions[0].path, grid.fir, [], options)
         assert shaper.next(10**6) is not None
@@ -136,7 +136,7 @@ def test_off_is_the_plain_shaper() -> None:
     program = sg.Program.from_text(paper_text().encode(), machine, source="paper")
     model = MachineModel(machine)
     limits = model.limits(arc_feed_ratio=0.99)
-    writer = RegionWriter(machine, model, grid)
+    writer = RegionWriter(model, grid)
     tolerance = writer.tolerance(1e6)
     path = program.regions[-1].path
     piece = _core.RegionShaper(path, grid.fir, [], writer.options(limits, tolerance)).next(10**6)

@@ -40,7 +40,7 @@ def fine_machine(contour: str = "off") -> sg.Machine:
 def command(path: _core.Path, grid: Grid, machine: sg.Machine, offset: Offset) -> np.ndarray:
     """The shaped command of a region, borders and middles in turn."""
     model = MachineModel(machine)
-    writer = RegionWriter(machine, model, grid)
+    writer = RegionWriter(model, grid)
     options = writer.options(model.limits(), writer.tolerance(1e6), offset)
     piece = _core.RegionShaper(path, grid.fir, [], options).next(1 << 30)
     assert piece is not None
@@ -58,8 +58,8 @@ def test_the_shaped_command_is_the_followed_one() -> None:
     alone = make_grid(grid.block_period_s, _core.Shaper([0.0], [1.0]))
     offset = region_offset(region, machine)
     model = MachineModel(machine)
-    tolerance = RegionWriter(machine, model, grid).tolerance(1e6)
-    options = RegionWriter(machine, model, alone).options(model.limits(), tolerance, offset)
+    tolerance = RegionWriter(model, grid).tolerance(1e6)
+    options = RegionWriter(model, alone).options(model.limits(), tolerance, offset)
     bare = _core.RegionShaper(region.path, alone.fir, [], options).next(1 << 30)
     assert bare is not None
     before = np.empty((len(bare.grid_mm) + len(bare.middle_mm), 3))
@@ -96,7 +96,7 @@ def test_an_unknown_position_is_shaped_for_the_nominal_frequency() -> None:
     grid = choose_grid(machine)
     offset = region_offset(program.regions[0], machine)
     model = MachineModel(machine)
-    options = RegionWriter(machine, model, grid).options(model.limits(), _core.FilterTolerance(), offset)
+    options = RegionWriter(model, grid).options(model.limits(), _core.FilterTolerance(), offset)
     assert options.following is None
     report = sg.convert(program, machine).to_dict()
     assert any("position of Z is not known" in warning for warning in report["warnings"])

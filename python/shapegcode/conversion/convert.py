@@ -148,7 +148,7 @@ class _Run:
         self.grid = choose_grid(machine, block_period_s)
         program.refuse_endless(_MOST_PERIODS * self.grid.block_period_s)
         self.model = MachineModel(machine)
-        self.judge = Judge(machine, self.model)
+        self.judge = Judge(self.model)
         self.reasons = [why_kept(region, machine) for region in program.regions]
         self.room_um = [machine.tolerance.contour_um * _CONTOUR_MARGIN] * len(program.regions)
         self.spending = None if budget is None else Spending(budget, program, machine)
@@ -174,15 +174,14 @@ class _Run:
         rapids: ShapedRapids | None = None
         if self.machine.shaping.rapids:
             rapids = shape_rapids(
-                settled.emitted, settled.written.placed, self.machine, self.model, self.grid, self.pool, self.budget
+                settled.emitted, settled.written.placed, self.model, self.grid, self.pool, self.budget
             )
             written = replace(settled.written, text=rapids.text, placed=rapids.placed)
             settled = replace(settled, written=written, emitted=rapids.emitted)
         return self._result(settled, rapids)
 
     def _write(self, grid: Grid, on_progress: Callable[[int, int], None] = lambda _done, _total: None) -> Written:
-        ratio = self.machine.shaping.arc_feed_ratio
-        writer = TextWriter(self.program, self.machine, self.model, grid, ratio)
+        writer = TextWriter(self.program, self.model, grid)
         # Of what was given up for a budget one sentence speaks for all.
         untold = None if self.spending is None else self.spending.given_up
         return writer.write(self.reasons, self.room_um, untold, on_progress)

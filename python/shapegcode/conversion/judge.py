@@ -30,7 +30,6 @@ from shapegcode.conversion.figures import (
     worst_counted,
 )
 from shapegcode.conversion.readback import Placed
-from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm
 from shapegcode.results.figures import ContourError, Deviation, Tracks, largest_xyz_um
@@ -69,16 +68,15 @@ class Judge:
     """Plays emitted regions in every case and holds them against the machine's tolerances.
 
     Args:
-        machine: tolerances, and the band in which a program must be good.
-        model: the same machine for the core.
+        model: of the machine; its file states tolerances, and the band in which a program must be good.
     """
 
-    def __init__(self, machine: Machine, model: MachineModel) -> None:
-        self._machine = machine
+    def __init__(self, model: MachineModel) -> None:
+        self._machine = model.machine
         self._model = model
-        self.cases = stated_cases(machine)
+        self.cases = stated_cases(model.machine)
         """In the order of `RegionFigures.cases`."""
-        self.target: Target = "response" if machine.shaping.contour == "response" else "command"
+        self.target: Target = "response" if model.machine.shaping.contour == "response" else "command"
         """What the contour tolerance is about."""
 
     def measure(

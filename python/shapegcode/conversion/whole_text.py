@@ -75,21 +75,16 @@ class TextWriter:
 
     Args:
         program: the original.
-        machine: how text is written.
-        model: the same machine for the core.
+        model: of the machine; its file says how text is written.
         grid: block period and shapers.
-        arc_feed_ratio: feed on arcs relative to the programmed one.
     """
 
-    def __init__(
-        self, program: Program, machine: Machine, model: MachineModel, grid: Grid, arc_feed_ratio: float
-    ) -> None:
+    def __init__(self, program: Program, model: MachineModel, grid: Grid) -> None:
         self._program = program
-        self._machine = machine
+        self._machine = model.machine
         self._model = model
         self._grid = grid
-        self._arc_feed_ratio = arc_feed_ratio
-        self._regions = RegionWriter(machine, model, grid)
+        self._regions = RegionWriter(model, grid)
 
     def write(
         self,
@@ -146,7 +141,7 @@ class TextWriter:
         )
 
     def _shape(self, region: _core.Region, room_um: float) -> EmittedRegion:
-        limits = self._model.limits(arc_feed_ratio=self._arc_feed_ratio)
+        limits = self._model.limits(arc_feed_ratio=self._machine.shaping.arc_feed_ratio)
         try:
             return self._regions.write(self._program, region, limits, self._regions.tolerance(room_um))
         except _core.ArgumentError as error:

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import NO_OFFSET, Offset
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
@@ -103,13 +102,12 @@ class RegionWriter:
     """Shapes regions on one grid and writes them.
 
     Args:
-        machine: how motion is shaped and text is written.
-        model: the same machine for the core.
+        model: of the machine; its file says how motion is shaped and text is written.
         grid: block period and shapers.
     """
 
-    def __init__(self, machine: Machine, model: MachineModel, grid: Grid) -> None:
-        self._machine = machine
+    def __init__(self, model: MachineModel, grid: Grid) -> None:
+        self._machine = model.machine
         self._model = model
         self._grid = grid
 

@@ -105,7 +105,8 @@ class MachineModel:
     """
 
     def __init__(self, machine: Machine) -> None:
-        self._machine = machine
+        self.machine = machine
+        """What the machine file says."""
         self.name = machine.name
         """Of the machine."""
         self.period_s = machine.controller.interpolation_period_s
@@ -126,12 +127,12 @@ class MachineModel:
     @cached_property
     def ordinary(self) -> PlayingController:
         """The controller as it plays an ordinary program."""
-        return PlayingController(controller_model(self._machine))
+        return PlayingController(controller_model(self.machine))
 
     @cached_property
     def shaped(self) -> PlayingController:
         """The controller as it plays shaped blocks: one by one, without look-ahead."""
-        model = controller_model(self._machine)
+        model = controller_model(self.machine)
         model.motion = _core.MotionKind.after_interpolation
         model.filter_shape = _core.FilterShape.linear
         model.time_constant_s = self.shaped_time_constant_s
@@ -157,11 +158,11 @@ class MachineModel:
         Returns:
             The limits, in mm and s.
         """
-        return motion_limits(self._machine, arc_feed_ratio=arc_feed_ratio)
+        return motion_limits(self.machine, arc_feed_ratio=arc_feed_ratio)
 
     def offset(self, region: _core.Region) -> Offset:
         """From the program's positions in a region to the machine's; see `region_offset`."""
-        return region_offset(region, self._machine)
+        return region_offset(region, self.machine)
 
     def options(
         self,
@@ -193,10 +194,10 @@ class MachineModel:
         options = _core.PlaybackOptions()
         options.period_s = self.period_s
         if plant == "modal":
-            options.modes = axis_modes(self._machine, shift, only)
-            options.mode_tables = mode_tables(self._machine, shift, offset, only)
+            options.modes = axis_modes(self.machine, shift, only)
+            options.mode_tables = mode_tables(self.machine, shift, offset, only)
         else:
-            options.drives = drive_parameters(self._machine)
+            options.drives = drive_parameters(self.machine)
         ticks = round(time_constant_s / self.period_s)
         options.axis_filters = [_core.Fir.moving_average(ticks)] if ticks > 1 else []
         return options
@@ -267,7 +268,7 @@ class MachineModel:
         options.record_samples = record_samples
         if starved_blocks:
             options.starved_blocks = list(starved_blocks)
-            options.starved_s = self._machine.verdict.starved_s
+            options.starved_s = self.machine.verdict.starved_s
             options.starved_memory_s = memory_s + own_s if memory_s > 0.0 else 0.0
         return _core.play_blocks(blocks, path, block_end or self.own_rule, override, options)
 
@@ -284,7 +285,7 @@ class MachineModel:
         Returns:
             The figures, positions in mm.
         """
-        filter_s = self._machine.controller.look_ahead_filter_time_constant_s
+        filter_s = self.machine.controller.look_ahead_filter_time_constant_s
         options = self.options(time_constant_s=filter_s, offset=offset)
         return _core.play_path(blocks, _core.plan_speed(blocks, self.limits()), options, path)
 

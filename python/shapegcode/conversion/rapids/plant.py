@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.conversion.rapids.candidates import Rapid
-from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import NO_OFFSET
 
@@ -85,11 +84,11 @@ class RapidPlant:
     """Rapids as the controller and the modes of a machine make them.
 
     Args:
-        machine: tolerances and modes.
-        model: the same machine for the core.
+        model: of the machine.
     """
 
-    def __init__(self, machine: Machine, model: MachineModel) -> None:
+    def __init__(self, model: MachineModel) -> None:
+        machine = model.machine
         self._playing = model
         self.model = model.ordinary.model
         self.band_mm = machine.tolerance.residual_floor_um * 1e-3

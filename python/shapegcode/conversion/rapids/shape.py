@@ -64,7 +64,6 @@ class ShapedRapids:
 def shape_rapids(
     emitted: Program,
     placed: Sequence[Placed],
-    machine: Machine,
     model: MachineModel,
     grid: Grid,
     pool: Executor,
@@ -75,8 +74,7 @@ def shape_rapids(
     Args:
         emitted: a program with shaped regions, read back.
         placed: the regions and their places in it.
-        machine: controller, modes and tolerances.
-        model: the same machine for the core.
+        model: of the machine: controller, modes and tolerances.
         grid: block period and shaper.
         pool: runs playbacks.
         budget: limits of the whole text; rapids get what the regions leave.
@@ -88,12 +86,12 @@ def shape_rapids(
         ArgumentError: `tolerance.residual_floor_um` is 0: there is no band to settle in.
         RoundTripError: see `read_back`.
     """
-    if machine.tolerance.residual_floor_um <= 0.0:
+    if model.machine.tolerance.residual_floor_um <= 0.0:
         raise _core.ArgumentError(
             "tolerance.residual_floor_um is 0: shaped rapids need the band in which vibration counts as settled"
         )
     # One shaper for all axes keeps a straight move straight.
-    return _RapidShaper(emitted, placed, machine, model, replace(grid, axis_firs=()), pool).shaped(budget)
+    return _RapidShaper(emitted, placed, _without_contour(model), replace(grid, axis_firs=()), pool).shaped(budget)
 
 
 class _RapidShaper:
@@ -103,17 +101,15 @@ class _RapidShaper:
         self,
         emitted: Program,
         placed: Sequence[Placed],
-        machine: Machine,
         model: MachineModel,
         grid: Grid,
         pool: Executor,
     ) -> None:
         self.emitted, self.placed, self.grid, self.pool = emitted, placed, grid, pool
-        self.machine = _without_contour(machine)
-        self.model = model
-        self.writer = RegionWriter(self.machine, model, grid)
-        self.judge = Judge(self.machine, model)
-        self.plant = RapidPlant(machine, model)
+        self.model, self.machine = model, model.machine
+        self.writer = RegionWriter(model, grid)
+        self.judge = Judge(model)
+        self.plant = RapidPlant(model)
 
     def shaped(self, budget: Budget | None) -> ShapedRapids:
         """The text with those rapids replaced that are worth it."""
@@ -202,11 +198,12 @@ class _RapidShaper:
             choice.verdict = verdict
 
 
-def _without_contour(machine: Machine) -> Machine:
+def _without_contour(model: MachineModel) -> MachineModel:
     """The same machine for moves in the air: their contour is neither corrected nor judged."""
+    machine = model.machine
     shaping = machine.shaping.model_copy(update={"contour": "off"})
     tolerance = machine.tolerance.model_copy(update={"contour_um": math.inf})
-    return machine.model_copy(update={"shaping": shaping, "tolerance": tolerance})
+    return MachineModel(machine.model_copy(update={"shaping": shaping, "tolerance": tolerance}))
 
 
 def _save_bytes(gaps: Sequence[OpenGap], room: int, kept: Counter[str]) -> None:
