@@ -157,6 +157,8 @@ def documentation(model: type[TomlTable], builtin_names: Sequence[str]) -> str:
         "not finite or a value outside its limits is an error, and all errors of a file are listed at once.",
         "",
         f"Built-in machines, usable by name in place of a file: {builtin}.",
+        'For one run `--set KEY=VALUE` replaces a value, in Python `machine.with_values("tolerance.contour_um", 5)`;',
+        "both are checked as the file is. Modes count from 1: `axes.x.modes.1.frequency_hz`.",
         "",
         "A default marked **assumed** is not known for real controllers in general: look it up or measure",
         "it. The FANUC column names the parameter that corresponds to a key; numbers differ between series,",
