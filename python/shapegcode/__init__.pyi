@@ -57,6 +57,8 @@ from shapegcode.checking.result import (
 from shapegcode.conversion.budget import Budget as Budget
 from shapegcode.conversion.convert import convert as convert
 from shapegcode.conversion.result import Conversion as Conversion
+from shapegcode.conversion.scheduled import convert_scheduled as convert_scheduled
+from shapegcode.conversion.scheduled_result import ScheduledConversion as ScheduledConversion
 from shapegcode.cutting.stock import Stock as Stock
 from shapegcode.cutting.tool import Tool as Tool
 from shapegcode.demos.corner import corner_demo as corner_demo
@@ -87,8 +89,6 @@ from shapegcode.feed.plots import (
 )
 from shapegcode.feed.result import FeedSchedule as FeedSchedule
 from shapegcode.feed.schedule import schedule_feed as schedule_feed
-from shapegcode.feed.shaped import convert_scheduled as convert_scheduled
-from shapegcode.feed.shaped_result import ScheduledConversion as ScheduledConversion
 from shapegcode.feed.survey import (
     Survey as Survey,
     survey as survey,

@@ -153,6 +153,6 @@ def _converted(args: argparse.Namespace, program: Program, machine: Machine, bar
 def _scheduled(args: argparse.Namespace, program: Program, machine: Machine, bar: ProgressBar) -> Conversion:
     """Feeds and shaping in one go."""
     from shapegcode.cli.feed import read_cutting_arguments
-    from shapegcode.feed.shaped import convert_scheduled
+    from shapegcode.conversion.scheduled import convert_scheduled
 
     return convert_scheduled(program, machine, **read_cutting_arguments(args), **_options(args), on_progress=bar.update)

@@ -19,9 +19,9 @@ from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.survey import Survey, survey
 from shapegcode.feed.travel import Mover, OrdinaryMotion
 from shapegcode.machine import Machine
+from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.results.result import Pair
-from shapegcode.timing.cycle_time import cycle_time
 
 __all__ = ["MARGIN", "schedule_feed", "schedule_survey"]
 
@@ -128,7 +128,7 @@ def schedule_survey(
         on_progress(_PLANNING + (1.0 - _PLANNING) * (index + 1) / total)
     return feed_figures(
         surveyed, plans, loads, machine, margin=margin, text=text, written=written,
-        cycle_time_s=Pair(cycle_time(program, machine).cycle_time_s, cycle_time(written, machine).cycle_time_s),
+        cycle_time_s=Pair(*(MachineModel(machine).cycle_time_s(each.core) for each in (program, written))),
         blocks=Pair(sum(region.blocks for region in program.regions), blocks),
     )  # fmt: skip
 

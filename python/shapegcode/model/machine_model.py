@@ -289,6 +289,10 @@ class MachineModel:
         options = self.options(time_constant_s=filter_s, offset=offset)
         return _core.play_path(blocks, _core.plan_speed(blocks, self.limits()), options, path)
 
+    def cycle_time_s(self, program: _core.ProgramText) -> float:
+        """Time of a whole program in closed form, s; `shapegcode.cycle_time` says where it goes."""
+        return float(_core.time_program(program, self.ordinary.model).total_s)
+
     def other_time_s(self, program: _core.ProgramText) -> float:
         """Time of everything between the regions, s: rapids, waits for in-position, dwells, kept moves, functions.
 

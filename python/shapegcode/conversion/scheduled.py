@@ -9,6 +9,8 @@ from pathlib import Path
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.convert import convert
 from shapegcode.conversion.result import Conversion
+from shapegcode.conversion.scheduled_motion import ShapedMotion
+from shapegcode.conversion.scheduled_result import ScheduledConversion
 from shapegcode.conversion.whole_text import marked_out_of_tolerance
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
@@ -16,9 +18,8 @@ from shapegcode.feed.figures import feed_figures
 from shapegcode.feed.load import PathLoad, load_of
 from shapegcode.feed.result import FeedSchedule
 from shapegcode.feed.schedule import MARGIN, schedule_survey
-from shapegcode.feed.shaped_result import ScheduledConversion
 from shapegcode.feed.survey import survey
-from shapegcode.feed.travel import OrdinaryMotion, ShapedMotion, travel_emitted
+from shapegcode.feed.travel import OrdinaryMotion, travel_emitted
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.shaping.grid import choose_grid
