@@ -173,6 +173,8 @@ void register_gcode(py::module_& module) {
       .def_readwrite("least_increment_inch", &ReaderOptions::least_increment_inch, "Inch least increment, inch.")
       .def_readwrite("arc_tolerance_mm", &ReaderOptions::arc_tolerance_mm,
                      "Largest difference of an arc's radii, mm (parameter 3410).")
+      .def_readwrite("arc_without_centre_is_line", &ReaderOptions::arc_without_centre_is_line,
+                     "G02, G03 without R, I, J, K are lines (parameter 3403#5 = 0); False: alarm 0022.")
       .def_readwrite("max_line_length", &ReaderOptions::max_line_length, "Characters.")
       .def_readwrite("unknown_after_tool_change", &ReaderOptions::unknown_after_tool_change,
                      "Axes whose position is not known after M06.")
@@ -214,6 +216,7 @@ void register_gcode(py::module_& module) {
   py::class_<RegionNote>(module, "RegionNote", "An N word or a comment inside a region.")
       .def_readonly("segment", &RegionNote::segment, "Index of the segment before which it stood.")
       .def_readonly("n_number", &RegionNote::n_number, "-1: none.")
+      .def_readonly("n_digits", &RegionNote::n_digits, "Digits of it as written: N0010 has four.")
       .def_readonly("comment_offset", &RegionNote::comment_offset, "Byte offset of its comment in the text.")
       .def_readonly("comment_length", &RegionNote::comment_length, "Bytes; 0: no comment.");
 

@@ -304,3 +304,12 @@ TEST_CASE("interpreter: a '/' move leaves its axes unknown until they are given"
   CHECK(program.regions[1]->last_line == 6);
   CHECK(program.regions[2]->first_line == 8);  // X20. was kept and made X known
 }
+
+TEST_CASE("interpreter: a mirror of one axis of the plane turns G68 the other way") {
+  // Worked out by hand: mirror about X8.353, then +108.657 degrees about the mirrored centre (25.33, -6.157).
+  const Program program = read("G51.1X8.353\nG68X-8.624Y-6.157R-108.657\nG00X14.088Y-6.791\nG69\nG50.1X0\n");
+  CHECK(near(program.final_state.position_mm, {33.196, -27.473, 0}, 6e-4));
+  // Mirrored in both axes it turns as programmed.
+  const Program both = read("G51.1X0Y0\nG68X0Y0R90.\nG00X1.Y0\nG69\nG50.1X0Y0\n");
+  CHECK(near(both.final_state.position_mm, {0, -1, 0}, 1e-9));
+}

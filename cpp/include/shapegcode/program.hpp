@@ -61,12 +61,13 @@ struct CodeBindings {
 
 /// How a program text is to be read: the controller's settings that change its meaning.
 struct ReaderOptions {
-  bool calculator_decimal_point = true;  ///< parameter 3401#0: X10 is 10 mm (true) or 10 least increments (false)
-  bool absolute_arc_centres = false;     ///< I J K are positions, not distances from the start (not FANUC)
-  double least_increment_mm = 0.001;     ///< of metric input
-  double least_increment_inch = 0.0001;  ///< of inch input
-  double arc_tolerance_mm = 0.01;        ///< largest difference of start and end radius
-  std::size_t max_line_length = 250;     ///< characters
+  bool calculator_decimal_point = true;     ///< parameter 3401#0: X10 is 10 mm (true) or 10 least increments (false)
+  bool absolute_arc_centres = false;        ///< I J K are positions, not distances from the start (not FANUC)
+  double least_increment_mm = 0.001;        ///< of metric input
+  double least_increment_inch = 0.0001;     ///< of inch input
+  double arc_tolerance_mm = 0.01;           ///< largest difference of start and end radius
+  bool arc_without_centre_is_line = false;  ///< parameter 3403#5 = 0: G02, G03 without R, I, J, K; else alarm 0022
+  std::size_t max_line_length = 250;        ///< characters
   std::array<bool, axis_count> unknown_after_tool_change = {true, true, true};
   std::vector<std::array<double, axis_count>> work_offsets_mm;          ///< G54 ... G59, empty if not known
   std::map<int, std::array<double, axis_count>> extra_work_offsets_mm;  ///< G54.1 P1 ...
@@ -77,6 +78,7 @@ struct ReaderOptions {
   std::int64_t program = -1;  ///< O number to play of a file that holds several; -1: the first
   std::function<std::optional<SourceText>(std::int64_t)> load_program;  ///< programs that the file does not hold
   std::array<std::int64_t, 2> opaque_programs = {9000, 9999};           ///< if not found: called, but not looked into
+  std::vector<std::int64_t> not_looked_into;  ///< called, but not looked into even where they are at hand
   int subprogram_nesting = 10;
   std::uint64_t max_steps = 10'000'000;           ///< blocks executed behind the first call or jump
   std::uint64_t max_cycle_moves = 2'000'000;      ///< moves that all drilling cycles of a program come to
@@ -109,6 +111,7 @@ struct LineOrigin {
 struct RegionNote {
   std::uint32_t segment = 0;
   std::int32_t n_number = -1;        ///< -1: none
+  std::uint32_t n_digits = 0;        ///< as written: N0010 has four
   std::uint32_t comment_offset = 0;  ///< into the text
   std::uint32_t comment_length = 0;
 };

@@ -23,6 +23,12 @@ class Input(TomlTable):
         "for other controls",
         default="incremental",
     )
+    arc_without_centre: Literal["alarm", "line"] = key(
+        'G02 or G03 without R, I, J, K: "alarm" 0022, or a "line" to its end',
+        fanuc="3403#5",
+        default="alarm",
+        assumed=True,
+    )
     tool_change_unknown_axes: Annotated[str, Strict(), Field(pattern=r"^X?Y?Z?$")] = key(
         "axes whose position is not known after M06, until they are programmed again; letters of XYZ in this order",
         default="XYZ",

@@ -41,6 +41,7 @@ def reader_options(
     options.absolute_arc_centres = machine.input.arc_centre == "absolute" and not emitted
     options.least_increment_mm = machine.controller.least_increment_mm
     options.least_increment_inch = machine.controller.least_increment_inch
+    options.arc_without_centre_is_line = machine.input.arc_without_centre == "line"
     options.arc_tolerance_mm = machine.controller.arc_radius_tolerance_mm
     options.max_line_length = machine.input.max_line_length
     options.unknown_after_tool_change = [axis in machine.input.tool_change_unknown_axes for axis in "XYZ"]

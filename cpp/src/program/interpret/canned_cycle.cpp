@@ -28,11 +28,15 @@ class Hole {
         moves_(moves) {}
 
   Vector3 drill() {
-    if (cycle_.code == 87) {
+    if (cycle_.code == 87 && cycle_.has_bottom) {
       bore_back();
       return position_;
     }
     rapid(cycle_.r_mm);
+    if (!cycle_.has_bottom) {
+      rapid(cycle_.return_to_r ? cycle_.r_mm : cycle_.initial_mm);
+      return position_;
+    }
     if (cuts_in_steps(cycle_)) {
       peck();
     } else {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/text.hpp"
 #include "program/interpret/interpreter_impl.hpp"
 #include "shapegcode/error.hpp"
 
@@ -61,7 +62,9 @@ void Interpreter::note(std::size_t segment) {
   }
   if (words().has('N')) {
     entry.comment_length = 0;
+    const std::string_view written = block_->text_of(words()['N']);
     entry.n_number = static_cast<std::int32_t>(words()['N'].value);
+    entry.n_digits = static_cast<std::uint32_t>(std::ranges::count_if(written, is_digit));
     region_->notes.push_back(entry);
   }
 }
@@ -158,7 +161,7 @@ void Interpreter::execute(const ParsedBlock& block, std::uint32_t line, const Li
   if (words().has('S')) {
     state_.spindle_rev_per_min = words()['S'].value;
   }
-  flow.motion = words().has_any(axis_letters | centre_letters) && !one_shot_axes_;
+  flow.motion = words().has_any(state_.cycle != 80 ? hole_letters : axis_letters | centre_letters) && !one_shot_axes_;
   if (words().has_any(other_axis_letters)) {
     if (state_.motion != 0 && state_.cycle == 80) {
       warn("move of a rotary or additional axis is passed through untouched");

@@ -92,6 +92,7 @@ void Interpreter::cycle_code(int whole) {
     cycle_ = CannedCycle{};
     cycle_.clearance_mm = options_.peck_clearance_mm;
     cycle_.initial_mm = state_.position_mm[plane_normal(state_.plane)];
+    cycle_.r_mm = cycle_.bottom_mm = cycle_.initial_mm;
   }
   state_.cycle = whole;
 }
@@ -141,6 +142,7 @@ void Interpreter::read_code(int g_tenths, Group group, std::uint32_t column, Lin
       flow.stop = true;
     }
     distance_given_ = distance_given_ || group == Group::distance;
+    units_given_ = units_given_ || group == Group::units;
     if (group == Group::feed_mode && changes) {
       state_.feed = 0.0;  // the old F has another unit
     }
@@ -204,7 +206,9 @@ void Interpreter::dwell() {
     seconds = x.has_point || options_.calculator_decimal_point ? x.value : x.value * 1e-3;
     time = &x;
   } else {
-    fail("G04 needs P (milliseconds) or X (seconds)");
+    warn("G04 without P (milliseconds) or X (seconds): a stop, no dwell");
+    close_region();
+    return;
   }
   if (seconds < 0.0) {
     alarm(6, fmt::format("dwell G04 {}{} is negative", time->letter, time->value), time->column);

@@ -22,6 +22,8 @@ namespace shapegcode::detail {
 
 inline constexpr std::uint32_t axis_letters = letter_mask("XYZ");
 inline constexpr std::uint32_t centre_letters = letter_mask("IJK");
+// What makes a block of a drilling cycle drill; one without these stores neither Q nor P and moves nothing.
+inline constexpr std::uint32_t hole_letters = letter_mask("XYZR");
 inline constexpr std::uint32_t other_axis_letters = letter_mask("ABCUVW");
 // What a block of a region may carry beside G codes; any other word makes it a stop.
 inline constexpr std::uint32_t region_letters = letter_mask("XYZIJKRFN");
@@ -124,6 +126,7 @@ class Interpreter {
   bool explicit_exact_stop_ = false;
   bool one_shot_axes_ = false;  ///< axis words belong to a one-shot code
   bool distance_given_ = false;
+  bool units_given_ = false;
   bool ended_ = false;
   bool look_ahead_ = false;  ///< a look-ahead mode was switched on by the program
   Vector3 local_offset_ = Vector3::Zero();
@@ -132,7 +135,10 @@ class Interpreter {
   std::uint64_t cycle_moves_ = 0;  ///< that the cycles came to so far
   std::uint32_t seen_no_point_ = 0;
   std::uint32_t seen_distance_ = 0;
+  std::uint32_t seen_units_ = 0;
   std::uint32_t seen_cycle_point_ = 0;
+  std::uint32_t seen_cycle_level_ = 0;
+  std::uint32_t seen_cycle_depth_ = 0;
   std::uint32_t kept_run_line_ = 0;
 };
 

@@ -65,7 +65,9 @@ bool Interpreter::target(Vector3& end, std::array<bool, 3>& known_after, bool& r
 }
 
 Segment Interpreter::cutting_segment(const Vector3& end) const {
-  if (state_.motion == 1) {
+  const std::uint32_t across = 1U << static_cast<unsigned>('I' - 'A' + plane_normal(state_.plane));
+  const bool without_centre = !words().has('R') && !words().has_any(centre_letters & ~across);
+  if (state_.motion == 1 || (without_centre && options_.arc_without_centre_is_line)) {
     Segment segment = make_line(state_.position_mm, end, 0.0, line_number_);
     segment.feed_mm_per_s = feed_mm_per_s(segment.length_mm);
     return segment;
@@ -109,6 +111,13 @@ void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t beg
   if (!distance_given_) {
     warn_once(seen_distance_, fmt::format("neither G90 nor G91 before the first move: G{} assumed (power_on.distance)",
                                           state_.distance));
+  }
+  if (!units_given_) {
+    const bool inch = state_.units == 20;
+    warn_once(seen_units_,
+              fmt::format("neither G20 nor G21 before the first move: X100. is read as 100 {}, and would be "
+                          "{} (power_on.units)",
+                          inch ? "inch" : "mm", inch ? "100 mm" : "2540 mm in inch"));
   }
   for (char letter : {'X', 'Y', 'Z', 'I', 'J', 'K', 'R'}) {
     if (words().has(letter) && !words()[letter].has_point && words()[letter].value != 0.0) {
@@ -239,10 +248,18 @@ void Interpreter::read_cycle_words(int axis) {
   if (words().has('R')) {
     const double value = length_mm(words()['R']);
     cycle_.r_mm = incremental ? cycle_.initial_mm + value : value;
+    cycle_.has_r = true;
+  } else if (!cycle_.has_r) {
+    warn_once(seen_cycle_level_,
+              fmt::format("drilling cycle G{} without R: R is the level at which the cycle began", state_.cycle));
   }
   if (words().has(depth_letter)) {
     const double value = length_mm(words()[depth_letter]);
     cycle_.bottom_mm = incremental ? cycle_.r_mm + value : value;
+    cycle_.has_bottom = true;
+  } else if (!cycle_.has_bottom) {
+    warn_once(seen_cycle_depth_,
+              fmt::format("drilling cycle G{} without {}: nothing is drilled", state_.cycle, depth_letter));
   }
   if (words().has('Q')) {
     cycle_.peck_mm = std::abs(length_mm(words()['Q']));

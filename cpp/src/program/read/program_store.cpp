@@ -29,56 +29,75 @@ std::int64_t leading_number(std::string_view line, char letter) noexcept {
   return scan_whole(line, i);
 }
 
-// The number of "DO m" or "END m" at the end of a macro line: 0 if it is none. A comment may hold anything.
-int loop_number(std::string_view line, std::string_view keyword) {
+// The number of "END m" or "EN m" at the end of a macro line: 0 if it is none. A comment may hold anything.
+int end_number(std::string_view line) {
   std::string plain;
   bool comment = false;
   for (const char c : line) {
     comment = comment || c == '(';
-    if (!comment && c != ' ' && c != '\t') {
+    if (!comment && c != ' ' && c != '\t' && c != '\r') {
       plain += upper(c);
     }
     comment = comment && c != ')';
   }
-  const auto at = plain.rfind(keyword);
-  if (at == std::string::npos || at + keyword.size() >= plain.size()) {
-    return 0;
+  std::size_t digits = plain.size();
+  while (digits > 0 && is_digit(plain[digits - 1])) {
+    --digits;
   }
-  const char digit = plain[at + keyword.size()];
-  // Not the tail of another word, as in WHILE[..]DO1 the DO is preceded by a bracket or stands first.
-  const bool own = at == 0 || !(plain[at - 1] >= 'A' && plain[at - 1] <= 'Z');
-  return own && digit >= '1' && digit <= '3' ? digit - '0' : 0;
+  std::size_t letters = digits;
+  while (letters > 0 && plain[letters - 1] >= 'A' && plain[letters - 1] <= 'Z') {
+    --letters;
+  }
+  const std::string_view word = std::string_view(plain).substr(letters, digits - letters);
+  const bool one_digit = digits + 1 == plain.size() && plain[digits] >= '1' && plain[digits] <= '3';
+  return one_digit && (word == "END" || word == "EN") ? plain[digits] - '0' : 0;
 }
 
-// The lines that begin with O, in their order. Only the letters O are looked at: a plain program of a million lines has
-// hardly any.
+// The lines that begin a program (O, a colon, a name in < >) or a folder (&F=), in their order. Only those characters
+// are looked at: a plain program of a million lines has hardly any.
 class ProgramHeads {
  public:
+  enum class Kind : std::uint8_t { number, name, folder };
   struct Head {
     std::size_t begin;  // of the line
-    std::int64_t number;
+    Kind kind;
+    std::int64_t number;  // -1: has none
   };
 
   ProgramHeads(const std::string& text, const TapeFrame& frame)
-      : text_(std::string_view(text).substr(0, frame.end)),
-        from_(frame.begin),
-        next_{find('O', frame.begin), find('o', frame.begin)} {}
+      : text_(std::string_view(text).substr(0, frame.end)), from_(frame.begin) {
+    for (std::size_t k = 0; k < marks.size(); ++k) {
+      next_[k] = find(marks[k], frame.begin);
+    }
+  }
 
   std::optional<Head> next() {
     for (;;) {
-      const std::size_t at = std::min(next_[0], next_[1]);
+      const auto nearest = std::min_element(next_.begin(), next_.end());
+      const std::size_t at = *nearest;
       if (at == text_.size()) {
         return std::nullopt;
       }
-      const std::size_t which = next_[0] == at ? 0 : 1;
-      next_[which] = find(which == 0 ? 'O' : 'o', at + 1);
+      const char mark = marks[static_cast<std::size_t>(nearest - next_.begin())];
+      *nearest = find(mark, at + 1);
       const std::size_t newline = at == 0 ? std::string_view::npos : text_.rfind('\n', at - 1);
       const std::size_t begin = std::max(newline == std::string_view::npos ? 0 : newline + 1, from_);
-      const std::int64_t number = leading_number(text_.substr(begin), 'O');
       std::size_t first = begin;
-      skip_spaces(text_, first);
-      if (number >= 0 && first == at) {
-        return Head{begin, number};
+      while (first < at && (text_[first] == ' ' || text_[first] == '\t' || text_[first] == '\r')) {
+        ++first;
+      }
+      if (first != at) {
+        continue;
+      }
+      if (mark == '&' || mark == '<') {
+        return Head{begin, mark == '&' ? Kind::folder : Kind::name, -1};
+      }
+      const std::string_view line = text_.substr(at);
+      const std::int64_t number = leading_number(line, mark == ':' ? ':' : 'O');
+      std::size_t behind = 1;
+      skip_spaces(line, behind);
+      if (number >= 0 || (behind < line.size() && line[behind] == '<' && mark != ':')) {
+        return Head{begin, number >= 0 ? Kind::number : Kind::name, number};
       }
     }
   }
@@ -88,9 +107,11 @@ class ProgramHeads {
     return std::min(text_.find(letter, from), text_.size());
   }
 
+  static constexpr std::array<char, 5> marks = {'O', 'o', ':', '<', '&'};
+
   std::string_view text_;
   std::size_t from_;
-  std::array<std::size_t, 2> next_;
+  std::array<std::size_t, marks.size()> next_{};
 };
 
 }  // namespace
@@ -127,17 +148,17 @@ TapeFrame find_frame(const std::string& text) {
   const auto last_line = static_cast<std::uint32_t>(1 + std::count(text.begin(), text.end(), '\n'));
   TapeFrame frame;
   frame.framed = first != std::string::npos;
-  // One '%' alone is half a tape: the other half is missing. None at all is a text without tape marks; then M30 or M02
-  // must show that it is whole.
-  if (frame.framed && second == std::string::npos) {
-    if (leads) {
-      throw Error(ErrorKind::program, "no line '%' at the end of the program: truncated?", last_line, 1);
-    }
-    throw Error(ErrorKind::program, "a line '%' at the end of the program, but none at its start", 1, 1);
+  // A '%' at the start alone is half a tape: the end is missing. None at all is a text without tape marks; then M30 or
+  // M02 must show that it is whole. One at the end alone was left behind when the start was cut off: nothing is lost.
+  if (frame.framed && second == std::string::npos && leads) {
+    throw Error(ErrorKind::program, "no line '%' at the end of the program: truncated?", last_line, 1);
   }
   frame.begin = 0;
   frame.end = text.size();
-  if (frame.framed) {
+  frame.no_start = frame.framed && second == std::string::npos;
+  if (frame.no_start) {
+    frame.end = first;
+  } else if (frame.framed) {
     frame.begin = std::min(text.find('\n', first), text.size() - 1) + 1;
     frame.end = second;
   }
@@ -159,7 +180,9 @@ bool ProgramUnit::next_line(LinePlace& place, std::string_view& line, std::size_
     --stop;
   }
   line = std::string_view(data + begin, stop - begin);
-  place.at = next;
+  // A punched end of block may be LF CR CR.
+  const bool punched = next + 2 <= end && data[next - 1] == '\n' && data[next] == '\r' && data[next + 1] == '\r';
+  place.at = next + (punched ? 2 : 0);
   ++place.line;
   return true;
 }
@@ -202,7 +225,7 @@ std::optional<LinePlace> ProgramUnit::behind_end(int loop, const LinePlace& from
   std::size_t begin = 0;
   std::optional<LinePlace> found;
   while (!found && next_line(place, line, begin)) {
-    if (loop_number(line, "END") == loop) {
+    if (end_number(line) == loop) {
       found = place;
     }
   }
@@ -221,9 +244,10 @@ void ProgramStore::add(const std::string& text, const TapeFrame& frame, std::uin
     return unit;
   };
   auto unit = unit_at({frame.begin, frame.first_line}, -1);
+  bool headed = false;  // the unit has its O number or name
   const auto close = [&](std::size_t at) {
-    const ProgramUnit* twin = unit->number < 0 ? nullptr : find(unit->number);
-    if (twin != nullptr && twin->file == file) {
+    const ProgramUnit* twin = unit->number <= 0 ? nullptr : find(unit->number, unit.get());
+    if (twin != nullptr && twin->file == file && twin->folder == unit->folder) {
       throw alarm_error(
           73, fmt::format("program O{} stands twice in the file, first in line {}", unit->number, twin->first.line),
           unit->first.line, 1);
@@ -237,26 +261,40 @@ void ProgramStore::add(const std::string& text, const TapeFrame& frame, std::uin
     here.line += static_cast<std::uint32_t>(std::count(text.begin() + static_cast<std::ptrdiff_t>(here.at),
                                                        text.begin() + static_cast<std::ptrdiff_t>(head->begin), '\n'));
     here.at = head->begin;
-    if (head->number == 0 || head->number > 99'999'999) {
+    if (head->number > 99'999'999) {
       throw alarm_error(74, fmt::format("program number O{} outside 1 ... 99999999", head->number), here.line, 1);
     }
-    if (unit->number < 0) {
-      unit->number = head->number;  // what stands before the first O line belongs to its program
-      continue;
+    if (headed) {
+      const std::uint32_t folder = unit->folder;
+      close(head->begin);
+      unit = unit_at(here, -1);
+      unit->folder = folder;
+      headed = false;
     }
-    close(head->begin);
-    unit = unit_at(here, head->number);
+    if (head->kind == ProgramHeads::Kind::folder) {
+      ++unit->folder;
+    } else {
+      unit->number = head->number;  // what stands before the first head belongs to its program
+      headed = true;
+    }
   }
-  close(frame.end);
+  if (headed || units_.empty() || unit->first.at < frame.end) {
+    close(frame.end);
+  }
 }
 
-ProgramUnit* ProgramStore::find(std::int64_t number) noexcept {
+ProgramUnit* ProgramStore::find(std::int64_t number, const ProgramUnit* from) noexcept {
+  ProgramUnit* found = nullptr;
   for (const auto& unit : units_) {
-    if (unit->number == number) {
-      return unit.get();
+    const bool here = from != nullptr && unit->file == from->file && unit->folder == from->folder;
+    if (unit->number == number && (found == nullptr || here)) {
+      found = unit.get();
+      if (here) {
+        break;
+      }
     }
   }
-  return nullptr;
+  return found;
 }
 
 }  // namespace shapegcode::detail

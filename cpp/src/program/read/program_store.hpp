@@ -20,9 +20,10 @@ struct TapeFrame {
   std::size_t end = 0;           ///< the closing '%'
   std::uint32_t first_line = 1;  ///< line number at `begin`
   bool framed = false;           ///< has its '%' lines
+  bool no_start = false;         ///< has the closing one alone
 };
 
-/// Finds the frame. Throws Error(program) on an empty text, a zero byte, one '%' without the other.
+/// Finds the frame. Throws Error(program) on an empty text, a zero byte, a '%' at the start without one at the end.
 [[nodiscard]] TapeFrame find_frame(const std::string& text);
 
 /// A place in a text: offset of a line's first byte and the line's number.
@@ -33,8 +34,9 @@ struct LinePlace {
 
 /// One program: an O number and its lines.
 struct ProgramUnit {
-  std::int64_t number = -1;  ///< -1: the text has no O line
+  std::int64_t number = -1;  ///< -1: the text has no O line, or a name; 0: O0000
   std::uint32_t file = 0;
+  std::uint32_t folder = 0;  ///< of a memory punch, counted by its "&F=" lines
   const std::string* text = nullptr;
   LinePlace first;
   std::size_t end = 0;
@@ -56,9 +58,10 @@ struct ProgramUnit {
 
 class ProgramStore {
  public:
-  /// Splits a text into its programs. Throws alarm 0073 on an O number given twice.
+  /// Splits a text into its programs. Throws alarm 0073 on an O number given twice in a folder.
   void add(const std::string& text, const TapeFrame& frame, std::uint32_t file);
-  [[nodiscard]] ProgramUnit* find(std::int64_t number) noexcept;
+  /// That of the same file and folder as `from`, if there is one there.
+  [[nodiscard]] ProgramUnit* find(std::int64_t number, const ProgramUnit* from = nullptr) noexcept;
   [[nodiscard]] const std::vector<std::unique_ptr<ProgramUnit>>& units() const noexcept { return units_; }
 
  private:

@@ -44,6 +44,12 @@ void Reader::load_main() {
   const auto end_of_line = text.find('\n');
   if (end_of_line != std::string::npos && end_of_line > 0 && text[end_of_line - 1] == '\r') {
     program_.line_end = "\r\n";
+  } else if (end_of_line != std::string::npos && text.compare(end_of_line, 3, "\n\r\r") == 0) {
+    program_.line_end = "\n\r\r";
+  }
+  if (frame.no_start) {
+    program_.warnings.push_back(
+        {1, "no line '%' at the start: a control that reads from a tape skips all before one", 0, 0, ""});
   }
   program_.header_offset = frame.begin;
   program_.line_count =
@@ -181,6 +187,15 @@ Program Reader::run() {
   while (running) {
     try {
       running = step();
+    } catch (const UnknownValue& unknown) {
+      // A macro of a probe asks what only the control knows: it is read again as a call that nobody looks into.
+      if (frames_.size() > 1 && !looks_not_into(frames_.back().unit->number)) {
+        throw OpaqueProgram{frames_.back().unit->number};
+      }
+      if (!options_.collect_alarms) {
+        throw located(unknown);
+      }
+      running = record(unknown);
     } catch (const Error& error) {
       if (!options_.collect_alarms) {
         throw located(error);
@@ -191,6 +206,10 @@ Program Reader::run() {
   }
   finish();
   return result();
+}
+
+bool Reader::looks_not_into(std::int64_t number) const noexcept {
+  return std::ranges::find(options_.not_looked_into, number) != options_.not_looked_into.end();
 }
 
 Program Reader::result() {
@@ -236,7 +255,7 @@ void Reader::line(std::string_view text, std::size_t begin, std::size_t end) {
   }
   if (line_.macro) {
     macro_line(begin);
-  } else if (line_.sorted().has('O') && !is_call(line_.sorted())) {
+  } else if (line_.folder || !line_.program_name.empty() || (line_.sorted().has('O') && !is_call(line_.sorted()))) {
     program_line(end);
   } else {
     plain_line(begin, end);
@@ -246,14 +265,23 @@ void Reader::line(std::string_view text, std::size_t begin, std::size_t end) {
 // The O line at a program's head: that of a called program becomes a comment.
 void Reader::program_line(std::size_t end) {
   interpreter_.require_plain_words(line_.sorted(), here_.line);
-  const auto number = static_cast<std::int64_t>(line_.sorted()['O'].value);
+  const bool numbered = line_.sorted().has('O');
+  const auto number = numbered ? static_cast<std::int64_t>(line_.sorted()['O'].value) : -1;
+  if (number == 0) {
+    warn("program number O0: a control gives it another one or refuses it (alarm 0074)");
+  }
   std::string comments;
   for (std::size_t i = 0; i < line_.comment_count; ++i) {
     comments += line_.comments[i];
   }
   if (frames_.size() > 1) {
     // A call does not stop the motion: its comment may stand inside of a region.
-    rewriter_.comment("(" + program_name(number) + ")" + comments, origin_);
+    if (!line_.folder) {
+      const std::string_view name = line_.program_name;
+      rewriter_.comment(
+          "(" + (numbered ? program_name(number) : std::string(name.substr(1, name.size() - 2))) + ")" + comments,
+          origin_);
+    }
     return;
   }
   interpreter_.close_region();
@@ -368,7 +396,16 @@ void Reader::finish() {
 namespace shapegcode {
 
 Program read_program(std::string text, const ReaderOptions& options) {
-  return detail::Reader(std::move(text), options).run();
+  ReaderOptions again = options;
+  for (;;) {
+    detail::Reader reader(std::move(text), again);
+    try {
+      return reader.run();
+    } catch (const detail::OpaqueProgram& opaque) {
+      text = reader.take_text();
+      again.not_looked_into.push_back(opaque.number);
+    }
+  }
 }
 
 }  // namespace shapegcode

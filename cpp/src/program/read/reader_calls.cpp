@@ -250,7 +250,7 @@ void Reader::modal_calls() {
 }
 
 ProgramUnit* Reader::lookup(std::int64_t number) {
-  ProgramUnit* unit = store_.find(number);
+  ProgramUnit* unit = store_.find(number, frames_.empty() ? nullptr : frames_.back().unit);
   if (unit != nullptr || !options_.load_program || sought_.contains(number)) {
     return unit;
   }
@@ -279,8 +279,12 @@ ProgramUnit* Reader::lookup(std::int64_t number) {
 bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool macro, int repeats, std::uint32_t column,
                    std::string_view text) {
   ProgramUnit* unit = lookup(number);
-  if (unit == nullptr) {
-    if (!text.empty() && number >= options_.opaque_programs[0] && number <= options_.opaque_programs[1]) {
+  const bool shut = unit != nullptr && looks_not_into(number);
+  if (shut && text.empty()) {
+    fail("program " + program_name(number) + " asks for values that only the control knows", column);
+  }
+  if (unit == nullptr || shut) {
+    if (shut || (!text.empty() && number >= options_.opaque_programs[0] && number <= options_.opaque_programs[1])) {
       // A macro of the machine or of a probe: kept, and what it did is not known.
       rewriter_.flush();
       interpreter_.close_region();
@@ -288,7 +292,8 @@ bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool ma
       interpreter_.forget_all();
       variables_.forget();
       warn("program " + program_name(number) +
-           " is not at hand: the call is kept, position and variables are not known afterwards");
+           (shut ? " asks for values that only the control knows" : " is not at hand") +
+           ": the call is kept, position and variables are not known afterwards");
       return false;
     }
     alarm(78, "program " + program_name(number) + " is not found", column);

@@ -50,10 +50,17 @@ class ControlVariables : public SystemVariables {
 /// O0012: at least four digits.
 [[nodiscard]] std::string program_name(std::int64_t number);
 
+/// Thrown by a reading: a program that it called asks for values that only the control knows.
+struct OpaqueProgram {
+  std::int64_t number;
+};
+
 class Reader {
  public:
   Reader(std::string text, const ReaderOptions& options);
   Program run();
+  /// The text that was handed over, behind a `run` that ended with OpaqueProgram.
+  [[nodiscard]] std::string take_text() noexcept { return std::move(sources_.front().text); }
 
  private:
   struct Loop {
@@ -77,6 +84,7 @@ class Reader {
   };
 
   // Texts and lines.
+  [[nodiscard]] bool looks_not_into(std::int64_t number) const noexcept;
   void load_main();
   void expand_from(std::size_t begin);
   bool step();

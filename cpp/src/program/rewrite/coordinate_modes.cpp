@@ -34,7 +34,8 @@ Vector3 CoordinateModes::rotate(const Vector3& point, double sense) const noexce
   }
   const ArcFrame plane(rotation_normal);
   const double c = std::cos(rotation_rad);
-  const double s = sense * std::sin(rotation_rad);
+  // Where the plane is mirrored, clockwise and counter-clockwise change places, for an angle as for an arc.
+  const double s = (flips(rotation_normal) ? -sense : sense) * std::sin(rotation_rad);
   const Eigen::Vector2d way = plane.way(rotation_centre, point);
   Vector3 turned = point;
   turned[plane.a] = rotation_centre[plane.a] + c * way.x() - s * way.y();

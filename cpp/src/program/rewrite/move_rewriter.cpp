@@ -115,7 +115,7 @@ void MoveRewriter::block(const ParsedBlock& block, const LineOrigin& origin) {
   const bool own_axes = has_any_code(words, mode_data_codes) || has_any_code(words, machine_coordinate_codes) ||
                         (words.groups & group_bit(Group::unknown_position)) != 0 || has_code(words, 40);
   const bool drills = programmed_.cycle != 80 && !own_axes;
-  if (drills && words.has_any(axis_letters | letter_mask("RKL"))) {
+  if (drills && words.has_any(hole_letters)) {
     drill_holes(std::move(item));
     return;
   }
@@ -141,8 +141,14 @@ void MoveRewriter::drill_holes(Item item) {
     read_cycle(hole, data_only);
     item.head.clear();
     item.tail.clear();
+    const Vector3 place = hole_;
     enqueue(std::move(hole));
     synchronise();
+    // Of several holes in G91 each is a step from where the one before should be, not from its rounded place.
+    const ArcFrame plane(plane_normal(programmed_.plane));
+    for (const int axis : {plane.a, plane.b}) {
+      programmed_point_[axis] = place[axis];
+    }
   }
 }
 
@@ -391,6 +397,7 @@ void MoveRewriter::read_cycle(Item& item, bool data_only) {
     polar_angle_rad_ = angle;
   }
   const Vector3 target = modes_.apply(end);
+  hole_ = end;
   item.move = item.cycle = true;
   item.increment_mm = target - programmed_.position_mm;
   item.segment = make_line(programmed_.position_mm, target, 0.0, origin_.line);

@@ -95,6 +95,7 @@ class MoveRewriter {
   Put put_;
 
   ModalState programmed_;                       // position in work coordinates, exact
+  Vector3 hole_ = Vector3::Zero();              ///< place of the last hole, as programmed
   Vector3 programmed_point_ = Vector3::Zero();  // the same before the coordinate modes
   CoordinateModes modes_;
   bool polar_ = false;

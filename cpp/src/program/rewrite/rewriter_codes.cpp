@@ -88,13 +88,15 @@ void MoveRewriter::set_compensation(int code) {
     return;
   }
   const BlockWords& words = *words_;
-  const int number = words.has('D') ? static_cast<int>(words['D'].value) : d_number_;
-  const std::uint32_t column = words.has('D') ? words['D'].column : 1;
-  if (number < 0) {
-    fail(fmt::format("cutter compensation G{} without an offset number D", code), column);
+  // Offset number 0 is a radius of 0, and so is none at all.
+  const int number = words.has('D') ? static_cast<int>(words['D'].value) : std::max(d_number_, 0);
+  if (!words.has('D') && d_number_ < 0) {
+    program_.warnings.push_back(
+        {origin_.line, fmt::format("cutter compensation G{} without an offset number D: its radius is 0", code), 0, 0,
+         program_.files[origin_.file]});
   }
   d_number_ = number;
-  const auto radius = interpreter_.offsets().radius(number);
+  const auto radius = number == 0 ? std::optional(0.0) : interpreter_.offsets().radius(number);
   // While the control compensates with a radius that is not known, it cannot be told to stand where the tool would.
   if (!radius || programmed_.compensation != 40) {
     // The moves stay as they are, and their path is not known.

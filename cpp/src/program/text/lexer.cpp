@@ -30,6 +30,7 @@ std::string quoted(char c) {
   return std::string("byte 0x") + hex[byte >> 4] + hex[byte & 15];
 }
 
+// Two letters and more stand for the whole word, as on the control: WH[...]DO1 ... EN1.
 bool is_macro_keyword(std::string_view text, std::size_t i) noexcept {
   std::array<char, 5> run{};
   std::size_t size = 0;
@@ -39,7 +40,7 @@ bool is_macro_keyword(std::string_view text, std::size_t i) noexcept {
   const std::string_view word(run.data(), size);
   for (const std::string_view keyword :
        {"IF", "THEN", "GOTO", "WHILE", "DO", "END", "POPEN", "DPRNT", "PCLOS", "BPRNT"}) {
-    if (word.starts_with(keyword)) {
+    if (size >= 2 && (keyword.starts_with(word) || word.starts_with(keyword))) {
       return true;
     }
   }
@@ -126,6 +127,23 @@ bool scan_corner_word(std::string_view text, std::uint32_t line, std::size_t& i,
   return true;
 }
 
+// "<NAME>" or "O<NAME>" in the place of an O number.
+bool scan_program_name(std::string_view text, std::uint32_t line, std::size_t& i, Block& block) {
+  std::size_t open = i + (upper(text[i]) == 'O' ? 1 : 0);
+  skip_spaces(text, open);
+  if (open >= text.size() || text[open] != '<' || block.word_count > 0) {
+    return false;
+  }
+  constexpr std::size_t longest_name = 32;
+  const std::size_t close = text.find('>', open);
+  if (close == std::string_view::npos || close == open + 1 || close - open - 1 > longest_name) {
+    fail(fmt::format("a program name is <...> of 1 to {} characters", longest_name), line, open);
+  }
+  block.program_name = text.substr(open, close + 1 - open);
+  i = close + 1;
+  return true;
+}
+
 [[noreturn]] void refuse_character(std::string_view text, std::uint32_t line, std::size_t i, const Block& block) {
   const char c = text[i];
   if ((c == '.' || c == '-') && block.word_count > 0 && block.words[block.word_count - 1].end == i) {
@@ -146,6 +164,8 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
   block.word_count = 0;
   block.comment_count = 0;
   block.optional_skip = false;
+  block.program_name = {};
+  block.folder = false;
   block.macro = false;
   const std::size_t n = text.size();
   if (n > max_length) {
@@ -154,6 +174,9 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
   std::size_t i = 0;
   while (i < n && !block.macro) {
     const char c = text[i];
+    if ((c == '<' || upper(c) == 'O') && scan_program_name(text, line, i, block)) {
+      continue;
+    }
     if (is_letter(c)) {
       ++i;
       block.macro = !scan_word(text, line, i, upper(c), block);
@@ -161,6 +184,12 @@ void scan_block(std::string_view text, std::uint32_t line, std::size_t max_lengt
       ++i;
     } else if (c == '(') {
       scan_comment(text, line, i, block);
+    } else if (c == ':' && block.word_count == 0) {
+      ++i;  // ISO tapes write :0001 for O0001
+      block.macro = !scan_word(text, line, i, 'O', block);
+    } else if (c == '&' && block.word_count == 0) {
+      block.folder = true;
+      i = n;
     } else if (c == '/') {
       scan_block_skip(text, line, i, block);
     } else if (c == '#' || c == '[' || c == ']' || c == '=') {

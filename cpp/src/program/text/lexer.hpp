@@ -25,18 +25,20 @@ struct Block {
   std::array<std::string_view, max_comments> comments;  ///< each with its parentheses
   std::size_t comment_count = 0;
   bool optional_skip = false;
-  int skip_switch = 1;  ///< of "/" or "/1" ... "/9"
-  bool macro = false;   ///< a custom macro statement, or words with expressions: words and comments are not complete
+  int skip_switch = 1;            ///< of "/" or "/1" ... "/9"
+  std::string_view program_name;  ///< of a line "<NAME>" or "O<NAME>", with its brackets; empty: none
+  bool folder = false;            ///< a line "&F=/..." of a memory punch: the folder of the programs behind it
+  bool macro = false;  ///< a custom macro statement, or words with expressions: words and comments are not complete
 
   [[nodiscard]] const Word* begin() const noexcept { return words.data(); }
   [[nodiscard]] const Word* end() const noexcept { return words.data() + word_count; }
 };
 
-/// Splits one line (without its line end) into words. `line` counts from 1 and goes into errors.
-/// Throws Error(program) with line and column on: a byte that is no program character, a letter without a number, a
-/// comment that does not close, more than 40 words or 8 comments, more than 8 digits in a number, a decimal point in an
-/// address that takes whole numbers, a line longer than `max_length` characters. Stops with `block.macro` at the first
-/// sign of a custom macro statement.
+/// Splits one line (without its line end) into words. A colon in the place of an O number is read as O. `line` counts
+/// from 1 and goes into errors. Throws Error(program) with line and column on: a byte that is no program character, a
+/// letter without a number, a comment that does not close, more than 40 words or 8 comments, more than 8 digits in a
+/// number, a decimal point in an address that takes whole numbers, a line longer than `max_length` characters. Stops
+/// with `block.macro` at the first sign of a custom macro statement.
 void scan_block(std::string_view text, std::uint32_t line, std::size_t max_length, Block& block);
 
 }  // namespace shapegcode

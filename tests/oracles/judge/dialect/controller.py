@@ -141,9 +141,11 @@ class Controller(Motion, Offsets):
         elif code == "G68":
             if "R" not in block:
                 raise self.fail("G68 without R", 0)
+            t.turn_centre = None
             here = t.backward(self.position)
             t.turn_axes = self.axes[:2]
-            t.turn_centre = np.array([named.get(k, here[k]) if k in t.turn_axes else 0.0 for k in range(3)])
+            # Operator's manuals: in scaling mode the centre is scaled, the angle is not; so is the mirror.
+            t.turn_centre = t.forward(np.array([named.get(k, here[k]) if k in t.turn_axes else 0.0 for k in range(3)]))
             t.turn_rad = math.radians(block.counted("R", 0.001))
         elif code == "G50":
             t.scale_centre, t.factors = None, np.ones(3)

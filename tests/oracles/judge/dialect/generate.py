@@ -92,8 +92,8 @@ def coordinate_programs(draw: Draw) -> str:
             modes.append(("G51.1" + axes.format(draw(whole), draw(whole)), "G50.1X0Y0"))
         elif choice == 2:
             modes.append((f"G51X0Y0Z0P{draw(st.integers(2, 30)) * 100}", "G50"))
-        if choice in (2, 3):
-            modes.append((f"G68X0Y0R{draw(st.integers(-1800, 1800)) / 10}", "G69"))
+        if choice in (1, 2, 3) and draw(st.booleans()):
+            modes.append((f"G68X{draw(whole)}.Y{draw(whole)}.R{draw(st.integers(-1800, 1800)) / 10}", "G69"))
         lines += [on for on, _ in modes]
         x, y = draw(whole), draw(whole)
         lines += [f"G90G00X{x}.Y{y}.", "G01Z-2.F100."]

@@ -69,10 +69,9 @@ class Motion:
 
     def motion_block(self: Controller, block: BlockWords) -> None:
         if self.modal["cycle"] != "G80":
+            # Operator's manual: a block without X, Y, Z, R drills nothing, and its Q and P are not stored.
             if any(letter in block for letter in "XYZR"):
                 self.drill(block)
-            else:
-                self.keep_cycle_words(block)
             return
         arc = self.modal["motion"] in ("G02", "G03")
         if not any(letter in block for letter in ("XYZIJKR" if arc else "XYZ")):

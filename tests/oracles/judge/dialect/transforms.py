@@ -38,7 +38,10 @@ class Transform:
         if self.turn_centre is not None:
             a, b = self.turn_axes
             step = np.eye(4)
-            c, s = math.cos(self.turn_rad), math.sin(self.turn_rad)
+            # Operator's manuals, table of the programmable mirror image: CW and CCW of the rotation change places.
+            mirrored = np.linalg.det(total[np.ix_((a, b), (a, b))]) < 0.0
+            angle = -self.turn_rad if mirrored else self.turn_rad
+            c, s = math.cos(angle), math.sin(angle)
             step[a, a], step[a, b], step[b, a], step[b, b] = c, -s, s, c
             step[:3, 3] = self.turn_centre - step[:3, :3] @ self.turn_centre
             total = step @ total
