@@ -98,10 +98,10 @@ void register_emission(py::module_& module) {
       "Raises ArgumentError on a position outside +-99999.999 mm.");
 
   py::class_<BlockMark>(module, "BlockMark", "An N word or comment to be written before the block that begins there.")
-      .def(py::init([](std::uint32_t period, std::int32_t n_number, const py::bytes& comment) {
-             return BlockMark{period, n_number, static_cast<std::string>(comment)};
+      .def(py::init([](std::uint32_t period, std::int32_t n_number, const py::bytes& comment, std::uint32_t n_digits) {
+             return BlockMark{period, n_number, static_cast<std::string>(comment), n_digits};
            }),
-           py::arg("period"), py::arg("n_number") = -1, py::arg("comment") = py::bytes());
+           py::arg("period"), py::arg("n_number") = -1, py::arg("comment") = py::bytes(), py::arg("n_digits") = 0);
 
   py::class_<WriterOptions>(module, "WriterOptions", "How fitted blocks are written.")
       .def(py::init<>())

@@ -1150,6 +1150,14 @@ class ReaderOptions:
     def arc_tolerance_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def arc_without_centre_is_line(self) -> bool:
+        """
+        G02, G03 without R, I, J, K are lines (parameter 3403#5 = 0); False: alarm 0022.
+        """
+    @arc_without_centre_is_line.setter
+    def arc_without_centre_is_line(self, arg0: bool) -> None:
+        ...
+    @property
     def bindings(self) -> CodeBindings:
         """
         Codes bound to programs.
@@ -1362,6 +1370,11 @@ class RegionNote:
     def comment_offset(self) -> int:
         """
         Byte offset of its comment in the text.
+        """
+    @property
+    def n_digits(self) -> int:
+        """
+        Digits of it as written: N0010 has four.
         """
     @property
     def n_number(self) -> int:
@@ -2670,7 +2683,7 @@ class BlockMark:
     """
     An N word or comment to be written before the block that begins there.
     """
-    def __init__(self, period: typing.SupportsInt | typing.SupportsIndex, n_number: typing.SupportsInt | typing.SupportsIndex = -1, comment: bytes = b'') -> None:
+    def __init__(self, period: typing.SupportsInt | typing.SupportsIndex, n_number: typing.SupportsInt | typing.SupportsIndex = -1, comment: bytes = b'', n_digits: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         ...
 class WriterOptions:
     """

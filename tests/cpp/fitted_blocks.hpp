@@ -117,7 +117,13 @@ inline Findings judge(const Command& command, const std::vector<FittedBlock>& bl
     const Eigen::Index last = n + 1 < blocks.size()
                                   ? static_cast<Eigen::Index>(blocks[n + 1].first_period)
                                   : std::min<Eigen::Index>(first + block.periods, command.grid.rows() - 1);
-    if (block.end != rounded(command, last, options.increment_mm)) ++found.wrong_end;
+    // Half between two increments either is the nearest.
+    bool nearest = true;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      const double exact = command.grid(last, i) / options.increment_mm;
+      nearest = nearest && std::abs(static_cast<double>(block.end[static_cast<std::size_t>(i)]) - exact) <= 0.5 + 1e-6;
+    }
+    if (!nearest) ++found.wrong_end;
     if (block.end == from) ++found.empty;
     for (Eigen::Index i = 0; i < 3; ++i) {
       const auto axis = static_cast<std::size_t>(i);
@@ -137,7 +143,9 @@ inline Findings judge(const Command& command, const std::vector<FittedBlock>& bl
     Eigen::Index moving = first;
     const Position begin = rounded(command, first, options.increment_mm);
     while (moving < last && rounded(command, moving, options.increment_mm) == begin) ++moving;
-    const double slack = options.merge_tolerance_increments + (block.kind == FittedKind::line ? 1e-3 : 0.251);
+    // A straight command (within .05) is off by the rounding of the ends.
+    const double slack = block.kind == FittedKind::line ? std::max(options.merge_tolerance_increments, 0.55) + 1e-3
+                                                        : options.merge_tolerance_increments + 0.251;
     for (Eigen::Index k = first + 1; k < last && moving < last; ++k) {
       const Vector3 p = played.at(static_cast<double>(k - first) / static_cast<double>(last - first));
       const Vector3 off = (p - command.grid.row(k).transpose()).cwiseAbs() / options.increment_mm;

@@ -1,9 +1,11 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <random>
 #include <vector>
 
 #include "fitted_blocks.hpp"
@@ -140,6 +142,64 @@ TEST_CASE("block fit: a move too slow for any F is run faster, in whole periods,
   CHECK(found.wrong_end == 0);
   for (const FittedBlock& block : blocks) CHECK(block.feed >= options.minimum_feed);
   CHECK(found.periods == 400);
+}
+
+namespace {
+
+/// Blocks between the transitions of a line at `units` of F: 6 periods of acceleration at either end.
+int steady_blocks(std::mt19937& random, const FitOptions& options, int units) {
+  const double speed = units * options.feed_unit_mm_per_s;
+  const int last = 500 + static_cast<int>(random() % 4000);
+  const double ramp = 6.0;
+  const double angle = std::array{0.0, 0.3, 0.9272952180016122}[random() % 3];
+  const Vector3 direction(std::cos(angle), std::sin(angle), 0.0);
+  const double phase = std::uniform_real_distribution<>(0.0, 1.0)(random) * options.increment_mm;
+  const auto travelled = [&](double k) {
+    if (k < ramp) return 0.5 * k * k / ramp;
+    if (k < last) return k - 0.5 * ramp;
+    const double past = std::min(k - last, ramp);
+    return last - 0.5 * ramp + past - 0.5 * past * past / ramp;
+  };
+  const Command command = sampled(last + 6, [&](double k) {
+    return Vector3(direction * speed * options.block_period_s * travelled(k) + Vector3(phase, 0.3 * phase, 0.0));
+  });
+  int count = 0;
+  for (const FittedBlock& block : fit(command, options)) {
+    count += block.first_period >= 6 && block.first_period + block.periods <= static_cast<unsigned>(last) ? 1 : 0;
+  }
+  return count;
+}
+
+}  // namespace
+
+TEST_CASE("block fit: a steady line takes few blocks, whatever its F, its direction and the grid") {
+  std::mt19937 random(7);
+  int over_four = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    FitOptions options;
+    options.block_period_s = std::array{0.001, 0.002, 0.004, 0.005, 0.008}[random() % 5];
+    options.merge_tolerance_increments = 0.35;
+    int units = 10 + static_cast<int>(random() % 149990);  // F1 ... F15000 in steps of a tenth
+    if (trial % 4 == 3) {                                  // inch
+      options.increment_mm = 0.00254;
+      options.feed_unit_mm_per_s = 0.1 * 25.4 / 60.0;
+      units = 10 + static_cast<int>(random() % 5900);
+    }
+    // Round feeds move by whole increments: the command may stay half between two of them for its whole length.
+    units = trial % 3 == 0 ? units / 10 * 10 + 10 : trial % 5 == 0 ? units / 600 * 600 + 600 : units;
+    CAPTURE(units);
+    CAPTURE(options.block_period_s);
+    CAPTURE(options.increment_mm);
+    const int count = steady_blocks(random, options, units);
+    CHECK(count <= 8);
+    over_four += count > 4 ? 1 : 0;
+  }
+  CHECK(over_four <= 5);
+  // F60 at 5 ms is five increments a period; so are the others.
+  for (const int units : {600, 4800, 9000, 12000, 30000}) {
+    CAPTURE(units);
+    CHECK(steady_blocks(random, FitOptions{}, units) <= 4);
+  }
 }
 
 TEST_CASE("block fit: a block ends at every break") {

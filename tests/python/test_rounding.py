@@ -25,7 +25,8 @@ def _compare(found: dict[str, list[Outcome]]) -> None:
     # Not always the same number: a path that just leaves its contour tolerance is shaped again, slower.
     blocks = [sum(row.blocks for row in rows) for rows in (nearest, vibration)]
     assert abs(blocks[1] - blocks[0]) < 0.01 * blocks[0]
-    assert sum(row.size for row in vibration) < 1.01 * sum(row.size for row in nearest)
+    # Where the nearest ends leave F as it is, the others may ask for another one.
+    assert sum(row.size for row in vibration) < 1.08 * sum(row.size for row in nearest)
 
 
 def test_a_third_of_the_residual_is_left() -> None:

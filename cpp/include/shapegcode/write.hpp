@@ -33,7 +33,9 @@ struct FitOptions {
   double interpolation_period_s = 0.001;
   double feed_unit_mm_per_s = 0.1 / 60.0;   ///< one step of the last F digit
   std::int64_t minimum_feed = 10;           ///< in feed units
-  double merge_tolerance_increments = 0.5;  ///< deviation of merged blocks from the shaped command, per axis
+  /// Deviation of merged blocks from the shaped command, per axis; where the command is straight the rounding of their
+  /// ends, half an increment, is all that counts.
+  double merge_tolerance_increments = 0.5;
   double arc_min_chord_mm = 0.02;           ///< shorter pieces are lines
   /// What the last block must be, so that the modal motion code behind it is the original's: a control refuses G02 or
   /// G03 alone. An arc that takes the place of a line there has `last_radius_mm` in the plane across `last_normal`.
@@ -74,6 +76,7 @@ struct BlockMark {
   std::uint32_t period = 0;    ///< block period at which it stood
   std::int32_t n_number = -1;  ///< -1: none
   std::string comment;         ///< with its parentheses; empty: none
+  std::uint32_t n_digits = 0;  ///< least digits of the N word: leading zeros are kept
 };
 
 struct WriterOptions {

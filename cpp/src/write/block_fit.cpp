@@ -18,6 +18,7 @@ constexpr double largest_position_mm = 99999.999;
 // How far a line is tried beyond its last good end before it is settled: keeps the fit linear in the program's length.
 constexpr std::uint32_t line_patience = 2048;
 constexpr std::uint32_t longest_arc_periods = 65536;
+constexpr double straight_increments = 0.05;  // from its chord: the command is a steady line
 
 using Position = BlockPosition;
 
@@ -25,6 +26,29 @@ using Position = BlockPosition;
 struct Candidate {
   FittedBlock block;
   std::uint32_t covered = 0;
+};
+
+// The slopes, in increments per period, of lines from a point that stay within a tolerance of every sample so far.
+class Cone {
+ public:
+  explicit Cone(double tolerance_increments) : tolerance_(tolerance_increments) {}
+
+  [[nodiscard]] bool holds(const Vector3& slope) const {
+    return (slope.array() >= lowest_).all() && (slope.array() <= highest_).all();
+  }
+  // Takes a sample in; false if no line is left.
+  bool narrow(const Vector3& offset, double steps) {
+    lowest_ = lowest_.max((offset.array() - tolerance_) / steps);
+    highest_ = highest_.min((offset.array() + tolerance_) / steps);
+    return (lowest_ <= highest_).all();
+  }
+
+ private:
+  static constexpr double endless = std::numeric_limits<double>::infinity();
+
+  double tolerance_;
+  Eigen::Array3d lowest_ = Eigen::Array3d::Constant(-endless);
+  Eigen::Array3d highest_ = Eigen::Array3d::Constant(endless);
 };
 
 class Fitter {
@@ -156,36 +180,41 @@ class Fitter {
     return line;
   }
 
-  // Longest line from period k that stays within the merge tolerance of every sample (an opening cone per axis).
+  // Longest line from period k that stays within the merge tolerance of every sample; or, where the command itself is
+  // straight, one that is off by the rounding of its ends alone.
   std::optional<Candidate> fit_line(std::uint32_t k, std::uint32_t limit) {
-    const double tolerance = options_.merge_tolerance_increments + 1e-6;
-    std::array<double, axis_count> lowest;
-    std::array<double, axis_count> highest;
-    lowest.fill(-std::numeric_limits<double>::infinity());
-    highest.fill(std::numeric_limits<double>::infinity());
+    Cone near(options_.merge_tolerance_increments + 1e-6);
+    Cone straight(straight_increments);
+    const Vector3 start = grid_.row(k) / options_.increment_mm;
+    const Vector3 from(static_cast<double>(position_[0]), static_cast<double>(position_[1]),
+                       static_cast<double>(position_[2]));
     std::optional<Candidate> best;
+    std::optional<Candidate> forward;  // the one whose end is rounded furthest ahead
+    double most_ahead = -std::numeric_limits<double>::infinity();
+    std::uint32_t reached = 0;  // periods over which it could be one line, but for F
     for (std::uint32_t j = k + 1; j <= periods_; ++j) {
       if (best && (j > limit || bends(j - 1) || j - k > best->covered + line_patience)) {
         break;
       }
       const double steps = j - k;
       const Position end = shape_.rounded(j);
-      bool inside = true;
-      bool open = true;
-      for (std::size_t i = 0; i < axis_count; ++i) {
-        const double offset =
-            grid_(j, static_cast<Eigen::Index>(i)) / options_.increment_mm - static_cast<double>(position_[i]);
-        const double slope = static_cast<double>(end[i] - position_[i]) / steps;
-        // The end itself is off by its own rounding, at most half an increment, and need not obey the cone.
-        inside = inside && slope >= lowest[i] && slope <= highest[i];
-        lowest[i] = std::max(lowest[i], (offset - tolerance) / steps);
-        highest[i] = std::min(highest[i], (offset + tolerance) / steps);
-        open = open && lowest[i] <= highest[i];
-      }
+      const Vector3 sample = grid_.row(j) / options_.increment_mm;
+      const Vector3 to(static_cast<double>(end[0]), static_cast<double>(end[1]), static_cast<double>(end[2]));
+      // The end itself is off by its own rounding, at most half an increment, and need not obey the cone.
+      const bool inside_near = near.holds((to - from) / steps);
+      const bool inside = straight.holds((sample - start) / steps) || inside_near;
+      const bool near_open = near.narrow(sample - from, steps);
+      const bool open = straight.narrow(sample - start, steps) || near_open;
       if (end != position_ && (inside || !best)) {
+        reached = inside ? j - k : reached;
         const double length = (shape_.to_mm(end) - shape_.to_mm(position_)).norm();
         if (const auto f = shape_.feed(length, j - k + lent_)) {
           best = Candidate{{end, 0, *f, k, j - k + lent_, FittedKind::line, 2}, j - k};
+          const double ahead = (to - sample).dot((sample - start).normalized());
+          if (inside && ahead > most_ahead) {
+            most_ahead = ahead;
+            forward = best;
+          }
         } else if (!best) {
           best = line_to(end, length, k, j - k);
         }
@@ -194,7 +223,8 @@ class Fitter {
         break;
       }
     }
-    return best;
+    // A block at the F of a steady line cannot catch up: from an end that is rounded backwards no far one is reached.
+    return forward && reached > 2 * best->covered ? forward : best;
   }
 
   [[nodiscard]] std::optional<Candidate> arc_over(std::uint32_t k, std::uint32_t j, int normal) const {

@@ -10,6 +10,7 @@ namespace {
 constexpr double largest_radius_increments = 99999999.0;  // a word has eight digits
 // Ticks by which a block ends before its last tick: far over the rounding of any controller, far under what matters.
 constexpr double tick_margin = 1e-4;
+constexpr double tie_slope = 1e-7;  // increments: far over the noise of positions, far under what matters
 
 }  // namespace
 
@@ -30,7 +31,9 @@ BlockShape::BlockShape(const Eigen::Ref<const Eigen::MatrixXd>& grid, const Eige
 BlockPosition BlockShape::rounded(std::uint32_t k) const {
   BlockPosition result;
   for (int i = 0; i < axis_count; ++i) {
-    result[static_cast<std::size_t>(i)] = std::llround(grid_(k, i) / options_.increment_mm);
+    // A command that moves by whole increments may stay half between two: without a slope to one side the noise of its
+    // last digits would round it now up and now down, and no steady line would be one.
+    result[static_cast<std::size_t>(i)] = std::llround(grid_(k, i) / options_.increment_mm + tie_slope);
   }
   return result;
 }

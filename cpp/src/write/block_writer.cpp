@@ -1,7 +1,10 @@
 #include "shapegcode/write.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 #include <utility>
 
 #include "program/text/number_format.hpp"
@@ -73,8 +76,7 @@ class BlockText {
     }
   }
   void number(const BlockMark& mark) {
-    text_ += 'N';
-    text_ += std::to_string(mark.n_number);
+    fmt::format_to(std::back_inserter(text_), "N{:0{}}", mark.n_number, mark.n_digits);
   }
   void codes(const FittedBlock& block) {
     if (block.kind != FittedKind::line && plane_ != plane_code(block.normal)) {

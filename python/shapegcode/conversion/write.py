@@ -75,8 +75,8 @@ class _Marks:
         self._program = program
         self._notes = notes
         self._next = 0
-        self.first_number = -1
-        """N word at the region's begin, which belongs before its prologue; -1: none."""
+        self.first_word = ""
+        """N word at the region's begin, as it was written, which belongs before its prologue; empty: none."""
 
     def within(self, piece: _core.ShapedCommand, *, last: bool) -> tuple[list[_core.BlockMark], list[int]]:
         """Marks of a piece and the periods at which its blocks must end for them, both counted from its begin."""
@@ -89,11 +89,11 @@ class _Marks:
             note, period = self._notes[self._next], reached[self._next] - first
             self._next += 1
             number = note.n_number
-            if note.segment == 0 and self.first_number < 0 <= number:
-                self.first_number, number = number, -1
+            if note.segment == 0 and number >= 0 and not self.first_word:
+                self.first_word, number = f"N{number:0{note.n_digits}}", -1
             comment = self._program.core.slice(note.comment_offset, note.comment_offset + note.comment_length)
             if number >= 0 or comment:
-                marks.append(_core.BlockMark(period, number, comment))
+                marks.append(_core.BlockMark(period, number, comment, note.n_digits))
                 breaks.append(period)
         return marks, breaks
 
@@ -197,7 +197,7 @@ class RegionWriter:
             periods.append(fitted.periods)
             piece = following
         # A search for the region's N word must not skip the prologue.
-        number = f"N{marks.first_number}" if marks.first_number >= 0 else ""
+        number = marks.first_word
         before = self._head(region, number, starts[0], state)
         after = _lines([_restore_line(region, state.motion, state.plane), *self._machine.emission.epilogue], state)
         text, all_periods = b"".join(texts), np.concatenate(periods)
