@@ -144,7 +144,10 @@ def test_progress_is_told() -> None:
     machine = sg.Machine.load("vx500")
     heard: list[tuple[str, int, int]] = []
     sg.convert(
-        sg.Program.read(PROGRAMS / "TEST_G90.NC", machine), machine, on_progress=lambda *step: heard.append(step)
+        sg.Program.read(PROGRAMS / "TEST_G90.NC", machine),
+        machine,
+        shape_all=True,
+        on_progress=lambda *step: heard.append(step),
     )
     assert {stage for stage, _, _ in heard} == {"shaping", "round trip"}
     for stage in ("shaping", "round trip"):

@@ -23,7 +23,9 @@ TWO = PART.replace("M30", "G00X0Y0\nG01X30.F3000\nM30")
 @functools.cache
 def converted(text: str = PART, **options: Any) -> sg.Conversion:
     machine = machine_with()
-    return sg.convert(sg.Program.from_text(text.encode(), machine, source="part.nc"), machine, **options)
+    return sg.convert(
+        sg.Program.from_text(text.encode(), machine, source="part.nc"), machine, **({"shape_all": True} | options)
+    )
 
 
 def rows(conversion: sg.Conversion) -> dict[str, BeforeAfter]:
@@ -34,7 +36,7 @@ def test_the_answer_is_the_verdict_with_the_figures_of_the_json() -> None:
     conversion = converted()
     report = conversion.to_dict()
     was, now = (report["residual_vibration_um"][side]["y"] for side in ("original", "emitted"))
-    assert conversion.answer.startswith(f"within tolerance: residual vibration Y {was:.1f} → {now:.1f} µm, contour ")
+    assert conversion.answer.startswith(f"worth running: residual vibration Y {was:.1f} → {now:.1f} µm, contour ")
     both = report["contour_error_um"]["response"]
     assert f"contour {both['original']['max']:.1f} → {both['emitted']['max']:.1f} µm" in conversion.answer
     time = report["cycle_time_s"]
@@ -98,11 +100,11 @@ def test_the_limit_is_that_of_the_region_shown() -> None:
 
 def test_nothing_to_shape_is_one_line() -> None:
     air = converted("%\nG90G21\nG0X10.Y0Z0\nM30\n%\n")
-    assert air.answer == "nothing to shape: the text is unchanged"
+    assert air.answer == "no benefit: run the original: there is nothing to shape; the text is unchanged"
     assert air.tables() == [] and dict(air.plots()) == {}
     assert air.next_step.startswith("run the original")
     given_up = converted(budget=sg.Budget(max_bytes=len(PART)))
-    assert given_up.answer == "nothing fits the budget: the text is unchanged"
+    assert given_up.answer == "no benefit: run the original: nothing fits the budget; the text is unchanged"
 
 
 def test_the_next_step_follows_the_verdict() -> None:
@@ -111,7 +113,7 @@ def test_the_next_step_follows_the_verdict() -> None:
     assert replace(good, warnings=("w",)).next_step.startswith("settle the warnings")
     bad = replace(good, regions=(replace(good.regions[0], lines=(3, 9), misses=("contour error too large",)),))
     assert (bad.ok, bad.exit_code, bad.within_tolerance) == (False, 1, False)
-    assert bad.answer.startswith("OUT OF TOLERANCE: ")
+    assert bad.answer.startswith("do not run, OUT OF TOLERANCE: ")
     assert bad.next_step.startswith("do not run it (lines 3 to 9: contour error too large)")
 
 
@@ -136,7 +138,7 @@ def test_pictures_are_drawn_into_the_callers_axes() -> None:
 )
 def test_an_option_is_a_key_of_the_machine_file(options: dict[str, Any], keys: dict[str, Any]) -> None:
     machine = machine_with(keys)
-    stated = sg.convert(sg.Program.from_text(PART.encode(), machine, source="part.nc"), machine)
+    stated = sg.convert(sg.Program.from_text(PART.encode(), machine, source="part.nc"), machine, shape_all=True)
     assert converted(**options).text == stated.text != converted().text
 
 

@@ -76,7 +76,7 @@ def with_tables(machine: Machine, **tables: dict[str, Any]) -> Machine:
 
 def converted(text: str, machine: Machine | None = None, **options: Any) -> Conversion:
     machine = with_tables(machine or Machine.load("vx500"), shaping={"rapids": True}, emission={"header": False})
-    return convert(Program.from_text(text, machine), machine, **options)
+    return convert(Program.from_text(text, machine), machine, **({"shape_all": True} | options))
 
 
 def rapid_by_hand(start: Vector, end: Vector) -> Vector:
@@ -218,7 +218,7 @@ def test_the_table_is_settled_sooner_and_rings_less_at_the_next_cut() -> None:
 
 def test_it_is_off_by_default_and_changes_nothing_else() -> None:
     machine = with_tables(Machine.load("vx500"), emission={"header": False})
-    plain = convert(Program.from_text(PROGRAM, machine), machine)
+    plain = convert(Program.from_text(PROGRAM, machine), machine, shape_all=True)
     assert "rapids" not in plain.to_dict()
     shaped = converted(PROGRAM)
     assert plain.to_dict()["regions"] != [] and len(plain.to_dict()["regions"]) == len(shaped.to_dict()["regions"])
@@ -255,7 +255,7 @@ def test_where_nothing_is_gained_the_text_stays(damping_ratio: float) -> None:
     text = f"G90 G21 G17 G40\nG00 X0. Y0. Z2.\nG01 Z1. F500\nX20.\nG00 Z2.\n{moves}G01 Z1. F500\nX40.\nM30\n"
     machine = with_tables(Machine.from_toml(toml), emission={"header": False})
     conversion = converted(text, machine)
-    plain = convert(Program.from_text(text, machine), machine)
+    plain = convert(Program.from_text(text, machine), machine, shape_all=True)
     assert conversion.to_dict()["rapids"]["shaped"] == 0
     assert conversion.to_dict()["rapids"]["kept"]["no time gained"] >= 1
     assert conversion.to_dict()["rapids"]["time_saved_s"] == 0.0
@@ -337,14 +337,16 @@ def test_a_rapid_that_is_no_plain_one_stays(text: str, reason: str) -> None:
     assert rapids["found"] == rapids["shaped"] + sum(rapids["kept"].values())
     assert rapids["shaped"] == 0
     off = with_tables(Machine.load("vx500"), emission={"header": False})
-    assert conversion.text == convert(Program.from_text(text, off), off).text
+    assert conversion.text == convert(Program.from_text(text, off), off, shape_all=True).text
 
 
 def test_compensated_rapids_stay() -> None:
     text = one_rapid("G00 X80.", before="G41 D1\n", after="G40\n")
     machine = with_tables(Machine.load("vx500"), input={"compensation": "keep"}, emission={"header": False},
                           shaping={"rapids": True})  # fmt: skip
-    rapids = convert(Program.from_text(text, machine, expand_compensation=False), machine).to_dict()["rapids"]
+    rapids = convert(Program.from_text(text, machine, expand_compensation=False), machine, shape_all=True).to_dict()[
+        "rapids"
+    ]
     assert rapids["kept"]["cutter compensation"] == 1
     assert rapids["shaped"] == 0
 
@@ -459,7 +461,7 @@ def test_a_budget_comes_first() -> None:
     full = converted(text)
     assert full.to_dict()["rapids"]["shaped"] == 1
     off = with_tables(Machine.load("vx500"), emission={"header": False})
-    plain = convert(Program.from_text(text, off), off)
+    plain = convert(Program.from_text(text, off), off, shape_all=True)
     tight = converted(text, budget=Budget(max_bytes=len(full.text) - 1))
     assert tight.text == plain.text
     assert tight.to_dict()["rapids"]["kept"]["budget"] == 1

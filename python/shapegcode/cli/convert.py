@@ -58,6 +58,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_override_arguments(parser, MACHINE_KEYS)
     parser.add_argument(
+        "--all",
+        action="store_true",
+        help="shape every region: also where that gains less than shaping.least_gain_um, or misses a tolerance (then "
+        "the program fails as a whole); without it such a region keeps its text",
+    )
+    parser.add_argument(
         "--block-period",
         metavar="TIME",
         type=seconds,
@@ -107,6 +113,7 @@ def run(args: argparse.Namespace) -> int:
     """
     from shapegcode._core import ArgumentError
     from shapegcode.cli import runner
+    from shapegcode.conversion.benefit import summary
     from shapegcode.program.compensation import read_for_conversion
 
     output = output_file(args.output)
@@ -122,6 +129,8 @@ def run(args: argparse.Namespace) -> int:
         result = (_scheduled if args.feed_schedule else _converted)(args, program, machine, bar)
     target = output if result.ok else failed
     notes = ["original: the program with these feeds, not yet shaped"] if args.feed_schedule else []
+    if result.kept:
+        notes.append(summary(result.kept, result.least_gain_um))
     if target == failed and output.exists():
         notes.append(f"{output} is of an earlier run and was left alone")
     return runner.finish(result, args, notes=notes, output=(target, result.text))
@@ -147,7 +156,7 @@ def _converted(args: argparse.Namespace, program: Program, machine: Machine, bar
     def show(stage: str, done: int, total: int) -> None:
         bar.update(begins[stage] + 0.5 * done / total)
 
-    return convert(program, machine, **_options(args), on_progress=show)
+    return convert(program, machine, **_options(args), shape_all=args.all, on_progress=show)
 
 
 def _scheduled(args: argparse.Namespace, program: Program, machine: Machine, bar: ProgressBar) -> Conversion:

@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from shapegcode import _core
+from shapegcode.conversion.benefit import KeptRegion, gain_um, most_to_gain_um
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.figures import (
     AppliedLimits,
@@ -24,7 +25,7 @@ from shapegcode.conversion.judge import Judge, RegionFigures
 from shapegcode.conversion.rapids.shape import ShapedRapids, shape_rapids
 from shapegcode.conversion.readback import read_back
 from shapegcode.conversion.result import Conversion
-from shapegcode.conversion.spending import Spending
+from shapegcode.conversion.spending import Spending, keepable
 from shapegcode.conversion.warnings import played_warnings, text_warnings
 from shapegcode.conversion.whole_text import TextWriter, Written, judged, why_kept
 from shapegcode.machine import Machine
@@ -57,6 +58,7 @@ def convert(
     budget: Budget | None = None,
     arc_feed_ratio: float | None = None,
     block_period_s: float | None = None,
+    shape_all: bool = False,
     on_progress: Progress = lambda _stage, _done, _total: None,
 ) -> Conversion:
     """Shape every cutting region of a program, and judge the emitted text by playing it.
@@ -74,6 +76,8 @@ def convert(
         budget: what the emitted text may need; None: no limit.
         arc_feed_ratio: feed on arcs relative to the programmed one, reached before the arc: `shaping.arc_feed_ratio`.
         block_period_s: duration of a short block, s: `emission.block_period_s`; None there too: see `choose_grid`.
+        shape_all: shape every region, also where that gains less than `shaping.least_gain_um` or misses a tolerance;
+            False: such a region keeps its text.
         on_progress: called with stage, regions done and regions in all.
 
     Returns:
@@ -107,7 +111,8 @@ def convert(
     # The originals are played on the other cores while this one shapes.
     pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
     try:
-        return _Run(program, machine, block_period_s, budget, pool, on_progress).conversion()
+        run = _Run(program, machine, block_period_s, budget, pool, on_progress)
+        return run.conversion(shape_all=shape_all)
     finally:
         pool.shutdown(cancel_futures=True)
 
@@ -151,14 +156,17 @@ class _Run:
         self.judge = Judge(self.model)
         self.reasons = [why_kept(region, machine) for region in program.regions]
         self.room_um = [machine.tolerance.contour_um * _CONTOUR_MARGIN] * len(program.regions)
+        self.kept: dict[int, KeptRegion] = {}
         self.spending = None if budget is None else Spending(budget, program, machine)
         self.originals = [
             pool.submit(self.model.play_original, region.path, offset=self.model.offset(region))
             for region in program.regions
         ]
 
-    def conversion(self) -> Conversion:
+    def conversion(self, *, shape_all: bool) -> Conversion:
         """Shape, write, read back and judge."""
+        if not shape_all:
+            self._leave_what_has_nothing_to_gain()
         if self.spending is not None and self.spending.budget.limits_rate and not self.fixed_period:
             weights = [float(play.result().residual_mm.max()) for play in self.originals]
             self.grid = self.spending.choose_period(self.grid, weights, partial(choose_grid, self.machine), self._write)
@@ -171,6 +179,8 @@ class _Run:
             for index, given_up in self.spending.given_up.items():
                 self.reasons[index] = given_up.reason
             settled = self._settle()
+        if not shape_all:
+            settled = self._without_what_gains_nothing(settled)
         rapids: ShapedRapids | None = None
         if self.machine.shaping.rapids:
             rapids = shape_rapids(
@@ -180,11 +190,48 @@ class _Run:
             settled = replace(settled, written=written, emitted=rapids.emitted)
         return self._result(settled, rapids)
 
+    def _leave_what_has_nothing_to_gain(self) -> None:
+        """Where the original shakes and errs by less than the least gain, shaping is not even tried."""
+        least = self.machine.shaping.least_gain_um
+        for index, (reason, play) in enumerate(zip(self.reasons, self.originals, strict=True)):
+            if not reason and keepable(self.program.regions[index], self.machine):
+                most = most_to_gain_um(play.result())
+                if most < least:
+                    self._keep(index, f"nothing there to gain: {most:.1f} µm", most)
+
+    def _without_what_gains_nothing(self, settled: _Settled) -> _Settled:
+        """The same without the regions that gained too little or left a tolerance: these keep their text."""
+        least = self.machine.shaping.least_gain_um
+        indices = [index for index, reason in enumerate(self.reasons) if not reason]
+        verdicts = self.judge.verdicts(settled.figures, settled.written.placed, self.grid.block_period_s)
+        left: list[RegionFigures] = []
+        for index, figures, verdict in zip(indices, settled.figures, verdicts, strict=True):
+            gained = gain_um(figures)
+            if not keepable(self.program.regions[index], self.machine) or (gained >= least and not verdict.misses):
+                left.append(figures)
+            else:
+                why = verdict.misses[0] if verdict.misses else f"shaping gains {gained:.1f} µm"
+                self._keep(index, why, gained)
+        if len(left) == len(indices):
+            return settled
+        # What stays shaped is shaped as before, so that it need not be played again.
+        written = self._write(self.grid)
+        return _Settled(written, read_back(written.text, written.placed, self.machine), left)
+
+    def _keep(self, index: int, reason: str, gained_um: float) -> None:
+        region = self.program.regions[index]
+        self.reasons[index] = reason
+        self.kept[index] = KeptRegion(
+            (region.first_line, region.last_line), reason, gained_um, self.originals[index].result().duration_s
+        )
+
     def _write(self, grid: Grid, on_progress: Callable[[int, int], None] = lambda _done, _total: None) -> Written:
         writer = TextWriter(self.program, self.model, grid)
-        # Of what was given up for a budget one sentence speaks for all.
-        untold = None if self.spending is None else self.spending.given_up
-        return writer.write(self.reasons, self.room_um, untold, on_progress)
+        # Of what was given up for a budget, or gains nothing, one sentence speaks for all.
+        given_up = {} if self.spending is None else self.spending.given_up
+        return writer.write(
+            self.reasons, self.room_um, {*given_up, *self.kept}, on_progress, with_loads=self.spending is not None
+        )
 
     def _settle(self) -> _Settled:
         """Write, read back and play; again, slower, where a region left the contour tolerance."""
@@ -263,6 +310,8 @@ class _Run:
             warnings=tuple(warnings),
             budget=self.spending.outcome(self.grid, written) if self.spending is not None else None,
             rapids=rapids.outcome if rapids is not None else None,
+            kept=tuple(self.kept[index] for index in sorted(self.kept)),
+            least_gain_um=machine.shaping.least_gain_um,
             text=judged(written.text, good=figures.within_tolerance),
             emitted=settled.emitted,
             placed=tuple(written.placed),
@@ -276,7 +325,7 @@ class _Run:
         warnings += region_range_warnings(program.regions, machine)
         if self.spending is not None and (sentence := self.spending.warning(self.grid)):
             warnings.append(sentence)
-        elif not written.placed:
+        elif not written.placed and not self.kept:
             warnings.append(f"{program.source}: no cutting moves that can be shaped: the text is unchanged")
         warnings += played_warnings(program, figures, machine)
         return warnings + text_warnings(program, written.placed, figures, machine, len(written.text), written.blocks)

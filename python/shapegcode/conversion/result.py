@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from shapegcode.conversion.benefit import KeptRegion
 from shapegcode.conversion.budget import BudgetOutcome
 from shapegcode.conversion.figures import AppliedLimits, BlockCount, PlayedFigures, UsedShaper
 from shapegcode.conversion.rapids.result import RapidsOutcome
@@ -44,13 +45,15 @@ class Conversion(PlayedFigures, Result):
         warnings: what to heed.
         budget: only under one: what it allowed, and what was given up for it.
         rapids: only where rapids may be shaped: what became of them.
+        kept: regions that keep their text because shaping them gains too little, or would miss a tolerance.
+        least_gain_um: what is too little.
         text: the emitted program, as a file holds it.
         emitted: the same, read back.
         placed: the shaped regions and their places in it.
         model: the machine that it was played on.
     """
 
-    json_extra: ClassVar[dict[str, Any]] = Result.json_extra | {"within_tolerance": bool}
+    json_extra: ClassVar[dict[str, Any]] = Result.json_extra | {"within_tolerance": bool, "recommendation": str}
 
     program: str
     machine: str
@@ -67,6 +70,8 @@ class Conversion(PlayedFigures, Result):
     warnings: tuple[str, ...]
     budget: BudgetOutcome | None = field(default=None, metadata=sparse())
     rapids: RapidsOutcome | None = field(default=None, metadata=sparse())
+    kept: tuple[KeptRegion, ...] = ()
+    least_gain_um: float = 0.0
     text: bytes = field(metadata=hidden())
     emitted: Program = field(metadata=hidden())
     placed: tuple[Placed, ...] = field(metadata=hidden())
@@ -83,16 +88,31 @@ class Conversion(PlayedFigures, Result):
         return self.blocks.emitted == 0
 
     @property
-    def answer(self) -> str:
-        """The verdict, and the three figures that people look at first."""
+    def recommendation(self) -> str:
+        """One of three: "worth running", "no benefit: run the original", "do not run"."""
         if self.nothing_shaped:
-            return f"nothing {'fits the budget' if self._gave_up else 'to shape'}: the text is unchanged"
+            return "no benefit: run the original"
+        return "worth running" if self.ok else "do not run"
+
+    @property
+    def answer(self) -> str:
+        """What to do with it, and the three figures that people look at first."""
+        if self.nothing_shaped:
+            if self._gave_up:
+                why = "nothing fits the budget"
+            elif self.kept:
+                most = max(region.gain_um for region in self.kept)
+                why = f"shaping would gain {most:.1f} µm at most (least: {self.least_gain_um:g})"
+            else:
+                why = "there is nothing to shape"
+            return f"{self.recommendation}: {why}; the text is unchanged"
         vibration = self.residual_vibration_um
         axis = max("xyz", key=lambda each: vibration.original[each])
         target = getattr(self.contour_error_um, self.limits.contour_target)
         change = change_percent(self.cycle_time_s.original, self.cycle_time_s.emitted)
+        verdict = self.recommendation + ("" if self.within_tolerance else ", OUT OF TOLERANCE")
         return (
-            f"{'within tolerance' if self.within_tolerance else 'OUT OF TOLERANCE'}: residual vibration {axis.upper()} "
+            f"{verdict}: residual vibration {axis.upper()} "
             f"{vibration.original[axis]:.1f} → {vibration.emitted[axis]:.1f} µm, "
             f"contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, time {percent(change)}"
         )

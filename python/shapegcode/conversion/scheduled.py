@@ -75,7 +75,12 @@ def convert_scheduled(
     for attempt in range(_ROUNDS):
         planned = schedule_survey(surveyed, machine, motion=motion, margin=margin)
         conversion = convert(
-            planned.written, machine, arc_feed_ratio=arc_feed_ratio, block_period_s=block_period_s, budget=budget
+            planned.written,
+            machine,
+            arc_feed_ratio=arc_feed_ratio,
+            block_period_s=block_period_s,
+            budget=budget,
+            shape_all=True,
         )
         on_progress(0.2 + 0.8 * (attempt + 1) / _ROUNDS)
         emitted = _measured(planned, conversion, machine, wanted)

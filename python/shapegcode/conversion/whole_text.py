@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 from shapegcode import _core
@@ -90,17 +90,19 @@ class TextWriter:
         self,
         reasons: Sequence[str],
         room_um: Sequence[float],
-        untold: Mapping[int, object] | None = None,
+        untold: Collection[int] = (),
         on_progress: Step = lambda _done, _total: None,
+        *,
+        with_loads: bool = False,
     ) -> Written:
         """The whole text.
 
         Args:
             reasons: why a region keeps its text, per region; empty: it is shaped.
             room_um: deviation that its feed is planned for, per region, µm.
-            untold: indices of kept regions that need no warning of their own, under a budget, which asks for loads;
-                None: there is no budget.
+            untold: indices of kept regions that need no warning of their own.
             on_progress: called with regions done and regions in all.
+            with_loads: measure what each region asks of memory, line and control.
 
         Returns:
             The text, and where its shaped regions stand.
@@ -119,7 +121,7 @@ class TextWriter:
             position = region.text_end
             line += between.count(b"\n")
             if reason:
-                if untold is None or index not in untold:
+                if index not in untold:
                     written.kept_warnings.append(self._keep(region, reason))
                 text = core.slice(region.text_begin, region.text_end)
             else:
@@ -129,7 +131,7 @@ class TextWriter:
                 written.placed.append(Placed(region, line, line + text.count(b"\n") - 1))
                 if shaped.planned_um > 0.0:
                     written.planned_um[index] = shaped.planned_um
-                if untold is not None:
+                if with_loads:
                     bits = self._machine.controller.dnc_bits_per_character
                     written.loads[index] = measure_load(region, shaped, self._grid, bits)
                 on_progress(index + 1, len(regions))

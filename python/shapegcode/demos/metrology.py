@@ -228,7 +228,8 @@ def _machine(contour: str) -> Machine:
 def _measured(original: Program, machine: Machine) -> Measurement:
     """The program and its conversions side by side, called as the paper's cases."""
     emitted = [
-        convert(original, _machine(contour), arc_feed_ratio=ratio).emitted for ratio, contour in _SHAPED.values()
+        convert(original, _machine(contour), arc_feed_ratio=ratio, shape_all=True).emitted
+        for ratio, contour in _SHAPED.values()
     ]
     played = measure([original, *emitted], machine, _TOOL_DIAMETER_MM, against=original)
     named = zip(played.programs, ("unshaped", *_SHAPED), strict=True)

@@ -135,6 +135,12 @@ class Shaping(TomlTable):
         "does not act on them",
         default=False,
     )
+    least_gain_um: NonNegative = key(
+        "a region keeps its text unless shaping it lowers its residual vibration or the contour error of the table by "
+        "at least this; 0: everything is shaped",
+        unit="µm",
+        default=3.0,
+    )
     plunge_angle_deg: Annotated[NonNegative, Field(le=90)] = key(
         "a corner is a forced stop of the shaped command if a side of it leans from the Z axis by no more than "
         "this and the direction changes by 45 degrees or more: a shaper must not mix plunges with other cuts",

@@ -1,0 +1,106 @@
+"""Regions that gain nothing keep their text; the three grades of the verdict."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+import shapegcode as sg
+from acceptance import PROGRAMS, convert, machine_with
+from command import run
+from shapegcode.results.json import schema
+
+# A fast contour that shakes the table, and a slow one that does not.
+FAST = "G1X20.F12000.\nG3X40.Y20.R20.\nG1Y40.\n"
+SLOW = "G1X20.F200.\nG3X40.Y20.R20.\nG1Y40.\n"
+MACHINE = sg.Machine.load("vx500")
+
+
+def part(*contours: str) -> str:
+    body = "".join(f"G0X0Y0\nG1Z-1.F100.\n{contour}G0Z5.\n" for contour in contours)
+    return f"%\nO1\nG21G17G90G94\nG0X0Y0Z5.\n{body}M30\n%\n"
+
+
+def test_a_program_that_gains_nothing_is_left_as_it_is() -> None:
+    judged = convert(part(SLOW, SLOW), MACHINE, shape_all=False)
+    conversion = judged.conversion
+    assert conversion.text == part(SLOW, SLOW).encode()
+    assert conversion.recommendation == "no benefit: run the original"
+    assert conversion.ok
+    assert conversion.answer.startswith("no benefit: run the original: shaping would gain ")
+    assert conversion.kept
+    # What is there to gain is what playing the original shows.
+    played = sg.simulate(sg.Program.from_text(part(SLOW, SLOW), MACHINE), MACHINE)
+    most = max(region.gain_um for region in conversion.kept)
+    shown = max(played.contour_error_um.response.max, *played.residual_vibration_um)
+    assert most == pytest.approx(shown, rel=0.02, abs=0.02)
+    assert most < MACHINE.shaping.least_gain_um
+
+
+def test_only_the_region_that_gains_is_shaped() -> None:
+    text = part(SLOW, FAST, SLOW)
+    conversion = convert(text, MACHINE, shape_all=False).conversion
+    assert conversion.recommendation == "worth running"
+    (region,) = conversion.regions
+    assert "G1X20.F12000." in text.split("\n")[region.lines[0] - 1 : region.lines[1]]
+    kept = {each.lines for each in conversion.kept}
+    assert len(kept) == len(conversion.kept) == 2
+    # The others stand in the text to the letter.
+    assert conversion.text.decode().count(SLOW) == 2
+    everything = convert(text, MACHINE).conversion
+    assert everything.kept == ()
+    assert everything.bytes_emitted > conversion.bytes_emitted
+    assert conversion.residual_vibration_um.emitted.x <= everything.residual_vibration_um.emitted.x + 0.1
+
+
+def test_a_region_that_would_miss_its_tolerance_keeps_its_text_and_is_named() -> None:
+    machine = machine_with({"tolerance.residual_ratio": 1e-6, "tolerance.residual_floor_um": 1e-6,
+                            "tolerance.residual_floor_increments": 0.0})  # fmt: skip
+    whole = convert(part(FAST), machine)
+    assert whole.conversion.recommendation == "do not run"
+    assert not whole.conversion.ok
+    kept = convert(part(FAST), machine, shape_all=False).conversion
+    assert kept.ok
+    assert kept.text == part(FAST).encode()
+    assert any("residual" in region.reason for region in kept.kept)
+
+
+def test_a_least_gain_of_nothing_shapes_everything() -> None:
+    machine = machine_with({"shaping.least_gain_um": 0.0})
+    conversion = convert(part(SLOW, FAST), machine, shape_all=False).conversion
+    assert len(conversion.regions) == 2
+    assert conversion.kept == ()
+
+
+def test_the_command_says_it_first(tmp_path: Path) -> None:
+    (tmp_path / "slow.nc").write_text(part(SLOW))
+    done = run(tmp_path, "convert", "slow.nc", "-m", "vx500", "-o", "out.nc", "--json", "out.json")
+    assert done.returncode == 0
+    assert done.stdout.startswith("no benefit: run the original")
+    assert "as programmed: shaping would gain less than 3 µm" in done.stdout
+    assert (tmp_path / "out.nc").read_text() == part(SLOW)
+    data = json.loads((tmp_path / "out.json").read_text())
+    jsonschema.validate(data, schema(sg.Conversion))
+    assert data["recommendation"] == "no benefit: run the original"
+    done = run(tmp_path, "convert", "slow.nc", "-m", "vx500", "-o", "all.nc", "--all")
+    assert done.stdout.startswith("worth running")
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["TEST_G90.NC", *(pytest.param(name, marks=pytest.mark.slow) for name in ("PARALLEL.NC", "PROGRAM2.NC"))],
+)
+def test_what_stays_shaped_is_shaped_as_before(name: str) -> None:
+    program = sg.Program.read(PROGRAMS / name, MACHINE)
+    everything = sg.convert(program, MACHINE, shape_all=True)
+    chosen = sg.convert(program, MACHINE)
+    assert chosen.ok
+    whole = {region.lines: region for region in everything.regions}
+    for region in chosen.regions:
+        other = whole[region.lines]
+        assert region.residual_vibration_um == other.residual_vibration_um
+        assert region.contour_error_um == other.contour_error_um
+    assert len(chosen.regions) + len(chosen.kept) == len(everything.regions)
