@@ -31,12 +31,12 @@ struct FitOptions {
   double increment_mm = 0.001;  ///< least increment of the words (0.0001 inch = 0.00254 mm)
   double block_period_s = 0.005;
   double interpolation_period_s = 0.001;
-  double feed_unit_mm_per_s = 0.1 / 60.0;   ///< one step of the last F digit
-  std::int64_t minimum_feed = 10;           ///< in feed units
+  double feed_unit_mm_per_s = 0.1 / 60.0;  ///< one step of the last F digit
+  std::int64_t minimum_feed = 10;          ///< in feed units
   /// Deviation of merged blocks from the shaped command, per axis; where the command is straight the rounding of their
   /// ends, half an increment, is all that counts.
   double merge_tolerance_increments = 0.5;
-  double arc_min_chord_mm = 0.02;           ///< shorter pieces are lines
+  double arc_min_chord_mm = 0.02;  ///< shorter pieces are lines
   /// What the last block must be, so that the modal motion code behind it is the original's: a control refuses G02 or
   /// G03 alone. An arc that takes the place of a line there has `last_radius_mm` in the plane across `last_normal`.
   FittedKind last_kind = FittedKind::line;
