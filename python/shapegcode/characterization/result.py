@@ -128,7 +128,7 @@ class Characterisation(Result):
         """To repeat what contradicts, else to use the machine file."""
         if not self.ok:
             return "repeat the tests that contradict the others"
-        return "write the machine file with these values (-o FILE), then shapegcode machine show FILE"
+        return "shapegcode machine show explains the machine file with these values, which -o FILE writes"
 
     def to_toml(self) -> str:
         """The machine file with everything that is known; a remark stands behind each key that was measured."""

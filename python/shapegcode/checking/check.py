@@ -37,6 +37,7 @@ _COMMENT = re.compile(r"\([^()\n]*\)?")
 _ALARM_WORDS = re.compile(r" \(alarm \d+\)")
 _MACRO_FROM_DNC = 123
 _NO_ROOM = 70
+_LOST_S = 1e-3  # by a run with short blocks: less is no reason to change the program
 # Of one reading (most_alarms in the core's reader).
 _MOST_ALARMS = 200
 
@@ -209,7 +210,8 @@ def _short_findings(program: Program, machine: Machine, runs: Iterable[CuttingRu
                 f"shorter than the block time of {block_time_s * 1e3:g} ms, the shortest {run.shortest_s * 1e3:.3g} "
                 f"ms: without blocks in store the control starves, and {run.time_s:.3f} s become {run.taken_s:.3f} s"
             )
-            yield _at(program, "warning", "short_block", run.first_short_line, message)
+            lost = run.taken_s - run.time_s >= _LOST_S
+            yield _at(program, "warning" if lost else "note", "short_block", run.first_short_line, message)
 
 
 def _short_blocks(program: Program, machine: Machine, table: BlockTable) -> ShortBlocks:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 from shapegcode.results.result import Result
@@ -40,9 +41,9 @@ class Finding:
 
     @property
     def place(self) -> str:
-        """``file:line:column`` as far as it is known."""
+        """``file:line:column`` as far as it is known; the file without its folder."""
         known = [
-            self.file,
+            Path(self.file).name,
             *([self.line] if self.line > 0 else []),
             *([self.column] if self.line * self.column else []),
         ]

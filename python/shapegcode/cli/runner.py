@@ -160,6 +160,6 @@ def finish(
     for file in (*wrote, *([output[0]] if output is not None else [])):
         say(f"wrote {file}")
     if plots is not None:
-        say(f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: none, as there is nothing to draw")
+        say(f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: none are drawn of this")
     say(f"next: {result.next_step}")
     return result.exit_code

@@ -146,10 +146,10 @@ def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]
     found = []
     for axis, table in zip("XYZ", machine.axes.as_tuple(), strict=True):
         for number, mode in enumerate(table.modes, start=1):
-            name, damping = f"{axis} {mode.frequency_hz:g} Hz", mode.damping_uncertainty_percent
-            less = f", damping {-damping:g} %" if damping else ""
+            name, damping = f"{axis} {mode.frequency_hz:.4g} Hz", mode.damping_uncertainty_percent
+            less = f", damping {-damping:.3g} %" if damping else ""
             if percent := mode.frequency_uncertainty_percent:
-                ways = [(f"{name} {shift * percent:+g} %{less}", shift) for shift in (-1.0, 1.0)]
+                ways = [(f"{name} {shift * percent:+.3g} %{less}", shift) for shift in (-1.0, 1.0)]
             elif damping:
                 ways = [(f"{name}{less}", -1.0)]
             else:

@@ -127,7 +127,9 @@ class Conversion(PlayedFigures, Result):
         if self.nothing_shaped:
             return "run the original program: nothing in it was shaped."
         if not self.ok:
-            return f"do not run it ({next(self.misses())}): lower the feed there, and convert again."
+            stated = any("; feasible: " in warning for warning in self.warnings)
+            remedy = "a warning says which limit is feasible" if stated else "lower the feed there, and convert again"
+            return f"do not run it ({next(self.misses())}): {remedy}."
         if self.warnings:
             return "settle the warnings, then run the emitted program above the workpiece, without a tool."
         return "run the emitted program above the workpiece, without a tool, at 100 % feed override."

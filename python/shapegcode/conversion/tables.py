@@ -103,7 +103,7 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
         Column("command", value=lambda case: _micrometres(case.contour_error_um.command)),
         Column("table", value=lambda case: _micrometres(case.contour_error_um.response)),
         Column("s", value="time_s", digits=2),
-        Column("limit", value=lambda case: _share(case.share_of_limit)),
+        Column("of limit", value=lambda case: _share(case.share_of_limit)),
         Column("verdict", value=lambda case: _verdict(case) + (" <- worst" if case is worst else ""), left=True),
     )
     shown = sum(not case.counts for case in cases)

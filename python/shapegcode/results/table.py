@@ -122,7 +122,14 @@ class Table:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """How rich prints it."""
+        from rich.text import Text
+
+        # On lines of their own: rich would wrap them at the width of the table.
+        if self.title:
+            yield Text(self.title, style="bold")
         yield self._rich(options.max_width)
+        if self.caption:
+            yield Text(self.caption, style=self.caption_style)
 
     def _rich(self, width: int) -> RichTable:
         from rich.box import SIMPLE_HEAD
@@ -131,9 +138,7 @@ class Table:
 
         shown = self._shown()
         table = RichTable(
-            title=Text(self.title, style="bold") if self.title else None, title_justify="left", box=SIMPLE_HEAD,
-            show_edge=False, pad_edge=False, padding=(0, 1, 0, 0), caption_justify="left",
-            caption=Text(self.caption, style=self.caption_style) if self.caption else None,
+            box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0),
         )  # fmt: skip
         rows = [[_whole(column, column.cell(row)) for column in shown] for row in self.rows]
         for column, place in zip(shown, _widths(shown, rows, width), strict=True):

@@ -45,7 +45,7 @@ class CutDesign(Result):
         """What is cut."""
         cut = self.cut
         seconds = sum(each.duration_s for each in cut.passes)
-        return f"{cut.kind} for {cut.machine}: {len(cut.passes)} measuring passes, {seconds:.0f} s in all"
+        return f"{cut.kind} for {cut.machine}: {len(cut.passes)} measuring passes, {seconds:.0f} s of cutting in them"
 
     @property
     def next_step(self) -> str:

@@ -16,8 +16,8 @@ struct CannedCycle {
   double dwell_s = 0.0;       ///< P
   double initial_mm = 0.0;    ///< level before the cycle, the return level of G98
   bool return_to_r = false;   ///< G99
-  bool has_r = false;         ///< R was given; else R is the level before the cycle
-  bool has_bottom = false;    ///< Z was given; else nothing is drilled
+  bool has_r = true;          ///< R was given; else R is the level before the cycle
+  bool has_bottom = true;     ///< Z was given; else nothing is drilled
 };
 
 /// How often the tool feeds down in one hole: the pecks of G73 and G83, else 1.

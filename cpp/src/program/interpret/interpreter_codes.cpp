@@ -93,6 +93,7 @@ void Interpreter::cycle_code(int whole) {
     cycle_.clearance_mm = options_.peck_clearance_mm;
     cycle_.initial_mm = state_.position_mm[plane_normal(state_.plane)];
     cycle_.r_mm = cycle_.bottom_mm = cycle_.initial_mm;
+    cycle_.has_r = cycle_.has_bottom = false;
   }
   state_.cycle = whole;
 }

@@ -375,18 +375,19 @@ void Reader::finish() {
                                              program_.program_number, others),
                                  0, 0, ""});
   }
-  if (!interpreter_.ended() && !framed_) {
+  // Behind the last alarm that is collected nothing was read: what is missing there may well be there.
+  const bool read_to_the_end = program_.alarms.size() < most_alarms;
+  if (!interpreter_.ended() && !framed_ && read_to_the_end) {
     const Error error(ErrorKind::program, "the program has neither '%' lines nor an end M30 or M02: truncated?",
                       last_of_text, 1);
     if (!record(error)) {
       throw error;
     }
-  } else if (!interpreter_.ended()) {
+  } else if (!interpreter_.ended() && read_to_the_end) {
     program_.warnings.push_back({last, "the program does not end with M30 or M02", 0, 0, ""});
   } else if (!framed_) {
     program_.warnings.push_back(
-        {last, "the program has no '%' lines; a control that reads it over a line or from a tape needs them", 0, 0,
-         ""});
+        {1, "the program has no '%' lines; a control that reads it over a line or from a tape needs them", 0, 0, ""});
   }
   program_.probed.resize(options_.probe_lines.size(), interpreter_.state());
 }
