@@ -21,7 +21,8 @@ _HEAD = """\
 `import shapegcode as sg` offers these names. `help(sg.convert)` says what each takes, with shapes and units, what it
 returns and raises, and where the method comes from. Every function that takes a program takes a `Program` or its path.
 Every result of a command is a frozen dataclass with `ok`, `warnings`, `next_step`, `to_dict()`, `tables()`, `plots()`;
-the keys of its JSON are in [schema](schema). `result.plots()` draws its pictures by name, `result.save_plots(folder)` writes them.
+the keys of its JSON are in [schema](schema). `result.plots()` draws its pictures by name,
+`result.save_plots(folder)` writes them.
 
     machine = sg.Machine.load("vx500").with_values("tolerance.contour_um", 10)
     conversion = sg.convert("part.nc", machine)
