@@ -143,7 +143,7 @@ def test_the_shaper_and_the_verdict_use_it(capsys: pytest.CaptureFixture[str], t
         assert band.uncertainty == (mode.frequency_uncertainty_percent / 100.0 if designed else 0.0)
         assert band.mode.damping_ratio == mode.damping_ratio
         names = [case.name for case in stated_cases(machine) if case.counts]
-        damping = f"damping -{mode.damping_uncertainty_percent:g} %"
+        damping = f"damping -{mode.damping_uncertainty_percent:.3g} %"
         assert sum(damping in name for name in names) == 2
 
 
