@@ -108,7 +108,7 @@ def convert(
         raise _core.ProgramError(
             f"{program.source}:1:1: written by shapegcode already (its header says so): convert the original"
         )
-    # The originals are played on the other cores while this one shapes.
+    # Plays the originals, and what was emitted, on all cores.
     pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
     try:
         run = _Run(program, machine, block_period_s, budget, pool, on_progress)
@@ -153,6 +153,7 @@ class _Run:
         self.grid = choose_grid(machine, block_period_s)
         program.refuse_endless(_MOST_PERIODS * self.grid.block_period_s)
         self.model = MachineModel(machine)
+        self.writer = TextWriter(program, self.model, self.grid)
         self.judge = Judge(self.model)
         self.reasons = [why_kept(region, machine) for region in program.regions]
         self.room_um = [machine.tolerance.contour_um * _CONTOUR_MARGIN] * len(program.regions)
@@ -214,7 +215,7 @@ class _Run:
                 self._keep(index, why, gained)
         if len(left) == len(indices):
             return settled
-        # What stays shaped is shaped as before, so that it need not be played again.
+        # What stays shaped is as before: it is neither shaped nor played again.
         written = self._write(self.grid)
         return _Settled(written, read_back(written.text, written.placed, self.machine), left)
 
@@ -226,10 +227,11 @@ class _Run:
         )
 
     def _write(self, grid: Grid, on_progress: Callable[[int, int], None] = lambda _done, _total: None) -> Written:
-        writer = TextWriter(self.program, self.model, grid)
+        if self.writer.grid is not grid:
+            self.writer = TextWriter(self.program, self.model, grid)
         # Of what was given up for a budget, or gains nothing, one sentence speaks for all.
         given_up = {} if self.spending is None else self.spending.given_up
-        return writer.write(
+        return self.writer.write(
             self.reasons, self.room_um, {*given_up, *self.kept}, on_progress, with_loads=self.spending is not None
         )
 

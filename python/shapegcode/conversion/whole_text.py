@@ -83,8 +83,9 @@ class TextWriter:
         self._program = program
         self._machine = model.machine
         self._model = model
-        self._grid = grid
+        self.grid = grid
         self._regions = RegionWriter(model, grid)
+        self._shaped: dict[int, tuple[float, EmittedRegion]] = {}  # by region: its room, and what it came to
 
     def write(
         self,
@@ -125,7 +126,7 @@ class TextWriter:
                     written.kept_warnings.append(self._keep(region, reason))
                 text = core.slice(region.text_begin, region.text_end)
             else:
-                shaped = self._shape(region, room)
+                shaped = self._shape(index, region, room)
                 text = shaped.text
                 blocks += shaped.blocks
                 written.placed.append(Placed(region, line, line + text.count(b"\n") - 1))
@@ -133,7 +134,7 @@ class TextWriter:
                     written.planned_um[index] = shaped.planned_um
                 if with_loads:
                     bits = self._machine.controller.dnc_bits_per_character
-                    written.loads[index] = measure_load(region, shaped, self._grid, bits)
+                    written.loads[index] = measure_load(region, shaped, self.grid, bits)
                 on_progress(index + 1, len(regions))
             line += text.count(b"\n")
             parts += [between, text]
@@ -142,7 +143,13 @@ class TextWriter:
             b"".join(parts), written.placed, blocks, written.kept_warnings, written.planned_um, written.loads
         )
 
-    def _shape(self, region: _core.Region, room_um: float) -> EmittedRegion:
+    def _shape(self, index: int, region: _core.Region, room_um: float) -> EmittedRegion:
+        """The region's text; one whose room is as it was in the text before is not shaped again."""
+        if index not in self._shaped or self._shaped[index][0] != room_um:
+            self._shaped[index] = (room_um, self._shaped_anew(region, room_um))
+        return self._shaped[index][1]
+
+    def _shaped_anew(self, region: _core.Region, room_um: float) -> EmittedRegion:
         limits = self._model.limits(arc_feed_ratio=self._machine.shaping.arc_feed_ratio)
         try:
             return self._regions.write(self._program, region, limits, self._regions.tolerance(room_um))
@@ -169,7 +176,7 @@ class TextWriter:
     def _header(self) -> list[str]:
         from shapegcode import __version__
 
-        grid = self._grid
+        grid = self.grid
         modes = [
             f"{axis} {mode.frequency_hz:g} HZ {mode.damping_ratio:g}"
             for axis, modes in zip("XYZ", self._model.options().modes, strict=True)

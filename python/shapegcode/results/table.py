@@ -1,4 +1,4 @@
-"""Tables, declared once: columns with name, unit, value and digits; for the terminal, Markdown and HTML.
+"""Tables, declared once: columns with name, unit, value and digits; for the terminal.
 
 >>> COLUMNS = (Column("lines", value="lines"), Column("time", "s", "duration_s", digits=3))
 >>> console.print(Table("slowest", COLUMNS, regions))
@@ -100,15 +100,6 @@ class Table:
 
     def _shown(self) -> list[Column]:
         return [column for column in self.columns if not self.rows or any(column.cell(row) for row in self.rows)]
-
-    def markdown(self) -> str:
-        """The table for a page of text, its title as a line above it."""
-        head, *rows = self.cells()
-        rules = ["---" if column.text or column.left else "---:" for column in self._shown()]
-        lines = [f"| {' | '.join(cells)} |" for cells in (head, rules, *rows)]
-        return "\n".join(
-            [*([self.title, ""] if self.title else []), *lines, *(["", self.caption] if self.caption else [])]
-        )
 
     def __str__(self) -> str:
         """As on a terminal of 80 columns, without colours."""
