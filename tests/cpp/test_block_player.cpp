@@ -12,6 +12,7 @@
 
 #include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
+#include "stepped_into.hpp"
 
 using shapegcode::BlockEnd;
 using shapegcode::BlockPlayer;
@@ -264,12 +265,5 @@ TEST_CASE("block player: into memory of the caller's, the same set-points") {
   const std::vector<Segment> blocks = row_of_lines({1.0, 0.4, 2.0}, {10.0, 20.0, 30.0});
   BlockPlayer player(blocks, 0.01, BlockEnd::ceil);
   BlockPlayer other(blocks, 0.01, BlockEnd::ceil);
-  Vector3 position;
-  std::array<double, 3> out{};
-  bool moving = true;
-  while (moving) {
-    moving = player.step(position);
-    CHECK(other.step(std::span<double>(out)) == moving);
-    CHECK(Vector3(out[0], out[1], out[2]) == position);
-  }
+  shapegcode::tests::check_same_into_memory(player, other);
 }

@@ -12,6 +12,7 @@
 
 #include "shapegcode/error.hpp"
 #include "shapegcode/motion.hpp"
+#include "stepped_into.hpp"
 
 using shapegcode::Error;
 using shapegcode::interpolate;
@@ -221,12 +222,5 @@ TEST_CASE("interpolator: into memory of the caller's, the same set-points") {
   const ProfilePointer profile = std::make_shared<const SpeedProfile>(plan_speed(*path, shapegcode::MotionLimits{}));
   Interpolator player(path, profile, 0.004);
   Interpolator other(path, profile, 0.004);
-  Vector3 position;
-  std::array<double, 3> out{};
-  bool moving = true;
-  while (moving) {
-    moving = player.step(position);
-    CHECK(other.step(std::span<double>(out)) == moving);
-    CHECK(Vector3(out[0], out[1], out[2]) == position);
-  }
+  shapegcode::tests::check_same_into_memory(player, other);
 }

@@ -8,6 +8,7 @@
 #include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/motion.hpp"
+#include "stepped_into.hpp"
 
 using namespace shapegcode;
 
@@ -118,12 +119,5 @@ TEST_CASE("rapid: set-points end in the end, and go on giving it") {
 TEST_CASE("rapid: into memory of the caller's, the same set-points") {
   RapidPlayer player({0.0, 1.0, 2.0}, {10.0, -5.0, 2.0}, paper_machine());
   RapidPlayer other = player;
-  Vector3 position;
-  std::array<double, 3> out{};
-  bool moving = true;
-  while (moving) {
-    moving = player.step(position);
-    CHECK(other.step(std::span<double>(out)) == moving);
-    CHECK(Vector3(out[0], out[1], out[2]) == position);
-  }
+  shapegcode::tests::check_same_into_memory(player, other);
 }

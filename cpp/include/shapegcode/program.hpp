@@ -78,7 +78,6 @@ struct ReaderOptions {
   std::int64_t program = -1;  ///< O number to play of a file that holds several; -1: the first
   std::function<std::optional<SourceText>(std::int64_t)> load_program;  ///< programs that the file does not hold
   std::array<std::int64_t, 2> opaque_programs = {9000, 9999};           ///< if not found: called, but not looked into
-  std::vector<std::int64_t> not_looked_into;  ///< called, but not looked into even where they are at hand
   int subprogram_nesting = 10;
   std::uint64_t max_steps = 10'000'000;           ///< blocks executed behind the first call or jump
   std::uint64_t max_cycle_moves = 2'000'000;      ///< moves that all drilling cycles of a program come to

@@ -186,8 +186,7 @@ class Fitter {
     Cone near(options_.merge_tolerance_increments + 1e-6);
     Cone straight(straight_increments);
     const Vector3 start = grid_.row(k) / options_.increment_mm;
-    const Vector3 from(static_cast<double>(position_[0]), static_cast<double>(position_[1]),
-                       static_cast<double>(position_[2]));
+    const Vector3 from = in_increments(position_);
     std::optional<Candidate> best;
     std::optional<Candidate> forward;  // the one whose end is rounded furthest ahead
     double most_ahead = -std::numeric_limits<double>::infinity();
@@ -199,7 +198,7 @@ class Fitter {
       const double steps = j - k;
       const Position end = shape_.rounded(j);
       const Vector3 sample = grid_.row(j) / options_.increment_mm;
-      const Vector3 to(static_cast<double>(end[0]), static_cast<double>(end[1]), static_cast<double>(end[2]));
+      const Vector3 to = in_increments(end);
       // The end itself is off by its own rounding, at most half an increment, and need not obey the cone.
       const bool inside_near = near.holds((to - from) / steps);
       const bool inside = straight.holds((sample - start) / steps) || inside_near;

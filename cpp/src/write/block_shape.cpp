@@ -38,10 +38,7 @@ BlockPosition BlockShape::rounded(std::uint32_t k) const {
   return result;
 }
 
-Vector3 BlockShape::to_mm(const BlockPosition& p) const {
-  return Vector3(static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])) *
-         options_.increment_mm;
-}
+Vector3 BlockShape::to_mm(const BlockPosition& p) const { return in_increments(p) * options_.increment_mm; }
 
 std::optional<std::int64_t> BlockShape::feed(double length_mm, std::uint32_t periods) const {
   const auto wanted = static_cast<double>(periods * ticks_per_period_);

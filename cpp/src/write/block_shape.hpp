@@ -10,6 +10,11 @@ namespace shapegcode {
 
 using BlockPosition = std::array<std::int64_t, axis_count>;  // in increments
 
+/// The same as a vector, still in increments.
+[[nodiscard]] inline Vector3 in_increments(const BlockPosition& p) {
+  return {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
+}
+
 // An arc through two end points with a radius, as a controller builds it from R.
 struct ChordArc {
   double chord = 0.0;

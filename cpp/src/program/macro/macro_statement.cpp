@@ -41,7 +41,7 @@ constexpr std::array<NamedKeyword, 10> keywords = {{{"IF", Keyword::if_},
 
 Keyword keyword_of(std::string_view run) noexcept {
   for (const NamedKeyword& candidate : keywords) {
-    if (macro::abbreviates(run, candidate.name)) {
+    if (abbreviates(run, candidate.name)) {
       return candidate.keyword;
     }
   }

@@ -35,18 +35,6 @@ std::string_view letters_at(std::string_view text, std::size_t i) noexcept {
   return text.substr(i, end - i);
 }
 
-bool abbreviates(std::string_view run, std::string_view name) noexcept {
-  if (run.size() < 2 || run.size() > name.size()) {
-    return false;
-  }
-  for (std::size_t k = 0; k < run.size(); ++k) {
-    if (upper(run[k]) != name[k]) {
-      return false;
-    }
-  }
-  return true;
-}
-
 void skip_comment(std::string_view text, std::size_t& i, std::uint32_t line) {
   const std::size_t close = text.find(')', i);
   if (close == std::string_view::npos) {

@@ -10,6 +10,7 @@
 
 #include "base/text.hpp"
 #include "program/macro/macro_expression.hpp"
+#include "program/text/lexer.hpp"
 
 namespace shapegcode::macro {
 
@@ -33,9 +34,6 @@ std::string shown(double value);
 
 /// The letters in a row that begin at `i`.
 std::string_view letters_at(std::string_view text, std::size_t i) noexcept;
-
-/// Whether `run` is `name` or its beginning of at least two letters, in either case of letters.
-bool abbreviates(std::string_view run, std::string_view name) noexcept;
 
 /// `i` stands on '('; goes behind the ')'. Throws Error(program) if the comment does not close.
 void skip_comment(std::string_view text, std::size_t& i, std::uint32_t line);

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "base/text.hpp"
+#include "program/text/lexer.hpp"
 #include "program/text/number_scan.hpp"
 #include "shapegcode/error.hpp"
 
@@ -50,7 +51,7 @@ int end_number(std::string_view line) {
   }
   const std::string_view word = std::string_view(plain).substr(letters, digits - letters);
   const bool one_digit = digits + 1 == plain.size() && plain[digits] >= '1' && plain[digits] <= '3';
-  return one_digit && (word == "END" || word == "EN") ? plain[digits] - '0' : 0;
+  return one_digit && abbreviates(word, "END") ? plain[digits] - '0' : 0;
 }
 
 // The lines that begin a program (O, a colon, a name in < >) or a folder (&F=), in their order. Only those characters

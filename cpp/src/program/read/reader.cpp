@@ -14,8 +14,9 @@ constexpr std::size_t most_alarms = 200;  // collected in one reading
 
 }  // namespace
 
-Reader::Reader(std::string text, const ReaderOptions& options)
+Reader::Reader(std::string text, const ReaderOptions& options, std::span<const std::int64_t> shut)
     : options_(options),
+      shut_(shut),
       interpreter_(program_, options),
       rewriter_(options, program_, interpreter_,
                 [this](std::string_view flat, const LineOrigin& origin) { put(flat, origin); }),
@@ -189,7 +190,7 @@ Program Reader::run() {
       running = step();
     } catch (const UnknownValue& unknown) {
       // A macro of a probe asks what only the control knows: it is read again as a call that nobody looks into.
-      if (frames_.size() > 1 && !looks_not_into(frames_.back().unit->number)) {
+      if (frames_.size() > 1 && !is_shut(frames_.back().unit->number)) {
         throw OpaqueProgram{frames_.back().unit->number};
       }
       if (!options_.collect_alarms) {
@@ -208,9 +209,7 @@ Program Reader::run() {
   return result();
 }
 
-bool Reader::looks_not_into(std::int64_t number) const noexcept {
-  return std::ranges::find(options_.not_looked_into, number) != options_.not_looked_into.end();
-}
+bool Reader::is_shut(std::int64_t number) const noexcept { return std::ranges::find(shut_, number) != shut_.end(); }
 
 Program Reader::result() {
   if (!program_.expanded) {
@@ -397,14 +396,14 @@ void Reader::finish() {
 namespace shapegcode {
 
 Program read_program(std::string text, const ReaderOptions& options) {
-  ReaderOptions again = options;
+  std::vector<std::int64_t> shut;
   for (;;) {
-    detail::Reader reader(std::move(text), again);
+    detail::Reader reader(std::move(text), options, shut);
     try {
       return reader.run();
     } catch (const detail::OpaqueProgram& opaque) {
       text = reader.take_text();
-      again.not_looked_into.push_back(opaque.number);
+      shut.push_back(opaque.number);
     }
   }
 }

@@ -279,7 +279,7 @@ ProgramUnit* Reader::lookup(std::int64_t number) {
 bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool macro, int repeats, std::uint32_t column,
                    std::string_view text) {
   ProgramUnit* unit = lookup(number);
-  const bool shut = unit != nullptr && looks_not_into(number);
+  const bool shut = unit != nullptr && is_shut(number);
   if (shut && text.empty()) {
     fail("program " + program_name(number) + " asks for values that only the control knows", column);
   }

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -57,7 +58,8 @@ struct OpaqueProgram {
 
 class Reader {
  public:
-  Reader(std::string text, const ReaderOptions& options);
+  /// Programs of `shut` are called, but not looked into even where they are at hand; it outlives the reader.
+  Reader(std::string text, const ReaderOptions& options, std::span<const std::int64_t> shut);
   Program run();
   /// The text that was handed over, behind a `run` that ended with OpaqueProgram.
   [[nodiscard]] std::string take_text() noexcept { return std::move(sources_.front().text); }
@@ -84,7 +86,7 @@ class Reader {
   };
 
   // Texts and lines.
-  [[nodiscard]] bool looks_not_into(std::int64_t number) const noexcept;
+  [[nodiscard]] bool is_shut(std::int64_t number) const noexcept;
   void load_main();
   void expand_from(std::size_t begin);
   bool step();
@@ -136,6 +138,7 @@ class Reader {
   [[nodiscard]] std::array<double, 26> argument_scale() const;
 
   const ReaderOptions& options_;
+  std::span<const std::int64_t> shut_;
   Program program_;
   std::deque<SourceText> sources_;  ///< the text that was handed over, and those of programs in other files
   ProgramStore store_;

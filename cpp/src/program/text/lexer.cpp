@@ -30,7 +30,6 @@ std::string quoted(char c) {
   return std::string("byte 0x") + hex[byte >> 4] + hex[byte & 15];
 }
 
-// Two letters and more stand for the whole word, as on the control: WH[...]DO1 ... EN1.
 bool is_macro_keyword(std::string_view text, std::size_t i) noexcept {
   std::array<char, 5> run{};
   std::size_t size = 0;
@@ -40,7 +39,7 @@ bool is_macro_keyword(std::string_view text, std::size_t i) noexcept {
   const std::string_view word(run.data(), size);
   for (const std::string_view keyword :
        {"IF", "THEN", "GOTO", "WHILE", "DO", "END", "POPEN", "DPRNT", "PCLOS", "BPRNT"}) {
-    if (size >= 2 && (keyword.starts_with(word) || word.starts_with(keyword))) {
+    if (abbreviates(word, keyword) || word.starts_with(keyword)) {
       return true;
     }
   }
@@ -159,6 +158,18 @@ bool scan_program_name(std::string_view text, std::uint32_t line, std::size_t& i
 }
 
 }  // namespace
+
+bool abbreviates(std::string_view run, std::string_view name) noexcept {
+  if (run.size() < 2 || run.size() > name.size()) {
+    return false;
+  }
+  for (std::size_t k = 0; k < run.size(); ++k) {
+    if (upper(run[k]) != name[k]) {
+      return false;
+    }
+  }
+  return true;
+}
 
 void scan_block(std::string_view text, std::uint32_t line, std::size_t max_length, Block& block) {
   block.word_count = 0;

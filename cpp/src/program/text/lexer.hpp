@@ -34,6 +34,10 @@ struct Block {
   [[nodiscard]] const Word* end() const noexcept { return words.data() + word_count; }
 };
 
+/// Whether `run` is a word of the control such as WHILE, or its beginning of at least two letters, in either case of
+/// letters: WH[...]DO1 ... EN1.
+[[nodiscard]] bool abbreviates(std::string_view run, std::string_view name) noexcept;
+
 /// Splits one line (without its line end) into words. A colon in the place of an O number is read as O. `line` counts
 /// from 1 and goes into errors. Throws Error(program) with line and column on: a byte that is no program character, a
 /// letter without a number, a comment that does not close, more than 40 words or 8 comments, more than 8 digits in a

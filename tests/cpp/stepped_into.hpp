@@ -1,0 +1,26 @@
+#pragma once
+
+#include <doctest/doctest.h>
+
+#include <array>
+#include <span>
+
+#include "shapegcode/samples.hpp"
+
+// Both forms of a player's step, side by side.
+namespace shapegcode::tests {
+
+/// Two equal players give the same set-points to the end, one of them into memory of the caller's.
+template <class Player>
+void check_same_into_memory(Player& player, Player& other) {
+  Vector3 position;
+  std::array<double, 3> out{};
+  bool moving = true;
+  while (moving) {
+    moving = player.step(position);
+    CHECK(other.step(std::span<double>(out)) == moving);
+    CHECK(Vector3(out[0], out[1], out[2]) == position);
+  }
+}
+
+}  // namespace shapegcode::tests
