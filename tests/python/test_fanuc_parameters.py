@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
@@ -137,7 +138,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     jsonschema.validate(report, schema(ParameterImport))
     rapid = [row for row in report["read"] if row["key"] == "axes.y.rapid_mm_per_min"]
     assert rapid == [
-        {"parameter": 1420, "axis": "A3", "raw": "P18000.0", "line": 5, "key": rapid[0]["key"], "value": 18000.0}
+        {"parameter": 1420, "axis": "A3", "raw": "P18000.0", "line": 6, "key": rapid[0]["key"], "value": 18000.0}
     ]
     assert {"key": "controller.rapid_bell_time_s", "value": 0.04} in [
         {name: row[name] for name in ("key", "value")} for row in report["assumed"]
@@ -151,3 +152,192 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*argv, "--force"]) == 0
     assert main(["machine", "import", "--help"]) == 0
     assert "example: shapegcode machine import" in capsys.readouterr().out
+
+
+def taken(text: str, **options: Any) -> ParameterImport:
+    """A dump with some records, on the built-in machine."""
+    return import_parameters(f"%\n{text}\n%\n".encode(), Machine.load("vx500"), source="HM1_CNC-PARA.TXT", **options)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "value"),
+    [
+        # Filter that acts on shaped programs, too: 1610#0 linear, neither bit exponential.
+        ("N01622Q1A1P100A2P100A3P100\nN01610Q1A1P00000001", "controller.shaped_time_constant_s", 0.1),
+        ("N01622Q1A1P100A2P100A3P100\nN01610Q1A1P00000001", "controller.shaped_filter_shape", "linear"),
+        ("N01622Q1A1P100A2P100A3P100\nN01610Q1A1P00000000", "controller.shaped_filter_shape", "exponential"),
+        ("N01622Q1A1P40A2P50A3P60\nN01610Q1A1P00000001", "controller.shaped_time_constant_s", 0.06),
+        # Look-ahead on when a program starts.
+        ("N01604Q1P00000001", "emission.prologue", ("G05.1Q0",)),
+        ("N01604Q1P00000001", "emission.epilogue", ("G05.1Q1",)),
+        ("N01604Q1P00000001", "verdict.look_ahead", True),
+        ("N01604Q1P00000000", "verdict.look_ahead", False),
+        ("N01604Q1P00000000", "emission.prologue", ()),
+        # A serial line only where the channel is one, at the speed of that channel.
+        ("N00020Q1P0\nN00103Q1P12", "controller.dnc_baud", 19200),
+        ("N00020Q1P1\nN00103Q1P12\nN00113Q1P11", "controller.dnc_baud", 9600),
+        ("N00020Q1P4\nN00103Q1P12", "controller.dnc_baud", 0),
+        ("N00020Q1P17\nN00103Q1P12", "controller.dnc_baud", 0),
+        ("N00103Q1P12", "controller.dnc_baud", 0),
+        # Increment systems.
+        ("N01013Q1A1P00000000A2P00000000A3P00000000", "controller.least_increment_mm", 0.001),
+        ("N01013Q1A1P00000010A2P00000010A3P00000010", "controller.least_increment_mm", 0.0001),
+        ("N01013Q1A1P00000010A2P00000010A3P00000010", "controller.least_increment_inch", 0.00001),
+        ("N01013Q1A1P00000001A2P00000001A3P00000001", "controller.least_increment_mm", 0.01),
+        ("N01004 P 00000010", "controller.least_increment_mm", 0.0001),
+        # Programs.
+        ("N05400Q1P10000000", "input.scale_unit", 0.001),
+        ("N05400Q1P00000000", "input.scale_unit", 0.00001),
+        ("N05114Q1P0.2", "input.peck_clearance_mm", 0.2),
+        ("N05114 P 200\nN05115 P 500", "input.peck_clearance_mm", 0.5),
+        ("N05003Q1P00000001", "input.compensation_start_up", "B"),
+        ("N05003Q1P00000000", "input.compensation_start_up", "A"),
+        ("N03403Q1P00100000", "input.arc_without_centre", "alarm"),
+        ("N03403Q1P00000000", "input.arc_without_centre", "line"),
+        ("N06071Q1P6\nN06072Q1P0", "input.m_subprograms", {"6": 9001}),
+        ("N06079Q1P199", "input.m_subprograms", {"199": 9009}),
+        ("N06080Q1P200\nN06089Q1P201", "input.m_macros", {"200": 9020, "201": 9029}),
+        ("N06050Q1P120\nN06059Q1P0", "input.g_macros", {"120": 9010}),
+        ("N06001Q1P00100000", "input.tool_program", 9000),
+        ("N00000Q1P00000100", "power_on.units", "G20"),
+        (
+            "N01220Q1A1M1.0A2M0.0A3M0.0\nN01221Q1A1M-10.5A2M2.0A3M0.25",
+            "input.work_offsets",
+            {"G54": (-9.5, 2.0, 0.25)},
+        ),
+        ("N01222 A1 P -10500 A2 P 0 A3 P 0", "input.work_offsets", {"G55": (-10.5, 0.0, 0.0)}),
+        # Filter of the look-ahead: linear, bell, exponential with the same second moment.
+        (
+            "N01660Q1A1P900.A2P900.A3P900.\nN01769Q1P24\nN01602Q1P01000000",
+            "controller.look_ahead_filter_time_constant_s",
+            0.024,
+        ),
+        (
+            "N01660Q1A1P900.A2P900.A3P900.\nN01769Q1P24\nN01602Q1P00000000",
+            "controller.look_ahead_filter_time_constant_s",
+            pytest.approx(0.024 * math.sqrt(12), rel=1e-5),
+        ),
+    ],
+)
+def test_a_parameter_and_its_key(text: str, key: str, value: object) -> None:
+    found = taken(text).machine.model_dump()
+    for part in key.split("."):
+        found = found[part]
+    assert found == value
+
+
+@pytest.mark.parametrize(
+    ("multiplier", "system", "width_um"),
+    [
+        (2, "00000000", 5000.0),
+        (20, "00000000", 500.0),
+        (1, "00000000", 10000.0),
+        (102, "00000000", 10000.0),
+        (20, "00000010", 50.0),
+        (None, "00000000", 5000.0),
+    ],
+)
+def test_in_position_width_counts_detection_units(multiplier: int | None, system: str, width_um: float) -> None:
+    """A detection unit is a least increment over the command multiplier; 1820 = 20 is a multiplier of 10."""
+    per_axis = {1013: system, 1826: 5000} | ({1820: multiplier} if multiplier else {})
+    text = "\n".join(f"N{n:05d}Q1A1P{v}A2P{v}A3P{v}" for n, v in per_axis.items())
+    assert taken(text).machine.controller.in_position_width_um.x == pytest.approx(width_um)
+
+
+def test_bell_of_the_filter_on_shaped_programs_keeps_the_radial_error_of_the_manual() -> None:
+    controller = taken("N01622Q1A1P64A2P64A3P64\nN01610Q1A1P00000010").machine.controller
+    assert controller.shaped_filter_shape == "linear"
+    variance = (controller.shaped_time_constant_s**2 + controller.shaped_bell_time_s**2) / 12
+    assert math.isclose(variance / 2, 0.064**2 / 24)
+
+
+def test_what_is_read_and_not_used_is_said() -> None:
+    found = taken("N05003Q1P00000010\nN01732Q1P100\nN00103Q1P12\nN06080Q1P-5")
+    said = {row.parameter: row.why for row in found.missing}
+    assert "type C" in said["5003"]
+    assert "no key" in said["1732"]
+    assert "0020" in said["103"]
+    assert "not used" in said["6080"]
+
+
+def test_the_machine_is_called_as_its_control() -> None:
+    assert taken("N01420Q1A1P9000A2P9000A3P9000").machine.name == "HM1"
+    found = taken("N01420Q1A1P9000A2P9000A3P9000", name="Halle 3")
+    assert (found.machine.name, "VX500" in found.machine.description) == ("Halle 3", True)
+
+
+TABLES = {
+    "TOOLOFST.TXT": "%\nG10G90L10P1R185.676 \nG10G90L11P1R-0.010 \nG10G90L12P1R5.000 \nG10G90L13P1R0.000 \n"
+    "G10G90L10P2R0.000\nG10G90L11P2R0.000\nG10G90L12P2R0.000\nG10G90L13P2R0.000\nM02 \n%\n",
+    "EXT_WKZ.TXT": "%\nG90 \nG10L2P0X0.5Y0.0Z0.0B0.0 \nG10L2P1X-865.475Y-934.435Z-833.845B0.0\n"
+    "G10L2P2X-0.5Y0.0Z0.0B0.0\nG10L20P12X1.0Y2.0Z3.0B0.0\nM02 \n%\n",
+    "MACRO.TXT": "%\nG10L85P504(40B1940000000000)\nG10L85P505(FFFFFFFFFFFFFFFF)\nG10L85P100(4044000000000000)\n"
+    "SETVN500[]\nM02 \n%\n",
+}
+
+
+def written(folder: Path, tables: dict[str, str]) -> list[Path]:
+    """Tables as files."""
+    for name, text in tables.items():
+        (folder / name).write_text(text, encoding="ascii")
+    return [folder / name for name in tables]
+
+
+def test_tables_of_offsets_and_variables(tmp_path: Path) -> None:
+    found = taken("N01420Q1A1P9000A2P9000A3P9000", tables=written(tmp_path, TABLES))
+    read, controller = found.machine.input, found.machine.controller
+    assert (read.tool_length_mm, read.tool_length_wear_mm) == ({"1": 185.676}, {"1": -0.01})
+    assert (read.tool_radius_mm, read.tool_radius_wear_mm) == ({"1": 5.0}, {})
+    assert controller.offset_memory == "C"
+    assert read.work_offsets == {"G54": (-864.975, -934.435, -833.845), "G54.1P12": (1.5, 2.0, 3.0)}
+    # 40B1940000000000 is the double 4500.0; all ones is a vacant variable.
+    assert read.variables == {"504": 4500.0}
+    assert any("#100" in row.why for row in found.missing)
+    assert any("1 of 2 tool offsets are zero" in row.why for row in found.missing)
+    assert {row.key for row in found.tables_read} >= {"input.variables", "input.tool_length_mm", "input.work_offsets"}
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "value"),
+    [
+        ("%\nG10P3R12500\n%", "tool_length_mm", {"3": 12.5}),
+        ("%\nG10L10P3R100.\nG10L11P3R.1\n%", "tool_radius_mm", {"3": 100.0}),
+        ("%\nG10L10P3R100.\nG10L11P3R.1\n%", "tool_length_wear_mm", {"3": 0.1}),
+        ("%\n#500=[25283*65536+65536]/134217728\n#501=#0\n#502=-2.5\nM02\n%", "variables", {"500": None, "502": -2.5}),
+    ],
+)
+def test_tables_of_older_series(tmp_path: Path, text: str, key: str, value: dict[str, float | None]) -> None:
+    found = taken("N01420Q1A1P9000A2P9000A3P9000", tables=written(tmp_path, {"T.TXT": text}))
+    read = getattr(found.machine.input, key)
+    wanted = {number: (25283 * 65536 + 65536) / 134217728 if v is None else v for number, v in value.items()}
+    assert read == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize(
+    "line", ["G10L10P1R", "G10L2P9X1.", "G10L85P500(12)", "#500=__import__", "#500=1/0", "G10L10P1R1.R2.X"]
+)
+def test_bad_table_names_its_line(tmp_path: Path, line: str) -> None:
+    (table,) = written(tmp_path, {"BAD.TXT": f"%\nG10L2P1X1.Y1.Z1.\n{line}\n%\n"})
+    with pytest.raises(MachineError, match=r"BAD\.TXT:3"):
+        taken("N01420Q1A1P9000A2P9000A3P9000", tables=[table])
+
+
+def test_dump_of_which_nothing_is_read_fails(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "m.toml"
+    (dump,) = written(tmp_path, {"D.TXT": "%\nN09999Q1P1\n%\n"})
+    for more in (["--from", "vx500"], []):
+        assert main(["machine", "import", str(dump), "-o", str(output), *more]) == 1
+        assert "nothing in it" in capsys.readouterr().out
+        assert not output.exists()
+
+
+def test_command_with_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "m.toml"
+    files = [str(DUMPS / "with_q.txt"), *map(str, written(tmp_path, TABLES))]
+    assert main(["machine", "import", *reversed(files), "-o", str(output), "--name", "Mill 2"]) == 0
+    machine = Machine.load(output)
+    assert (machine.name, machine.input.variables) == ("Mill 2", {"504": 4500.0})
+    assert "FANUC MACRO.TXT" in output.read_text(encoding="utf-8")
+    capsys.readouterr()
+    assert main(["machine", "import", *files[1:], "-o", str(output), "--force"]) == 2
+    assert "parameter dump" in capsys.readouterr().err

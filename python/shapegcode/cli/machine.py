@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 from shapegcode.cli.console import add_json_argument
 
@@ -38,16 +39,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     take = actions.add_parser(
         "import",
         help="make a machine file from a controller's parameter dump (CNC-PARA.TXT)",
-        description="Make a machine file from a FANUC parameter dump, and say what was read, assumed and missing.",
-        epilog="example: shapegcode machine import CNC-PARA.TXT --from vx500 -o machine.toml",
+        description="Make a machine file from a FANUC parameter dump, and say what was read, assumed and missing. "
+        "Exit code 1 if nothing was read.",
+        epilog="example: shapegcode machine import CNC-PARA.TXT TOOLOFST.TXT MACRO.TXT --from vx500 -o machine.toml",
     )
-    take.add_argument("dump", metavar="DUMP", help="parameter dump as the controller punches it")
+    take.add_argument(
+        "dump",
+        metavar="DUMP",
+        nargs="+",
+        help="parameter dump as the controller punches it; with it, if wanted, its tables of tool offsets, work "
+        "offsets and variables (TOOLOFST.TXT, EXT_WKZ.TXT, MACRO.TXT)",
+    )
     take.add_argument(
         "-o", "--output", metavar="FILE", default=_DEFAULT_FILE, help="file to write (default: %(default)s)"
     )
     take.add_argument(
         "--from", dest="base", metavar="MACHINE", help="machine for what the dump does not say, such as the modes"
     )
+    take.add_argument("--name", metavar="NAME", help="name of the machine (default: that of the dump's file)")
     take.add_argument("--force", action="store_true", help="overwrite an existing file")
     add_json_argument(take)
 
@@ -95,9 +104,32 @@ def _import(args: argparse.Namespace) -> int:
     from shapegcode.machine.fanuc_import import import_parameters
 
     runner.check_files(args)
-    found = import_parameters(args.dump, Machine.load(args.base) if args.base else None)
-    _write(args, found.to_toml())
-    return runner.finish(found, args, wrote=[args.output])
+    dump, tables = _sorted(args.dump)
+    base = Machine.load(args.base) if args.base else None
+    found = import_parameters(dump, base, tables=tables, name=args.name)
+    if found.ok:
+        _write(args, found.to_toml())
+    return runner.finish(found, args, wrote=[args.output] if found.ok else [])
+
+
+def _sorted(files: list[str]) -> tuple[str, list[str]]:
+    """The parameter dump among some files, and the tables.
+
+    Raises:
+        ArgumentError: no dump, or more than one.
+        OSError: a file cannot be read.
+    """
+    from shapegcode.errors import ArgumentError
+    from shapegcode.machine.fanuc_tables import is_table
+
+    if len(files) == 1:
+        return files[0], []
+    tables = [file for file in files if is_table(Path(file).read_bytes())]
+    dumps = [file for file in files if file not in tables]
+    if len(dumps) != 1:
+        said = f"more than one: {', '.join(dumps)}" if dumps else "none: tables of offsets do not make a machine"
+        raise ArgumentError(f"one parameter dump (CNC-PARA.TXT) is needed, and there is {said}")
+    return dumps[0], tables
 
 
 def _show(args: argparse.Namespace) -> int:

@@ -29,11 +29,10 @@ class ShapedMotion:
         self._period_s = period
         model = MachineModel(machine)
         self._limits = model.limits()
-        self._tolerance = filter_tolerance(grid, model.shaped_time_constant_s, machine.tolerance.contour_um)
+        self._tolerance = filter_tolerance(grid, model.shaped_filter, machine.tolerance.contour_um)
         shaper = _core.Fir([ticks * delay for delay in grid.fir.delays], list(grid.fir.taps))
-        own = model.options(time_constant_s=model.shaped_time_constant_s).axis_filters
         # The emitted blocks join samples of the shaped command by straight lines.
-        self._filters = [shaper, _core.Fir.moving_average(ticks), *own]
+        self._filters = [shaper, _core.Fir.moving_average(ticks), *model.shaped.filters]
 
     @property
     def reach_s(self) -> float:

@@ -176,7 +176,9 @@ class TextWriter:
     def _header(self) -> list[str]:
         from shapegcode import __version__
 
-        grid = self.grid
+        grid, own = self.grid, self._model.shaped_filter
+        shape = " EXPONENTIAL" if own.shape == "exponential" and own.time_constant_s else ""
+        shape += f" BELL {own.bell_time_s * 1e3:g} MS" if own.bell_time_s else ""
         modes = [
             f"{axis} {mode.frequency_hz:g} HZ {mode.damping_ratio:g}"
             for axis, modes in zip("XYZ", self._model.options().modes, strict=True)
@@ -188,7 +190,7 @@ class TextWriter:
             f"BLOCK PERIOD {grid.block_period_s * 1e3:g} MS SHAPER {grid.duration_s * 1e3:g} MS",
             *([f"{len(grid.track.nodes)} SHAPERS FOLLOW {'XYZ'[grid.track.axis]}"] if grid.track else []),
             "SET FEED OVERRIDE 100 PCT",
-            f"TIME CONSTANT AFTER INTERPOLATION {self._model.shaped_time_constant_s * 1e3:g} MS",
+            f"TIME CONSTANT AFTER INTERPOLATION {own.time_constant_s * 1e3:g} MS{shape}",
         ]
         first, *rest = (f"({_plain(line)[:_COMMENT_WIDTH]})" for line in lines)
         return [first, _VERDICT_PENDING.decode(), *rest]

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.machine_model import MachineModel, OwnFilter
 from shapegcode.model.modes import NO_OFFSET, Offset
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
 from shapegcode.shaping.grid import Grid
@@ -49,20 +49,20 @@ class EmittedRegion:
     planned_um: float
 
 
-def filter_tolerance(grid: Grid, own_filter_s: float, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
+def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
     """What keeps the shaped command within a tolerance at corners and on arcs.
 
     Args:
         grid: what follows the look-ahead; its spread limits the speed.
-        own_filter_s: time constant with which the controller smooths the shaped program once more, s.
+        own: with which the controller smooths the shaped program once more.
         contour_tolerance_um: deviation allowed to it, µm.
 
     Returns:
         The tolerance, in mm.
     """
     tolerance = _core.FilterTolerance()
-    tolerance.variance_s2 = max(shaper.variance_s2 for shaper in grid.shapers) + own_filter_s * own_filter_s / 12.0
-    tolerance.mean_deviation_s = max(_mean_deviation_s(shaper) for shaper in grid.shapers) + own_filter_s / 4.0
+    tolerance.variance_s2 = max(shaper.variance_s2 for shaper in grid.shapers) + own.variance_s2
+    tolerance.mean_deviation_s = max(_mean_deviation_s(shaper) for shaper in grid.shapers) + own.mean_deviation_s
     tolerance.contour_tolerance_mm = contour_tolerance_um * 1e-3
     tolerance.corner_share = _CORNER_SHARE
     return tolerance
@@ -113,7 +113,7 @@ class RegionWriter:
 
     def tolerance(self, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
         """See `filter_tolerance`."""
-        return filter_tolerance(self._grid, self._model.shaped_time_constant_s, contour_tolerance_um)
+        return filter_tolerance(self._grid, self._model.shaped_filter, contour_tolerance_um)
 
     def options(
         self, limits: _core.MotionLimits, tolerance: _core.FilterTolerance, offset: Offset = NO_OFFSET
@@ -137,7 +137,7 @@ class RegionWriter:
         options.interpolation_period_s = self._model.period_s
         options.plunge_axis_angle_rad = self._machine.shaping.plunge_angle_deg * _DEGREE
         options.plunge_corner_angle_rad = _PLUNGE_CORNER_DEG * _DEGREE
-        options.rest_at_stop_s = self._model.shaped_time_constant_s
+        options.rest_at_stop_s = self._model.shaped_filter.duration_s
         options.target = _TARGETS[self._machine.shaping.contour]
         options.modes = plant.modes
         options.axis_shapers = list(grid.axis_firs)

@@ -68,7 +68,6 @@ def travel_emitted(
 ) -> Travelled:
     """Travel of shaped blocks as the controller plays them, along the programmed path; else as `Mover.travel`."""
     model = MachineModel(machine)
-    options = model.options(time_constant_s=model.shaped_time_constant_s)
     return Travelled.of(
-        _core.travel_blocks(blocks, path, model.own_rule, stations_mm, options.period_s, options.axis_filters, window_s)
+        _core.travel_blocks(blocks, path, model.own_rule, stations_mm, model.period_s, model.shaped.filters, window_s)
     )

@@ -162,6 +162,20 @@ class Controller(TomlTable):
         default=0.0,
         assumed=True,
     )
+    shaped_bell_time_s: Annotated[NonNegative, Field(le=10)] = key(
+        "length of its second moving average, where it builds up the acceleration as a bell; 0: none",
+        unit="s",
+        fanuc="1622 with 1610#1",
+        default=0.0,
+        assumed=True,
+    )
+    shaped_filter_shape: Literal["linear", "exponential"] = key(
+        'how it smooths. "linear": moving averages of the lengths shaped_time_constant_s and shaped_bell_time_s; '
+        '"exponential": a first-order lag of shaped_time_constant_s',
+        fanuc="1610#0, #1",
+        default="linear",
+        assumed=True,
+    )
     program_memory_bytes: Annotated[int, Strict(), Field(gt=0)] = key(
         "memory for programs; a larger output gets a warning", unit="bytes", default=262_144, assumed=True
     )

@@ -5,11 +5,11 @@ from __future__ import annotations
 from shapegcode.errors import Problem
 from shapegcode.machine.fanuc_dump import Dump, Entry
 
-__all__ = ["LONGEST_MS", "DumpValues"]
+__all__ = ["LONGEST_MS", "MM_PER_INCH", "DumpValues"]
 
 LONGEST_MS = 10_000.0
 _LARGEST = 1e7
-_MM_PER_INCH = 25.4
+MM_PER_INCH = 25.4
 
 
 class DumpValues:
@@ -85,7 +85,7 @@ class DumpValues:
         return entry.text[7 - bit] == "1"
 
     def _number(self, entry: Entry, low: float, high: float, unit: str) -> float:
-        value = float(entry.text) * (_MM_PER_INCH if entry.letter == "I" and unit.startswith("mm") else 1.0)
+        value = float(entry.text) * (MM_PER_INCH if entry.letter == "I" and unit.startswith("mm") else 1.0)
         if not low <= value <= high:
             name = f"parameter {entry.number} {entry.target}".rstrip()
             limit = f"must be {low:g} to {high:g} (unit: {unit})"

@@ -19,6 +19,7 @@ __all__ = [
     "MissingParameter",
     "ParameterImport",
     "ReadParameter",
+    "ReadTable",
     "Value",
     "describe_machine",
 ]
@@ -46,6 +47,25 @@ class ReadParameter:
     line: int
     key: str
     value: Value
+
+
+@dataclass(frozen=True)
+class ReadTable:
+    """A table of offsets or variables of the control, and the key that it went into.
+
+    Attributes:
+        file: name of the file.
+        first_line: of it, from 1.
+        last_line: of it.
+        key: dotted name in the machine file.
+        count: how many values the key has.
+    """
+
+    file: str
+    first_line: int
+    last_line: int
+    key: str
+    count: int
 
 
 @dataclass(frozen=True)
@@ -86,6 +106,7 @@ class ParameterImport(Result):
         dump: name of the dump.
         machine: the machine that it describes.
         read: per value that was taken, in the order of the keys.
+        tables_read: per key that a table of offsets or variables gave.
         assumed: what is an assumption.
         missing: what the dump does not say or what was not understood.
         remarks: text behind the keys of the machine file: where each value comes from.
@@ -95,6 +116,7 @@ class ParameterImport(Result):
     dump: str
     machine: Machine = field(metadata=hidden())
     read: tuple[ReadParameter, ...]
+    tables_read: tuple[ReadTable, ...]
     assumed: tuple[AssumedValue, ...]
     missing: tuple[MissingParameter, ...]
     remarks: Mapping[str, str] = field(metadata=hidden())
@@ -102,13 +124,15 @@ class ParameterImport(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether it makes a machine: always, as a dump that makes none is refused."""
-        return True
+        """Whether anything was read: a machine of nothing but assumptions is none."""
+        return bool(self.read or self.tables_read)
 
     @property
     def answer(self) -> str:
         """How much of the machine the dump says."""
-        keys = len({row.key for row in self.read})
+        if not self.ok:
+            return f"{self.dump}: nothing in it says anything about the motion or the programs: no machine"
+        keys = len({row.key for row in self.read} | {row.key for row in self.tables_read})
         return (
             f"{self.dump}: {keys} keys of {self.machine.name} read, {len(self.assumed)} assumed, "
             f"{len(self.missing)} parameters missing or not understood"
@@ -117,6 +141,8 @@ class ParameterImport(Result):
     @property
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
+        if not self.ok:
+            return "punch the parameters out again (CNC-PARA.TXT, all of them), and import that."
         if not any(axis.modes for axis in self.machine.axes.as_tuple()):
             return "find the vibration modes, which no dump holds: shapegcode identify TAP.csv --update MACHINE."
         return "look at what is assumed, and measure it: shapegcode characterize."
@@ -132,6 +158,11 @@ class ParameterImport(Result):
             Column("value", value=lambda rows: _shown(rows[0]), text=True),
             Column("from", value=_origins, text=True),
         )
+        tables = (
+            Column("key", left=True),
+            Column("values", value="count"),
+            Column("from", value=lambda row: f"{row.file}, lines {row.first_line} to {row.last_line}", text=True),
+        )
         assumed = (
             Column("key", left=True),
             Column("value", value=_shown, text=True),
@@ -140,6 +171,7 @@ class ParameterImport(Result):
         missing = (Column("parameter"), Column("line"), Column("why", text=True))
         found = [
             Table("read", read, [list(rows) for _, rows in groupby(self.read, key=lambda row: row.key)]),
+            Table("read from tables", tables, self.tables_read),
             Table("assumed", assumed, self.assumed),
             Table("missing or not understood", missing, self.missing),
         ]

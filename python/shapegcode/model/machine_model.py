@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,7 +20,7 @@ from shapegcode.model.controller import controller_model, motion_limits
 from shapegcode.model.drives import drive_parameters
 from shapegcode.model.modes import NO_OFFSET, Offset, axis_modes, mode_tables, region_offset, slowest_mode
 
-__all__ = ["PLANTS", "MachineModel", "PlayingController"]
+__all__ = ["PLANTS", "MachineModel", "OwnFilter", "PlayingController"]
 
 PLANTS = ("modal", "feed-drive")
 """The plants that there are: modes behind an ideal servo, or motor, ball screw and table with their servo loops."""
@@ -27,6 +28,37 @@ PLANTS = ("modal", "feed-drive")
 _LEAST_DECAY_PER_S = 0.01  # below it a mode has no damping to speak of
 
 FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class OwnFilter:
+    """The control's own filter behind the interpolation, while shaped blocks run.
+
+    Attributes:
+        shape: "linear" (moving averages) or "exponential".
+        time_constant_s: length of the moving average, or time constant; 0: none.
+        bell_time_s: length of the second moving average; 0: none.
+        duration_s: of the answer to a step.
+    """
+
+    shape: str
+    time_constant_s: float
+    bell_time_s: float
+    duration_s: float
+
+    @property
+    def variance_s2(self) -> float:
+        """Second moment about the mean: an arc of radius R shrinks by half of it times v²/R."""
+        if self.shape == "exponential":
+            return self.time_constant_s**2
+        return (self.time_constant_s**2 + self.bell_time_s**2) / 12.0
+
+    @property
+    def mean_deviation_s(self) -> float:
+        """Mean of the absolute distance from the mean, at most: what a corner is cut by goes with it."""
+        if self.shape == "exponential":
+            return self.time_constant_s * 2.0 / math.e
+        return (self.time_constant_s + self.bell_time_s) / 4.0
 
 
 class PlayingController:
@@ -113,8 +145,6 @@ class MachineModel:
         """Interpolation period."""
         self.own_rule: _core.BlockEnd = getattr(_core.BlockEnd, machine.controller.block_end)
         """The controller's own rule of block timing."""
-        self.shaped_time_constant_s = machine.controller.shaped_time_constant_s
-        """Of the filter behind the interpolation while shaped blocks run."""
         rates = [
             damping * 2.0 * math.pi * frequency
             for axis in machine.axes.as_tuple()
@@ -133,11 +163,23 @@ class MachineModel:
     def shaped(self) -> PlayingController:
         """The controller as it plays shaped blocks: one by one, without look-ahead."""
         model = controller_model(self.machine)
+        controller = self.machine.controller
         model.motion = _core.MotionKind.after_interpolation
-        model.filter_shape = _core.FilterShape.linear
-        model.time_constant_s = self.shaped_time_constant_s
-        model.bell_time_s = 0.0
+        model.filter_shape = getattr(_core.FilterShape, controller.shaped_filter_shape)
+        model.time_constant_s = controller.shaped_time_constant_s
+        model.bell_time_s = controller.shaped_bell_time_s
         return PlayingController(model)
+
+    @cached_property
+    def shaped_filter(self) -> OwnFilter:
+        """What smooths shaped blocks behind the interpolation."""
+        controller, filters = self.machine.controller, self.shaped.filters
+        return OwnFilter(
+            controller.shaped_filter_shape,
+            controller.shaped_time_constant_s,
+            controller.shaped_bell_time_s,
+            sum(each.duration_samples + 1 for each in filters) * self.period_s,
+        )
 
     def playing(self, *, shaped: bool) -> PlayingController:
         """One of the two: `shaped` for a program that shapegcode wrote."""
@@ -168,16 +210,16 @@ class MachineModel:
         self,
         *,
         plant: str = "modal",
-        time_constant_s: float = 0.0,
+        filters: Sequence[_core.Fir] = (),
         shift: float = 0.0,
         only: str | None = None,
         offset: Offset = NO_OFFSET,
     ) -> _core.PlaybackOptions:
-        """Interpolation period and plant, with an acceleration filter after interpolation.
+        """Interpolation period and plant, with acceleration filters after interpolation.
 
         Args:
             plant: "modal" for the modes behind an ideal servo, "feed-drive" for `axes.*.drive`.
-            time_constant_s: length of the filter; 0: none.
+            filters: behind the interpolation, such as those of `shaped` or `ordinary`.
             shift: share of each mode's stated uncertainty by which it is off; see `axis_modes`.
             only: the one mode that is off, such as "x.1"; None: all of them.
             offset: from the command's positions to the machine's, for modes that vary with them.
@@ -198,8 +240,7 @@ class MachineModel:
             options.mode_tables = mode_tables(self.machine, shift, offset, only)
         else:
             options.drives = drive_parameters(self.machine)
-        ticks = round(time_constant_s / self.period_s)
-        options.axis_filters = [_core.Fir.moving_average(ticks)] if ticks > 1 else []
+        options.axis_filters = list(filters)
         return options
 
     def play_original(
@@ -258,8 +299,7 @@ class MachineModel:
         Returns:
             The figures, positions in mm.
         """
-        own_s = self.shaped_time_constant_s
-        options = self.options(time_constant_s=own_s, shift=shift, only=only, offset=offset)
+        options = self.options(filters=self.shaped.filters, shift=shift, only=only, offset=offset)
         options.measure_contour = contour
         if tracker is not None:
             options.tracker = tracker
@@ -269,7 +309,7 @@ class MachineModel:
         if starved_blocks:
             options.starved_blocks = list(starved_blocks)
             options.starved_s = self.machine.verdict.starved_s
-            options.starved_memory_s = memory_s + own_s if memory_s > 0.0 else 0.0
+            options.starved_memory_s = memory_s + self.shaped_filter.duration_s if memory_s > 0.0 else 0.0
         return _core.play_blocks(blocks, path, block_end or self.own_rule, override, options)
 
     def play_planned(
@@ -285,8 +325,8 @@ class MachineModel:
         Returns:
             The figures, positions in mm.
         """
-        filter_s = self.machine.controller.look_ahead_filter_time_constant_s
-        options = self.options(time_constant_s=filter_s, offset=offset)
+        ticks = round(self.machine.controller.look_ahead_filter_time_constant_s / self.period_s)
+        options = self.options(filters=[_core.Fir.moving_average(ticks)] if ticks > 1 else [], offset=offset)
         return _core.play_path(blocks, _core.plan_speed(blocks, self.limits()), options, path)
 
     def cycle_time_s(self, program: _core.ProgramText) -> float:

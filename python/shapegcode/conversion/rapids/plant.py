@@ -180,7 +180,7 @@ class RapidPlant:
         return clock_s + max(0.0, settling_s - still_s)
 
     def _filter_periods(self) -> int:
-        return math.ceil(self._playing.shaped_time_constant_s / self.model.period_s) + 1
+        return math.ceil(self._playing.shaped_filter.duration_s / self.model.period_s) + 1
 
     def _options(self, region: _core.Region | None) -> _core.PlaybackOptions:
         return self._playing.options(offset=NO_OFFSET if region is None else self._playing.offset(region))

@@ -1,0 +1,114 @@
+"""A machine in the making: tables of its file, and for each value where it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from shapegcode.errors import Problem
+from shapegcode.machine.fanuc_dump import Dump
+from shapegcode.machine.fanuc_values import DumpValues
+from shapegcode.machine.result import AssumedValue, MissingParameter, ReadParameter, ReadTable, Value
+from shapegcode.results.result import Xyz
+
+__all__ = ["Draft"]
+
+
+class Draft:
+    """Tables of a machine file, filled from a dump.
+
+    Args:
+        dump: the records.
+        data: tables of the machine from which it starts.
+
+    Attributes:
+        dump: the records.
+        values: the same as numbers and bits.
+        data: tables of the machine file.
+        read: every value of the dump that went into a key.
+        tables: tables of offsets and variables that went into keys.
+        assumed: what was taken though nobody says it.
+        missing: what the dump does not say, what was not understood, what is read and not used.
+        remarks: per dotted key, where its value comes from.
+    """
+
+    def __init__(self, dump: Dump, data: dict[str, Any]) -> None:
+        self.dump = dump
+        self.values = DumpValues(dump)
+        self.data = data
+        self.read: list[ReadParameter] = []
+        self.tables: list[ReadTable] = []
+        self.assumed: list[AssumedValue] = []
+        self.missing: list[MissingParameter] = []
+        self.remarks: dict[str, str] = {}
+
+    def problem(self, number: int, said: str) -> None:
+        """Something that makes the dump useless; the line is that of the parameter."""
+        line = next((entry.line for (n, _), entry in self.dump.entries.items() if n == number), None)
+        self.values.problems.append(Problem(f"parameter {number}", "", said, line))
+
+    def miss(self, number: int | str, why: str, line: int | None = None) -> None:
+        """A parameter that is not there, or that changes nothing."""
+        if line is None and isinstance(number, int):
+            entry = self.dump.get(number) or next(iter(self.values.entries(number)), None)
+            line = entry.line if entry else None
+        self.missing.append(MissingParameter(str(number), line, why))
+
+    def assume(self, key: str, value: Value, why: str) -> None:
+        """A value that rests on an assumption; it is in the machine already, or in no key."""
+        self.assumed.append(AssumedValue(key, value, why))
+
+    def assume_key(self, key: str, value: Value, why: str) -> None:
+        """A value of a key that the dump does not give."""
+        self.put(key, value)
+        self.remarks[key] = f"assumed: {why}"
+        self.assume(key, value, why)
+
+    def get(self, key: str) -> Any:
+        """What the machine has under a dotted key; None where it has nothing."""
+        value: Any = self.data
+        for part in key.split("."):
+            value = value.get(part) if isinstance(value, Mapping) else None
+        return value
+
+    def drop(self, key: str) -> None:
+        """Take a key out, so that its default holds."""
+        *tables, name = key.split(".")
+        table = self.get(".".join(tables))
+        if isinstance(table, dict):
+            table.pop(name, None)
+
+    def set(self, key: str, value: Any, *numbers: int, note: str = "", axis: int | None = None) -> None:
+        """Put a value of the dump into the machine.
+
+        Args:
+            key: dotted.
+            value: of the key; a list is one per axis.
+            numbers: of the parameters that it comes from.
+            note: what had to be assumed to understand them; the remark begins with it then.
+            axis: the one whose values were read; None: all three.
+        """
+        shown = self.put(key, value)
+        origin = "FANUC " + ", ".join(str(number) for number in numbers)
+        self.remarks[key] = f"{origin}: {note}" if note else origin
+        if note:
+            self.assume(key, shown, note)
+        for number in numbers:
+            axes = self.values.axes if axis is None else (axis,)
+            entries = [entry for a in axes if (entry := self.dump.get(number, a))]
+            path = self.dump.get(number)
+            for entry in entries or ([path] if path else []):
+                self.read.append(ReadParameter(number, entry.target, entry.letter + entry.text, entry.line, key, shown))
+
+    def put(self, key: str, value: Any) -> Value:
+        """Put a value into the tables, without a word about it; what is shown of it comes back."""
+        *tables, name = key.split(".")
+        table = self.data
+        for part in tables:
+            table = table.setdefault(part, {})
+        if isinstance(value, list):
+            table[name] = dict(zip("xyz", value, strict=True))
+            return Xyz(*value)
+        table[name] = value
+        shown: Value = "; ".join(f"{k} = {v}" for k, v in value.items()) if isinstance(value, dict) else value
+        return shown

@@ -1,0 +1,239 @@
+"""What a parameter dump says about the motion: limits, acceleration, filters, corners, rapids, servo.
+
+Sources of the meanings stand in docs/parameters.md, with those that no text confirmed.
+"""
+
+from __future__ import annotations
+
+import math
+
+from shapegcode.machine.fanuc_draft import Draft
+from shapegcode.machine.fanuc_program import increment_um
+from shapegcode.machine.fanuc_values import LONGEST_MS
+
+__all__ = ["NUMBERS", "take_motion"]
+
+_LAW = (1401, 1420, 1422, 1430, 1432, 1602, 1603, 1604, 1610, 1620, 1621, 1622, 1623, 1660, 1730, 1731, 1732)
+_AHEAD = (1735, 1737, 1769, 1770, 1771, 1772, 1773, 1774, 1783)
+NUMBERS = frozenset((*_LAW, *_AHEAD, 1820, 1825, 1826, 2005, 2068, 2092))
+"""Parameters that are read here."""
+
+_OFF, _ON = ("G05.1Q0",), ("G05.1Q1",)
+
+
+def take_motion(draft: Draft) -> None:
+    """Everything about the motion.
+
+    Args:
+        draft: is filled; its increment system is known already.
+    """
+    before = _limits_and_law(draft)
+    _shaped_filter(draft)
+    _look_ahead_at_start(draft)
+    _corners_and_arcs(draft)
+    _rapids(draft, before)
+    _servo(draft)
+
+
+def _limits_and_law(draft: Draft) -> bool:
+    """Limits of the axes and the kind of acceleration; True where it lies before the interpolation."""
+    values = draft.values
+    acceleration = values.per_axis(1660, unit="mm/s²")
+    speed, time = values.per_axis(1770, unit="mm/min"), values.per_axis(1771, LONGEST_MS, "ms")
+    filter_ms, bell_ms = values.scalar(1769, LONGEST_MS, "ms"), values.scalar(1772, LONGEST_MS, "ms")
+    numbers: tuple[int, ...] = ()
+    if acceleration and min(acceleration) > 0:
+        numbers = (1660,)
+    elif speed and time and min(*speed, *time) > 0:
+        acceleration = [v / 60 / (t / 1000) for v, t in zip(speed, time, strict=True)]
+        numbers = (1770, 1771)
+    # The 16i family has no 1769 or 1772 beside 1770, 1771.
+    before = bool(numbers) and (numbers[0] == 1770 or filter_ms is not None or bell_ms is not None)
+    if before:
+        why = "the dump has acceleration before interpolation, but whether it is on the program decides (G05.1, G08)"
+        if values.bit(1604, 0):
+            draft.set("controller.motion", "look_ahead", 1604, *numbers)
+        else:
+            draft.set("controller.motion", "look_ahead", *numbers, note=why)
+        draft.set("controller.law", "jerk_limited", *numbers, note="constant acceleration before interpolation")
+        if filter_ms is not None:
+            _look_ahead_filter(draft, filter_ms / 1000)
+        if bell_ms is not None:
+            draft.set("controller.bell_time_s", bell_ms / 1000, 1772)
+    _cutting_feeds(draft, before)
+    if not before:
+        _after_interpolation(draft)
+    if numbers and acceleration:
+        for k, name in enumerate("xyz"):
+            axis = values.axes[k]
+            draft.set(f"axes.{name}.max_acceleration_mm_s2", acceleration[k], *numbers, axis=axis)
+    return before
+
+
+def _look_ahead_filter(draft: Draft, time_s: float) -> None:
+    """1769 is one time; 1602#3 and #6 say what kind of filter it belongs to, of which one key holds a moving average.
+
+    A bell, and an exponential of another length, take an arc as far from its radius as that average does.
+    """
+    key = "controller.look_ahead_filter_time_constant_s"
+    linear, bell = draft.values.bit(1602, 6), draft.values.bit(1602, 3)
+    if linear is None or bell is None:
+        draft.set(key, time_s, 1769, note="no 1602: linear after interpolation")
+    elif bell:
+        draft.set(key, time_s, 1769, 1602, note="bell, as a moving average of the same radial error")
+    elif linear or not time_s:
+        draft.set(key, time_s, 1769, 1602)
+    else:
+        average_s = round(time_s * math.sqrt(12.0), 6)
+        note = f"exponential of {time_s * 1e3:g} ms, as a moving average of the same radial error"
+        draft.set(key, average_s, 1769, 1602, note=note)
+
+
+def _cutting_feeds(draft: Draft, before: bool) -> None:
+    values = draft.values
+    found = {n: values.per_axis(n, unit="mm/min") for n in (1422, 1430, 1432)}
+    for k, name in enumerate("xyz"):
+        usable = {n: feeds[k] for n, feeds in found.items() if feeds and feeds[k] > 0}
+        per_axis = 1432 if before and 1432 in usable else 1430
+        usable.pop(1430 if per_axis == 1432 else 1432, None)
+        if usable:
+            number = min(usable, key=lambda n: usable[n])
+            draft.set(f"axes.{name}.max_feed_mm_per_min", usable[number], number, axis=values.axes[k])
+
+
+def _after_interpolation_s(draft: Draft) -> tuple[float, float, str, str] | None:
+    """Time constant, second moving average, shape and note of the filter of 1622; None where the dump has none."""
+    time = draft.values.scalar(1622, LONGEST_MS, "ms")
+    if time is None:
+        return None
+    linear, bell = draft.values.bit(1610, 0), draft.values.bit(1610, 1)
+    if bell:
+        # Two moving averages a = b = T/√2 have the variance T²/12 of the manual's radial error.
+        part = time / 1000 / math.sqrt(2)
+        return part, part, "linear", f"bell of {time:g} ms as two moving averages of T/√2"
+    if linear is None:
+        return time / 1000, 0.0, "linear", "kind of acceleration after interpolation not given (1610): linear"
+    return time / 1000, 0.0, "linear" if linear else "exponential", ""
+
+
+def _after_interpolation(draft: Draft) -> None:
+    """The ordinary motion of a control that has no acceleration before interpolation."""
+    found = _after_interpolation_s(draft)
+    if found is None:
+        draft.miss(1622, "no time constant of cutting feed; the kind of motion cannot be known")
+        return
+    time_s, bell_s, shape, note = found
+    why = "no acceleration before interpolation in the dump"
+    draft.set("controller.motion", "after_interpolation", 1622, note=why)
+    draft.set("controller.time_constant_s", time_s, 1622, 1610, note=note)
+    draft.set("controller.bell_time_s", bell_s, 1622, 1610, note=note)
+    draft.set("controller.after_interpolation_shape", shape, 1610, note=note)
+    lowest = draft.values.scalar(1623, unit="mm/min")
+    if lowest:
+        draft.miss(1623, f"lowest feed of exponential acceleration, {lowest:g} mm/min: read, but no key holds it")
+
+
+def _shaped_filter(draft: Draft) -> None:
+    """With the look-ahead off, cutting blocks pass the filter of 1622, whoever wrote them."""
+    found = _after_interpolation_s(draft)
+    if found is None:
+        if draft.get("controller.shaped_time_constant_s") is None:
+            why = "no 1622: whether a filter after interpolation acts on shaped programs is not known"
+            draft.assume_key("controller.shaped_time_constant_s", 0.0, why)
+        return
+    time_s, bell_s, shape, note = found
+    draft.set("controller.shaped_time_constant_s", time_s, 1622, 1610, note=note)
+    draft.set("controller.shaped_bell_time_s", bell_s, 1622, 1610, note=note)
+    draft.set("controller.shaped_filter_shape", shape, 1610, note=note)
+
+
+def _look_ahead_at_start(draft: Draft) -> None:
+    """A control that starts every program with the look-ahead on must be told to leave it, and may not do so."""
+    on = draft.values.bit(1604, 0)
+    if on is None:
+        return
+    draft.set("verdict.look_ahead", on, 1604)
+    if on:
+        draft.set("emission.prologue", _OFF, 1604)
+        draft.set("emission.epilogue", _ON, 1604)
+
+
+def _corners_and_arcs(draft: Draft) -> None:
+    values = draft.values
+    steps = values.per_axis(1783, unit="mm/min")
+    if steps and min(steps) > 0:
+        draft.set("controller.corner_speed_difference_mm_per_min", steps, 1783)
+    elif steps:
+        draft.miss(1783, "0: what the controller does then is not known")
+    across = [v for v in values.per_axis(1735, unit="mm/s²") or [] if v > 0]
+    feed, radius = values.scalar(1730, unit="mm/min"), values.scalar(1731, unit="µm")
+    if across:
+        draft.set("controller.centripetal_acceleration_mm_s2", min(across), 1735)
+    elif feed and radius:
+        draft.set("controller.centripetal_acceleration_mm_s2", (feed / 60) ** 2 / (radius / 1000), 1730, 1731)
+    if values.scalar(1732, unit="mm/min"):
+        draft.miss(1732, "lowest feed of the clamp on arcs: read, but no key holds it")
+    along = values.per_axis(1737, unit="mm/s²")
+    if along and min(along) > 0:
+        draft.set("controller.contour_acceleration_mm_s2", along, 1737)
+
+
+def _rapids(draft: Draft, before: bool) -> None:
+    values = draft.values
+    rates = values.per_axis(1420, unit="mm/min", low=1e-3)
+    for k, name in enumerate("xyz"):
+        if rates:
+            draft.set(f"axes.{name}.rapid_mm_per_min", rates[k], 1420, axis=values.axes[k])
+    look_ahead = before or draft.get("controller.motion") == "look_ahead"
+    ahead = values.per_axis(1773, LONGEST_MS, "ms") if look_ahead else None
+    use_1773 = bool(ahead) and min(ahead or [0]) > 0
+    times = ahead if use_1773 else values.per_axis(1620, LONGEST_MS, "ms")
+    if times:
+        draft.set("controller.rapid_time_constant_s", [t / 1000 for t in times], 1773 if use_1773 else 1620)
+    number = 1774 if use_1773 else 1621
+    bell = values.scalar(number, LONGEST_MS, "ms")
+    if bell is not None:
+        note = ""
+        if number == 1621 and bell and values.bit(1603, 6) is False:
+            # Newer series have no RBL and take the bell from 1621 alone [general knowledge].
+            note = "bell bit 1603#6 is 0; on this series " + ("1621 alone decides" if draft.dump.with_q else "off")
+            bell = bell if draft.dump.with_q else 0.0
+        draft.set("controller.rapid_bell_time_s", bell / 1000, number, note=note)
+    linear = values.bit(1401, 1)
+    if linear is not None:
+        draft.set("controller.rapid_path", "linear" if linear else "non_linear", 1401)
+
+
+def _multiplier(code: float) -> float | None:
+    """Command multiplier (CMR) of a value of 1820: twice the multiplier, or 100 and its denominator; None: none."""
+    if 101 <= code <= 127:
+        return 1.0 / (code - 100)
+    return code / 2.0 if 1 <= code <= 96 else None
+
+
+def _servo(draft: Draft) -> None:
+    values = draft.values
+    gains = values.per_axis(1825, unit="0.01/s", low=1)
+    if gains:
+        draft.set("controller.position_gain_per_s", [g * 0.01 for g in gains], 1825)
+    widths = values.per_axis(1826, unit="detection units")
+    if widths and min(widths) > 0:
+        codes = values.per_axis(1820, 1000)
+        multipliers = [_multiplier(code) for code in codes or ()]
+        step_um, known = increment_um(draft)
+        if len(multipliers) == 3 and all(multipliers):
+            units = [step_um / each for each in multipliers if each]
+            note = "" if known else f"least increment {step_um:g} µm (no 1013)"
+            numbers: tuple[int, ...] = (1826, 1820, 1013) if known else (1826, 1820)
+        else:
+            units, numbers, note = [1.0] * 3, (1826,), "detection unit 1 µm assumed (no command multiplier 1820)"
+        um = [round(width * unit, 9) for width, unit in zip(widths, units, strict=True)]
+        draft.set("controller.in_position_width_um", um, *numbers, note=note)
+    on = [draft.dump.get(2005, axis) for axis in values.axes]
+    if all(on):
+        fine, coarse = values.per_axis(2092, 10_000, "0.01 %"), values.per_axis(2068, 100, "%")
+        ratios = [0.0, 0.0, 0.0]
+        for k, entry in enumerate(on):
+            if entry is not None and values.bit_of(entry, 1):
+                ratios[k] = fine[k] / 1e4 if fine and fine[k] else (coarse[k] / 100 if coarse else 0.0)
+        draft.set("controller.feed_forward_ratio", ratios, 2005, 2092 if fine else 2068)

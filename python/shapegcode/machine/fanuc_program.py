@@ -1,0 +1,211 @@
+"""What a parameter dump says about programs: increments, power-on state, offsets, cycles, calls, serial line.
+
+Sources of the meanings stand in docs/parameters.md, with those that no text confirmed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from shapegcode.machine.fanuc_draft import Draft
+from shapegcode.machine.fanuc_values import MM_PER_INCH
+
+__all__ = ["NUMBERS", "increment_um", "is_inch", "take_program"]
+
+_SERIAL = {0: 103, 1: 113, 2: 123, 3: 133}
+"""Channel of 0020 -> parameter of its transfer speed; other channels are cards, networks, data servers."""
+_BAUD = (0, 50, 100, 110, 150, 200, 300, 600, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 76800, 115200)
+_OFFSETS = tuple(range(1220, 1227))
+NUMBERS = frozenset(
+    (
+        *(0, 20, *_SERIAL.values(), 1004, 1013, 1020, *_OFFSETS),
+        *(3401, 3402, 3403, *range(3410, 3433)),
+        *(5003, 5004, 5114, 5115, 5400, 6001, *range(6050, 6060), *range(6071, 6090)),
+    )
+)
+"""Parameters that are read here."""
+
+
+def take_program(draft: Draft) -> None:
+    """Everything about programs.
+
+    Args:
+        draft: is filled.
+    """
+    _axes(draft)
+    _increments(draft)
+    _words_and_arcs(draft)
+    _cycles_and_offsets(draft)
+    _work_offsets(draft)
+    _calls(draft)
+    _serial_line(draft)
+
+
+def _axes(draft: Draft) -> None:
+    """Which of A1, A2, ... is X, Y, Z."""
+    names = {
+        float(entry.text): int(entry.target[1:])
+        for (number, target), entry in draft.dump.entries.items()
+        if number == 1020 and target.startswith("A")
+    }
+    if not names:
+        draft.assume("axes", "A1, A2, A3", "no axis names (1020): A1 is X, A2 is Y, A3 is Z")
+        return
+    absent = [chr(code) for code in (88, 89, 90) if code not in names]
+    if absent:
+        draft.problem(1020, f"no axis is named {', '.join(absent)}")
+        return
+    draft.values.axes = (names[88], names[89], names[90])
+
+
+def increment_um(draft: Draft) -> tuple[float, bool]:
+    """Least increment of a metric axis, µm: 1013#1 is IS-C, #0 IS-A, neither IS-B; and whether the dump says so."""
+    number = _increment_parameter(draft)
+    if number is None:
+        return 1.0, False
+    fine, coarse = draft.values.bit(number, 1), draft.values.bit(number, 0)
+    return (0.1 if fine else 10.0 if coarse else 1.0), True
+
+
+def _increment_parameter(draft: Draft) -> int | None:
+    """1013 has the bits per axis; older series have them in 1004, for all."""
+    return next((n for n in (1013, 1004) if draft.values.bit(n, 1) is not None), None)
+
+
+def is_inch(draft: Draft) -> bool:
+    """Whether the control's setting is inch input (0000#2): values without a unit of their own are inch then."""
+    return bool(draft.values.bit(0, 2))
+
+
+def _increments(draft: Draft) -> None:
+    number = _increment_parameter(draft)
+    if number is None:
+        draft.miss(1013, "no increment system: IS-B is assumed, least increment 0.001 mm")
+        return
+    step_um, _ = increment_um(draft)
+    steps = {draft.values.bit_of(entry, 1) for entry in draft.values.entries(number)}
+    if len(steps) > 1:
+        draft.assume(f"parameter {number}", "differs", "increment systems differ between the axes; that of X counts")
+    draft.set("controller.least_increment_mm", round(step_um / 1000, 9), number)
+    draft.set("controller.least_increment_inch", round(step_um / 10_000, 9), number)
+
+
+def _words_and_arcs(draft: Draft) -> None:
+    values = draft.values
+    point = values.bit(3401, 0)
+    if point is not None:
+        draft.set("controller.calculator_decimal_point", point, 3401)
+    alarm = values.bit(3403, 5)
+    if alarm is not None:
+        draft.set("input.arc_without_centre", "alarm" if alarm else "line", 3403)
+    entry = draft.dump.get(3410)
+    if entry and (tolerance := _length_mm(draft, 3410)):
+        note = "" if "." in entry.text else "whole number: in least increments"
+        draft.set("controller.arc_radius_tolerance_mm", tolerance, 3410, note=note)
+    elif entry:
+        draft.miss(3410, "0: taken by some series as no check; not known", entry.line)
+    choices: tuple[tuple[str, Callable[[], str]], ...] = (
+        ("motion", lambda: "G01" if values.bit(3402, 0) else "G00"),
+        ("plane", lambda: "G19" if values.bit(3402, 2) else "G18" if values.bit(3402, 1) else "G17"),
+        ("distance", lambda: "G91" if values.bit(3402, 3) else "G90"),
+    )
+    if values.bit(3402, 0) is not None:
+        for name, choose in choices:
+            draft.set(f"power_on.{name}", choose(), 3402)
+    inch = values.bit(0, 2)
+    if inch is not None:
+        draft.set("power_on.units", "G20" if inch else "G21", 0)
+    codes = {n: values.scalar(n, 99_999_999) for n in range(3411, 3433)}
+    given = {n: int(code) for n, code in codes.items() if code}
+    if given:
+        draft.set("controller.no_buffer_m_codes", tuple(sorted(set(given.values()))), *given)
+
+
+def _length_mm(draft: Draft, number: int) -> float | None:
+    """A length without axes: with a point in mm or inch, without one in least increments."""
+    value = draft.values.scalar(number, unit="mm")
+    if value is None:
+        return None
+    entry = draft.dump.get(number) or draft.values.entries(number)[0]
+    return value if "." in entry.text else round(value * increment_um(draft)[0] / 1000, 9)
+
+
+def _cycles_and_offsets(draft: Draft) -> None:
+    values = draft.values
+    unit = values.bit(5400, 7)
+    if unit is not None:
+        draft.set("input.scale_unit", 0.001 if unit else 0.00001, 5400)
+    clearances = {n: _length_mm(draft, n) for n in (5114, 5115)}
+    given = {n: mm for n, mm in clearances.items() if mm is not None}
+    if given:
+        largest = max(given.values())
+        note = "" if min(given.values()) == largest else "G73 and G83 differ; the larger one counts for both"
+        draft.set("input.peck_clearance_mm", largest, *given, note=note)
+    first, second = values.bit(5003, 0), values.bit(5003, 1)
+    if second:
+        draft.miss(5003, "start-up of cutter compensation of type C: read, but not expanded so; type A or B is used")
+    elif first is not None:
+        draft.set("input.compensation_start_up", "B" if first else "A", 5003)
+
+
+def _work_offsets(draft: Draft) -> None:
+    """1221 to 1226 are G54 to G59, to each of which 1220 is added."""
+    values, step_mm = draft.values, increment_um(draft)[0] / 1000
+    found: dict[int, list[float]] = {}
+    for number in _OFFSETS:
+        entries = values.entries(number)
+        if len(entries) == 3:
+            mm = values.per_axis(number, unit="mm", low=-1e7) or []
+            found[number] = [v if "." in e.text else v * step_mm for v, e in zip(mm, entries, strict=True)]
+    shift = found.pop(1220, [0.0, 0.0, 0.0])
+    sums = {
+        f"G{number - 1167}": tuple(round(a + b, 9) for a, b in zip(each, shift, strict=True))
+        for number, each in found.items()
+    }
+    if sums:
+        used = [number for number in _OFFSETS if number in found] + ([1220] if any(shift) else [])
+        draft.set("input.work_offsets", {name: each for name, each in sums.items() if any(each)}, *used)
+
+
+def _calls(draft: Draft) -> None:
+    """G, M and T codes that call programs."""
+    tables = (
+        ("input.g_macros", range(6050, 6060), 9010),
+        ("input.m_subprograms", range(6071, 6080), 9001),
+        ("input.m_macros", range(6080, 6090), 9020),
+    )
+    for key, numbers, first in tables:
+        codes = {n: draft.values.scalar(n, 99_999_999, low=-9999) for n in numbers}
+        given = {n: int(code) for n, code in codes.items() if code and code > 0}
+        for n in (n for n, code in codes.items() if code and code < 0):
+            draft.miss(n, "a code that calls a macro in every block (negative): read, but not used")
+        if any(code is not None for code in codes.values()):
+            draft.set(key, {str(code): first + n - numbers[0] for n, code in given.items()}, *(given or codes))
+    call = draft.values.bit(6001, 5)
+    if call is not None:
+        draft.set("input.tool_program", 9000 if call else 0, 6001)
+
+
+def _serial_line(draft: Draft) -> None:
+    """The speed counts where 0020 names the channel that it belongs to: else programs are not drip fed."""
+    channel = draft.values.scalar(20, 35)
+    if channel is None:
+        if draft.values.scalar(103) is not None:
+            draft.miss(103, "no 0020: which channel programs come from is not known; not taken as drip feed")
+        return
+    number = _SERIAL.get(int(channel))
+    if number is None:
+        draft.set("controller.dnc_baud", 0, 20)
+        return
+    speed = draft.values.scalar(number, 1000)
+    if speed is None:
+        draft.miss(number, f"transfer speed of channel {channel:g} (0020) is not in the dump")
+    elif not speed < len(_BAUD):
+        draft.miss(number, f"{speed:g}: no transfer speed has this code (0 to {len(_BAUD) - 1})")
+    elif speed:
+        draft.set("controller.dnc_baud", _BAUD[int(speed)], 20, number)
+
+
+def inch_factor(draft: Draft) -> float:
+    """What values without a unit of their own are multiplied by to be mm."""
+    return MM_PER_INCH if is_inch(draft) else 1.0
