@@ -10,6 +10,7 @@
 #include "shapegcode/error.hpp"
 #include "write/block_rounding.hpp"
 #include "write/block_shape.hpp"
+#include "write/feed_words.hpp"
 
 namespace shapegcode {
 namespace {
@@ -89,6 +90,7 @@ class Fitter {
       round_for_vibration(blocks, grid_, shape_, k, rests, options_);
     }
     end_with_arc(blocks);
+    shorten_feeds(blocks, shape_.rounded(0), shape_);
     return blocks;
   }
 

@@ -10,6 +10,10 @@ namespace {
 constexpr double largest_radius_increments = 99999999.0;  // a word has eight digits
 // Ticks by which a block ends before its last tick: far over the rounding of any controller, far under what matters.
 constexpr double tick_margin = 1e-4;
+// Way, and share of its time, that a block may stand still at its end for the sake of a shorter F, and by which an
+// arc's middle may be off for the sake of a shorter R, in increments: a tenth of what an end is off by its rounding.
+constexpr double negligible_increments = 0.25;
+constexpr double negligible_share = 0.005;
 constexpr double tie_slope = 1e-7;  // increments: far over the noise of positions, far under what matters
 
 }  // namespace
@@ -67,6 +71,25 @@ std::int64_t BlockShape::nearest_feed(double length_mm, std::uint32_t periods) c
   return std::max(options_.minimum_feed, static_cast<std::int64_t>(std::ceil(exact)));
 }
 
+BlockShape::FeedRange BlockShape::feeds_like(const FittedBlock& block, double length_mm) const {
+  const double time_s = static_cast<double>(block.periods * ticks_per_period_) * options_.interpolation_period_s;
+  const double unit = options_.feed_unit_mm_per_s;
+  const double in_time = (length_mm + negligible_increments * options_.increment_mm) / (time_s * unit);
+  const double in_last_tick = length_mm / ((time_s - (1.0 - tick_margin) * options_.interpolation_period_s) * unit);
+  const double hardly_faster = static_cast<double>(block.feed) * (1.0 + negligible_share);
+  const auto most = static_cast<std::int64_t>(std::floor(std::min({in_time, in_last_tick, hardly_faster})));
+  return {block.feed, std::max(block.feed, most)};
+}
+
+double BlockShape::length_mm(const BlockPosition& from, const FittedBlock& block) const {
+  const Vector3 way = to_mm(block.end) - to_mm(from);
+  if (block.kind == FittedKind::line) {
+    return way.norm();
+  }
+  const ChordArc arc = arc_of(from, block);
+  return std::hypot(arc.radius * arc.sweep, way[block.normal]);
+}
+
 void BlockShape::set_feed(FittedBlock& block, double length_mm) const {
   auto f = feed(length_mm, block.periods);
   if (!f) {
@@ -102,8 +125,12 @@ std::optional<ChordArc> BlockShape::chord_arc(const BlockPosition& from, const B
     return std::nullopt;
   }
   const double radius = (0.25 * arc.chord * arc.chord + height * height) / (2.0 * std::abs(height));
-  arc.radius = std::round(radius / options_.increment_mm) * options_.increment_mm;
-  if (radius / options_.increment_mm > largest_radius_increments || 0.5 * arc.chord >= arc.radius) {
+  if (radius / options_.increment_mm > largest_radius_increments) {
+    return std::nullopt;
+  }
+  arc.radius = static_cast<double>(short_radius(radius / options_.increment_mm, arc.chord / options_.increment_mm)) *
+               options_.increment_mm;
+  if (0.5 * arc.chord >= arc.radius) {
     return std::nullopt;
   }
   arc.sweep = 2.0 * std::asin(0.5 * arc.chord / arc.radius);
@@ -112,6 +139,20 @@ std::optional<ChordArc> BlockShape::chord_arc(const BlockPosition& from, const B
     return std::nullopt;
   }
   return arc;
+}
+
+// The radius with the fewest digits whose arc has its middle where that of the exact one is.
+std::int64_t BlockShape::short_radius(double radius, double chord) const {
+  const auto height = [half = 0.5 * chord](double r) { return r - std::sqrt(std::max(0.0, r * r - half * half)); };
+  std::int64_t step = 1;
+  for (std::int64_t next = 10; static_cast<double>(next) <= radius; next *= 10) {
+    const double trial = std::round(radius / static_cast<double>(next)) * static_cast<double>(next);
+    if (trial <= 0.5 * chord || std::abs(height(trial) - height(radius)) > negligible_increments) {
+      break;
+    }
+    step = next;
+  }
+  return std::llround(radius / static_cast<double>(step)) * step;
 }
 
 ChordArc BlockShape::arc_of(const BlockPosition& from, const FittedBlock& block) const {

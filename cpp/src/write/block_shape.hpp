@@ -43,6 +43,16 @@ class BlockShape {
   // will do.
   [[nodiscard]] std::optional<std::int64_t> feed(double length_mm, std::uint32_t periods) const;
 
+  // The feeds from a block's own F up that it may as well have: it stands still a little longer at its end, far below
+  // what counts.
+  struct FeedRange {
+    std::int64_t least, most;
+  };
+  [[nodiscard]] FeedRange feeds_like(const FittedBlock& block, double length_mm) const;
+
+  // Way of a block from where it begins, as the controller goes it.
+  [[nodiscard]] double length_mm(const BlockPosition& from, const FittedBlock& block) const;
+
   // Gives a block its F for the periods that it has. One too slow for the resolution of F is run a little faster, in
   // fewer whole periods.
   void set_feed(FittedBlock& block, double length_mm) const;
@@ -59,6 +69,7 @@ class BlockShape {
                                                int normal, std::uint32_t periods, double tolerance_increments) const;
 
  private:
+  [[nodiscard]] std::int64_t short_radius(double radius_increments, double chord_increments) const;
   [[nodiscard]] std::int64_t nearest_feed(double length_mm, std::uint32_t periods) const;
   [[nodiscard]] std::optional<ChordArc> chord_arc(const BlockPosition& from, const BlockPosition& to, int normal,
                                                   const Eigen::Vector2d& middle) const;
