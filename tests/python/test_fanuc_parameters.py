@@ -41,12 +41,13 @@ def test_dump_with_q_and_axes_in_another_order() -> None:
 
 def test_old_dump_with_bell_keeps_the_radial_error_of_the_manual() -> None:
     base = Machine.load("vx500")
-    machine = import_parameters(DUMPS / "old.txt", base).machine
+    machine = import_parameters(DUMPS / "old.txt", base, keep_modes="x").machine
     controller = machine.controller
     assert controller.motion == "after_interpolation"
     variance = (controller.time_constant_s**2 + controller.bell_time_s**2) / 12
     assert math.isclose(variance / 2, 0.064**2 / 24)
     assert machine.axes.x.modes == base.axes.x.modes
+    assert machine.axes.y.modes == ()
     assert controller.rapid_path == "non_linear"
     assert controller.centripetal_acceleration_mm_s2 == 500
 

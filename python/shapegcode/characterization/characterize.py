@@ -157,7 +157,8 @@ def _fitted(machine: Machine, facts: Sequence[ControllerFact]) -> tuple[Machine,
         head, _, last = key.rpartition(".")
         _table(data, head)[last] = round(centre, 7)
         remarks[key] = f"measured ({several[0].source}), mean of the axes: ± {half:.2g}"
-    return Machine.from_data(data, "the machine with the fitted values"), remarks
+    fitted = Machine.from_data(data, "the machine with the fitted values")
+    return fitted.with_remarks(machine.all_remarks() | remarks), remarks
 
 
 def _table(data: dict[str, Any], dotted: str) -> Any:

@@ -5,8 +5,13 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from shapegcode.cli import modes
 from shapegcode.cli.console import add_json_argument
+
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
 
 __all__ = ["add_arguments", "run"]
 
@@ -56,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     take.add_argument(
         "--from", dest="base", metavar="MACHINE", help="machine for what the dump does not say, such as the modes"
     )
+    modes.add_modes_arguments(take, "--keep-modes")
     take.add_argument("--name", metavar="NAME", help="name of the machine (default: that of the dump's file)")
     take.add_argument("--force", action="store_true", help="overwrite an existing file")
     add_json_argument(take)
@@ -63,8 +69,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     show = actions.add_parser(
         "show",
         help="print every value with its unit, origin and meaning",
-        description="Print every value with its unit, meaning and origin: file, default, or "
-        "assumed for a default that is an assumption.",
+        description="Print every value with its unit, meaning and origin: measured, from the control's dump, inherited "
+        "from another machine, assumed, a choice, stated in the file, or a default.",
     )
     show.add_argument("machine", metavar="FILE_OR_NAME", help="machine file, or name of a built-in machine")
     add_json_argument(show)
@@ -86,14 +92,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _init(args: argparse.Namespace) -> int:
-    from shapegcode.machine import Machine
+    from shapegcode.machine import inherited_text
 
-    text = Machine.builtin_text(args.name)
+    text = inherited_text(args.name)
     if args.output == "-":
         sys.stdout.write(text)
         return 0
     _write(args, text)
-    print(f"wrote {args.output}, the values of {args.name}")
+    print(f"wrote {args.output}, the values of {args.name}: inherited or assumed, until you put in your own")
     print(f"next: put in your machine's limits and vibration modes, then: shapegcode machine show {args.output}")
     return 0
 
@@ -106,10 +112,19 @@ def _import(args: argparse.Namespace) -> int:
     runner.check_files(args)
     dump, tables = _sorted(args.dump)
     base = Machine.load(args.base) if args.base else None
-    found = import_parameters(dump, base, tables=tables, name=args.name)
+    keep, rigid = modes.decided_modes(args, _modes_of(base), "no dump holds modes, and")
+    found = import_parameters(dump, base, tables=tables, name=args.name, keep_modes=keep, rigid=rigid)
     if found.ok:
         _write(args, found.to_toml())
     return runner.finish(found, args, wrote=[args.output] if found.ok else [])
+
+
+def _modes_of(machine: Machine | None) -> dict[str, str]:
+    """Per axis the modes that a machine has, in words."""
+    axes = zip("xyz", machine.axes.as_tuple(), strict=True) if machine else ()
+    frequencies = {name: [f"{mode.frequency_hz:g} Hz" for mode in axis.modes] for name, axis in axes}
+    whose = machine.name if machine else ""
+    return {name: f"{', '.join(found)} (of {whose})" for name, found in frequencies.items() if found}
 
 
 def _sorted(files: list[str]) -> tuple[str, list[str]]:

@@ -34,6 +34,24 @@ def program_number(text: str) -> int:
     return int(match[1])
 
 
+def axes(text: str) -> str:
+    """Axes such as ``XZ``, ``x,z`` or ``"x z"``.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        Their letters, small, each once, in the order x, y, z.
+
+    Raises:
+        ArgumentTypeError: something else than X, Y, Z.
+    """
+    letters = set(re.sub(r"[\s,]+", "", text.lower()))
+    if not letters or letters - set("xyz"):
+        raise argparse.ArgumentTypeError(f"{text!r}: must be axes, for example X or XZ")
+    return "".join(sorted(letters))
+
+
 def line_range(text: str) -> tuple[int, int]:
     """Lines such as ``120-180`` or ``120``, first and last, from 1.
 

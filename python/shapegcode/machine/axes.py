@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from shapegcode.machine.drive import Drive
-from shapegcode.settings.keys import Float, InlineTable, NonNegative, Positive, Text, TomlTable, key, toml
+from shapegcode.settings.keys import Bool, Float, InlineTable, NonNegative, Positive, Text, TomlTable, key, toml
 
 
 class FrequencyOver(InlineTable):
@@ -128,9 +128,20 @@ class Axis(TomlTable):
         "largest jerk while cutting; left out: not limited", unit="mm/s³", default=None
     )
     modes: tuple[AxisMode, ...] = key("vibration modes, one table each; none: the axis is taken as rigid", default=())
+    rigid: Bool = key(
+        "no vibration mode of this axis counts: looked for and not found, or decided. false, and no modes: nobody "
+        "knows; the axis is taken as rigid, and every verdict says so",
+        default=False,
+    )
     drive: Drive | None = key(
         "feed drive, for the simulation with friction; left out: the axis follows its set-points exactly", default=None
     )
+
+    @model_validator(mode="after")
+    def _rigid_or_not(self) -> Axis:
+        if self.rigid and self.modes:
+            raise ValueError("rigid is true, and there are modes: take out one of both")
+        return self
 
 
 class Axes(TomlTable):

@@ -15,12 +15,14 @@ from shapegcode.errors import MachineError, Problem
 from shapegcode.machine import fanuc_motion, fanuc_program
 from shapegcode.machine.fanuc_draft import Draft
 from shapegcode.machine.fanuc_dump import read_dump
+from shapegcode.machine.fanuc_modes import take_modes
 from shapegcode.machine.fanuc_motion import take_motion
 from shapegcode.machine.fanuc_offsets import take_tables
 from shapegcode.machine.fanuc_program import take_program
 from shapegcode.machine.fanuc_tables import ControlTables, is_table, read_table
 from shapegcode.machine.machine import Machine
 from shapegcode.machine.result import ParameterImport
+from shapegcode.settings.remarks import inherited
 
 __all__ = ["import_parameters"]
 
@@ -34,6 +36,8 @@ def import_parameters(
     *,
     tables: Sequence[str | Path] = (),
     name: str | None = None,
+    keep_modes: str = "",
+    rigid: str = "",
     source: str = "<dump>",
 ) -> ParameterImport:
     """The machine that a control's parameter dump describes (CNC-PARA.TXT).
@@ -44,6 +48,9 @@ def import_parameters(
         tables: files of tool offsets, work offsets and variables that the control punched out (TOOLOFST.TXT,
             EXT_WKZ.TXT, MACRO.TXT).
         name: of the machine; None: that of the dump's file.
+        keep_modes: axes whose modes are those of the base, because it is the same machine: "xy". The modes of other
+            axes are not taken over: no dump holds any.
+        rigid: axes that have no modes, because somebody knows or decides it: "z".
         source: names the content in messages.
 
     Returns:
@@ -52,6 +59,7 @@ def import_parameters(
 
     Raises:
         MachineError: no dump, a value that is not plausible, or a limit of an axis that neither dump nor base has.
+        ArgumentError: modes to keep of an axis for which the base has none, or that shall be rigid.
         OSError: a file cannot be read.
     """
     data, file = (dump, source) if isinstance(dump, bytes) else (Path(dump).read_bytes(), str(dump))
@@ -59,6 +67,7 @@ def import_parameters(
     take_program(draft)
     take_motion(draft)
     take_tables(draft, _read_tables(tables))
+    take_modes(draft, base, keep_modes, rigid)
     _list_missing(draft)
     if draft.values.problems:
         raise MachineError(file, tuple(draft.values.problems))
@@ -72,7 +81,7 @@ def import_parameters(
         draft.assume(f"parameter {number}", largest, "differs between the axes; the largest counts")
     return ParameterImport(
         file,
-        machine,
+        machine.with_remarks(draft.remarks),
         tuple(draft.read),
         tuple(draft.tables),
         tuple(draft.assumed),
@@ -124,11 +133,11 @@ def _remark_the_rest(draft: Draft, machine: Machine, base: Machine | None) -> No
     for value in machine.values():
         if value.key in draft.remarks or value.key in ("name", "description"):
             continue
-        if value.assumed:
+        if value.assumed and value.origin == "default":
             draft.remarks[value.key] = "assumed: not in the dump"
             draft.assume(value.key, value.value, "default of the machine file")
-        elif base and value.origin == "file":
-            draft.remarks[value.key] = f"from {base.name}"
+        elif base and value.origin != "default":
+            draft.remarks[value.key] = inherited(base.name, base.remarks.get(value.key, ""))
 
 
 def _assume_limits(draft: Draft) -> None:

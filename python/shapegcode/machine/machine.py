@@ -14,7 +14,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, overload
 
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, PrivateAttr, Strict, model_validator
 
 from shapegcode.errors import MachineError, Problem
 from shapegcode.machine.axes import Axes, Axis, AxisMode
@@ -28,6 +28,7 @@ from shapegcode.settings.describe import documentation, values_of, write_toml
 from shapegcode.settings.keys import KeyInfo, KeyValue, PerAxis, Text, TomlTable, key, toml
 from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem
+from shapegcode.settings.remarks import DEFAULT, inherited, remarks_of, with_remarks
 
 __all__ = [
     "Axes",
@@ -47,6 +48,7 @@ __all__ = [
     "Times",
     "Tolerance",
     "Verdict",
+    "inherited_text",
     "key_documentation",
 ]
 
@@ -88,6 +90,49 @@ class Machine(TomlTable):
                 "emission.block_period_s", period, f"must not be below controller.block_time_s = {toml(shortest)}"
             )
         return self
+
+    _remarks: dict[str, str] = PrivateAttr(default_factory=dict)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the values are the same, wherever they come from."""
+        if not isinstance(other, Machine):
+            return NotImplemented
+        return self.__dict__ == other.__dict__
+
+    def __hash__(self) -> int:
+        """By the name: equal machines have the same one."""
+        return hash(self.name)
+
+    @property
+    def remarks(self) -> Mapping[str, str]:
+        """What stands behind the values in the file, by dotted key: where they come from."""
+        return self._remarks
+
+    def all_remarks(self) -> dict[str, str]:
+        """The remarks with one for every default: what is written down looks like a statement, and it stays one.
+
+        Returns:
+            By dotted key, for keys that the machine has.
+        """
+        held = self.values()
+        remarks = {value.key: value.remark for value in held if value.remark}
+        for value in held:
+            if value.origin == "default" and value.value not in ("not set", "[]", "{}"):
+                remarks[value.key] = f"assumed: {DEFAULT}" if value.assumed else DEFAULT
+        return remarks
+
+    def with_remarks(self, remarks: Mapping[str, str]) -> Machine:
+        """The same machine with other words on where its values come from.
+
+        Args:
+            remarks: by dotted key, in place of those that there are; see `shapegcode.settings.remarks` for their form.
+
+        Returns:
+            A new machine; this one stays as it is.
+        """
+        copy = self.model_copy()
+        copy._remarks = {**self._remarks, **remarks}
+        return copy
 
     @classmethod
     def load(cls, path_or_name: str | Path) -> Machine:
@@ -146,7 +191,9 @@ class Machine(TomlTable):
         Raises:
             MachineError: wrong keys or values; every problem is listed.
         """
-        return validated(cls, data, source, text, MachineError)
+        machine = validated(cls, data, source, text, MachineError)
+        machine._remarks = remarks_of(text)
+        return machine
 
     @staticmethod
     def builtin_names() -> tuple[str, ...]:
@@ -175,11 +222,11 @@ class Machine(TomlTable):
         return (resources.files("shapegcode") / "data" / f"{name}.toml").read_text(encoding="utf-8")
 
     def to_toml(self, remarks: Mapping[str, str] | None = None) -> str:
-        """The machine as a commented machine file, which loads back to an equal machine.
+        """The machine as a commented machine file, which loads back to an equal machine; origins of values stay.
 
         Args:
             remarks: text for the end of a key's line by its dotted key (modes count from 1:
-                ``axes.x.modes.1.frequency_hz``), for example where the value comes from.
+                ``axes.x.modes.1.frequency_hz``), for example where the value comes from; in place of the machine's own.
 
         Returns:
             The text of the file.
@@ -187,7 +234,7 @@ class Machine(TomlTable):
         Raises:
             KeyError: a remark for a key that does not exist.
         """
-        return write_toml(self, remarks or {})
+        return write_toml(self, self.all_remarks() | dict(remarks or {}))
 
     @overload
     def with_values(self, key: str, value: object, /, *, source: str = "") -> Machine: ...
@@ -211,11 +258,40 @@ class Machine(TomlTable):
             MachineError: no such key, or a value that a machine file could not have; every problem is listed.
         """
         values = {key: value} if isinstance(key, str) else key
-        return change.with_values(self, values, source or self.name, MachineError)
+        changed = change.with_values(self, values, source or self.name, MachineError)
+        below = tuple(f"{name}." for name in values)
+        changed._remarks = {
+            name: remark for name, remark in self._remarks.items() if name not in values and not name.startswith(below)
+        }
+        return changed
 
     def values(self) -> list[KeyValue]:
         """Every key with its value and origin, in the order of the file."""
-        return list(values_of(self))
+        return list(values_of(self, remarks=self._remarks))
+
+
+_OF_A_MACHINE = ("axes.", "controller.", "times.", "power_on.", "feed_control.")
+
+
+def inherited_text(name: str) -> str:
+    """A built-in machine's file as the start of another one: what was measured there is inherited here.
+
+    Args:
+        name: of the built-in machine.
+
+    Returns:
+        The file; only remarks are other ones.
+
+    Raises:
+        MachineError: no built-in machine of that name.
+    """
+    text = Machine.builtin_text(name)
+    whose = Machine.load(name).name
+
+    def remark(key: str, remark: str) -> str:
+        return inherited(whose, remark) if remark and key.startswith(_OF_A_MACHINE) else remark
+
+    return with_remarks(text, remark)
 
 
 def key_documentation() -> str:

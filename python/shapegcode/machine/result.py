@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -221,9 +222,10 @@ class MachineDescription(Result):
     @property
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
-        assumed = sum(value.assumed for value in self.keys.values())
-        if assumed:
-            return f"look up or measure what is assumed ({assumed} keys): shapegcode characterize, or machine import."
+        open_keys = sum(value.unmeasured for value in self.keys.values())
+        if open_keys:
+            what = f"what is assumed or inherited ({open_keys} keys)"
+            return f"look up or measure {what}: shapegcode machine import, identify --update, characterize."
         return "use it: shapegcode convert IN -m MACHINE -o OUT."
 
     def tables(self) -> list[Table]:
@@ -236,7 +238,12 @@ class MachineDescription(Result):
             Column("origin", value=_origin, left=True),
             Column("meaning", value=lambda row: getattr(row, "meaning", None), text=True),
         )
-        return [Table("", columns, rows, sections=heads, row_style=lambda row: "bold" if isinstance(row, str) else "")]
+        counts = Counter(_origin(value) or "" for value in self.keys.values())
+        summary = (Column("origin", value=lambda row: row[0], left=True), Column("keys", value=lambda row: row[1]))
+        return [
+            Table("", columns, rows, sections=heads, row_style=lambda row: "bold" if isinstance(row, str) else ""),
+            Table("origins", summary, counts.most_common()),
+        ]
 
     def _rows(self) -> Iterator[str | KeyValue]:
         section = ""

@@ -9,17 +9,21 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from shapegcode.settings.keys import InlineTable, KeyInfo, KeyValue, TomlTable, item_type, key_info, table_type, toml
+from shapegcode.settings.remarks import origin_of
 
 _LINE_WIDTH = 110
 
 
-def values_of(table: TomlTable, prefix: str = "", given: bool = True) -> Iterator[KeyValue]:
+def values_of(
+    table: TomlTable, prefix: str = "", given: bool = True, remarks: Mapping[str, str] | None = None
+) -> Iterator[KeyValue]:
     """Every key below a table with its value and origin, in the order of the file.
 
     Args:
         table: a machine or a part of it.
         prefix: what stands before the names of its keys.
         given: True if the file has this table.
+        remarks: per dotted key, what stands behind its value in the file.
 
     Returns:
         The values one by one.
@@ -28,20 +32,26 @@ def values_of(table: TomlTable, prefix: str = "", given: bool = True) -> Iterato
         value, key = getattr(table, name), f"{prefix}{name}"
         from_file = given and name in table.model_fields_set
         if isinstance(value, TomlTable) and not isinstance(value, InlineTable):
-            yield from values_of(value, f"{key}.", from_file)
+            yield from values_of(value, f"{key}.", from_file, remarks)
         elif item_type(field) and value:
             for number, item in enumerate(value, start=1):
-                yield from values_of(item, f"{key}.{number}.", from_file)
+                yield from values_of(item, f"{key}.{number}.", from_file, remarks)
         else:
             info = key_info(field, key)
+            remark = (remarks or {}).get(key, "")
+            # A key without a value can have a remark that says why: "assumed: not limited", "not measured: rigid".
+            says_why = not value and (value is not None or remark.startswith("assumed"))
+            origin = origin_of(remark) if from_file or (remark and says_why) else "default"
+            assumed = origin == "assumed" or (info.assumed and origin == "default")
             yield KeyValue(
                 key=key,
                 value="not set" if value is None else toml(value),
                 unit=info.unit,
-                origin="file" if from_file else "default",
-                assumed=info.assumed and not from_file,
+                origin=origin,
+                assumed=assumed,
                 meaning=info.meaning,
                 fanuc=info.fanuc,
+                remark=remark,
             )
 
 

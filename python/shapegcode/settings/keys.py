@@ -7,10 +7,12 @@ import math
 import re
 from dataclasses import dataclass
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict
 from pydantic.fields import FieldInfo
+
+from shapegcode.settings.remarks import Origin
 
 # Numbers are strict: a string or a truth value in place of a number is an error; 3 for 3.0 is not.
 Float = Annotated[float, Strict(), Field(allow_inf_nan=False)]
@@ -119,19 +121,28 @@ class KeyValue:
         key: dotted name, ``axes.x.modes.1.frequency_hz``.
         value: the value as TOML, "not set" for an optional key without one.
         unit: unit, "1" for a ratio, empty where there is none.
-        origin: "file" where the file gives the value, else "default".
-        assumed: True where the value is a default that is an assumption.
+        origin: where it comes from: "measured" on this machine, "dump" of the control's parameters, "inherited" from
+            another machine, "assumed", "choice" (no property of a machine), "file" (the file states it, and does not
+            say why), "default" (the file leaves it out).
+        assumed: True where the value is an assumption, in the file or as a default.
         meaning: what it is.
         fanuc: numbers of the FANUC parameters that correspond to it, or empty.
+        remark: what stands behind the value in the file.
     """
 
     key: str
     value: str
     unit: str
-    origin: Literal["file", "default"]
+    origin: Origin
     assumed: bool
     meaning: str
     fanuc: str
+    remark: str = ""
+
+    @property
+    def unmeasured(self) -> bool:
+        """Whether nobody measured or looked it up on this machine: it is assumed or inherited."""
+        return self.assumed or self.origin == "inherited"
 
 
 def facts(field: FieldInfo | None) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 
 from shapegcode.errors import Problem
 from shapegcode.settings.keys import TomlTable, facts, table_type, toml, toml_key
+from shapegcode.settings.remarks import open_brackets
 
 
 class KeyProblem(ValueError):
@@ -183,7 +184,7 @@ def line_of(key: str, text: str) -> int | None:
     inside = 0  # depth of the brackets of a list that goes over several lines
     for number, line in enumerate(text.splitlines(), start=1):
         if inside:
-            inside += _open_brackets(line)
+            inside += open_brackets(line)
             continue
         header = _HEADER.fullmatch(line)
         if header:
@@ -199,11 +200,5 @@ def line_of(key: str, text: str) -> int | None:
             name = f"{table}.{assignment[1]}" if table else assignment[1]
             if key == name or key.startswith(name + "."):
                 return number
-            inside = _open_brackets(line[assignment.end() :])
+            inside = open_brackets(line[assignment.end() :])
     return None
-
-
-def _open_brackets(line: str) -> int:
-    """How many more lists begin in a line than end in it; texts and comments do not count."""
-    bare = re.sub(r'"(?:[^"\\]|\\.)*"|\'[^\']*\'|#.*', "", line)
-    return bare.count("[") - bare.count("]")

@@ -1,0 +1,193 @@
+"""Where values come from: measured, dump, inherited, assumed; it stays so through every command that writes a file."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import shapegcode as sg
+from acceptance import machine_with
+from shapegcode.cli import main
+from shapegcode.settings.remarks import origin_of, remarks_of, with_remarks
+
+DUMP = b"""%
+N01013Q1A1P00000000A2P00000000A3P00000000
+N01420Q1A1P20000.0A2P20000.0A3P20000.0
+N01610Q1A1P00000001A2P00000001A3P00000001
+N01622Q1A1P24A2P24A3P24
+N01820Q1A1P2A2P2A3P2
+N01826Q1A1P10A2P10A3P10
+%
+"""
+
+
+def origins(machine: sg.Machine) -> dict[str, str]:
+    """Per key its origin, as `machine show` says it."""
+    return {value.key: value.origin for value in machine.values()}
+
+
+@pytest.mark.parametrize(
+    ("remark", "origin"),
+    [
+        ("measured (paper 000)", "measured"),
+        ("95 %: 46.1 ... 46.3", "measured"),
+        ("half of the 95 % interval", "measured"),
+        ("FANUC 1622, 1610", "dump"),
+        ("FANUC 1826: detection unit 1 µm assumed", "dump"),
+        ("FANUC", "file"),
+        ("from VX500: measured (paper 000)", "inherited"),
+        ("assumed", "assumed"),
+        ("assumed: not in the dump", "assumed"),
+        ("not known", "assumed"),
+        ("share of the residues 1/m, not measured", "assumed"),
+        ("choice, not a property of the machine", "choice"),
+        ("default", "default"),
+        ("paper 004", "file"),
+        ("", "file"),
+    ],
+)
+def test_what_a_remark_says(remark: str, origin: str) -> None:
+    assert origin_of(remark) == origin
+
+
+def test_remarks_are_read_as_toml_reads_its_comments() -> None:
+    text = """\
+name = "a # in a name"  # measured  # twice
+list = [
+  "x", # inside
+]  # behind
+[axes.x]  # the X axis
+'quoted' = 1
+value = '#'# close
+# unset = ...  # not known
+# prose = with # a sign
+[[axes.x.modes]]  # first
+frequency_hz = 1
+[[axes.x.modes]]
+frequency_hz = 2  # second
+# [[axes.z.modes]]  # rigid
+"""
+    assert tomllib.loads(text)["axes"]["x"]["modes"][1] == {"frequency_hz": 2}
+    assert remarks_of(text) == {
+        "name": "measured  # twice",
+        "axes.x.value": "close",
+        "axes.x.unset": "not known",
+        "axes.x.modes.2.frequency_hz": "second",
+        "axes.z.modes": "rigid",
+    }
+    changed = with_remarks(text, lambda key, remark: f"<{remark}>" if remark else "")
+    assert (
+        with_remarks(changed, lambda key, remark: re.sub("[<>]", "", remark)).replace("'  # close", "'# close") == text
+    )
+    assert tomllib.loads(changed) == tomllib.loads(text)
+
+
+def test_init_inherits_what_was_measured_on_the_built_in_machine(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    assert main(["machine", "init", "vx500", "-o", str(file)]) == 0
+    built_in, mine = sg.Machine.load("vx500"), sg.Machine.load(file)
+    assert mine == built_in
+    found = origins(mine)
+    assert found["axes.x.modes.1.frequency_hz"] == "inherited"
+    assert found["axes.x.modes.1.damping_ratio"] == "assumed"
+    assert found["tolerance.contour_um"] == "choice"
+    # Nothing of the machine itself is stated here: nobody has said anything of it yet.
+    stated = [key for key, origin in found.items() if origin in ("measured", "file") and key.startswith("controller.")]
+    assert stated == []
+    assert origins(built_in)["axes.x.modes.1.frequency_hz"] == "measured"
+
+
+def test_show_counts_and_names_origins(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "mine.toml"
+    main(["machine", "init", "vx500", "-o", str(file)])
+    capsys.readouterr()
+    assert main(["machine", "show", str(file), "--json", "-"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    mode = report["keys"]["axes.y.modes.1.frequency_hz"]
+    assert (mode["origin"], mode["assumed"]) == ("inherited", False)
+    assert mode["remark"].startswith("from VX500: measured")
+    assert report["keys"]["controller.rapid_path"]["assumed"] is True
+    assert main(["machine", "show", str(file)]) == 0
+    shown = capsys.readouterr().out
+    assert re.search(r"inherited +\d", shown)
+    assert "assumed or inherited" in shown
+
+
+def test_import_says_of_every_value_where_it_comes_from() -> None:
+    found = origins(sg.import_parameters(DUMP, sg.Machine.load("vx500"), source="HM.TXT").machine)
+    assert found["controller.shaped_time_constant_s"] == "dump"
+    assert found["controller.in_position_width_um"] == "dump"
+    assert found["axes.x.max_acceleration_mm_s2"] == "assumed"
+    assert found["controller.time_constant_s"] == "dump"
+    assert found["controller.law"] == "inherited"
+    assert found["axes.z.modes"] == "assumed"
+
+
+def test_modes_are_never_taken_over_in_silence() -> None:
+    base = sg.Machine.load("vx500")
+    result = sg.import_parameters(DUMP, base, source="HM.TXT")
+    axes = result.machine.axes
+    assert [axis.modes for axis in axes.as_tuple()] == [(), (), ()]
+    assert any("46 Hz of VX500" in row.why and "--keep-modes X" in row.why for row in result.missing)
+    kept = sg.import_parameters(DUMP, base, source="HM.TXT", keep_modes="x", rigid="yz").machine
+    assert (kept.axes.x.modes, kept.axes.y.modes) == (base.axes.x.modes, ())
+    assert (kept.axes.y.rigid, kept.axes.z.rigid, kept.axes.x.rigid) == (True, True, False)
+    assert origins(kept)["axes.x.modes.1.frequency_hz"] == "inherited"
+    for wrong in ({"keep_modes": "z"}, {"keep_modes": "x", "rigid": "x"}, {"rigid": "q"}):
+        with pytest.raises(sg.ArgumentError):
+            sg.import_parameters(DUMP, base, **wrong)
+
+
+def test_origins_survive_writing_reading_and_changing() -> None:
+    machine = sg.import_parameters(DUMP, sg.Machine.load("vx500"), source="HM.TXT", keep_modes="xy").machine
+    again = sg.Machine.from_toml(machine.to_toml())
+    assert again == machine
+    before, after = origins(machine), origins(again)
+    assert {key: origin for key, origin in after.items() if origin != before[key]} == {
+        # A default that is written down is still not known.
+        key: "assumed"
+        for key, origin in before.items()
+        if origin == "default" and after[key] == "assumed"
+    }
+    changed = machine.with_values("axes.x.modes.1.frequency_hz", 47.0)
+    assert origins(changed)["axes.x.modes.1.frequency_hz"] == "file"
+    assert origins(changed)["axes.x.modes.1.damping_ratio"] == "assumed"
+    assert "axes.y.modes.1.frequency_hz" not in origins(machine.with_values("axes.y.modes", []))
+
+
+def test_a_mode_and_rigid_contradict_each_other() -> None:
+    with pytest.raises(sg.MachineError, match="rigid is true, and there are modes"):
+        machine_with({"axes.x.rigid": True})
+
+
+def without_terminal(monkeypatch: pytest.MonkeyPatch, answers: str) -> None:
+    """Standard input and error that say they are a terminal, with answers typed ahead."""
+
+    class Typed:
+        def __init__(self) -> None:
+            self.lines = iter(answers.splitlines(keepends=True))
+
+        def isatty(self) -> bool:
+            return True
+
+        def readline(self) -> str:
+            return next(self.lines, "")
+
+    monkeypatch.setattr("sys.stdin", Typed())
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+
+
+def test_at_a_terminal_the_import_asks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any) -> None:
+    dump, file = tmp_path / "HM.TXT", tmp_path / "m.toml"
+    dump.write_bytes(DUMP)
+    without_terminal(monkeypatch, "k\nr\n")
+    assert main(["machine", "import", str(dump), "--from", "vx500", "-o", str(file)]) == 0
+    machine = sg.Machine.load(file)
+    assert [mode.frequency_hz for mode in machine.axes.x.modes] == [46.0]
+    assert (machine.axes.y.modes, machine.axes.y.rigid) == ((), True)
+    assert "X has 46 Hz (of VX500)" in capfd.readouterr().err
