@@ -8,12 +8,16 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import shapegcode as sg
 from acceptance import machine_with
 from shapegcode.cli import main
+from shapegcode.identification.mode import Estimate, IdentifiedMode
+from shapegcode.identification.update import update_modes
 from shapegcode.settings.remarks import origin_of, remarks_of, with_remarks
+from shapegcode.shaping.grid import choose_grid
 
 DUMP = b"""%
 N01013Q1A1P00000000A2P00000000A3P00000000
@@ -191,3 +195,93 @@ def test_at_a_terminal_the_import_asks(tmp_path: Path, monkeypatch: pytest.Monke
     assert [mode.frequency_hz for mode in machine.axes.x.modes] == [46.0]
     assert (machine.axes.y.modes, machine.axes.y.rigid) == ((), True)
     assert "X has 46 Hz (of VX500)" in capfd.readouterr().err
+
+
+def identified(frequency_hz: float) -> IdentifiedMode:
+    """A mode that data support."""
+    near = Estimate(frequency_hz, 0.999 * frequency_hz, 1.001 * frequency_hz)
+    return IdentifiedMode(near, Estimate(0.03, 0.029, 0.031), None, None, None, "")
+
+
+@pytest.fixture
+def started(tmp_path: Path) -> Path:
+    """A machine file as `machine init` leaves it."""
+    file = tmp_path / "mine.toml"
+    main(["machine", "init", "vx500", "-o", str(file)])
+    return file
+
+
+def test_a_tap_on_x_does_not_keep_the_mode_of_another_machine_in_y(started: Path) -> None:
+    text = started.read_text(encoding="utf-8")
+    with pytest.raises(sg.ArgumentError, match=r"Y: 131\.0 Hz \(from VX500.*--keep-modes Y .* --rigid Y"):
+        update_modes(text, "x", [identified(47.0)], source="tap")
+    rigid = update_modes(text, "x", [identified(47.0)], source="tap", rigid="yz")
+    assert (rigid.machine.axes.y.modes, rigid.machine.axes.y.rigid, rigid.machine.axes.z.rigid) == ((), True, True)
+    assert origins(rigid.machine)["axes.x.modes.1.frequency_hz"] == "measured"
+    before, after = tomllib.loads(text), tomllib.loads(rigid.text)
+    for axis, table in (("x", before), ("x", after), ("y", before)):
+        table["axes"][axis].pop("modes")
+    for axis in "yz":
+        before["axes"][axis]["rigid"] = True
+    assert after == before
+    # The shaper is that of the measured mode alone.
+    design = [choose_grid(each).duration_s for each in (rigid.machine, sg.Machine.load(started))]
+    assert design[0] < 0.8 * design[1]
+
+
+def test_a_mode_that_is_kept_stays_inherited_and_is_asked_for_once(started: Path) -> None:
+    text = started.read_text(encoding="utf-8")
+    kept = update_modes(text, "x", [identified(47.0)], source="tap", keep_modes="y")
+    assert origins(kept.machine)["axes.y.modes.1.frequency_hz"] == "inherited"
+    assert any("Y: kept" in note for note in kept.notes)
+    again = update_modes(kept.text, "x", [identified(47.0)], source="tap")
+    assert again.text == kept.text
+    # In the end it is measured.
+    measured = update_modes(kept.text, "y", [identified(130.0)], source="tap")
+    assert origins(measured.machine)["axes.y.modes.1.frequency_hz"] == "measured"
+    assert any("no mode of Z is known" in note for note in measured.notes)
+
+
+def test_a_mode_measured_on_a_rigid_axis_takes_that_back(started: Path) -> None:
+    text = started.read_text(encoding="utf-8")
+    rigid = update_modes(text, "x", [identified(47.0)], source="tap", rigid="y").text
+    back = update_modes(rigid, "y", [identified(130.0)], source="tap")
+    assert (back.machine.axes.y.rigid, len(back.machine.axes.y.modes)) == (False, 1)
+    with pytest.raises(sg.ArgumentError, match="cannot be rigid"):
+        update_modes(text, "x", [identified(47.0)], source="tap", rigid="x", keep_modes="y")
+
+
+@pytest.mark.parametrize("name", sg.Machine.builtin_names())
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_rigid_changes_nothing_else(name: str, end: str) -> None:
+    text = sg.Machine.builtin_text(name).replace("\n", end)
+    update = update_modes(text, "x", [identified(47.0)], source="tap", rigid="yz")
+    plain = update_modes(text, "x", [identified(47.0)], source="tap")
+    wanted = tomllib.loads(plain.text)
+    for axis in "yz":
+        wanted["axes"][axis].pop("modes", None)
+        wanted["axes"][axis]["rigid"] = True
+    assert tomllib.loads(update.text) == wanted
+    assert set(re.findall(r"\r?\n", update.text)) == {end}
+
+
+def test_identify_asks_or_fails(
+    started: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record = tmp_path / "stop.csv"
+    t = np.arange(0, 2.0, 1 / 2048)
+    ring = np.exp(-0.02 * 2 * np.pi * 46 * t) * np.sin(2 * np.pi * 46 * t)
+    noise = np.random.default_rng(1).normal(0, 1e-3, len(t))
+    lines = ["time [s],acceleration [m/s^2]", *(f"{a:.9f},{b:.9f}" for a, b in zip(t, ring + noise, strict=True))]
+    record.write_text("\n".join(lines), encoding="utf-8")
+    argv = ["identify", str(record), "--decay", "--axis", "x", "--update", str(started)]
+    before = started.read_bytes()
+    assert main(argv) == 2
+    assert "--rigid Y" in capsys.readouterr().err
+    assert started.read_bytes() == before
+    assert main([*argv, "--rigid", "Y"]) in (0, 1)
+    assert sg.Machine.load(started).axes.y.rigid
+    started.write_bytes(before)
+    without_terminal(monkeypatch, "k\n")
+    assert main(argv) in (0, 1)
+    assert len(sg.Machine.load(started).axes.y.modes) == 1

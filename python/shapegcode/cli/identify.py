@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from shapegcode.cli import options, typed
+from shapegcode.cli import modes, options, typed
 from shapegcode.cli.console import add_json_argument
+
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
 
 __all__ = ["add_arguments", "run"]
 
@@ -55,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     along = "use the response along this axis; where the file names none, it is this one"
     add("--axis", choices=("x", "y", "z"), default=None, help=along)
     add("--update", metavar="MACHINE.toml", default=None, help="put the supported modes into this machine file")
+    modes.add_modes_arguments(parser, "--keep-modes")
     add("--tap-plan", action="store_true", help="say how to do the test (for the modes of -m MACHINE), nothing else")
     options.add_machine_argument(parser, required=False)
     add("--modes", metavar="N", type=typed.count, default=None, help="how many (default: chosen by evidence)")
@@ -108,7 +112,9 @@ def _identify(args: argparse.Namespace) -> int:
 
     if args.update is not None:
         options.refuse_same_file([Path(args.update)], map(Path, args.files))
-        check_updatable(args.update)
+        machine = check_updatable(args.update)
+        if args.axis is not None:
+            _decide(args, machine, args.axis)
     said = {field.name: getattr(args, field.name) for field in fields(ReadOptions)}
     said["response_columns"] = tuple(args.response_columns or ())
     with runner.progress(f"fitting {', '.join(args.files)}", args, endless=True):
@@ -118,8 +124,23 @@ def _identify(args: argparse.Namespace) -> int:
         )  # fmt: skip
     notes, wrote = list(found.notes), []
     if args.update is not None and found.modes:
-        update = update_machine(args.update, found)
+        if args.axis is None:
+            _decide(args, machine, found.axis)
+        update = update_machine(args.update, found, keep_modes=args.keep_modes, rigid=args.rigid)
         write_text(args.update, update.text)
         found, wrote = update.noted_in(found, args.update), [args.update]
         notes += [f"{args.update}: {note}" for note in update.notes]
     return runner.finish(found, args, notes=notes, wrote=wrote)
+
+
+def _decide(args: argparse.Namespace, machine: Machine, axis: str | None) -> None:
+    """Have somebody decide over modes of the other axes that nobody measured on this machine.
+
+    Raises:
+        ArgumentError: neither options nor answers do.
+    """
+    from shapegcode.identification.other_axes import open_modes, require_decisions
+
+    found = open_modes(machine, axis)
+    args.keep_modes, args.rigid = modes.decided_modes(args, found, f"{args.update}: not measured on this machine:")
+    require_decisions(found, args.keep_modes, args.rigid, args.update)

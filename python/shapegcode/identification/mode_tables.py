@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import tomlkit
-from tomlkit.items import AoT, SingleKey, Table
+from tomlkit.items import AoT, Key, SingleKey, Table
 
 from shapegcode.errors import ArgumentError
 from shapegcode.identification.mode import Estimate, IdentifiedMode
@@ -73,7 +73,7 @@ class ModeTables:
         self.expected: list[dict[str, Any]] = []
         self.home = self._axis_table()
         self.tables: list[Table] = next(
-            (item.body for key, item in self.home.value.body if key and key.key == "modes" and isinstance(item, AoT)),
+            (item.body for key, item in self.home.value.body if isinstance(item, AoT) and _is_modes(key, item)),
             [],
         )
         if len(self.tables) != len(self.old):
@@ -120,12 +120,36 @@ class ModeTables:
         added = [self._table(mode, share_of[id(mode)], meaning) for mode in fresh]
         self._insert(stay, added, left)
         self._tell_sum(modes)
+        if self.data["axes"][self.axis].get("rigid"):
+            self._say_rigid(False, "a mode was measured")
+            self.notes.append("it was said to be rigid: that is taken back")
         text = self.document.as_string()
         self._check(text)
         return text.removesuffix(self._last_end)
 
+    def make_rigid(self) -> str:
+        """The text without modes of the axis, which is said to be rigid.
+
+        Returns:
+            The new text of the file.
+
+        Raises:
+            ArgumentError: the result would not say what is meant, because of a layout that is not known here.
+        """
+        _, left = self._old_tables({}, {}, "it is taken as rigid")
+        entries = self.home.value.body
+        place = next((n for n, (key, item) in enumerate(entries) if _is_modes(key, item)), len(entries))
+        entries[place : place + 1] = [(None, item) for _, item in left]
+        self._say_rigid(True, "decided: no mode of it counts")
+        text = self.document.as_string()
+        self._check(text, rigid=True)
+        return text.removesuffix(self._last_end)
+
+    def _say_rigid(self, rigid: bool, remark: str) -> None:
+        self._put(self.home.value.body, {"rigid": (rigid, remark)})
+
     def _old_tables(
-        self, kept: Mapping[int, IdentifiedMode], seen: Mapping[int, IdentifiedMode]
+        self, kept: Mapping[int, IdentifiedMode], seen: Mapping[int, IdentifiedMode], why: str = "which was not found"
     ) -> tuple[list[Table], list[Entry]]:
         """Change the tables of the file.
 
@@ -142,7 +166,7 @@ class ModeTables:
                 self.expected.append(old)
                 self.notes.append(f"kept {old_hz} Hz as it is: the test shows it at {new_hz:.6g} Hz, not well enough")
             else:
-                self.notes.append(f"removed {toml(old['frequency_hz'])} Hz, which was not found: {toml(old)}")
+                self.notes.append(f"removed {toml(old['frequency_hz'])} Hz, {why}: {toml(old)}")
                 tail = take_tail(table)
                 blank = tail[:1] if tail and is_blank(tail[0]) else []
                 left += tail[len(blank) :]
@@ -153,12 +177,16 @@ class ModeTables:
             stay.append(table)
         return stay, left
 
-    def _check(self, text: str) -> None:
+    def _check(self, text: str, *, rigid: bool = False) -> None:
         """The new text must say what is meant, and nothing else may have changed."""
         wanted = copy.deepcopy(self.data)
-        wanted["axes"][self.axis]["modes"] = self.expected
+        axis = wanted["axes"][self.axis]
+        axis["modes"] = self.expected
+        if rigid or "rigid" in axis:
+            axis["rigid"] = rigid
         try:
             found = tomllib.loads(text)
+            found["axes"][self.axis].setdefault("modes", [])
             found["axes"][self.axis]["modes"].sort(key=_frequency)
             wanted["axes"][self.axis]["modes"].sort(key=_frequency)
         except (tomllib.TOMLDecodeError, KeyError, AttributeError):
@@ -275,6 +303,10 @@ class ModeTables:
                 return
         added[-1].value.body.extend(take_tail(self.home))
         entries.append(modes)
+
+
+def _is_modes(key: Key | None, item: object) -> bool:
+    return key is not None and key.key == "modes" and isinstance(item, AoT)
 
 
 def _text(entries: Sequence[Entry]) -> str:

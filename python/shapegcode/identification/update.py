@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from shapegcode.errors import ArgumentError
 from shapegcode.identification.mode import IdentifiedMode
 from shapegcode.identification.mode_tables import ModeTables
+from shapegcode.identification.other_axes import decide_axes, open_modes, require_decisions
 from shapegcode.identification.result import Identification, MachineFile
 from shapegcode.machine import Machine
 
@@ -43,12 +44,14 @@ class MachineUpdate:
         return replace(found, machine_file=MachineFile(str(path), found.axis, self.notes))
 
 
-def update_machine(path: str | Path, found: Identification) -> MachineUpdate:
+def update_machine(path: str | Path, found: Identification, *, keep_modes: str = "", rigid: str = "") -> MachineUpdate:
     """A machine file with the modes of an identification in it; see `update_machine_file`.
 
     Args:
         path: of the machine file, which is not touched.
         found: with modes, and the axis along which they were measured.
+        keep_modes: other axes whose modes stay though nobody measured them on this machine: "yz".
+        rigid: other axes that have no mode that counts; theirs are taken out.
 
     Returns:
         The text to write, what it says, and notes of what changed.
@@ -60,7 +63,15 @@ def update_machine(path: str | Path, found: Identification) -> MachineUpdate:
     """
     if found.axis is None:
         raise ArgumentError(f"{found.files[0]} does not say along which axis it was measured: add --axis x, y or z")
-    return update_machine_file(path, found.axis, found.modes, source=found.source, refused=found.refused)
+    return update_machine_file(
+        path,
+        found.axis,
+        found.modes,
+        source=found.source,
+        refused=found.refused,
+        keep_modes=keep_modes,
+        rigid=rigid,
+    )
 
 
 def update_machine_file(
@@ -70,6 +81,8 @@ def update_machine_file(
     *,
     source: str,
     refused: Sequence[IdentifiedMode] = (),
+    keep_modes: str = "",
+    rigid: str = "",
 ) -> MachineUpdate:
     """Read a machine file and put identified modes into it; see `update_modes`. The file itself is not touched.
 
@@ -79,6 +92,8 @@ def update_machine_file(
         modes: what the data support.
         source: where they come from.
         refused: modes that the data show without supporting their values.
+        keep_modes: other axes whose modes stay though nobody measured them on this machine: "yz".
+        rigid: other axes that have no mode that counts; theirs are taken out.
 
     Returns:
         The text to write, what it says, and notes of what changed.
@@ -90,14 +105,19 @@ def update_machine_file(
     """
     check_updatable(path)
     text = Path(path).read_bytes().decode("utf-8")
-    return update_modes(text, axis, modes, source=source, refused=refused, file=str(path))
+    return update_modes(
+        text, axis, modes, source=source, refused=refused, keep_modes=keep_modes, rigid=rigid, file=str(path)
+    )
 
 
-def check_updatable(path: str | Path) -> None:
+def check_updatable(path: str | Path) -> Machine:
     """Tell before the work what would make `update_machine_file` fail whatever the modes.
 
     Args:
         path: of the machine file, or name of a built-in machine.
+
+    Returns:
+        What the file says now.
 
     Raises:
         ArgumentError: a built-in machine, or no regular file.
@@ -111,7 +131,7 @@ def check_updatable(path: str | Path) -> None:
         )
     if Path(path).exists() and not Path(path).is_file():
         raise ArgumentError(f"{path}: not a regular file")
-    Machine.load(path)
+    return Machine.load(path)
 
 
 def update_modes(
@@ -121,6 +141,8 @@ def update_modes(
     *,
     source: str,
     refused: Sequence[IdentifiedMode] = (),
+    keep_modes: str = "",
+    rigid: str = "",
     file: str = "<text>",
 ) -> MachineUpdate:
     """The text of a machine file with the modes of one axis replaced by identified ones.
@@ -137,13 +159,16 @@ def update_modes(
         modes: what the data support.
         source: where they come from.
         refused: modes that the data show without supporting their values.
+        keep_modes: other axes whose modes stay though nobody measured them on this machine: "yz".
+        rigid: other axes that have no mode that counts; theirs are taken out.
         file: name for messages.
 
     Returns:
         The new text, and what changed in it.
 
     Raises:
-        ArgumentError: no mode, one without support, no such axis, or modes that are not written as [[axes.x.modes]].
+        ArgumentError: no mode, one without support, no such axis, modes that are not written as [[axes.x.modes]], or
+            modes of another axis that nobody measured on this machine and over which nobody decided.
         MachineError: the result would not load.
     """
     if axis not in ("x", "y", "z"):
@@ -155,7 +180,20 @@ def update_modes(
             raise ArgumentError(f"the mode at {mode.frequency_hz.value:g} Hz is not supported: {mode.refusal}")
     mark = "\ufeff" if text.startswith("\ufeff") else ""
     body = text.removeprefix(mark)
-    Machine.from_toml(body, file)
+    if axis in rigid:
+        raise ArgumentError(f"{axis.upper()}: it cannot be rigid, a mode of it was measured")
+    require_decisions(open_modes(Machine.from_toml(body, file), axis), keep_modes, rigid, file)
     tables = ModeTables(body, axis, source, file)
-    new = tables.put(modes, refused)
-    return MachineUpdate(mark + new, Machine.from_toml(new, file), tuple(tables.notes))
+    new, notes = decide_axes(tables.put(modes, refused), keep_modes, rigid, file)
+    machine = Machine.from_toml(new, file)
+    return MachineUpdate(mark + new, machine, (*tables.notes, *notes, *_unknown(machine)))
+
+
+def _unknown(machine: Machine) -> Iterator[str]:
+    """A note on axes of which nobody knows whether they have a mode."""
+    names = [
+        name for name, axis in zip("XYZ", machine.axes.as_tuple(), strict=True) if not axis.modes and not axis.rigid
+    ]
+    if names:
+        letters = "".join(names)
+        yield f"no mode of {', '.join(names)} is known: tap, or say --rigid {letters}; until then taken as rigid"
