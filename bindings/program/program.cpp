@@ -25,11 +25,14 @@ py::bytes slice(const Program& program, std::size_t begin, std::size_t end) {
   return py::bytes(program.text.data() + begin, end - begin);
 }
 
-// The cutting moves of a range of lines as one path (the regions there, put together).
+// The cutting moves of a range of lines of the source as one path (the regions there, put together).
 std::shared_ptr<const Path> cutting_path(const Program& program, std::uint32_t first_line, std::uint32_t last_line) {
+  const auto source_line = [&program](std::uint32_t line) {
+    return program.expanded ? program.origins[line - 1].line : line;
+  };
   std::vector<std::shared_ptr<Region>> inside;
   for (const auto& region : program.regions) {
-    if (region->first_line >= first_line && region->last_line <= last_line) {
+    if (source_line(region->first_line) >= first_line && source_line(region->last_line) <= last_line) {
       inside.push_back(region);
     }
   }
@@ -211,7 +214,8 @@ void register_gcode(py::module_& module) {
       .def_readwrite("collect_alarms", &ReaderOptions::collect_alarms,
                      "Go on behind an alarm and keep all in ProgramText.alarms.")
       .def_readwrite("power_on", &ReaderOptions::power_on, "Modal state before the first block.")
-      .def_readwrite("probe_lines", &ReaderOptions::probe_lines, "Ascending lines behind which the state is kept.");
+      .def_readwrite("probe_lines", &ReaderOptions::probe_lines,
+                     "Ascending lines of the source behind which the state is kept.");
 
   py::class_<RegionNote>(module, "RegionNote", "An N word or a comment inside a region.")
       .def_readonly("segment", &RegionNote::segment, "Index of the segment before which it stood.")
@@ -294,7 +298,7 @@ void register_gcode(py::module_& module) {
             return std::const_pointer_cast<Path>(cutting_path(self, first, last));
           },
           py::arg("first_line"), py::arg("last_line"),
-          "The cutting moves of the regions within a range of lines, as one path.");
+          "The cutting moves of the regions within a range of lines of the source, as one path.");
 
   module.def(
       "read_program",

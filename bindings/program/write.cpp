@@ -31,6 +31,12 @@ void register_emission(py::module_& module) {
       .def_readwrite("minimum_feed", &FitOptions::minimum_feed, "In feed units.")
       .def_readwrite("merge_tolerance_increments", &FitOptions::merge_tolerance_increments,
                      "Deviation of merged blocks per axis, least increments.")
+      .def_readwrite("most_periods", &FitOptions::most_periods,
+                     "Longest block, block periods. 1: all last the same time, for a feed override that is turned.")
+      .def_readwrite("equal_above_increments", &FitOptions::equal_above_increments,
+                     "Way per interpolation period up to which blocks may be longer than that, increments.")
+      .def_readwrite("equal_periods", &FitOptions::equal_periods,
+                     "Likewise blocks so far from both ends of a steady stretch, block periods; 0: none.")
       .def_readwrite("lent_periods", &FitOptions::lent_periods, "Periods that the blocks before did not last.")
       .def_readwrite("modes", &FitOptions::modes,
                      "Modes of X, Y, Z, which the rounding of block ends leaves at rest; none: ends are rounded to the "

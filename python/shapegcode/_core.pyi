@@ -1296,7 +1296,7 @@ class ReaderOptions:
     @property
     def probe_lines(self) -> list[int]:
         """
-        Ascending lines behind which the state is kept.
+        Ascending lines of the source behind which the state is kept.
         """
     @probe_lines.setter
     def probe_lines(self, arg0: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex]) -> None:
@@ -1460,7 +1460,7 @@ class ProgramText:
     """
     def cutting_path(self, first_line: typing.SupportsInt | typing.SupportsIndex, last_line: typing.SupportsInt | typing.SupportsIndex) -> Path:
         """
-        The cutting moves of the regions within a range of lines, as one path.
+        The cutting moves of the regions within a range of lines of the source, as one path.
         """
     def origin(self, line: typing.SupportsInt | typing.SupportsIndex) -> tuple:
         """
@@ -2598,6 +2598,22 @@ class FitOptions:
     def block_period_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def equal_above_increments(self) -> float:
+        """
+        Way per interpolation period up to which blocks may be longer than that, increments.
+        """
+    @equal_above_increments.setter
+    def equal_above_increments(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def equal_periods(self) -> int:
+        """
+        Likewise blocks so far from both ends of a steady stretch, block periods; 0: none.
+        """
+    @equal_periods.setter
+    def equal_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
     def feed_unit_mm_per_s(self) -> float:
         """
         One step of the last F digit, mm/s.
@@ -2652,6 +2668,14 @@ class FitOptions:
         """
     @modes.setter
     def modes(self, arg0: typing.Annotated[collections.abc.Sequence[collections.abc.Sequence[Mode]], "FixedSize(3)"]) -> None:
+        ...
+    @property
+    def most_periods(self) -> int:
+        """
+        Longest block, block periods. 1: all last the same time, for a feed override that is turned.
+        """
+    @most_periods.setter
+    def most_periods(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
 class FittedBlocks:
     """

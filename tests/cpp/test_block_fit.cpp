@@ -217,6 +217,23 @@ TEST_CASE("block fit: a steady line takes few blocks, whatever its F, its direct
   }
 }
 
+TEST_CASE("block fit: blocks of one duration, but where it is slow or far from the ends") {
+  const Command command = sampled(2000, [](double k) { return Vector3(0.3 * k, 0.0, 0.0); });
+  FitOptions options;
+  CHECK(fit(command, options).size() <= 4);
+  options.most_periods = 1;
+  CHECK(fit(command, options).size() == 2000);
+  options.equal_above_increments = 61.0;  // 300 increments per block of five ticks are 60 per tick
+  CHECK(fit(command, options).size() <= 4);
+  options.equal_above_increments = 59.0;
+  options.equal_periods = 100;
+  const auto blocks = fit(command, options);
+  REQUIRE(blocks.size() > 200);
+  CHECK(blocks.size() <= 204);
+  CHECK(std::all_of(blocks.begin(), blocks.begin() + 100, [](const FittedBlock& each) { return each.periods == 1; }));
+  CHECK(std::all_of(blocks.end() - 100, blocks.end(), [](const FittedBlock& each) { return each.periods == 1; }));
+}
+
 TEST_CASE("block fit: a block ends at every break") {
   const Command command = sampled(100, [](double k) { return Vector3(0.3 * k, 0.0, 0.0); });
   const auto blocks = fit(command, {}, {17, 18, 60, 100});

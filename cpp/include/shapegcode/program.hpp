@@ -88,7 +88,8 @@ struct ReaderOptions {
   double peck_clearance_mm = 0.5;                 ///< of G73 and G83 (parameters 5114, 5115)
   bool collect_alarms = false;                    ///< go on behind an alarm, and keep all in Program::alarms
   ModalState power_on;                            ///< state at the first block
-  std::vector<std::uint32_t> probe_lines;  ///< ascending lines behind which the modal state is kept (Program::probed)
+  /// Ascending lines of the source behind which the modal state is kept (Program::probed); calls count as one line.
+  std::vector<std::uint32_t> probe_lines;
 };
 
 /// Something to tell the user about one place of the text.

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -36,6 +37,13 @@ struct FitOptions {
   /// Deviation of merged blocks from the shaped command, per axis; where the command is straight the rounding of their
   /// ends, half an increment, is all that counts.
   double merge_tolerance_increments = 0.5;
+  /// Longest block. 1: all blocks last the same time, so that whatever a control adds to each of them at another feed
+  /// override is the same for all, and stretches the motion evenly.
+  std::uint32_t most_periods = std::numeric_limits<std::uint32_t>::max();
+  /// Way per interpolation period up to which blocks may be longer than that: what a control adds there is no more.
+  double equal_above_increments = 1.0;
+  /// Likewise blocks so far from both ends of a steady stretch: what they excite dies away before it. 0: none.
+  std::uint32_t equal_periods = 0;
   double arc_min_chord_mm = 0.02;  ///< shorter pieces are lines
   /// What the last block must be, so that the modal motion code behind it is the original's: a control refuses G02 or
   /// G03 alone. An arc that takes the place of a line there has `last_radius_mm` in the plane across `last_normal`.

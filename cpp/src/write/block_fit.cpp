@@ -69,15 +69,9 @@ class Fitter {
     position_ = shape_.rounded(0);
     std::uint32_t k = 0;
     while (k < periods_) {
-      const std::uint32_t limit = next_break(k);
-      std::optional<Candidate> best = fit_line(k, limit);
+      const std::optional<Candidate> best = fit(k, next_limit(k));
       if (!best) {
         break;  // rest to the end
-      }
-      if (arc_normal_[k] >= 0) {
-        if (const auto arc = fit_arc(k, limit, bends(k) ? 1 : best->covered + 1)) {
-          best = arc;
-        }
       }
       k += best->covered;
       lent_ += best->covered - best->block.periods;
@@ -161,6 +155,37 @@ class Fitter {
       ++break_;
     }
     return break_ < breaks_.size() ? std::min(breaks_[break_], periods_) : periods_;
+  }
+
+  // The block from period k: the longest line, or the arc that is longer.
+  std::optional<Candidate> fit(std::uint32_t k, std::uint32_t limit) {
+    const std::optional<Candidate> line = fit_line(k, limit);
+    if (line && arc_normal_[k] >= 0) {
+      if (const auto arc = fit_arc(k, limit, bends(k) ? 1 : line->covered + 1)) {
+        return arc;
+      }
+    }
+    return line;
+  }
+
+  // Where the block from period k must end: at a break, or as one of equal blocks.
+  std::uint32_t next_limit(std::uint32_t k) {
+    const std::uint32_t limit = next_break(k);
+    const double way = (grid_.row(k + 1) - grid_.row(k)).norm() / options_.increment_mm;
+    const double ticks = options_.block_period_s / options_.interpolation_period_s;
+    if (options_.most_periods >= limit - k || way <= options_.equal_above_increments * ticks) {
+      return limit;
+    }
+    const std::uint32_t margin = options_.equal_periods;
+    if (margin > 0 && k >= looked_until_) {
+      const auto whole = fit(k, limit);
+      const std::uint32_t covered = whole ? whole->covered : 1;
+      looked_until_ = k + covered;
+      free_from_ = covered / 2 > margin ? k + margin : looked_until_;
+    }
+    // What happens in the middle of a long block is forgotten before it ends.
+    return margin > 0 && k >= free_from_ && k + margin < looked_until_ ? looked_until_ - margin
+                                                                       : k + options_.most_periods;
   }
 
   // Deviation of the path's middle from the chord within one period, in the plane of the arc it follows.
@@ -271,6 +296,8 @@ class Fitter {
   std::uint32_t lent_ = 0;  // periods that the blocks so far did not last
   std::uint32_t left_ = 0;  // likewise, at the end
   std::size_t break_ = 0;
+  std::uint32_t looked_until_ = 0;  // end of the block that would be written were it not for equal ones
+  std::uint32_t free_from_ = 0;     // where it is far from its begin
 };
 
 // Time that was lent from before is rest in front of the command.

@@ -161,9 +161,9 @@ def _uncertain_modes(machine: Machine) -> list[tuple[str, list[tuple[str, float]
 def stated_cases(machine: Machine) -> list[Case]:
     """The cases in which a program of this machine is played; the two nominal ones come first (ceil, carry).
 
-    Overrides from 50 to 120 % and at the ends of the band, each mode and all of them up and down by their stated
-    uncertainty with as little damping as they state, both together at the corners of the band, the look-ahead mode
-    left on (for a controller that has one), and a block buffer that runs empty once.
+    Overrides from 50 to 120 % and at the ends of the band (none where the dial is locked), each mode and all of them up
+    and down by their stated uncertainty with as little damping as they state, both together at the corners of the band,
+    the look-ahead mode left on (for a controller that has one), and a block buffer that runs empty once.
     """
     band, own = machine.verdict, machine.controller.block_end
     low, high = band.override_percent
@@ -174,7 +174,9 @@ def stated_cases(machine: Machine) -> list[Case]:
     def at_override(percent: float) -> Case:
         return Case(f"override {percent:g} %", own, low <= percent <= high, override=percent / 100.0)
 
-    cases += [at_override(percent) for percent in sorted({*_OVERRIDES_PERCENT, low, high} - {100.0})]
+    turns = machine.emission.override != "lock"  # a dial that is switched off does nothing
+    ends = sorted({low, high} - {100.0}) if turns else []
+    cases += [at_override(percent) for percent in sorted({*_OVERRIDES_PERCENT, *ends} - {100.0}) if turns]
     modes = _uncertain_modes(machine)
     for mode, ways in modes:
         cases += [Case(words, own, band.mode_uncertainty, mode=mode, shift=shift) for words, shift in ways]
@@ -185,7 +187,7 @@ def stated_cases(machine: Machine) -> list[Case]:
         cases += [Case(words, own, band.mode_uncertainty, mode=ALL_MODES, shift=shift) for shift, words in together]
         cases += [
             replace(corner, name=f"{corner.name}, {words}", counts=band.mode_uncertainty, mode=ALL_MODES, shift=shift)
-            for corner in (at_override(percent) for percent in sorted({low, high} - {100.0}))
+            for corner in map(at_override, ends)
             for shift, words in together
         ]
     if machine.controller.motion == "look_ahead" or band.look_ahead:

@@ -128,10 +128,14 @@ class _Settled:
 
 @dataclass
 class _Attempt:
-    """The last room of a region that left the tolerance, what it then reached, µm, and whether less room helps."""
+    """The last room of a region that left the tolerance, what it then reached, µm, and whether less room helps.
+
+    `turned`: it left the tolerance only with the dial turned.
+    """
 
     room_um: float
     reached_um: float
+    turned: bool
     helps: bool = True
 
 
@@ -150,7 +154,9 @@ class _Run:
         self.program, self.machine, self.budget, self.pool = program, machine, budget, pool
         self.on_progress = on_progress
         self.fixed_period = block_period_s is not None
-        self.grid = choose_grid(machine, block_period_s)
+        fastest = max((region.path.fastest_feed_mm_per_s for region in program.regions), default=0.0)
+        self._grid_for = partial(choose_grid, machine, fastest_mm_per_s=fastest)
+        self.grid = self._grid_for(block_period_s)
         program.refuse_endless(_MOST_PERIODS * self.grid.block_period_s)
         self.model = MachineModel(machine)
         self.writer = TextWriter(program, self.model, self.grid)
@@ -170,7 +176,7 @@ class _Run:
             self._leave_what_has_nothing_to_gain()
         if self.spending is not None and self.spending.budget.limits_rate and not self.fixed_period:
             weights = [float(play.result().residual_mm.max()) for play in self.originals]
-            self.grid = self.spending.choose_period(self.grid, weights, partial(choose_grid, self.machine), self._write)
+            self.grid = self.spending.choose_period(self.grid, weights, self._grid_for, self._write)
         settled = self._settle()
         while self.spending is not None and self.spending.give_up(
             self.grid,
@@ -255,25 +261,28 @@ class _Run:
 
         The bound on feed counts corners and arcs one by one; where several fall into one shaper they add up. Where the
         feed was searched for a target, what it was planned for counts: more room than that would change nothing. A
-        region that less room does not help gets its room back: slower would only be slower.
+        region that less room does not help gets its room back: slower would only be slower. So does one that is
+        within the limit at 100 % feed override, and after one attempt still not at the stated others.
         """
         limit, room_um = self.machine.tolerance.contour_um, self.room_um
         places = {id(region): index for index, region in enumerate(self.program.regions)}
         tightened = False
         for place, region in zip(written.placed, figures, strict=True):
-            reached = self.judge.contour_um(region)
             index = places[id(place.region)]
             before = tried.get(index)
+            reached = self.judge.contour_um(region, turned=False)
+            if turned := reached <= limit:
+                reached = self.judge.contour_um(region)
             if reached <= limit or (before is not None and not before.helps):
                 continue
             tightened = True
-            if before is not None and reached > _HELPED * before.reached_um:
+            if before is not None and (before.turned or (not turned and reached > _HELPED * before.reached_um)):
                 room_um[index] = before.room_um
                 before.helps = False
-            else:
-                tried[index] = _Attempt(room_um[index], reached)
-                room_um[index] = min(room_um[index], written.planned_um.get(index, math.inf))
-                room_um[index] *= _CONTOUR_MARGIN * limit / reached
+                continue
+            tried[index] = _Attempt(room_um[index], reached, turned)
+            room_um[index] = min(room_um[index], written.planned_um.get(index, math.inf))
+            room_um[index] *= _CONTOUR_MARGIN * limit / reached
         return tightened
 
     def _result(self, settled: _Settled, rapids: ShapedRapids | None) -> Conversion:

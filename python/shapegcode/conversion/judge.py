@@ -123,15 +123,22 @@ class Judge:
             on_step(len(results), len(placed))
         return results
 
-    def contour_um(self, figures: RegionFigures) -> float:
+    def contour_um(self, figures: RegionFigures, *, turned: bool = True) -> float:
         """Largest deviation from the path of what the contour tolerance is about, over the cases that count, µm.
 
         Without those that a lower feed is no remedy for: look-ahead left on, a starved block.
+
+        Args:
+            figures: of the region.
+            turned: False: only the cases at 100 % feed override.
+
+        Returns:
+            The deviation.
         """
         deviations = [
             played.command if self.target == "command" else played.response
             for case, played in zip(self.cases, figures.cases, strict=True)
-            if case.counts and not case.look_ahead and case.starved_s == 0.0
+            if case.counts and not case.look_ahead and case.starved_s == 0.0 and (turned or case.override == 1.0)
         ]
         return max(each.largest_mm for each in deviations if each is not None) * 1e3
 
@@ -179,7 +186,7 @@ class Judge:
             override_residual=tuple(
                 OverrideResidual(
                     ratio,
-                    self._residual_um(figures, (c for c in self.cases if c.override == ratio and c.mode is None)),
+                    self._residual_um(figures, self._at_dial(ratio)),
                 )
                 for ratio in OVERRIDES
             ),
@@ -193,6 +200,11 @@ class Judge:
             worst_case=worst_counted(cases),
             regions=self.verdicts(figures, placed, block_period_s),
         )
+
+    def _at_dial(self, ratio: float) -> list[Case]:
+        """The cases with the dial at a ratio; the nominal ones where it is locked."""
+        turned = [case for case in self.cases if case.override == ratio and case.mode is None]
+        return turned or [case for case in self.cases if case.nominal]
 
     def _residual_um(self, figures: Sequence[RegionFigures], cases: Iterable[Case]) -> Xyz[float]:
         """Largest of all regions in some cases."""

@@ -26,6 +26,12 @@ _VERDICT_PENDING, _VERDICT_GOOD, _VERDICT_BAD = (
     b"(OUT OF TOLERANCE - DO NOT RUN  )",
 )
 
+_OVERRIDE_NOTE = {
+    "ask": "SET FEED OVERRIDE 100 PCT",
+    "lock": "FEED OVERRIDE IS OFF IN SHAPED MOVES",
+    "any": "BLOCKS OF ONE DURATION FOR ANY FEED OVERRIDE",
+}
+
 Step = Callable[[int, int], None]
 
 
@@ -189,7 +195,7 @@ class TextWriter:
             *(f"MODE {mode}" for mode in modes),
             f"BLOCK PERIOD {grid.block_period_s * 1e3:g} MS SHAPER {grid.duration_s * 1e3:g} MS",
             *([f"{len(grid.track.nodes)} SHAPERS FOLLOW {'XYZ'[grid.track.axis]}"] if grid.track else []),
-            "SET FEED OVERRIDE 100 PCT",
+            _OVERRIDE_NOTE[self._machine.emission.override],
             f"TIME CONSTANT AFTER INTERPOLATION {own.time_constant_s * 1e3:g} MS{shape}",
         ]
         first, *rest = (f"({_plain(line)[:_COMMENT_WIDTH]})" for line in lines)

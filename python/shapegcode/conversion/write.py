@@ -21,6 +21,8 @@ _PIECE_PERIODS = 1 << 17  # of a region in one go: what bounds the memory
 _CORNER_SHARE = 0.75  # several corners of a polyline may fall into one shaper, and then their deviations add up
 
 
+_FADED = 1.0 / 3.0  # of the time after which a vibration is a millionth: it is a hundredth
+
 _TARGETS = {
     "response": _core.ContourTarget.response,
     "command": _core.ContourTarget.command,
@@ -199,7 +201,9 @@ class RegionWriter:
         # A search for the region's N word must not skip the prologue.
         number = marks.first_word
         before = self._head(region, number, starts[0], state)
-        after = _lines([_restore_line(region, state.motion, state.plane), *self._machine.emission.epilogue], state)
+        emission = self._machine.emission
+        unlock = emission.unlock_lines if emission.override == "lock" else ()
+        after = _lines([_restore_line(region, state.motion, state.plane), *unlock, *emission.epilogue], state)
         text, all_periods = b"".join(texts), np.concatenate(periods)
         return EmittedRegion(
             before + text + after, len(all_periods), all_periods, len(before), len(before) + len(text),
@@ -218,6 +222,10 @@ class RegionWriter:
         fit.minimum_feed = max(1, math.ceil(controller.minimum_feed_mm_per_min / unit * 10**feed_decimals - 1e-9))
         fit.merge_tolerance_increments = emission.merge_tolerance_increments
         fit.arc_min_chord_mm = emission.arc_min_chord_mm
+        if self._machine.bears_override:
+            fit.most_periods = 1
+            fit.equal_above_increments = self._machine.tolerance.residual_floor_increments
+            fit.equal_periods = math.ceil(self._model.vibration_memory_s * _FADED / fit.block_period_s)
         if emission.rounding == "vibration":
             fit.modes = options.modes
         return fit
@@ -243,7 +251,8 @@ class RegionWriter:
         """The lines before the blocks: prologue, a safe line, the dwell in which the buffer fills."""
         emission = self._machine.emission
         fastest = max(axis.max_feed_mm_per_min for axis in self._machine.axes.as_tuple())
-        lines = [*emission.prologue, _safe_line(region, start, writer.position_decimals, fastest)]
+        lock = emission.lock_lines if emission.override == "lock" else ()
+        lines = [*lock, *emission.prologue, _safe_line(region, start, writer.position_decimals, fastest)]
         lines[0] = number + lines[0]
         if emission.prefill_dwell_s > 0.0:
             lines.append(f"G04P{round(emission.prefill_dwell_s * 1e3)}")

@@ -185,6 +185,11 @@ class Controller(TomlTable):
         fanuc="0103",
         default=0,
     )
+    macros: Bool = key(
+        "whether programs may set and read variables (custom macros, an option of many controls)",
+        default=True,
+        assumed=True,
+    )
     dnc_bits_per_character: Annotated[int, Strict(), Field(ge=7, le=12)] = key(
         "bits on the serial line for each character, with start, parity and stop bits",
         unit="bits",
@@ -235,6 +240,11 @@ class Controller(TomlTable):
     max_program_steps: Annotated[int, Strict(), Field(ge=1, le=10**12)] = key(
         "a program that executes more blocks than this counts as endless", unit="blocks", default=10_000_000
     )
+
+    @property
+    def holds_macros(self) -> bool:
+        """Whether macro statements may stand in a program: the control has them, and is not drip fed."""
+        return self.macros and self.dnc_baud == 0
 
 
 class Times(TomlTable):

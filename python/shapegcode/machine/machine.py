@@ -30,6 +30,8 @@ from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem
 from shapegcode.settings.remarks import DEFAULT, inherited, remarks_of, with_remarks
 
+_USUAL_DIAL_PERCENT = (70.0, 120.0)  # as far as operators turn it without thinking
+
 __all__ = [
     "Axes",
     "Axis",
@@ -91,6 +93,20 @@ class Machine(TomlTable):
             )
         return self
 
+    @model_validator(mode="after")
+    def _override_can_be_locked(self) -> Machine:
+        emission, controller = self.emission, self.controller
+        variables = any("#" in line for line in (*emission.lock_lines, *emission.unlock_lines))
+        if emission.override == "lock" and variables and not controller.holds_macros:
+            why = f"controller.dnc_baud = {controller.dnc_baud}" if controller.macros else "controller.macros = false"
+            raise KeyProblem(
+                "emission.override",
+                "lock",
+                f"emission.lock_lines set a variable, and none can be set with {why}: name the builder's own codes "
+                'there, such as ["M49"] and ["M48"], or use "any"',
+            )
+        return self
+
     _remarks: dict[str, str] = PrivateAttr(default_factory=dict)
 
     def __eq__(self, other: object) -> bool:
@@ -133,6 +149,21 @@ class Machine(TomlTable):
         copy = self.model_copy()
         copy._remarks = {**self._remarks, **remarks}
         return copy
+
+    @property
+    def bears_override(self) -> bool:
+        """Whether shaped text is made for a dial that is turned: asked for, or its positions stated in the verdict."""
+        stated = self.verdict.override_percent != (100.0, 100.0)
+        return self.emission.override == "any" or (self.emission.override == "ask" and stated)
+
+    @property
+    def dial_positions(self) -> tuple[float, ...]:
+        """Feed overrides in steps of a dial for which text is made that bears one: the stated band, or 70 to 120 %."""
+        low, high = self.verdict.override_percent
+        if low == high == 100.0:
+            low, high = _USUAL_DIAL_PERCENT
+        steps = {10.0 * step for step in range(math.ceil(low / 10.0), math.floor(high / 10.0) + 1)}
+        return tuple(percent / 100.0 for percent in sorted({low, *steps, high}))
 
     @classmethod
     def load(cls, path_or_name: str | Path) -> Machine:

@@ -27,6 +27,26 @@ class Emission(TomlTable):
         default=(),
     )
     epilogue: tuple[Text, ...] = key("lines written after each shaped stretch", default=())
+    override: Literal["ask", "any", "lock"] = key(
+        'what is done about the feed override while shaped moves run. "ask": the header asks for 100 %, but for a '
+        'verdict.override_percent that states more, where it is as "any"; "lock": '
+        "lock_lines switch the dial off before each shaped stretch, unlock_lines switch it on again behind it; "
+        '"any": blocks of one duration, on which the dial changes the speed and little else (more text, and a block '
+        "period that suits the dial)",
+        default="ask",
+    )
+    lock_lines: tuple[Text, ...] = key(
+        'lines that switch the feed override off, for override = "lock"; a builder\'s own code, for example ["M49"], '
+        "goes here",
+        fanuc="#3004",
+        default=("#33=#3004", "#3004=[#33OR2]"),
+    )
+    unlock_lines: tuple[Text, ...] = key(
+        "lines that give the feed override back as it was. Macro statements run when they are read, so G53 comes "
+        'first: it is not read past until the moves before it are done. For a builder\'s own code ["M48"]',
+        fanuc="#3004",
+        default=("G53", "#3004=#33"),
+    )
     prefill_dwell_s: Annotated[NonNegative, Field(le=60)] = key(
         "dwell before each shaped stretch, in which the block buffer fills; 0: none", unit="s", default=0.0
     )
@@ -64,7 +84,7 @@ class Emission(TomlTable):
         default="vibration",
     )
 
-    @field_validator("prologue", "epilogue")
+    @field_validator("prologue", "epilogue", "lock_lines", "unlock_lines")
     @classmethod
     def _fanuc_lines(cls, lines: tuple[str, ...]) -> tuple[str, ...]:
         for line in lines:
@@ -77,7 +97,7 @@ class Emission(TomlTable):
 
     @model_validator(mode="after")
     def _lines_fit(self) -> Emission:
-        for line in (*self.prologue, *self.epilogue):
+        for line in (*self.prologue, *self.epilogue, *self.lock_lines, *self.unlock_lines):
             if len(line) > self.max_line_length:
                 raise ValueError(
                     f"the line {json.dumps(line)} has {len(line)} characters, emission.max_line_length is "

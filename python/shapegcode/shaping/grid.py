@@ -14,6 +14,7 @@ from shapegcode.shaping.block_period import (
     choose_block_period,
     robust_candidate,
 )
+from shapegcode.shaping.dial import best_for_dial
 from shapegcode.shaping.options import DesignOptions
 from shapegcode.shaping.per_axis import design_per_axis
 from shapegcode.shaping.periods import candidate_periods, check_block_period
@@ -79,16 +80,20 @@ def make_grid(
     return Grid(block_period_s, shaper, _core.Fir(delays, list(shaper.amplitudes)), track, family, note)
 
 
-def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
+def choose_grid(
+    machine: Machine, block_period_s: float | None = None, *, fastest_mm_per_s: float | None = None
+) -> Grid:
     """Block period and shaper for all modes of a machine, and shapers that follow moving modes.
 
     With `shaping.family` = "auto" the shortest shaper without negative taps that leaves at most
     `shaping.vibration_limit` of the vibration anywhere in the modes' stated bands; exact where no band is stated. With
-    a named family its shortest one.
+    a named family its shortest one. Text that shall bear a turned feed override (`Machine.bears_override`) gets the
+    period that suits the dial, see `best_for_dial`.
 
     Args:
         machine: modes and controller.
         block_period_s: a period to use; None: `emission.block_period_s`, or the best one.
+        fastest_mm_per_s: the fastest feed that is programmed; None: the slowest of the axes' largest feeds.
 
     Returns:
         The grid: block period, shaper for all axes, shapers for stretches of the moving axis.
@@ -105,6 +110,7 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
     period = block_period_s if block_period_s is not None else machine.emission.block_period_s
     if period is not None:
         check_block_period(period, machine)
+    feed = fastest_mm_per_s or min(axis.max_feed_mm_per_min for axis in machine.axes.as_tuple()) / 60.0
     if shaping.family != "auto":
         if shaping.per_axis:
             raise _core.ArgumentError(f'shaping.per_axis needs shaping.family = "auto": it is {shaping.family!r}')
@@ -113,7 +119,7 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
                 f"shaping.family = {shaping.family!r}: modes that move with an axis (frequency_over) are followed by "
                 'shapers without negative taps; use "auto"'
             )
-        return _of_family(shaping.family, bands, machine, period)
+        return _of_family(shaping.family, bands, machine, period, feed)
     family = "robust" if any(band.uncertainty for band in bands) else "non-negative"
     best: BlockPeriodChoice | BlockPeriodCandidate
     if period is None:
@@ -121,7 +127,10 @@ def choose_grid(machine: Machine, block_period_s: float | None = None) -> Grid:
             bands, controller.interpolation_period_s, controller.block_time_s,
             max_duration_s=shaping.max_duration_s, vibration_limit=shaping.vibration_limit,
         )  # fmt: skip
-    else:
+        if machine.bears_override:
+            designs = [(each.period_s, each.shaper) for each in best.candidates if each.shaper is not None]
+            period, _ = best_for_dial(designs, machine, feed)
+    if period is not None:
         best = robust_candidate(bands, period, shaping.max_duration_s, shaping.vibration_limit)
     assert best.shaper is not None  # what is chosen exists
     grid = make_grid(best.period_s, best.shaper, _track(machine, best.period_s), family=family, note=best.note)
@@ -159,7 +168,9 @@ def _per_axis(grid: Grid, machine: Machine, *, exact: bool) -> Grid:
     return replace(grid, per_axis_duration_s=duration_s)
 
 
-def _of_family(name: str, bands: list[ModeBand], machine: Machine, period_s: float | None) -> Grid:
+def _of_family(
+    name: str, bands: list[ModeBand], machine: Machine, period_s: float | None, feed_mm_per_s: float
+) -> Grid:
     """The shortest shaper of a family, on one grid or on the one on which it is shortest."""
     shaping = machine.shaping
     periods_s = (
@@ -178,6 +189,9 @@ def _of_family(name: str, bands: list[ModeBand], machine: Machine, period_s: flo
     if not found:
         raise _core.DesignError(f"shaping.family = {name!r}: {refusals[0]}")
     best, period = min(found, key=lambda pair: (pair[0].duration_s, -pair[1]))
+    if machine.bears_override and len(found) > 1:
+        period, _ = best_for_dial([(each, design.shaper) for design, each in found], machine, feed_mm_per_s)
+        best = next(design for design, each in found if each == period)
     note = ""
     if best.worst_residual > shaping.vibration_limit:
         note = (

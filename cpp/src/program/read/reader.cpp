@@ -203,7 +203,9 @@ Program Reader::run() {
       }
       running = record(error);
     }
-    probe(program_.expanded ? static_cast<std::uint32_t>(program_.origins.size()) : here_.line);
+    if (frames_.size() == 1) {
+      probe(here_.line);
+    }
   }
   finish();
   return result();
