@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ import numpy as np
 import pytest
 
 import shapegcode as sg
-from acceptance import machine_with
+from acceptance import Judged, convert, machine_with
+from judge import Mode, contour_error_um, play, residual_um, response, starts
 from shapegcode.cli import main
 from shapegcode.identification.mode import Estimate, IdentifiedMode
 from shapegcode.identification.update import update_modes
@@ -285,3 +287,109 @@ def test_identify_asks_or_fails(
     without_terminal(monkeypatch, "k\n")
     assert main(argv) in (0, 1)
     assert len(sg.Machine.load(started).axes.y.modes) == 1
+
+
+PART = """%
+O0001
+G21G90G17
+G0X0Y0
+G1X50.F6000
+G3X65.Y15.J15.
+G1Y40.
+M30
+%
+"""
+CIRCLE = """%
+O0001
+G21G90G17
+G0X-60.Y50.
+G1X0F4000
+G2J-50.
+G1X60.
+M30
+%
+"""
+
+
+def unmeasured_machine(keys: dict[str, Any], remarks: dict[str, str]) -> sg.Machine:
+    """The built-in machine with other values, and all of them measured but for those with another remark."""
+    machine = machine_with(keys)
+    return machine.with_remarks({value.key: "measured" for value in machine.values()} | remarks)
+
+
+def replayed(judged: Judged, modes: list[list[Mode]], filter_ms: int) -> tuple[float, float, float, float]:
+    """Contour error of the table and residuals X, Y, Z, µm: the worst region, as somebody else plays the text."""
+    worst = np.zeros(4)
+    tick = judged.machine.controller.interpolation_period_s
+    for programmed, blocks, _ in judged.regions():
+        cuts = [move for move in blocks if move.length > 0.0]
+        points = play(cuts, period_s=tick, block_end="ceil", acceleration_samples=filter_ms)
+        points = points + np.round(starts(programmed)[0] - points[0], 2)
+        _, _, moved = response(points, modes, tick)
+        over = (len(moved) - 1) // (len(points) - 1)
+        contour = contour_error_um(moved[::over], programmed)[0]
+        worst = np.maximum(worst, [contour, *residual_um(points, modes, tick, still_mm=1e-9)])
+    return tuple(worst)
+
+
+def test_verdict_rests_on_a_filter_that_nobody_measured() -> None:
+    """1622 unknown: 24 ms of it would take the circle inwards, by what a second playback finds."""
+    machine = unmeasured_machine({}, {"controller.shaped_time_constant_s": "assumed"})
+    judged = convert(CIRCLE, machine)
+    rows = [row for row in judged.conversion.rests_on if row.key == "controller.shaped_time_constant_s"]
+    (row,) = rows
+    assert (row.origin, row.value, row.moved) == ("assumed", "0.0 s", "0.024 s")
+    assert row.figure == "contour error of the response"
+    before, after = (replayed(judged, judged.modes, ms)[0] for ms in (0, 24))
+    assert row.figure_um == pytest.approx(before, rel=0.05, abs=0.1)
+    assert row.moved_um == pytest.approx(after, rel=0.05)
+    assert row.moved_um > row.figure_um + 1.0
+
+
+def test_verdict_rests_on_a_mode_of_another_machine() -> None:
+    """An inherited frequency is moved both ways by 5 %, or by what is stated; the worse way counts."""
+    inherited = {"axes.x.modes.1.frequency_hz": "from VX500: measured"}
+    for stated, percent in ((None, 5.0), (2.0, 2.0)):
+        keys = {"axes.x.modes.1.frequency_uncertainty_percent": stated, "verdict.mode_uncertainty": False}
+        judged = convert(PART, unmeasured_machine(keys, inherited))
+        (row,) = judged.conversion.rests_on
+        assert (row.key, row.origin, row.moved[1:]) == (*list(inherited), "inherited", f"{percent:g} %")
+        x, y, z = judged.modes
+        left = []
+        for sign in (-1.0, 1.0):
+            moved = [replace(m, frequency_hz=m.frequency_hz * (1.0 + sign * percent / 100.0)) for m in x]
+            left.append(replayed(judged, [moved, y, z], 0))
+        place = ["contour error of the response", *(f"residual vibration {axis}" for axis in "XYZ")].index(row.figure)
+        assert row.moved_um == pytest.approx(max(each[place] for each in left), rel=0.05, abs=0.02)
+        assert row.figure_um == pytest.approx(replayed(judged, judged.modes, 0)[place], rel=0.05, abs=0.02)
+        assert row.moved_um > 1.2 * row.figure_um
+
+
+def test_what_is_measured_is_nothing_to_rest_on() -> None:
+    judged = convert(PART, unmeasured_machine({}, {}))
+    assert judged.conversion.rests_on == ()
+    assert not any("rests on" in str(table.title) for table in judged.conversion.tables())
+
+
+def test_verdict_ends_with_what_it_rests_on(started: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    part, report = tmp_path / "part.nc", tmp_path / "r.json"
+    part.write_text(PART, encoding="ascii")
+    out = str(tmp_path / "out.nc")
+    main(["convert", str(part), "-m", str(started), "-o", out, "--all", "--json", str(report)])
+    shown = capsys.readouterr().out
+    rows = json.loads(report.read_text(encoding="utf-8"))["rests_on"]
+    keys = [row["key"] for row in rows]
+    assert "axes.x.modes.1.frequency_hz" in keys
+    assert "axes.z.modes" not in keys  # Z stands still
+    moves = [(row["moved_um"] - row["figure_um"]) / row["limit_um"] for row in rows]
+    assert moves == sorted(moves, reverse=True)
+    assert min(moves) >= 0.01
+    assert len(keys) == len(set(keys)) <= 8
+    assert shown.index("what the verdict rests on") > shown.index("cases of the verdict")
+
+
+def test_an_axis_of_which_nobody_knows_is_tried_with_a_mode() -> None:
+    keys = {"axes.y.modes": [], "axes.z.modes": []}
+    (row,) = convert(PART, unmeasured_machine(keys, {})).conversion.rests_on
+    assert (row.key, row.value, row.moved) == ("axes.y.modes", "none", "a mode of 40 Hz")
+    assert convert(PART, unmeasured_machine(keys | {"axes.y.rigid": True}, {})).conversion.rests_on == ()

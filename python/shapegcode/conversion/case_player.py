@@ -13,7 +13,7 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import Offset
 from shapegcode.results.figures import Deviation
 
-__all__ = ["BLOCK_ENDS", "CasePlayer"]
+__all__ = ["BLOCK_ENDS", "CasePlayer", "case_figures"]
 
 BLOCK_ENDS = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 """Both rules of block timing."""
@@ -91,7 +91,7 @@ class CasePlayer:
                 figures.append(_starved(own, case.starved_s if own.starved else 0.0))
             else:
                 run = planned if case.look_ahead and planned is not None else by_rule[case.block_end or ""]
-                figures.append(_whole(run))
+                figures.append(case_figures(run))
         return tuple(figures)
 
     def _other(self, case: Case, run: _core.PlaybackFigures, own: _core.PlaybackFigures) -> CaseFigures:
@@ -100,13 +100,24 @@ class CasePlayer:
             response = Deviation.of([run.response]) if whole else None
             return CaseFigures(run.residual_mm, Deviation.of([own.command]), response, own.duration_s)
         if whole:
-            return _whole(run)
+            return case_figures(run)
         model = self.model
         cut_s = [_core.play_duration_s(self.blocks, model.period_s, model.own_rule, at) for at in (case.override, 1.0)]
         return CaseFigures(run.residual_mm, None, None, own.duration_s + cut_s[0] - cut_s[1])
 
 
-def _whole(run: _core.PlaybackFigures) -> CaseFigures:
+def case_figures(run: _core.PlaybackFigures, *, contour: bool = True) -> CaseFigures:
+    """What a playback showed.
+
+    Args:
+        run: the playback.
+        contour: the deviations were measured.
+
+    Returns:
+        Its figures.
+    """
+    if not contour:
+        return CaseFigures(run.residual_mm, None, None, run.duration_s)
     return CaseFigures(run.residual_mm, Deviation.of([run.command]), Deviation.of([run.response]), run.duration_s)
 
 

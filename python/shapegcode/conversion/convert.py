@@ -24,6 +24,7 @@ from shapegcode.conversion.figures import (
 from shapegcode.conversion.judge import Judge, RegionFigures
 from shapegcode.conversion.rapids.shape import ShapedRapids, shape_rapids
 from shapegcode.conversion.readback import read_back
+from shapegcode.conversion.rests import RestsOn, rests_on
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.spending import Spending, keepable
 from shapegcode.conversion.warnings import played_warnings, text_warnings
@@ -323,11 +324,20 @@ class _Run:
             rapids=rapids.outcome if rapids is not None else None,
             kept=tuple(self.kept[index] for index in sorted(self.kept)),
             least_gain_um=machine.shaping.least_gain_um,
+            rests_on=self._rests_on(settled, figures),
             text=judged(written.text, good=figures.within_tolerance),
             emitted=settled.emitted,
             placed=tuple(written.placed),
             model=self.model,
         )
+
+    def _rests_on(self, settled: _Settled, figures: PlayedFigures) -> tuple[RestsOn, ...]:
+        if figures.worst_case is None:
+            return ()
+        return rests_on(
+            self.model, self.judge, settled.figures, settled.written.placed, settled.emitted, figures.worst_case.lines,
+            self.pool,
+        )  # fmt: skip
 
     def _warnings(self, written: Written, figures: PlayedFigures) -> list[str]:
         program, machine = self.program, self.machine

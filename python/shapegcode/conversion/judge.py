@@ -211,8 +211,16 @@ class Judge:
         ranks = [self.cases.index(case) for case in cases]
         return largest_xyz_um(region.cases[rank].residual_mm for region in figures for rank in ranks)
 
-    def _limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
-        """What a region is judged by: its residual beside that of the original as programmed, in whatever case."""
+    def limits(self, figures: RegionFigures, place: Placed) -> RegionLimits:
+        """What a region is judged by: its residual beside that of the original as programmed, in whatever case.
+
+        Args:
+            figures: of the region.
+            place: the region.
+
+        Returns:
+            Its limits.
+        """
         tolerance = self._machine.tolerance
         increment_um = least_increment_mm(self._machine, place.region.exit.units) * 1e3
         floor_um = max(tolerance.residual_floor_um, tolerance.residual_floor_increments * increment_um)
@@ -222,7 +230,7 @@ class Judge:
         )
 
     def _verdict(self, figures: RegionFigures, place: Placed, block_period_s: float) -> RegionVerdict:
-        limits = self._limits(figures, place)
+        limits = self.limits(figures, place)
         after = np.max([run.residual_mm for run in figures.emitted], axis=0)
         misses = [*region_misses(self.cases, figures.cases, limits), *_haste(figures, place, block_period_s)]
         return RegionVerdict(
@@ -238,7 +246,7 @@ class Judge:
     def _case_verdicts(self, figures: Sequence[RegionFigures], placed: Sequence[Placed]) -> tuple[CaseVerdict, ...]:
         if not figures:
             return ()
-        limits = [self._limits(region, place) for region, place in zip(figures, placed, strict=True)]
+        limits = [self.limits(region, place) for region, place in zip(figures, placed, strict=True)]
         lines = [place.original_lines for place in placed]
         side = self._machine.input.material_side
         return tuple(

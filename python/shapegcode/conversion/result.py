@@ -11,7 +11,15 @@ from shapegcode.conversion.budget import BudgetOutcome
 from shapegcode.conversion.figures import AppliedLimits, BlockCount, PlayedFigures, UsedShaper
 from shapegcode.conversion.rapids.result import RapidsOutcome
 from shapegcode.conversion.readback import Placed
-from shapegcode.conversion.tables import BeforeAfter, before_after_table, case_table, change_percent, percent
+from shapegcode.conversion.rests import RestsOn
+from shapegcode.conversion.tables import (
+    BeforeAfter,
+    before_after_table,
+    case_table,
+    change_percent,
+    percent,
+    rests_table,
+)
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.results.figures import CONTOURS, ContourError
@@ -47,6 +55,7 @@ class Conversion(PlayedFigures, Result):
         rapids: only where rapids may be shaped: what became of them.
         kept: regions that keep their text because shaping them gains too little, or would miss a tolerance.
         least_gain_um: what is too little.
+        rests_on: values that nobody measured on this machine, by how far each moves the deciding figure to its limit.
         text: the emitted program, as a file holds it.
         emitted: the same, read back.
         placed: the shaped regions and their places in it.
@@ -72,6 +81,7 @@ class Conversion(PlayedFigures, Result):
     rapids: RapidsOutcome | None = field(default=None, metadata=sparse())
     kept: tuple[KeptRegion, ...] = ()
     least_gain_um: float = 0.0
+    rests_on: tuple[RestsOn, ...] = ()
     text: bytes = field(metadata=hidden())
     emitted: Program = field(metadata=hidden())
     placed: tuple[Placed, ...] = field(metadata=hidden())
@@ -141,12 +151,12 @@ class Conversion(PlayedFigures, Result):
                 yield "lines {} to {}: {}".format(*region.lines, miss)
 
     def tables(self) -> list[Table]:
-        """Original against emitted; the cases of the verdict. None where nothing was shaped."""
+        """Original against emitted; the cases of the verdict; what it rests on. None where nothing was shaped."""
         if self.nothing_shaped:
             return []
         groups = [self._times(), *self._vibrations(), *self._contours(), self._orbits(), self._sizes()]
         cases = [case_table(self.cases, self.worst_case)] if self.cases else []
-        return [before_after_table(groups), *cases]
+        return [before_after_table(groups), *cases, *([rests_table(self.rests_on)] if self.rests_on else [])]
 
     def _times(self) -> list[BeforeAfter]:
         pairs = (("cycle time", self.cycle_time_s), ("cutting time", self.cutting_time_s))

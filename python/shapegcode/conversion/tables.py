@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shapegcode.conversion.figures import CaseVerdict
+from shapegcode.conversion.rests import RestsOn
 from shapegcode.results.table import Column, Table
 
-__all__ = ["BeforeAfter", "before_after_table", "case_table", "change_percent", "percent"]
+__all__ = ["BeforeAfter", "before_after_table", "case_table", "change_percent", "percent", "rests_table"]
 
 # Rounding in sums of increments stays far below this, a least increment far above.
 # A percentage of less than this compares rounding with rounding.
@@ -114,6 +115,33 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
         cases,
         caption=f"{len(cases) - shown} of {len(cases)} cases count{brackets} ([verdict])",
         row_style=lambda case: _style(case, case is worst),
+    )
+
+
+def rests_table(rows: Sequence[RestsOn]) -> Table:
+    """The values that nobody measured on this machine and that the verdict rests on.
+
+    Args:
+        rows: those that move it furthest first.
+
+    Returns:
+        The table.
+    """
+    columns = (
+        Column("key", left=True),
+        Column("value", text=True),
+        Column("origin", left=True),
+        Column("if it were", value="moved", text=True),
+        Column("figure", text=True),
+        Column("µm", value=lambda row: f"{row.figure_um:.1f} → {row.moved_um:.1f}"),
+        Column("limit", value="limit_um", digits=1),
+    )
+    return Table(
+        "what the verdict rests on: values that nobody measured on this machine",
+        columns,
+        rows,
+        caption="one at a time, in the region that comes nearest to a limit",
+        row_style=lambda row: "red" if row.moved_um > row.limit_um else "",
     )
 
 

@@ -1,0 +1,284 @@
+"""What a verdict rests on: values that nobody measured on this machine, by how far each moves it.
+
+The deciding region, the one that comes nearest to a limit, is played again with each value moved by its stated
+uncertainty, or by what is usual where none is stated. That takes no more playbacks than the verdict itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapegcode import _core
+from shapegcode.conversion.case_player import case_figures
+from shapegcode.conversion.cases import Case, CaseFigures, Judged, RegionLimits, judge_region
+from shapegcode.conversion.judge import Judge, RegionFigures
+from shapegcode.conversion.readback import Placed
+from shapegcode.errors import MachineError
+from shapegcode.machine import Machine
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.program import Program
+from shapegcode.settings.keys import KeyValue
+
+__all__ = ["LEAST_SHARE", "RestsOn", "rests_on"]
+
+LEAST_SHARE = 0.01
+"""Of a limit: a value that moves its figure by less does not matter."""
+
+_MOST_SHOWN = 8
+_FREE_S = 60.0  # of motion: so much is always played
+_FULL_RUNS = 4  # a verdict plays every region about so often with its contour
+_FILTER_S = 0.024  # moving average of 1769 or 1622 on a machining centre, where the file says that there is none
+_MODE = {"frequency_hz": 40.0, "damping_ratio": 0.02}  # of an axis of a machining centre, where none is known
+_PERCENT = {"frequency_hz": 5.0, "damping_ratio": 50.0, "participation": 30.0}  # where no uncertainty is stated
+
+
+@dataclass(frozen=True)
+class RestsOn:
+    """A value of the machine file that nobody measured, and what it would do to the verdict.
+
+    Attributes:
+        key: dotted name in the machine file.
+        value: as it stands there, with its unit.
+        origin: "assumed", "inherited" from another machine, or "default".
+        moved: what it was moved to, in words.
+        figure: the judged figure that it moves furthest towards its limit.
+        figure_um: that figure as the file has the value.
+        moved_um: the same with the value moved.
+        limit_um: what is allowed.
+    """
+
+    key: str
+    value: str
+    origin: str
+    moved: str
+    figure: str
+    figure_um: float
+    moved_um: float
+    limit_um: float
+
+    @property
+    def share(self) -> float:
+        """How far the figure moves, of its limit."""
+        return (self.moved_um - self.figure_um) / self.limit_um if self.limit_um > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A value, what it is moved to in words, and how the region is then played."""
+
+    value: KeyValue
+    moved: str
+    machine: Machine
+    shift: float = 0.0
+    only: str | None = None
+
+
+@dataclass(frozen=True)
+class _Region:
+    """The deciding region: how it is played, and what it is judged by."""
+
+    figures: RegionFigures
+    place: Placed
+    emitted: Program
+    limits: RegionLimits
+    judge: Judge
+
+    def play(self, trial: _Trial, tracker: _core.ContourTracker | None) -> CaseFigures:
+        model = MachineModel(trial.machine)
+        run = model.play_emitted(
+            self.place.blocks(self.emitted), self.place.region.path, shift=trial.shift, only=trial.only,
+            offset=model.offset(self.place.region), contour=tracker is not None, tracker=tracker,
+            last_seconds=0.0 if tracker is not None else model.vibration_memory_s,
+        )  # fmt: skip
+        return case_figures(run, contour=tracker is not None)
+
+
+def rests_on(
+    model: MachineModel,
+    judge: Judge,
+    figures: Sequence[RegionFigures],
+    placed: Sequence[Placed],
+    emitted: Program,
+    deciding_lines: tuple[int, int],
+    pool: Executor,
+) -> tuple[RestsOn, ...]:
+    """The unmeasured values that matter for a program, those first that move its verdict furthest towards a limit.
+
+    Args:
+        model: of the machine.
+        judge: that judged the text.
+        figures: of every shaped region.
+        placed: these regions.
+        emitted: the text, read back.
+        deciding_lines: first and last line of the region that comes nearest to a limit.
+        pool: runs the playbacks.
+
+    Returns:
+        At most eight values, none that moves a figure by less than a hundredth of its limit.
+    """
+    pairs = zip(figures, placed, strict=True)
+    found, place = next(pair for pair in pairs if pair[1].original_lines == deciding_lines)
+    region = _Region(found, place, emitted, judge.limits(found, place), judge)
+    before = {each.figure: each for each in judge_region(_own(model, found), region.limits)}
+    trials = list(_trials(model.machine, _moving_axes(place)))
+    played_s = sum(each.emitted_s for each in figures) * _FULL_RUNS
+    full = len(trials) if found.emitted_s == 0.0 else int(max(_FREE_S, played_s) / found.emitted_s)
+    tracker = _core.ContourTracker(place.region.path)
+    runs = [pool.submit(region.play, trial, tracker if rank < full else None) for rank, trial in enumerate(trials)]
+    rows = [_row(trial, run.result(), before, region.limits) for trial, run in zip(trials, runs, strict=True)]
+    rows += _from_cases(model.machine, judge.cases, found, before, region.limits)
+    return _ranked(rows)
+
+
+def _own(model: MachineModel, found: RegionFigures) -> CaseFigures:
+    """The region as it is meant to run, under the controller's own rule of block timing."""
+    return case_figures(found.emitted[0 if model.own_rule == _core.BlockEnd.ceil else 1])
+
+
+def _moving_axes(place: Placed) -> str:
+    """Letters of the axes that move in a region."""
+    reach = np.ptp(np.asarray(place.region.path.polyline()), axis=0)
+    return "".join(axis for axis, way in zip("xyz", reach, strict=True) if way > 0.0)
+
+
+def _row(trial: _Trial, played: CaseFigures, before: Mapping[str, Judged], limits: RegionLimits) -> RestsOn:
+    return _rests(trial.value, trial.moved, before, judge_region(played, limits))
+
+
+def _rests(value: KeyValue, moved: str, before: Mapping[str, Judged], judged: Sequence[Judged]) -> RestsOn:
+    """The figure that a value moves furthest towards its limit."""
+    after = max(judged, key=lambda each: each.share - before[each.figure].share)
+    unit = f" {value.unit}" if value.unit not in ("", "1") and value.value not in ("not set", "[]") else ""
+    shown = "none" if value.value == "[]" else value.value + unit
+    origin = "assumed" if value.assumed else value.origin
+    figure_um = before[after.figure].value_um
+    return RestsOn(value.key, shown, origin, moved, after.figure, figure_um, after.value_um, after.limit_um)
+
+
+def _ranked(rows: Sequence[RestsOn]) -> tuple[RestsOn, ...]:
+    """The worst of each key, the furthest first."""
+    worst: dict[str, RestsOn] = {}
+    for row in rows:
+        if row.share >= LEAST_SHARE and (row.key not in worst or row.share > worst[row.key].share):
+            worst[row.key] = row
+    return tuple(sorted(worst.values(), key=lambda row: -row.share)[:_MOST_SHOWN])
+
+
+def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
+    """What is tried, the most likely to matter first."""
+    unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
+    order: tuple[Callable[[Machine, Mapping[str, KeyValue], str], Iterator[_Trial]], ...] = (
+        _filters,
+        _unknown_axes,
+        _frequencies,
+        _shares,
+        _periods,
+    )
+    for part in order:
+        yield from part(machine, unmeasured, moving)
+
+
+def _changed(machine: Machine, key: str, value: object) -> Iterator[Machine]:
+    """The machine with another value; nothing where the file could not have it."""
+    try:
+        yield machine.with_values(key, value)
+    except MachineError:
+        return
+
+
+def _filters(machine: Machine, unmeasured: Mapping[str, KeyValue], _moving: str) -> Iterator[_Trial]:
+    key = "controller.shaped_time_constant_s"
+    if key in unmeasured:
+        now = machine.controller.shaped_time_constant_s
+        other = 1.2 * now if now else _FILTER_S
+        for each in _changed(machine, key, other):
+            yield _Trial(unmeasured[key], f"{other:g} s", each)
+
+
+def _unknown_axes(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -> Iterator[_Trial]:
+    """An axis of which nobody knows whether it has a mode, with one."""
+    values = {value.key: value for value in machine.values()}
+    for letter in moving:
+        axis = getattr(machine.axes, letter)
+        if axis.modes or (axis.rigid and f"axes.{letter}.rigid" not in unmeasured):
+            continue
+        try:
+            other = machine.with_values({f"axes.{letter}.rigid": False, f"axes.{letter}.modes": [_MODE]})
+        except MachineError:
+            continue
+        said = f"a mode of {_MODE['frequency_hz']:g} Hz"
+        yield _Trial(_as_assumed(values[f"axes.{letter}.modes"]), said, other)
+
+
+def _as_assumed(value: KeyValue) -> KeyValue:
+    return KeyValue(value.key, value.value, value.unit, "assumed", True, value.meaning, value.fanuc, value.remark)
+
+
+def _modes(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str, name: str) -> Iterator[tuple[str, int]]:
+    """Letter and number of every mode of which a value is unmeasured."""
+    for letter in moving:
+        for number in range(1, len(getattr(machine.axes, letter).modes) + 1):
+            if f"axes.{letter}.modes.{number}.{name}" in unmeasured:
+                yield letter, number
+
+
+def _frequencies(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -> Iterator[_Trial]:
+    """Both ways; a table over a position or a mass moves as a whole."""
+    for letter, number in _modes(machine, unmeasured, moving, "frequency_hz"):
+        stem = f"axes.{letter}.modes.{number}"
+        stated = getattr(machine.axes, letter).modes[number - 1].frequency_uncertainty_percent
+        percent = stated if stated is not None else _PERCENT["frequency_hz"]
+        sharp = {f"{stem}.frequency_uncertainty_percent": percent, f"{stem}.damping_uncertainty_percent": None}
+        other = machine.with_values(sharp)
+        for shift in (-1.0, 1.0):
+            only = f"{letter}.{number}"
+            yield _Trial(unmeasured[f"{stem}.frequency_hz"], f"{shift * percent:+g} %", other, shift, only)
+
+
+def _shares(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -> Iterator[_Trial]:
+    """Less damping, more participation: the ways in which more is left."""
+    for name, sign in (("damping_ratio", -1.0), ("participation", 1.0)):
+        for letter, number in _modes(machine, unmeasured, moving, name):
+            mode, stem = getattr(machine.axes, letter).modes[number - 1], f"axes.{letter}.modes.{number}"
+            stated = mode.damping_uncertainty_percent if name == "damping_ratio" else None
+            percent = sign * (stated if stated is not None else _PERCENT[name])
+            for each in _changed(machine, f"{stem}.{name}", getattr(mode, name) * (1.0 + percent / 100.0)):
+                yield _Trial(unmeasured[f"{stem}.{name}"], f"{percent:+g} %", each)
+
+
+def _periods(machine: Machine, unmeasured: Mapping[str, KeyValue], _moving: str) -> Iterator[_Trial]:
+    key = "controller.interpolation_period_s"
+    if key in unmeasured:
+        free = machine.with_values("emission.block_period_s", None)
+        period = 2.0 * machine.controller.interpolation_period_s
+        for each in _changed(free, key, period):
+            yield _Trial(unmeasured[key], f"{period:g} s", each)
+
+
+def _from_cases(
+    machine: Machine,
+    cases: Sequence[Case],
+    found: RegionFigures,
+    before: Mapping[str, Judged],
+    limits: RegionLimits,
+) -> Iterator[RestsOn]:
+    """What was played anyway and counts for nothing: the other rule of block timing, look-ahead on, an empty buffer."""
+    unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
+    for case, played in zip(cases, found.cases, strict=True):
+        if case.counts:
+            continue
+        said = f"case {case.name}"
+        if case.look_ahead:
+            key = "controller.motion"
+        elif case.starved_s > 0.0:
+            key, said = "controller.block_time_s", f"longer: the buffer runs empty, {said}"
+        elif case.nominal:
+            key = "controller.block_end"
+        else:
+            continue
+        if key in unmeasured:
+            yield _rests(unmeasured[key], said, before, judge_region(played, limits))
