@@ -31,9 +31,13 @@ std::shared_ptr<const Path> cutting_path(const Program& program, std::uint32_t f
     return program.expanded ? program.origins[line - 1].line : line;
   };
   std::vector<std::shared_ptr<Region>> inside;
-  for (const auto& region : program.regions) {
-    if (source_line(region->first_line) >= first_line && source_line(region->last_line) <= last_line) {
-      inside.push_back(region);
+  // Regions lie in the order of their lines, of an expanded text not in that of the source's. Asked of every region of a
+  // long program, a look at all of them would be too much.
+  const auto first = program.expanded ? program.regions.begin()
+                                      : std::ranges::lower_bound(program.regions, first_line, {}, &Region::first_line);
+  for (auto at = first; at != program.regions.end() && (program.expanded || (*at)->first_line <= last_line); ++at) {
+    if (source_line((*at)->first_line) >= first_line && source_line((*at)->last_line) <= last_line) {
+      inside.push_back(*at);
     }
   }
   if (inside.size() == 1) {
@@ -167,6 +171,17 @@ void register_gcode(py::module_& module) {
       .def_readwrite("m_subprograms", &CodeBindings::m_subprograms, "M code to program, called like M98.")
       .def_readwrite("tool_program", &CodeBindings::tool_program, "T calls it with T in #149; -1: none.");
 
+  py::class_<WorkLimits>(module, "WorkLimits", "What a program may ask at most, counted while it is read.")
+      .def(py::init<>())
+      .def_readwrite("steps", &WorkLimits::steps, "Lines executed, each as often as it runs.")
+      .def_readwrite("moves", &WorkLimits::moves, "Moves, dwells, and blocks with machine functions.")
+      .def_readwrite("bytes", &WorkLimits::bytes, "Of texts that are read, and of the plain text they come to.")
+      .def_readwrite("seconds", &WorkLimits::seconds, "Least time, s.")
+      .def_readwrite("feed_mm_per_s", &WorkLimits::feed_mm_per_s, "Highest speed of each axis while cutting, mm/s.")
+      .def_readwrite("rapid_mm_per_s", &WorkLimits::rapid_mm_per_s, "Of each axis in a rapid, mm/s.")
+      .def_readwrite("tool_change_s", &WorkLimits::tool_change_s, "Time of an M06, s.")
+      .def_readwrite("m_function_s", &WorkLimits::m_function_s, "Time of any other M code, s.");
+
   py::class_<ReaderOptions>(module, "ReaderOptions", "The controller's settings that change how a text is read.")
       .def(py::init<>())
       .def_readwrite("calculator_decimal_point", &ReaderOptions::calculator_decimal_point,
@@ -198,9 +213,7 @@ void register_gcode(py::module_& module) {
       .def_readwrite("opaque_programs", &ReaderOptions::opaque_programs,
                      "First and last program number whose calls are kept if the program is not found.")
       .def_readwrite("subprogram_nesting", &ReaderOptions::subprogram_nesting, "Deepest nesting of M98.")
-      .def_readwrite("max_steps", &ReaderOptions::max_steps, "Blocks executed behind the first call or jump.")
-      .def_readwrite("max_cycle_moves", &ReaderOptions::max_cycle_moves,
-                     "Moves that all drilling cycles of a program come to.")
+      .def_readwrite("limits", &ReaderOptions::limits, "What a program may ask at most.")
       .def_readwrite("block_skip", &ReaderOptions::block_skip, "Switch of / ... /9: on, off, or None: not known.")
       .def_readwrite("expand_compensation", &ReaderOptions::expand_compensation,
                      "G41/G42 become plain moves; False: kept as they stand.")
@@ -255,6 +268,9 @@ void register_gcode(py::module_& module) {
       .def_readonly("line_end", &Program::line_end, "Line end of the text.")
       .def_readonly("line_count", &Program::line_count, "Lines.")
       .def_readonly("block_count", &Program::block_count, "Lines with at least one word.")
+      .def_readonly("move_count", &Program::move_count, "Moves, dwells, and blocks with machine functions.")
+      .def_readonly("least_time_s", &Program::least_time_s,
+                    "At its feeds, as far as the axes reach them; with dwells, without acceleration, s.")
       .def_readonly("header_offset", &Program::header_offset, "Byte offset at which a header comment may stand.")
       .def_readonly("program_number", &Program::program_number, "O number; -1: none.")
       .def_property_readonly(

@@ -92,23 +92,6 @@ TEST_CASE("cycle time: without steps, without blocks") {
   CHECK(interpolate_program(Program(), ControllerModel()).total_s == 0.0);
 }
 
-TEST_CASE("cycle time: a block that takes more than a day is refused with its line, and in closed form is not") {
-  const Program slow = program("G21 G90 G17\nG00 X0 Y0 Z0\nG93\nG01 X10. F1.\nX20. F.0001\nG94");
-  for (const MotionKind motion : {MotionKind::after_interpolation, MotionKind::look_ahead}) {
-    ControllerModel model = variant(0);
-    model.motion = motion;
-    try {
-      static_cast<void>(interpolate_program(slow, model));
-      FAIL("600 000 s are interpolated");
-    } catch (const Error& error) {
-      CHECK(error.kind() == ErrorKind::program);
-      CHECK(error.line() == 7);
-      CHECK(std::string(error.what()).find("600000 s") != std::string::npos);
-    }
-    CHECK(time_program(slow, model, false).parts.total_s() > 600000.0);
-  }
-}
-
 TEST_CASE("circle: refuses what is no circle") {
   CHECK_THROWS_AS((void)simulate_circle(0.0, 10.0, ControllerModel()), Error);
   CHECK_THROWS_AS((void)simulate_circle(10.0, -1.0, ControllerModel()), Error);

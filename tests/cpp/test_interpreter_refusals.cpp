@@ -141,14 +141,14 @@ TEST_CASE("interpreter: a line over the limit is refused with its length") {
 TEST_CASE("interpreter: a program of more drilling moves than memory holds is refused before it is expanded") {
   // Ten cuts a hole, three moves each.
   ReaderOptions options;
-  options.max_cycle_moves = 60;
+  options.limits.moves = 64;
   const std::string cycle = "G83 Z-10. R0. Q1. F100. ";
   CHECK(read(cycle + "\nX5.\nG80\n", options).alarms.empty());
   CHECK(read(cycle + "K2\nG80\n", options).alarms.empty());
   const Refusal repeated = refusal(framed(cycle + "K3\nG80\n"), options);
   CHECK(repeated.message ==
-        "drilling cycle G83 feeds down 10 times in 3 hole(s), 10.000 mm deep: the cycles of the program come to 90 "
-        "moves (limit 60)");
+        "drilling cycle G83 feeds down 10 times in 3 hole(s), 10.000 mm deep: with its 90 moves the program "
+        "comes to 90 (limit 64, controller.max_program_moves)");
   CHECK(repeated.line == 4);
   CHECK(repeated.column == 15);
   // What cycles came to before counts.
@@ -162,6 +162,6 @@ TEST_CASE("interpreter: a program of more drilling moves than memory holds is re
   // The one that filled the memory.
   const Refusal real = refusal(framed("G83 X1. Z-50. R2. Q0.001 F100. K9999\nG80\n"));
   CHECK(real.message.find("52000 times in 9999 hole(s)") != std::string::npos);
-  CHECK(real.message.find("(limit 2000000)") != std::string::npos);
+  CHECK(real.message.find("(limit 1000000, ") != std::string::npos);
   CHECK(real.line == 4);
 }

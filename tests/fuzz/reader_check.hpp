@@ -67,8 +67,8 @@ inline ReaderOptions options_from(std::span<const std::uint8_t> bytes) {
     options.probe_lines.push_back(3 * line);
   }
   // Enough to see what repeats; a fuzzer has no time for the limit that people get.
-  options.max_steps = 3000;
-  options.max_cycle_moves = 30'000;
+  options.limits.steps = 3000;
+  options.limits.moves = 30'000;
   const std::uint8_t choices = in.byte();
   options.collect_alarms = (choices & 1U) != 0;
   options.expand_compensation = (choices & 2U) == 0;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -59,6 +60,19 @@ struct CodeBindings {
   std::int64_t tool_program = -1;             ///< T calls it with T in #149; -1: none
 };
 
+/// What a program may ask of whoever reads and plays it. Each is counted while the text is read, and reading ends at
+/// the line where it is passed: what is too much is never expanded first.
+struct WorkLimits {
+  std::uint64_t steps = 10'000'000;  ///< lines executed, each as often as it runs
+  std::uint64_t moves = 1'000'000;   ///< moves, dwells, and blocks with machine functions
+  std::uint64_t bytes = 33'554'432;  ///< of texts that are read, and of the plain text that they come to
+  double seconds = 100'000.0;        ///< least time: moves at their feed, but no faster than the axes are; dwells
+  Vector3 feed_mm_per_s = Vector3::Constant(std::numeric_limits<double>::infinity());   ///< of each axis while cutting
+  Vector3 rapid_mm_per_s = Vector3::Constant(std::numeric_limits<double>::infinity());  ///< of each axis in a rapid
+  double tool_change_s = 0.0;                                                           ///< of an M06
+  double m_function_s = 0.0;                                                            ///< of any other M code
+};
+
 /// How a program text is to be read: the controller's settings that change its meaning.
 struct ReaderOptions {
   bool calculator_decimal_point = true;     ///< parameter 3401#0: X10 is 10 mm (true) or 10 least increments (false)
@@ -79,8 +93,7 @@ struct ReaderOptions {
   std::function<std::optional<SourceText>(std::int64_t)> load_program;  ///< programs that the file does not hold
   std::array<std::int64_t, 2> opaque_programs = {9000, 9999};           ///< if not found: called, but not looked into
   int subprogram_nesting = 10;
-  std::uint64_t max_steps = 10'000'000;           ///< blocks executed behind the first call or jump
-  std::uint64_t max_cycle_moves = 2'000'000;      ///< moves that all drilling cycles of a program come to
+  WorkLimits limits;
   std::array<std::optional<bool>, 9> block_skip;  ///< switch on, off, or not known, of / ... /9
   bool expand_compensation = true;                ///< G41/G42 become plain moves; false: kept as they stand
   char compensation_start_up = 'A';               ///< type A or B (parameter 5003)
@@ -171,6 +184,8 @@ struct Program {
   std::string line_end = "\n";
   std::uint32_t line_count = 0;
   std::uint32_t block_count = 0;     ///< lines with at least one word
+  std::uint64_t move_count = 0;      ///< as WorkLimits::moves counts
+  double least_time_s = 0.0;         ///< as WorkLimits::seconds counts
   std::size_t header_offset = 0;     ///< where a header comment may be inserted: behind the O line
   std::int64_t program_number = -1;  ///< O number, -1 if none
   std::vector<std::shared_ptr<Region>> regions;

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "base/checks.hpp"
 #include "play/program_runs.hpp"
 #include "shapegcode/error.hpp"
@@ -17,24 +15,10 @@ namespace {
 constexpr double settled_time_constants = 40.0;  // time constants of the servo loop that a wait needs to be played for
 constexpr double tick_slack = 1e-9;
 constexpr double rounding_mm = 1e-9;  // between the end of a motion and the start of the next
-// A block that takes more than a day is a slip (G93 with too small an F), and its set-points take minutes.
-constexpr double longest_block_s = 86400.0;
 
 const ControllerModel& checked(const ControllerModel& model) {
   check(model);
   return model;
-}
-
-void check_durations(const Path& path, const ControllerModel& model) {
-  for (const Segment& block : path.segments()) {
-    const double duration_s = block.length_mm > 0.0 ? block.length_mm / checked_feed(block, model) : 0.0;
-    if (!(duration_s <= longest_block_s)) {
-      throw Error(ErrorKind::program,
-                  fmt::format("block takes {:.6g} s at its feed of {:.3g} mm/min, at most {:.6g} s are interpolated",
-                              duration_s, 60.0 * block.feed_mm_per_s, longest_block_s),
-                  block.line);
-    }
-  }
 }
 
 }  // namespace
@@ -203,7 +187,6 @@ void ProgramSetPoints::open_cut(const std::shared_ptr<const Path>& programmed, b
   if (!(programmed->length_mm() > 0.0)) {
     return;
   }
-  check_durations(*programmed, model_);
   next_.kind = BlockKind::cutting;
   active_ = Cut{};
   Cut& cut = std::get<Cut>(active_);

@@ -24,7 +24,7 @@ from shapegcode.checking.result import (
 from shapegcode.checking.runs import BlockTable, Breaker, CuttingRun, block_table, look_ahead_breakers
 from shapegcode.machine import Machine
 from shapegcode.program import Program
-from shapegcode.program.program import file_bytes
+from shapegcode.program.reading import program_bytes
 
 __all__ = ["MOST_FINDINGS", "check", "check_text"]
 
@@ -37,6 +37,7 @@ _COMMENT = re.compile(r"\([^()\n]*\)?")
 _ALARM_WORDS = re.compile(r" \(alarm \d+\)")
 _MACRO_FROM_DNC = 123
 _NO_ROOM = 70
+_WORK_LIMIT = "controller.max_program_"  # in the message of every limit of a reading
 _LOST_S = 1e-3  # by a run with short blocks: less is no reason to change the program
 # Of one reading (most_alarms in the core's reader).
 _MOST_ALARMS = 200
@@ -60,7 +61,8 @@ def check(program: Program | str | Path, machine: Machine, *, program_number: in
     if isinstance(program, Program):
         text, source, folder = program.text, program.source, program.folder
     else:
-        text, source, folder = file_bytes(program), str(program), Path(program).parent
+        text = program_bytes(program, machine.controller.max_program_bytes)
+        source, folder = str(program), Path(program).parent
     return check_text(text, machine, source=source, program_number=program_number, folder=folder)
 
 
@@ -89,14 +91,15 @@ def check_text(
     """
     data = text.encode() if isinstance(text, str) else text
     found = list(_whole_file(data, source, machine))
+    too_long = len(data) > machine.controller.max_program_bytes  # and no more of it may have been read
     short: ShortBlocks | None = None
     dnc: SerialLine | None = None
     try:
         program = Program.from_text(
-            data, machine, source=source, program_number=program_number, collect_alarms=True, folder=folder
+            data, machine, source=source, program_number=program_number, collect_alarms=not too_long, folder=folder
         )
     except ProgramError as error:
-        if error.line < 1:
+        if error.line < 1 or too_long:
             raise
         message = str(error).removeprefix(f"{error.file}:{error.line}:{error.column}: ")
         found.append(_finding("alarm", "alarm", error.alarm, error.file or source, error.line, error.column, message))
@@ -173,7 +176,12 @@ def _whole_file(data: bytes, source: str, machine: Machine) -> Iterator[Finding]
 
 def _reader_findings(program: Program) -> Iterator[Finding]:
     for line, column, alarm, message, file in program.core.alarms:
-        yield _finding("alarm", "alarm", alarm, file or program.source, line, column, message)
+        if _WORK_LIMIT in message:
+            # No control refuses it: it is more than is computed here.
+            said = f"{message}: what follows is not checked"
+            yield _finding("warning", "work_limit", 0, file or program.source, line, column, said)
+        else:
+            yield _finding("alarm", "alarm", alarm, file or program.source, line, column, message)
     if len(program.core.alarms) >= _MOST_ALARMS:
         line, _, _, _, file = program.core.alarms[-1]
         message = f"reading stopped here after {_MOST_ALARMS} alarms: what follows is not checked"

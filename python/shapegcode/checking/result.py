@@ -221,6 +221,9 @@ class Check(Result):
             first = next(finding for finding in self.findings if finding.severity == "alarm")
             return f"correct {first.place} first: alarms behind it may come from it."
         worst = {finding.code for finding in self.findings if finding.severity == "warning"}
+        if "work_limit" in worst:
+            stop = next(finding for finding in self.findings if finding.code == "work_limit")
+            return f"correct {stop.place} if it is a slip; else raise the key that it names with --set."
         if "dnc_rate" in worst:
             return "raise the baud rate or lower the feed where the serial line starves (controller.dnc_baud)."
         if "program_memory" in worst:

@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
 
     machine = load_machine(args)
     runner.check_files(args)
-    with runner.progress(f"checking {args.input}", args, endless=True):
+    with runner.progress(f"checking {args.input}", args):
         result = check(args.input, machine, program_number=args.program)
     # The table says the warnings.
     return runner.finish(result, args, warnings=())

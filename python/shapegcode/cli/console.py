@@ -8,7 +8,6 @@ import json
 import os
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -72,7 +71,6 @@ class ProgressBar:
         """Start the clock; nothing is shown yet."""
         self._description = description
         self._enabled = enabled
-        self._began = time.monotonic()
         self._lock = threading.Lock()
         self._timer: threading.Timer | None = None
         self._closed = False
@@ -81,19 +79,13 @@ class ProgressBar:
 
     def update(self, fraction: float) -> None:
         """Tell how much of the work is done, 0 to 1; cheap enough for every step of a loop."""
-        if not self._enabled:
-            return
-        if self._bar is None:
-            if time.monotonic() - self._began < _PROGRESS_DELAY_S:
-                return
-            self._open()
         if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, completed=min(max(fraction, 0.0), 1.0))
+            self._bar.update(self._task, completed=min(max(fraction, 0.0), 1.0), total=1.0)
 
     def wait(self) -> None:
-        """Show from the first second on that work goes on which cannot tell how much of it is done."""
+        """Show from the first second on that work goes on, also as long as nobody tells how much of it is done."""
         if self._enabled:
-            self._timer = threading.Timer(_PROGRESS_DELAY_S, self._open_endless)
+            self._timer = threading.Timer(_PROGRESS_DELAY_S, self._open_late)
             self._timer.daemon = True
             self._timer.start()
 
@@ -107,30 +99,33 @@ class ProgressBar:
                 self._bar.stop()
                 self._bar = None
 
-    def _open_endless(self) -> None:
+    def _open_late(self) -> None:
         with self._lock:
-            if not self._closed and self._bar is None:
-                self._open(total=None)
+            if not self._closed:
+                self._open()
 
-    def _open(self, total: float | None = 1.0) -> None:
+    def _open(self) -> None:
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-        self._bar = Progress(
+        bar = Progress(
             TextColumn("{task.description}", markup=False),
             BarColumn(),
             TimeRemainingColumn(),
+            TimeElapsedColumn(),
             console=Console(stderr=True),
             transient=True,
         )
-        self._task = self._bar.add_task(self._description, total=total)
-        self._bar.start()
+        self._task = bar.add_task(self._description, total=None)
+        bar.start()
+        self._bar = bar
 
 
 @contextlib.contextmanager
 def progress(description: str, json_target: str | None = None) -> Iterator[ProgressBar]:
     """A progress bar for the block; off if standard error is no terminal or JSON goes to standard output."""
     bar = ProgressBar(description, enabled=sys.stderr.isatty() and json_target != "-")
+    bar.wait()
     try:
         yield bar
     finally:

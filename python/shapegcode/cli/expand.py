@@ -46,5 +46,6 @@ def run(args: argparse.Namespace) -> int:
 
     machine = load_machine(args)
     runner.check_files(args)
-    result = expand(args.input, machine, compensation=args.compensation, program_number=args.program)
+    with runner.progress(f"expanding {args.input}", args):
+        result = expand(args.input, machine, compensation=args.compensation, program_number=args.program)
     return runner.finish(result, args, notes=result.notes, output=(args.output, result.text))

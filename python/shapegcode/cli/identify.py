@@ -117,7 +117,7 @@ def _identify(args: argparse.Namespace) -> int:
             _decide(args, machine, args.axis)
     said = {field.name: getattr(args, field.name) for field in fields(ReadOptions)}
     said["response_columns"] = tuple(args.response_columns or ())
-    with runner.progress(f"fitting {', '.join(args.files)}", args, endless=True):
+    with runner.progress(f"fitting {', '.join(args.files)}", args):
         found = identify(
             args.files, ReadOptions(**said), most_modes=args.most_modes, modes=args.modes, band_hz=args.frequencies,
             start_s=args.start, strict=False,

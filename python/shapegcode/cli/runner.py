@@ -74,20 +74,17 @@ def standard_output(args: argparse.Namespace) -> str | None:
 
 
 @contextlib.contextmanager
-def progress(description: str, args: argparse.Namespace, *, endless: bool = False) -> Iterator[terminal.ProgressBar]:
+def progress(description: str, args: argparse.Namespace) -> Iterator[terminal.ProgressBar]:
     """A bar on standard error for the block, if that is a terminal and the work takes longer than a second.
 
     Args:
         description: what is being done.
         args: of the command.
-        endless: the work cannot tell how much of it is done.
 
     Returns:
-        The bar, within the block.
+        The bar, within the block; as long as it is not updated it shows that work goes on.
     """
     with terminal.progress(description, standard_output(args)) as bar:
-        if endless:
-            bar.wait()
         yield bar
 
 

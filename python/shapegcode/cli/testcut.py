@@ -191,7 +191,7 @@ def _fit(args: argparse.Namespace) -> int:
         _refuse_whole_tool_file(args.output)
     records = _records(args.files)
     runner.check_files(args, also_read=list(records.values()))
-    with runner.progress(f"fitting {args.cut}", args, endless=True):
+    with runner.progress(f"fitting {args.cut}", args):
         found = fit_test_cut(
             cut, records, forces_on=args.forces_on, chip_thickness=args.chip_thickness, edge_forces=args.edge_forces
         )

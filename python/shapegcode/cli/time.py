@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
 
     machine = load_machine(args)
     runner.check_files(args)
-    with runner.progress(f"timing {args.input}", args, endless=True):
+    with runner.progress(f"timing {args.input}", args):
         program = Program.read(args.input, machine, program_number=args.program)
         wanted = args.csv is not None or args.blocks
         time = cycle_time(

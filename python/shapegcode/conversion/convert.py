@@ -40,7 +40,6 @@ from shapegcode.shaping.grid import Grid, choose_grid
 __all__ = ["convert"]
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
-_MOST_PERIODS = 10_000_000  # block periods of a region: what fits into memory with a margin
 _HELPED = 0.98  # of what was reached before: less room that brings no more is taken back
 _ATTEMPTS = 8  # each with less room for the regions that left the contour tolerance; few need more than two
 
@@ -158,11 +157,10 @@ class _Run:
         fastest = max((region.path.fastest_feed_mm_per_s for region in program.regions), default=0.0)
         self._grid_for = partial(choose_grid, machine, fastest_mm_per_s=fastest)
         self.grid = self._grid_for(block_period_s)
-        program.refuse_endless(_MOST_PERIODS * self.grid.block_period_s)
         self.model = MachineModel(machine)
         self.writer = TextWriter(program, self.model, self.grid)
         self.judge = Judge(self.model)
-        self.reasons = [why_kept(region, machine) for region in program.regions]
+        self.reasons = [why_kept(region, machine, self.grid) for region in program.regions]
         self.room_um = [machine.tolerance.contour_um * _CONTOUR_MARGIN] * len(program.regions)
         self.kept: dict[int, KeptRegion] = {}
         self.spending = None if budget is None else Spending(budget, program, machine)
@@ -238,18 +236,21 @@ class _Run:
             self.writer = TextWriter(self.program, self.model, grid)
         # Of what was given up for a budget, or gains nothing, one sentence speaks for all.
         given_up = {} if self.spending is None else self.spending.given_up
-        return self.writer.write(
+        written = self.writer.write(
             self.reasons, self.room_um, {*given_up, *self.kept}, on_progress, with_loads=self.spending is not None
         )
+        for index, reason in written.no_room.items():
+            self.reasons[index] = reason
+        return written
 
     def _settle(self) -> _Settled:
         """Write, read back and play; again, slower, where a region left the contour tolerance."""
-        originals = [play for play, reason in zip(self.originals, self.reasons, strict=True) if not reason]
         tried: dict[int, _Attempt] = {}
         for attempt in range(_ATTEMPTS):
             stage = partial(self.on_progress, "shaping" if attempt == 0 else "shaping again, slower")
             written = self._write(self.grid, stage)
             emitted = read_back(written.text, written.placed, self.machine)
+            originals = [play for play, reason in zip(self.originals, self.reasons, strict=True) if not reason]
             figures = self.judge.measure(
                 emitted, written.placed, originals, self.pool, partial(self.on_progress, "round trip")
             )

@@ -9,7 +9,7 @@ from shapegcode import _core
 from shapegcode.conversion.budget import TransferLoad, measure_load
 from shapegcode.conversion.readback import Placed
 from shapegcode.conversion.spending import keepable
-from shapegcode.conversion.write import EmittedRegion, RegionWriter
+from shapegcode.conversion.write import EmittedRegion, NoRoomError, RegionWriter, Room
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
@@ -19,6 +19,7 @@ from shapegcode.shaping.grid import Grid
 __all__ = ["TextWriter", "Written", "judged", "marked_out_of_tolerance", "why_kept"]
 
 _COMMENT_WIDTH = 60
+_MOST_PERIODS = 10_000_000  # of a region: what fits into half a gigabyte
 # One length, so that the verdict can take its place without moving a line.
 _VERDICT_PENDING, _VERDICT_GOOD, _VERDICT_BAD = (
     b"(VERDICT PENDING                )",
@@ -45,8 +46,12 @@ def marked_out_of_tolerance(text: bytes) -> bytes:
     return text.replace(_VERDICT_GOOD, _VERDICT_BAD, 1)
 
 
-def why_kept(region: _core.Region, machine: Machine) -> str:
+def why_kept(region: _core.Region, machine: Machine, grid: Grid) -> str:
     """Why a region cannot be written as shaped blocks; empty if it can."""
+    longest_s = _MOST_PERIODS * grid.block_period_s
+    time_s = region.path.programmed_time_s
+    if time_s > longest_s:
+        return f"{time_s:.0f} s of cutting without a stop are more than can be shaped in one piece ({longest_s:.0f} s)"
     slowest = region.path.slowest_feed_mm_per_s * 60.0
     least = machine.controller.minimum_feed_mm_per_min
     if slowest < least * (1 - 1e-9):
@@ -66,6 +71,7 @@ class Written:
         planned_um: per index of a shaped region the deviation that its feed was planned for, µm, where the contour is
             kept by a target.
         loads: per index of a shaped region what it asks of memory, line and control, where that was asked for.
+        no_room: per index of a region that was to be shaped and keeps its text why there is no room for it.
     """
 
     text: bytes
@@ -74,6 +80,7 @@ class Written:
     kept_warnings: list[str]
     planned_um: dict[int, float]
     loads: dict[int, TransferLoad]
+    no_room: dict[int, str]
 
 
 class TextWriter:
@@ -121,19 +128,32 @@ class TextWriter:
         parts = [core.slice(0, core.header_offset), self._opening(shapes=not all(reasons))]
         line = 1 + sum(part.count(b"\n") for part in parts)
         position = core.header_offset
-        written = Written(b"", [], 0, [], {}, {})
-        blocks = 0
+        written = Written(b"", [], 0, [], {}, {}, {})
+        blocks, size = 0, core.size
+        # Moves that stay as they are: all, less those of the regions that are shaped.
+        shaped_moves = sum(len(each.path) for each, why in zip(regions, reasons, strict=True) if not why)
+        kept_moves = core.move_count - shaped_moves
         for index, (region, reason, room) in enumerate(zip(regions, reasons, room_um, strict=True)):
             between = core.slice(position, region.text_begin)
             position = region.text_end
             line += between.count(b"\n")
-            if reason:
+            shaped = None
+            if not reason:
+                size -= region.text_end - region.text_begin
+                try:
+                    shaped = self._shape(index, region, room, self._room(size, blocks + kept_moves))
+                except NoRoomError as error:
+                    written.no_room[index] = str(error)
+            if shaped is None:
                 if index not in untold:
-                    written.kept_warnings.append(self._keep(region, reason))
+                    written.kept_warnings.append(self._keep(region, written.no_room.get(index, reason)))
                 text = core.slice(region.text_begin, region.text_end)
+                if index in written.no_room:
+                    size += len(text)
+                    kept_moves += len(region.path)
             else:
-                shaped = self._shape(index, region, room)
                 text = shaped.text
+                size += len(text)
                 blocks += shaped.blocks
                 written.placed.append(Placed(region, line, line + text.count(b"\n") - 1))
                 if shaped.planned_um > 0.0:
@@ -146,19 +166,27 @@ class TextWriter:
             parts += [between, text]
         parts.append(core.slice(position, core.size))
         return Written(
-            b"".join(parts), written.placed, blocks, written.kept_warnings, written.planned_um, written.loads
-        )
+            b"".join(parts), written.placed, blocks, written.kept_warnings, written.planned_um, written.loads,
+            written.no_room,
+        )  # fmt: skip
 
-    def _shape(self, index: int, region: _core.Region, room_um: float) -> EmittedRegion:
-        """The region's text; one whose room is as it was in the text before is not shaped again."""
+    def _room(self, size: int, moves: int) -> Room:
+        """Room for a region beside the rest of the program, all else as it is."""
+        controller = self._machine.controller
+        return Room(controller.max_program_bytes - size, controller.max_program_moves - moves, self._machine)
+
+    def _shape(self, index: int, region: _core.Region, room_um: float, room: Room) -> EmittedRegion:
+        """The region's text; one whose tolerance is as it was in the text before is not shaped again."""
         if index not in self._shaped or self._shaped[index][0] != room_um:
-            self._shaped[index] = (room_um, self._shaped_anew(region, room_um))
-        return self._shaped[index][1]
+            self._shaped[index] = (room_um, self._shaped_anew(region, room_um, room))
+        shaped = self._shaped[index][1]
+        room.require(len(shaped.text), shaped.blocks)
+        return shaped
 
-    def _shaped_anew(self, region: _core.Region, room_um: float) -> EmittedRegion:
+    def _shaped_anew(self, region: _core.Region, room_um: float, room: Room) -> EmittedRegion:
         limits = self._model.limits(arc_feed_ratio=self._machine.shaping.arc_feed_ratio)
         try:
-            return self._regions.write(self._program, region, limits, self._regions.tolerance(room_um))
+            return self._regions.write(self._program, region, limits, self._regions.tolerance(room_um), room)
         except _core.ArgumentError as error:
             raise self._program.region_error(region, str(error)) from error
 

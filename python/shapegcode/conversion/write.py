@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel, OwnFilter
 from shapegcode.model.modes import NO_OFFSET, Offset
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
@@ -68,6 +69,44 @@ def filter_tolerance(grid: Grid, own: OwnFilter, contour_tolerance_um: float = m
     tolerance.contour_tolerance_mm = contour_tolerance_um * 1e-3
     tolerance.corner_share = _CORNER_SHARE
     return tolerance
+
+
+class NoRoomError(Exception):
+    """The shaped text of a region is more than the written program may have."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """What the text of a region may have at most.
+
+    Attributes:
+        bytes: of text.
+        blocks: shaped ones.
+        machine: whose keys say so.
+    """
+
+    bytes: int
+    blocks: int
+    machine: Machine
+
+    def require(self, text_bytes: int, blocks: int) -> None:
+        """Refuse what is more; called piece by piece, so that no more than a piece is written in vain.
+
+        Args:
+            text_bytes: written so far.
+            blocks: written so far.
+
+        Raises:
+            NoRoomError: it is more; the message says of what.
+        """
+        controller = self.machine.controller
+        if text_bytes > self.bytes:
+            limit = f"{controller.max_program_bytes} bytes (controller.max_program_bytes)"
+        elif blocks > self.blocks:
+            limit = f"{controller.max_program_moves} moves (controller.max_program_moves)"
+        else:
+            return
+        raise NoRoomError(f"its shaped text would take the program over {limit}")
 
 
 class _Marks:
@@ -155,6 +194,7 @@ class RegionWriter:
         region: _core.Region,
         limits: _core.MotionLimits,
         tolerance: _core.FilterTolerance,
+        room: Room | None = None,
     ) -> EmittedRegion:
         """Shape one region and write it.
 
@@ -165,12 +205,14 @@ class RegionWriter:
             region: what is replaced.
             limits: of the look-ahead.
             tolerance: see `tolerance`.
+            room: what the text may have at most; None: there is no limit.
 
         Returns:
             The text of the region and the blocks in it.
 
         Raises:
             ArgumentError: it cannot be shaped or written.
+            NoRoomError: its text is more than there is room for.
         """
         notes = region.notes
         options = self.options(limits, tolerance, self._model.offset(region))
@@ -197,6 +239,8 @@ class RegionWriter:
             text, state.motion, state.plane = _core.write_blocks(fitted, starts[-1], here, state)
             texts.append(text)
             periods.append(fitted.periods)
+            if room is not None:
+                room.require(sum(map(len, texts)), sum(map(len, periods)))
             piece = following
         # A search for the region's N word must not skip the prologue.
         number = marks.first_word

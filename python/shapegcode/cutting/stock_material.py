@@ -100,7 +100,7 @@ def _moves(stock: Stock, rough: Rough, machine: Machine) -> list[_core.Path]:
     if len(systems) > 1:
         names = ", ".join(f"G{system}" for system, _ in sorted(systems))
         raise stock.error("program.file", toml(rough.file), f"cuts in the work coordinates {names}: must cut in one")
-    paths = []
+    paths, moves = [], program.core.other_moves
     for kind, index, line in program.core.steps:
         if kind == _core.StepKind.region:
             region = program.regions[index]
@@ -108,7 +108,7 @@ def _moves(stock: Stock, rough: Rough, machine: Machine) -> list[_core.Path]:
                 raise refuse(line, "the place of these moves is not known")
             paths.append(region.path)
         elif kind == _core.StepKind.move:
-            segment, dwell_s = program.core.other_moves[index]
+            segment, dwell_s = moves[index]
             if dwell_s == 0 and segment.length_mm > 0:
                 paths.append(_core.Path([segment]))
     for path in paths:

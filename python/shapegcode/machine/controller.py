@@ -238,7 +238,27 @@ class Controller(TomlTable):
         "how deep subprograms may call one another; 4 on old controls", unit="levels", default=10, assumed=True
     )
     max_program_steps: Annotated[int, Strict(), Field(ge=1, le=10**12)] = key(
-        "a program that executes more blocks than this counts as endless", unit="blocks", default=10_000_000
+        "blocks that a program may execute, each as often as it runs; more count as endless",
+        unit="blocks",
+        default=10_000_000,
+    )
+    max_program_moves: Annotated[int, Strict(), Field(ge=1, le=10**9)] = key(
+        "moves that a program may come to, with the pecks of drilling cycles, dwells and blocks with M, S, T; each "
+        "takes some 400 bytes of memory",
+        unit="moves",
+        default=1_000_000,
+    )
+    max_program_bytes: Annotated[int, Strict(), Field(ge=1, le=4 * 10**9)] = key(
+        "largest text that is read, with the programs that it calls, largest plain text that it is expanded to, and "
+        "largest text that is written",
+        unit="bytes",
+        default=33_554_432,
+    )
+    max_program_s: Annotated[Positive, Field(le=1e9)] = key(
+        "time that a program may take at its feeds, with rapids and dwells: a slip of F or of a dwell is refused at "
+        "its line instead of being played for hours",
+        unit="s",
+        default=100_000.0,
     )
 
     @property

@@ -28,7 +28,6 @@ from shapegcode.program.program import written_by_shapegcode
 __all__ = ["measure", "measure_samples"]
 
 FloatArray = npt.NDArray[np.float64]
-_MOST_SAMPLES = 100_000_000  # set-points of a region: a minute or two of computing
 _CHUNK_SAMPLES = 65_536
 _LONGEST_REST_S = 10.0  # that a vibration is waited for behind a stop
 _LEAST_REST_S = 0.25
@@ -108,7 +107,6 @@ def measure(
     measured = []
     for program, is_shaped, counts in zip(several, shaped, _judged(beside), strict=True):
         nominal = against or program
-        program.refuse_endless(_MOST_SAMPLES * machine.controller.interpolation_period_s)
         jobs = jobs_of(program, nominal, machine, is_shaped, lines)
         regions = list(_measured_regions(jobs, machine, plant, is_shaped, settings, one_done))
         measured.append(

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import errno
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode import _core
 from shapegcode._core import ProgramError
-from shapegcode.program.reading import program_loader, reader_options
+from shapegcode.program.reading import program_bytes, program_loader, reader_options
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -63,8 +63,11 @@ class Program:
             ProgramError: the text is no program that can be read; the message starts with ``file:line:column``.
             OSError: the file cannot be read.
         """
+        from shapegcode.machine import Machine
+
+        machine = machine or Machine.load("vx500")
         return cls.from_text(
-            file_bytes(path),
+            program_bytes(path, machine.controller.max_program_bytes),
             machine,
             source=str(path),
             program_number=program_number,
@@ -124,7 +127,7 @@ class Program:
         folders = [folder] if folder is not None else []
         folders += [Path(name).expanduser() for name in machine.input.program_folders]
         if folders:
-            options.load_program = program_loader(folders)
+            options.load_program = program_loader(folders, machine.controller.max_program_bytes)
         try:
             core = _core.read_program(data, options)
         except ProgramError as error:
@@ -138,9 +141,10 @@ class Program:
         """The text that was read, to the letter."""
         return self.core.text if self.unexpanded is None else self.unexpanded
 
-    @property
+    @cached_property
     def regions(self) -> list[_core.Region]:
         """Runs of cutting moves between two stops, in order."""
+        # Made anew by the core at every call: kept, as a program may have a hundred thousand.
         return self.core.regions
 
     @property
@@ -192,20 +196,6 @@ class Program:
         first, file = self.core.origin(region.first_line)
         return located_error(file or self.source, first, 1, f"{self.lines(region)}: {message}")
 
-    def refuse_endless(self, limit_s: float) -> None:
-        """Refuse a region that cuts for longer than can be computed.
-
-        Args:
-            limit_s: longest time of a region at its programmed feeds, s.
-
-        Raises:
-            ProgramError: a region takes more than `limit_s` at its programmed feeds.
-        """
-        for region in self.regions:
-            time_s = region.path.programmed_time_s
-            if time_s > limit_s:
-                raise self.region_error(region, f"{time_s:.0f} s of cutting without a stop (limit {limit_s:.0f} s)")
-
 
 def least_increment_mm(machine: Machine, units: int) -> float:
     """Least increment of the words of a program in G20 or G21, mm."""
@@ -229,24 +219,6 @@ def _absolute_centre_hint(text: bytes, options: _core.ReaderOptions) -> str:
         return ""
     kind = "absolute" if options.absolute_arc_centres else "incremental"
     return f'; with {kind} I J K the whole program reads: set input.arc_centre = "{kind}"'
-
-
-def file_bytes(path: str | Path) -> bytes:
-    """Content of a file.
-
-    Args:
-        path: the file.
-
-    Returns:
-        Its bytes.
-
-    Raises:
-        OSError: the file cannot be read; it names the file, which a failed read() alone does not.
-    """
-    try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
 
 
 def given_program(program: Program | str | Path, machine: Machine) -> Program:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +13,9 @@ from shapegcode import _core
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["program_loader", "reader_options"]
+__all__ = ["program_bytes", "program_loader", "reader_options"]
+
+_NO_LIMIT = 2**63
 
 
 def reader_options(
@@ -58,7 +62,7 @@ def reader_options(
     options.program = -1 if program_number is None else program_number
     options.opaque_programs = list(machine.input.opaque_programs)
     options.subprogram_nesting = machine.controller.nesting_limit_subprogram
-    options.max_steps = machine.controller.max_program_steps
+    options.limits = _limits(machine, emitted=emitted)
     options.block_skip = [{"unknown": None, "on": True, "off": False}[machine.input.block_skip]] * 9
     options.expand_compensation = expand_compensation
     options.compensation_start_up = machine.input.compensation_start_up
@@ -77,6 +81,21 @@ def reader_options(
     options.power_on = state
     options.probe_lines = list(probe_lines)
     return options
+
+
+def _limits(machine: Machine, *, emitted: bool) -> _core.WorkLimits:
+    limits = _core.WorkLimits()
+    controller, axes = machine.controller, machine.axes.as_tuple()
+    limits.steps = controller.max_program_steps
+    limits.bytes = controller.max_program_bytes
+    limits.feed_mm_per_s = [axis.max_feed_mm_per_min / 60.0 for axis in axes]
+    limits.rapid_mm_per_s = [axis.rapid_mm_per_min / 60.0 for axis in axes]
+    limits.tool_change_s = machine.times.tool_change_s
+    limits.m_function_s = machine.times.m_function_s
+    # What is written for a program within the limits has more blocks and takes a little longer.
+    limits.moves = _NO_LIMIT if emitted else controller.max_program_moves
+    limits.seconds = math.inf if emitted else controller.max_program_s
+    return limits
 
 
 def _tool_offsets(machine: Machine) -> dict[int, _core.ToolOffset]:
@@ -105,11 +124,32 @@ def _bindings(machine: Machine) -> _core.CodeBindings:
 _SUFFIXES = ("", ".nc", ".NC", ".cnc", ".CNC", ".txt", ".TXT", ".tap", ".TAP", ".prg", ".PRG", ".ngc")
 
 
-def program_loader(folders: Sequence[Path]) -> Callable[[int], tuple[str, bytes] | None]:
+def program_bytes(path: str | Path, most: int) -> bytes:
+    """Content of a program file.
+
+    Args:
+        path: the file.
+        most: bytes that are of use to the caller.
+
+    Returns:
+        Its bytes, no more than one beyond `most`: of a file without an end neither.
+
+    Raises:
+        OSError: the file cannot be read; it names the file, which a failed read() alone does not.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            return file.read(most + 1)
+    except OSError as error:
+        raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+
+
+def program_loader(folders: Sequence[Path], most: int) -> Callable[[int], tuple[str, bytes] | None]:
     """Finds the file of a program that another one calls: O0123, O123, 0123 with a usual suffix.
 
     Args:
         folders: where to look, in this order.
+        most: bytes of it that are of use, see `program_bytes`.
 
     Returns:
         A function of the O number: name and content of the file, None where there is none.
@@ -121,7 +161,7 @@ def program_loader(folders: Sequence[Path]) -> Callable[[int], tuple[str, bytes]
                 for suffix in _SUFFIXES:
                     path = folder / (stem + suffix)
                     if path.is_file():
-                        return str(path), path.read_bytes()
+                        return str(path), program_bytes(path, most)
         return None
 
     return load

@@ -24,7 +24,6 @@ from shapegcode.simulation.result import Motion, RegionRun, Simulation
 
 __all__ = ["play_motion", "simulate"]
 
-_MOST_SAMPLES = 100_000_000  # set-points of a region: some ten seconds of computing
 # How long behind a stop its settling time is looked for. A drive is integrated all that time.
 _SHORTEST_REST_S, _LONGEST_REST_S, _DRIVE_REST_S = 0.5, 10.0, 0.5
 
@@ -56,14 +55,13 @@ def simulate(
         The figures of the regions, and their samples.
 
     Raises:
-        ProgramError: the program cannot be read, or a region takes longer than can be computed.
+        ProgramError: the program cannot be read.
         OSError: its file cannot be read.
         ArgumentError: there is no such plant, or a limit of the machine is not usable.
         MachineError: the machine has no feed drives.
         NumericError: the integrator of a feed drive fails.
     """
     program = given_program(program, machine)
-    program.refuse_endless(_MOST_SAMPLES * machine.controller.interpolation_period_s)
     model, band_um = MachineModel(machine), machine.tolerance.residual_floor_um
     limit_s = _rest_s(model, plant)
     runs = []

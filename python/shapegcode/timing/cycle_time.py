@@ -52,11 +52,19 @@ def cycle_time(
         The whole time in s and where it goes: by part, tool, region and, if asked for, block.
 
     Raises:
-        ArgumentError: a value that no controller can have, or a program too long to interpolate.
+        ArgumentError: a value that no controller can have, or an override at which full interpolation would take the
+            program beyond `controller.max_program_s`.
     """
     program = given_program(program, machine)
     model = controller_model(machine, feed_override=feed_override, rapid_override=rapid_override)
     timed = _core.time_program(program.core, model, per_block)
+    slowest, limit_s = min(feed_override, rapid_override, 1.0), machine.controller.max_program_s
+    if full and slowest < 1.0 and timed.total_s > limit_s:
+        raise _core.ArgumentError(
+            f"{program.source}: takes {timed.total_s:.0f} s with feeds at {feed_override:.4g} and rapids at "
+            f"{rapid_override:.4g} of the programmed ones, and at most {limit_s:.10g} s are interpolated "
+            "(controller.max_program_s); the closed form alone has no limit (--no-full)"
+        )
     return CycleTime(
         **_parts(timed),
         cycle_time_s=float(timed.total_s),

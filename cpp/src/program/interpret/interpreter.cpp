@@ -7,6 +7,11 @@
 #include "shapegcode/error.hpp"
 
 namespace shapegcode::detail {
+namespace {
+
+constexpr std::size_t most_warnings_of_one_kind = 100;
+
+}  // namespace
 
 void Interpreter::fail(const std::string& message, std::uint32_t column) const {
   throw Error(ErrorKind::program, message, line_number_, std::max<std::uint32_t>(column, 1));
@@ -16,8 +21,29 @@ void Interpreter::alarm(int number, const std::string& message, std::uint32_t co
   throw alarm_error(number, message, line_number_, std::max<std::uint32_t>(column, 1));
 }
 
-void Interpreter::warn(const std::string& message) {
-  program_.warnings.push_back({origin_.line, message, 0, 0, program_.files[origin_.file]});
+void Interpreter::warn_at(const LineOrigin& origin, const std::string& message) {
+  Warned& warned = warned_[message];
+  if (warned.places.contains({origin.file, origin.line})) {
+    return;
+  }
+  if (warned.places.size() >= most_warnings_of_one_kind) {
+    ++warned.further;
+    warned.last = origin;
+    return;
+  }
+  warned.places.emplace(origin.file, origin.line);
+  program_.warnings.push_back({origin.line, message, 0, 0, program_.files[origin.file]});
+}
+
+void Interpreter::tell_further_warnings() {
+  for (const auto& [message, warned] : warned_) {
+    if (warned.further > 0) {
+      program_.warnings.push_back({warned.last.line,
+                                   fmt::format("{} more like this, the last one here: {}", warned.further, message), 0,
+                                   0, program_.files[warned.last.file]});
+    }
+  }
+  warned_.clear();
 }
 
 void Interpreter::warn_once(std::uint32_t& seen, const std::string& message) {
@@ -91,8 +117,16 @@ void Interpreter::add_step(StepKind kind, std::size_t index) {
 void Interpreter::add_move(const OtherMove& move) {
   close_region();
   if (move.dwell_s > 0.0 || move.segment.length_mm > 0.0) {
+    require_room(move.dwell_s > 0.0 ? work_.wait(move.dwell_s, "dwell") : work_.move(move.segment));
     add_step(StepKind::move, program_.other_moves.size());
     program_.other_moves.push_back(move);
+  }
+}
+
+void Interpreter::require_room(const std::optional<std::string>& passed) {
+  if (passed) {
+    ended_ = true;
+    fail(*passed);
   }
 }
 
@@ -131,7 +165,10 @@ void Interpreter::require_plain_words(const BlockWords& words, std::uint32_t lin
 
 void Interpreter::finish() {
   close_region();
+  tell_further_warnings();
   program_.final_state = state_;
+  program_.move_count = work_.moves();
+  program_.least_time_s = work_.seconds();
 }
 
 void Interpreter::execute(const ParsedBlock& block, std::uint32_t line, const LineOrigin& origin, std::size_t begin,

@@ -1,6 +1,9 @@
 // Codes that change the modal state or what is known of the position.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <span>
+
 #include "path/arc_frame.hpp"
 #include "program/interpret/interpreter_impl.hpp"
 
@@ -329,6 +332,10 @@ void Interpreter::m_codes(LineFlow& flow) {
     MachineFunction function;
     function.m_codes = words().m_codes;
     function.m_count = words().m_count;
+    const auto codes = std::span(function.m_codes).first(static_cast<std::size_t>(function.m_count));
+    const auto changes = static_cast<double>(std::ranges::count(codes, 6));
+    const double other = static_cast<double>(function.m_count) - changes;
+    require_room(work_.wait(changes * options_.limits.tool_change_s + other * options_.limits.m_function_s, "block"));
     if (words().has('T')) {
       function.tool = static_cast<std::int64_t>(words()['T'].value);
     }

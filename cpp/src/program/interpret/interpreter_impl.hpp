@@ -6,7 +6,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -15,6 +18,7 @@
 #include "program/interpret/canned_cycle.hpp"
 #include "program/interpret/input_rules.hpp"
 #include "program/interpret/offsets.hpp"
+#include "program/interpret/work_count.hpp"
 #include "program/text/parsed_block.hpp"
 #include "shapegcode/program.hpp"
 
@@ -38,7 +42,7 @@ inline int plane_normal(int plane) noexcept { return plane == 17 ? 2 : plane == 
 class Interpreter {
  public:
   Interpreter(Program& program, const ReaderOptions& options)
-      : options_(options), program_(program), state_(options.power_on), offsets_(options) {}
+      : options_(options), program_(program), state_(options.power_on), offsets_(options), work_(options.limits) {}
 
   /// Throws where words could only be arguments of a macro call.
   void require_plain_words(const BlockWords& words, std::uint32_t line) const;
@@ -47,7 +51,9 @@ class Interpreter {
                std::size_t end);
   /// Ends an open region: the next line is not part of it.
   void close_region();
-  void warn(const std::string& message);
+  void warn(const std::string& message) { warn_at(origin_, message); }
+  /// Each place once, however often it is executed; of one message only the first ones, and how many more there are.
+  void warn_at(const LineOrigin& origin, const std::string& message);
   /// After something whose effect is not known.
   void forget_all() noexcept { state_.known = {false, false, false}; }
   /// How the program ended.
@@ -94,14 +100,17 @@ class Interpreter {
   void read_cycle_words(int axis);
   [[nodiscard]] int cycle_repeats() const;
   void require_cycle_data() const;
-  void require_room_for_holes(int holes) const;
+  void require_room_for_holes(int holes);
   void drill_hole(int axis, double feed_mm_per_s);
   void foreign_switch(int g_tenths);
   void look_ahead_switch(int g_tenths);
   void change_coordinates(int number, int extra);
   void add_move(const OtherMove& move);
+  /// Ends the reading where a limit is passed.
+  void require_room(const std::optional<std::string>& passed);
   void add_step(StepKind kind, std::size_t index);
   void note(std::size_t segment);
+  void tell_further_warnings();
   void warn_once(std::uint32_t& seen, const std::string& message);
   [[noreturn]] void fail(const std::string& message, std::uint32_t column = 0) const;
   [[noreturn]] void alarm(int number, const std::string& message, std::uint32_t column = 0) const;
@@ -132,7 +141,13 @@ class Interpreter {
   Vector3 local_offset_ = Vector3::Zero();
   std::array<bool, axis_count> local_offset_uncertain_ = {false, false, false};  ///< set in a '/' block
   CannedCycle cycle_;
-  std::uint64_t cycle_moves_ = 0;  ///< that the cycles came to so far
+  struct Warned {
+    std::set<std::pair<std::uint32_t, std::uint32_t>> places;  ///< file and line
+    std::uint64_t further = 0;
+    LineOrigin last;
+  };
+  std::map<std::string, Warned> warned_;
+  WorkCount work_;  ///< of the program so far
   std::uint32_t seen_no_point_ = 0;
   std::uint32_t seen_distance_ = 0;
   std::uint32_t seen_units_ = 0;

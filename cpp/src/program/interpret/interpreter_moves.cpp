@@ -225,6 +225,7 @@ void Interpreter::cut(const char* why_kept, const ModalState& before, std::size_
   region_->incremental = region_->incremental || relative;
   segment.stop_at_end = stops;
   if (segment.length_mm > 0.0) {
+    require_room(work_.move(segment));
     segments_.push_back(segment);
   }
   state_.position_mm = to;
@@ -313,14 +314,15 @@ void Interpreter::require_cycle_data() const {
 }
 
 // Before a single hole is expanded: a thousandth of a millimetre for Q fills the memory.
-void Interpreter::require_room_for_holes(int holes) const {
+void Interpreter::require_room_for_holes(int holes) {
   const double cuts = cuts_per_hole(cycle_);
-  const double moves = static_cast<double>(cycle_moves_) + holes * cuts * most_moves_per_cut(cycle_);
-  if (moves > static_cast<double>(options_.max_cycle_moves)) {
-    fail(fmt::format("drilling cycle G{} feeds down {:.0f} times in {} hole(s), {:.3f} mm deep: the cycles of the "
-                     "program come to {:.0f} moves (limit {})",
+  const double moves = holes * cuts * most_moves_per_cut(cycle_);
+  if (!work_.has_room(moves)) {
+    ended_ = true;
+    fail(fmt::format("drilling cycle G{} feeds down {:.0f} times in {} hole(s), {:.3f} mm deep: with its {:.0f} moves "
+                     "the program comes to {:.0f} (limit {}, controller.max_program_moves)",
                      cycle_.code, cuts, holes, std::abs(cycle_.r_mm - cycle_.bottom_mm), moves,
-                     options_.max_cycle_moves),
+                     static_cast<double>(work_.moves()) + moves, options_.limits.moves),
          words().has('Q') ? words()['Q'].column : 1);
   }
 }
@@ -347,7 +349,6 @@ void Interpreter::drill_hole(int axis, double feed_mm_per_s) {
   if (state_.known[z] && feed_mm_per_s > 0.0) {
     std::vector<OtherMove> moves;
     state_.position_mm = expand_cycle(cycle_, hole, axis, feed_mm_per_s, line_number_, moves);
-    cycle_moves_ += moves.size();
     for (const OtherMove& move : moves) {
       add_move(move);
     }

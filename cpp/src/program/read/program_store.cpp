@@ -81,13 +81,12 @@ class ProgramHeads {
       }
       const char mark = marks[static_cast<std::size_t>(nearest - next_.begin())];
       *nearest = find(mark, at + 1);
-      const std::size_t newline = at == 0 ? std::string_view::npos : text_.rfind('\n', at - 1);
-      const std::size_t begin = std::max(newline == std::string_view::npos ? 0 : newline + 1, from_);
-      std::size_t first = begin;
-      while (first < at && (text_[first] == ' ' || text_[first] == '\t' || text_[first] == '\r')) {
-        ++first;
+      // Back over blanks alone: a line may be as long as the text, and full of marks.
+      std::size_t begin = at;
+      while (begin > from_ && (text_[begin - 1] == ' ' || text_[begin - 1] == '\t' || text_[begin - 1] == '\r')) {
+        --begin;
       }
-      if (first != at) {
+      if (begin > from_ && text_[begin - 1] != '\n') {
         continue;
       }
       if (mark == '&' || mark == '<') {
@@ -215,23 +214,27 @@ std::optional<LinePlace> ProgramUnit::find_n(std::int64_t n, std::size_t from) {
   return behind == places.end() ? places.front() : *behind;
 }
 
-std::optional<LinePlace> ProgramUnit::behind_end(int loop, const LinePlace& from) {
-  const auto key = std::pair(from.at, loop);
-  const auto known = ends_.find(key);
-  if (known != ends_.end()) {
-    return known->second;
-  }
-  LinePlace place = from;
+void ProgramUnit::index_ends() {
+  ends_indexed_ = true;
+  LinePlace place = first;
   std::string_view line;
   std::size_t begin = 0;
-  std::optional<LinePlace> found;
-  while (!found && next_line(place, line, begin)) {
-    if (end_number(line) == loop) {
-      found = place;
+  while (next_line(place, line, begin)) {
+    if (const int loop = end_number(line); loop > 0) {
+      ends_[loop].push_back(place);
     }
   }
-  ends_[key] = found;
-  return found;
+}
+
+std::optional<LinePlace> ProgramUnit::behind_end(int loop, const LinePlace& from) {
+  if (!ends_indexed_) {
+    index_ends();
+  }
+  const auto& places = ends_[loop];
+  // Places lie behind their END: the one of a line that begins at `from` or later.
+  const auto found = std::upper_bound(places.begin(), places.end(), from.at,
+                                      [](std::size_t at, const LinePlace& place) { return at < place.at; });
+  return found == places.end() ? std::nullopt : std::optional(*found);
 }
 
 void ProgramStore::add(const std::string& text, const TapeFrame& frame, std::uint32_t file) {
@@ -254,6 +257,7 @@ void ProgramStore::add(const std::string& text, const TapeFrame& frame, std::uin
           unit->first.line, 1);
     }
     unit->end = at;
+    note(*unit);
     units_.push_back(std::move(unit));
   };
   ProgramHeads heads(text, frame);
@@ -284,18 +288,27 @@ void ProgramStore::add(const std::string& text, const TapeFrame& frame, std::uin
   }
 }
 
-ProgramUnit* ProgramStore::find(std::int64_t number, const ProgramUnit* from) noexcept {
-  ProgramUnit* found = nullptr;
-  for (const auto& unit : units_) {
-    const bool here = from != nullptr && unit->file == from->file && unit->folder == from->folder;
-    if (unit->number == number && (found == nullptr || here)) {
-      found = unit.get();
-      if (here) {
-        break;
-      }
+void ProgramStore::note(ProgramUnit& unit) {
+  placed_.try_emplace({unit.file, unit.folder, unit.number}, &unit);
+  first_.try_emplace(unit.number, &unit);
+}
+
+ProgramUnit* ProgramStore::find(std::int64_t number, const ProgramUnit* from) const {
+  if (from != nullptr) {
+    const auto here = placed_.find({from->file, from->folder, number});
+    if (here != placed_.end()) {
+      return here->second;
     }
   }
-  return found;
+  const auto found = first_.find(number);
+  return found == first_.end() ? nullptr : found->second;
+}
+
+ProgramUnit* ProgramStore::number_last(std::int64_t number) {
+  ProgramUnit& unit = *units_.back();
+  unit.number = number;
+  note(unit);
+  return &unit;
 }
 
 }  // namespace shapegcode::detail

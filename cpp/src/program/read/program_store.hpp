@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <unordered_map>
 #include <vector>
 
@@ -50,10 +51,12 @@ struct ProgramUnit {
 
  private:
   void index_numbers();
+  void index_ends();
 
   bool indexed_ = false;
   std::unordered_map<std::int64_t, std::vector<LinePlace>> numbers_;
-  std::map<std::pair<std::size_t, int>, std::optional<LinePlace>> ends_;
+  bool ends_indexed_ = false;
+  std::map<int, std::vector<LinePlace>> ends_;  ///< behind each END of a loop number
 };
 
 class ProgramStore {
@@ -61,11 +64,17 @@ class ProgramStore {
   /// Splits a text into its programs. Throws alarm 0073 on an O number given twice in a folder.
   void add(const std::string& text, const TapeFrame& frame, std::uint32_t file);
   /// That of the same file and folder as `from`, if there is one there.
-  [[nodiscard]] ProgramUnit* find(std::int64_t number, const ProgramUnit* from = nullptr) noexcept;
+  [[nodiscard]] ProgramUnit* find(std::int64_t number, const ProgramUnit* from = nullptr) const;
+  /// Gives the program added last a number; for one that has none of its own.
+  ProgramUnit* number_last(std::int64_t number);
   [[nodiscard]] const std::vector<std::unique_ptr<ProgramUnit>>& units() const noexcept { return units_; }
 
  private:
+  void note(ProgramUnit& unit);
+
   std::vector<std::unique_ptr<ProgramUnit>> units_;
+  std::map<std::tuple<std::uint32_t, std::uint32_t, std::int64_t>, ProgramUnit*> placed_;  ///< by file, folder, number
+  std::unordered_map<std::int64_t, ProgramUnit*> first_;                                   ///< by number
 };
 
 }  // namespace shapegcode::detail

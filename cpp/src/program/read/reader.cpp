@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "program/read/reader_impl.hpp"
 #include "shapegcode/error.hpp"
@@ -11,17 +12,28 @@ namespace shapegcode::detail {
 namespace {
 
 constexpr std::size_t most_alarms = 200;  // collected in one reading
+constexpr std::size_t most_names = 20;    // of programs, in one message
+
+// "O1, O2, O3"
+std::string program_names(std::span<const std::int64_t> numbers) {
+  std::string names;
+  for (const std::int64_t number : numbers.first(std::min(numbers.size(), most_names))) {
+    names += fmt::format("{}O{}", names.empty() ? "" : ", ", number);
+  }
+  return numbers.size() > most_names ? fmt::format("{} and {} more", names, numbers.size() - most_names) : names;
+}
 
 }  // namespace
 
-Reader::Reader(std::string text, const ReaderOptions& options, std::span<const std::int64_t> shut)
+Reader::Reader(std::string text, const ReaderOptions& options, std::span<const std::int64_t> shut, std::uint64_t steps)
     : options_(options),
       shut_(shut),
       interpreter_(program_, options),
       rewriter_(options, program_, interpreter_,
                 [this](std::string_view flat, const LineOrigin& origin) { put(flat, origin); }),
       control_(options, interpreter_, rewriter_),
-      variables_(options.retained_variables, &control_) {
+      variables_(options.retained_variables, &control_),
+      steps_(steps) {
   sources_.push_back({"", std::move(text)});
   program_.files.emplace_back();
 }
@@ -30,9 +42,7 @@ void Reader::fail(const std::string& message, std::uint32_t column) const {
   throw Error(ErrorKind::program, message, here_.line, column);
 }
 
-void Reader::warn(const std::string& message) {
-  program_.warnings.push_back({origin_.line, message, 0, 0, program_.files[origin_.file]});
-}
+void Reader::warn(const std::string& message) { interpreter_.warn_at(origin_, message); }
 
 void Reader::alarm(int number, const std::string& message, std::uint32_t column) const {
   throw alarm_error(number, message, here_.line, column);
@@ -40,6 +50,7 @@ void Reader::alarm(int number, const std::string& message, std::uint32_t column)
 
 void Reader::load_main() {
   const std::string& text = sources_.front().text;
+  require_room_for(text);
   const TapeFrame frame = find_frame(text);
   framed_ = frame.framed;
   const auto end_of_line = text.find('\n');
@@ -63,14 +74,11 @@ void Reader::load_main() {
   }
   ProgramUnit* main = options_.program < 0 ? store_.units().front().get() : store_.find(options_.program);
   if (main == nullptr) {
-    std::string known;
-    for (const std::int64_t number : program_.program_numbers) {
-      known += fmt::format("{}O{}", known.empty() ? "" : ", ", number);
-    }
-    throw alarm_error(78,
-                      fmt::format("program O{} is not in the file (it holds {})", options_.program,
-                                  known.empty() ? "no O number" : known),
-                      1, 1);
+    throw alarm_error(
+        78,
+        fmt::format("program O{} is not in the file (it holds {})", options_.program,
+                    program_.program_numbers.empty() ? "no O number" : program_names(program_.program_numbers)),
+        1, 1);
   }
   program_.program_number = main->number;
   control_.program = main->number;
@@ -220,6 +228,36 @@ Program Reader::result() {
   return std::move(program_);
 }
 
+// Counted before a line is executed, so that no reading does more than the limits say.
+void Reader::require_room() {
+  const WorkLimits& limits = options_.limits;
+  if (++steps_ > limits.steps) {
+    interpreter_.end();
+    fail(fmt::format("more than {} blocks executed (controller.max_program_steps){}", limits.steps,
+                     program_.expanded ? ": the program does not seem to end" : ""));
+  }
+  if (program_.text.size() > limits.bytes) {
+    interpreter_.end();
+    fail(fmt::format("more than {} bytes of plain text up to here (controller.max_program_bytes)", limits.bytes));
+  }
+}
+
+// Of all files of a reading together.
+void Reader::require_room_for(const std::string& text) {
+  bytes_read_ += text.size();
+  const std::uint64_t limit = options_.limits.bytes;
+  if (bytes_read_ <= limit) {
+    return;
+  }
+  const auto inside =
+      static_cast<std::ptrdiff_t>(text.size() - std::min<std::uint64_t>(text.size(), bytes_read_ - limit));
+  Error error(ErrorKind::program,
+              fmt::format("more than {} bytes of program text (controller.max_program_bytes)", limit),
+              static_cast<std::uint32_t>(1 + std::count(text.begin(), text.begin() + inside, '\n')), 1);
+  interpreter_.end();
+  throw error;
+}
+
 // Executes the next line. False at the end of the program.
 bool Reader::step() {
   Frame& frame = frames_.back();
@@ -229,20 +267,17 @@ bool Reader::step() {
   if (interpreter_.ended()) {
     return false;
   }
-  if (!frame.unit->next_line(frame.place, text, begin)) {
-    if (frames_.size() == 1) {
-      return false;
-    }
+  const bool goes_on = frame.unit->next_line(frame.place, text, begin);
+  if (goes_on) {
+    origin_ = {here_.line, frame.unit->file};
+  } else if (frames_.size() == 1) {
+    return false;
+  }
+  require_room();
+  if (!goes_on) {
     warn(fmt::format("program O{} ends without M99", frame.unit->number));
     leave();
     return true;
-  }
-  origin_ = {here_.line, frame.unit->file};
-  if (program_.expanded && ++steps_ > options_.max_steps) {
-    steps_ = 0;
-    interpreter_.end();
-    fail(fmt::format("more than {} blocks executed (controller.max_program_steps): the program does not seem to end",
-                     options_.max_steps));
   }
   line(text, begin, frame.place.at);
   return true;
@@ -364,16 +399,14 @@ void Reader::finish() {
     program_.line_count = static_cast<std::uint32_t>(program_.origins.size());
   }
   const std::uint32_t last = here_.line;
-  std::string others;
-  for (const std::int64_t number : program_.program_numbers) {
-    if (number != program_.program_number && !called_.contains(number)) {
-      others += fmt::format("{}O{}", others.empty() ? "" : ", ", number);
-    }
-  }
+  std::vector<std::int64_t> others;
+  std::ranges::copy_if(program_.program_numbers, std::back_inserter(others), [this](std::int64_t number) {
+    return number != program_.program_number && !called_.contains(number);
+  });
   if (!others.empty()) {
     program_.warnings.push_back({1,
                                  fmt::format("O{} is played; the file also holds {} (--program picks another)",
-                                             program_.program_number, others),
+                                             program_.program_number, program_names(others)),
                                  0, 0, ""});
   }
   // Behind the last alarm that is collected nothing was read: what is missing there may well be there.
@@ -399,12 +432,14 @@ namespace shapegcode {
 
 Program read_program(std::string text, const ReaderOptions& options) {
   std::vector<std::int64_t> shut;
+  std::uint64_t steps = 0;  // of all readings of the text
   for (;;) {
-    detail::Reader reader(std::move(text), options, shut);
+    detail::Reader reader(std::move(text), options, shut, steps);
     try {
       return reader.run();
     } catch (const detail::OpaqueProgram& opaque) {
       text = reader.take_text();
+      steps = reader.steps();
       shut.push_back(opaque.number);
     }
   }

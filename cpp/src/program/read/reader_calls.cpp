@@ -263,6 +263,7 @@ ProgramUnit* Reader::lookup(std::int64_t number) {
   program_.files.push_back(sources_.back().name);
   const auto file = static_cast<std::uint32_t>(program_.files.size() - 1);
   try {
+    require_room_for(sources_.back().text);
     store_.add(sources_.back().text, find_frame(sources_.back().text), file);
   } catch (Error& error) {
     error.set_file(sources_.back().name);
@@ -270,8 +271,7 @@ ProgramUnit* Reader::lookup(std::int64_t number) {
   }
   unit = store_.find(number);
   if (unit == nullptr && store_.units().back()->number < 0) {
-    store_.units().back()->number = number;  // a file without an O line goes by its name
-    unit = store_.units().back().get();
+    unit = store_.number_last(number);  // a file without an O line goes by its name
   }
   return unit;
 }

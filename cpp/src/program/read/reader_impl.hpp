@@ -59,9 +59,11 @@ struct OpaqueProgram {
 class Reader {
  public:
   /// Programs of `shut` are called, but not looked into even where they are at hand; it outlives the reader.
-  Reader(std::string text, const ReaderOptions& options, std::span<const std::int64_t> shut);
+  /// `steps`: that readings of the same text have taken before.
+  Reader(std::string text, const ReaderOptions& options, std::span<const std::int64_t> shut, std::uint64_t steps);
   Program run();
   /// The text that was handed over, behind a `run` that ended with OpaqueProgram.
+  [[nodiscard]] std::uint64_t steps() const noexcept { return steps_; }
   [[nodiscard]] std::string take_text() noexcept { return std::move(sources_.front().text); }
 
  private:
@@ -90,6 +92,8 @@ class Reader {
   void load_main();
   void expand_from(std::size_t begin);
   bool step();
+  void require_room();
+  void require_room_for(const std::string& text);
   void line(std::string_view text, std::size_t begin, std::size_t end);
   void plain_line(std::size_t begin, std::size_t end);
   void program_line(std::size_t end);
@@ -159,7 +163,8 @@ class Reader {
   LinePlace here_;  ///< the line that is executed
   bool framed_ = false;
   bool moved_ = false;  ///< the line that is executed moves an axis
-  std::uint64_t steps_ = 0;
+  std::uint64_t steps_;
+  std::uint64_t bytes_read_ = 0;
 };
 
 }  // namespace shapegcode::detail

@@ -91,9 +91,8 @@ void MoveRewriter::set_compensation(int code) {
   // Offset number 0 is a radius of 0, and so is none at all.
   const int number = words.has('D') ? static_cast<int>(words['D'].value) : std::max(d_number_, 0);
   if (!words.has('D') && d_number_ < 0) {
-    program_.warnings.push_back(
-        {origin_.line, fmt::format("cutter compensation G{} without an offset number D: its radius is 0", code), 0, 0,
-         program_.files[origin_.file]});
+    interpreter_.warn_at(origin_,
+                         fmt::format("cutter compensation G{} without an offset number D: its radius is 0", code));
   }
   d_number_ = number;
   const auto radius = number == 0 ? std::optional(0.0) : interpreter_.offsets().radius(number);
@@ -101,11 +100,9 @@ void MoveRewriter::set_compensation(int code) {
   if (!radius || programmed_.compensation != 40) {
     // The moves stay as they are, and their path is not known.
     if (programmed_.compensation == 40) {
-      program_.warnings.push_back({origin_.line,
-                                   fmt::format("the radius of offset D{} is not known (input.tool_radius_mm, or G10 "
-                                               "L12 in the program): G{} is kept as it stands",
-                                               number, code),
-                                   0, 0, program_.files[origin_.file]});
+      interpreter_.warn_at(origin_, fmt::format("the radius of offset D{} is not known (input.tool_radius_mm, or G10 "
+                                                "L12 in the program): G{} is kept as it stands",
+                                                number, code));
     }
     keeps_compensation_ = true;
     programmed_.compensation = code;

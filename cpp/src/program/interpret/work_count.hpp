@@ -1,0 +1,37 @@
+// Private: what the moves of a program come to so far, held against the limits of a reading.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "shapegcode/program.hpp"
+
+namespace shapegcode::detail {
+
+/// Counts moves and least times while they are read, so that what is too much is refused where it becomes too much.
+/// Each function gives the words of the limit that is passed, nothing while there is room.
+class WorkCount {
+ public:
+  explicit WorkCount(const WorkLimits& limits) noexcept : limits_(limits) {}
+
+  [[nodiscard]] std::optional<std::string> move(const Segment& segment);
+  [[nodiscard]] std::optional<std::string> wait(double seconds, const char* what);
+  /// So many moves as are still to come, all of them of one block: before the first one is made.
+  [[nodiscard]] bool has_room(double moves) const noexcept;
+
+  [[nodiscard]] std::uint64_t moves() const noexcept { return moves_; }
+  [[nodiscard]] double seconds() const noexcept { return seconds_; }
+
+ private:
+  [[nodiscard]] std::optional<std::string> add(double seconds, const char* what, double feed_mm_per_s);
+
+  const WorkLimits& limits_;
+  std::uint64_t moves_ = 0;
+  double seconds_ = 0.0;
+};
+
+/// Least time of a move on axes that reach these speeds, s: no longer than any control takes.
+[[nodiscard]] double least_time_s(const Segment& segment, const WorkLimits& limits) noexcept;
+
+}  // namespace shapegcode::detail
