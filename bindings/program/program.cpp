@@ -31,8 +31,8 @@ std::shared_ptr<const Path> cutting_path(const Program& program, std::uint32_t f
     return program.expanded ? program.origins[line - 1].line : line;
   };
   std::vector<std::shared_ptr<Region>> inside;
-  // Regions lie in the order of their lines, of an expanded text not in that of the source's. Asked of every region of a
-  // long program, a look at all of them would be too much.
+  // Regions lie in the order of their lines, of an expanded text not in that of the source's. Asked of every region of
+  // a long program, a look at all of them would be too much.
   const auto first = program.expanded ? program.regions.begin()
                                       : std::ranges::lower_bound(program.regions, first_line, {}, &Region::first_line);
   for (auto at = first; at != program.regions.end() && (program.expanded || (*at)->first_line <= last_line); ++at) {
