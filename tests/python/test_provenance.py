@@ -384,6 +384,7 @@ def test_verdict_ends_with_what_it_rests_on(started: Path, tmp_path: Path, capsy
     moves = [(row["moved_um"] - row["figure_um"]) / row["limit_um"] for row in rows]
     assert moves == sorted(moves, reverse=True)
     assert min(moves) >= 0.01
+    assert all(row["moved_um"] >= row["figure_um"] for row in rows)
     assert len(keys) == len(set(keys)) <= 8
     assert shown.index("what the verdict rests on") > shown.index("cases of the verdict")
 
@@ -393,3 +394,11 @@ def test_an_axis_of_which_nobody_knows_is_tried_with_a_mode() -> None:
     (row,) = convert(PART, unmeasured_machine(keys, {})).conversion.rests_on
     assert (row.key, row.value, row.moved) == ("axes.y.modes", "none", "a mode of 40 Hz")
     assert convert(PART, unmeasured_machine(keys | {"axes.y.rigid": True}, {})).conversion.rests_on == ()
+
+
+def test_an_axis_that_moves_elsewhere_is_named_too() -> None:
+    """Z moves in a region that does not decide."""
+    text = PART.replace("M30", "G0Z1.\nM8\nG1Z0.5F50.\nM30")
+    keys = {"input.tool_change_unknown_axes": "XYZ", "axes.z.modes": []}
+    conversion = convert(text, unmeasured_machine(keys, {})).conversion
+    assert [row.key for row in conversion.rests_on] == ["axes.z.modes"]

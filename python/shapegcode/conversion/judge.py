@@ -76,6 +76,8 @@ class Judge:
         self._model = model
         self.cases = stated_cases(model.machine)
         """In the order of `RegionFigures.cases`."""
+        self.own_rule = model.own_rule
+        """The controller's own rule of block timing."""
         self.target: Target = "response" if model.machine.shaping.contour == "response" else "command"
         """What the contour tolerance is about."""
 

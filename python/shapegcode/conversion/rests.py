@@ -6,7 +6,7 @@ uncertainty, or by what is usual where none is stated. That takes no more playba
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
@@ -79,22 +79,39 @@ class _Trial:
 
 @dataclass(frozen=True)
 class _Region:
-    """The deciding region: how it is played, and what it is judged by."""
+    """A region: how it is played, and what it is judged by."""
 
     figures: RegionFigures
     place: Placed
     emitted: Program
-    limits: RegionLimits
     judge: Judge
 
-    def play(self, trial: _Trial, tracker: _core.ContourTracker | None) -> CaseFigures:
-        model = MachineModel(trial.machine)
+    @property
+    def limits(self) -> RegionLimits:
+        """What it is judged by."""
+        return self.judge.limits(self.figures, self.place)
+
+    @property
+    def before(self) -> dict[str, Judged]:
+        """Its judged figures as it is meant to run, under the controller's own rule of block timing."""
+        own = self.figures.emitted[0 if self.judge.own_rule == _core.BlockEnd.ceil else 1]
+        return {each.figure: each for each in judge_region(case_figures(own), self.limits)}
+
+    @property
+    def moving(self) -> str:
+        """Letters of the axes that move in it."""
+        reach = np.ptp(np.asarray(self.place.region.path.polyline()), axis=0)
+        return "".join(axis for axis, way in zip("xyz", reach, strict=True) if way > 0.0)
+
+    def play(self, trial: _Trial, *, contour: bool) -> CaseFigures:
+        """The figures with a value moved; without the contour they come from the end of the region alone."""
+        model, path = MachineModel(trial.machine), self.place.region.path
         run = model.play_emitted(
-            self.place.blocks(self.emitted), self.place.region.path, shift=trial.shift, only=trial.only,
-            offset=model.offset(self.place.region), contour=tracker is not None, tracker=tracker,
-            last_seconds=0.0 if tracker is not None else model.vibration_memory_s,
+            self.place.blocks(self.emitted), path, shift=trial.shift, only=trial.only,
+            offset=model.offset(self.place.region), contour=contour,
+            last_seconds=0.0 if contour else model.vibration_memory_s,
         )  # fmt: skip
-        return case_figures(run, contour=tracker is not None)
+        return case_figures(run, contour=contour)
 
 
 def rests_on(
@@ -120,33 +137,23 @@ def rests_on(
     Returns:
         At most eight values, none that moves a figure by less than a hundredth of its limit.
     """
-    pairs = zip(figures, placed, strict=True)
-    found, place = next(pair for pair in pairs if pair[1].original_lines == deciding_lines)
-    region = _Region(found, place, emitted, judge.limits(found, place), judge)
-    before = {each.figure: each for each in judge_region(_own(model, found), region.limits)}
-    trials = list(_trials(model.machine, _moving_axes(place)))
-    played_s = sum(each.emitted_s for each in figures) * _FULL_RUNS
-    full = len(trials) if found.emitted_s == 0.0 else int(max(_FREE_S, played_s) / found.emitted_s)
-    tracker = _core.ContourTracker(place.region.path)
-    runs = [pool.submit(region.play, trial, tracker if rank < full else None) for rank, trial in enumerate(trials)]
-    rows = [_row(trial, run.result(), before, region.limits) for trial, run in zip(trials, runs, strict=True)]
-    rows += _from_cases(model.machine, judge.cases, found, before, region.limits)
-    return _ranked(rows)
-
-
-def _own(model: MachineModel, found: RegionFigures) -> CaseFigures:
-    """The region as it is meant to run, under the controller's own rule of block timing."""
-    return case_figures(found.emitted[0 if model.own_rule == _core.BlockEnd.ceil else 1])
-
-
-def _moving_axes(place: Placed) -> str:
-    """Letters of the axes that move in a region."""
-    reach = np.ptp(np.asarray(place.region.path.polyline()), axis=0)
-    return "".join(axis for axis, way in zip("xyz", reach, strict=True) if way > 0.0)
-
-
-def _row(trial: _Trial, played: CaseFigures, before: Mapping[str, Judged], limits: RegionLimits) -> RestsOn:
-    return _rests(trial.value, trial.moved, before, judge_region(played, limits))
+    regions = [_Region(found, place, emitted, judge) for found, place in zip(figures, placed, strict=True)]
+    deciding = next(region for region in regions if region.place.original_lines == deciding_lines)
+    trials = [(deciding, trial) for trial in _trials(model.machine, deciding.moving)]
+    for axis, trial in _unknown_axes(model.machine).items():
+        if axis not in deciding.moving:
+            region = next((region for region in regions if axis in region.moving), None)
+            trials += [(region, trial)] if region is not None else []
+    left_s = max(_FREE_S, _FULL_RUNS * sum(each.emitted_s for each in figures))
+    running = []
+    for region, trial in trials:
+        left_s -= region.figures.emitted_s
+        running.append(pool.submit(region.play, trial, contour=left_s >= 0.0))
+    rows = [
+        _rests(trial.value, trial.moved, region.before, judge_region(run.result(), region.limits))
+        for (region, trial), run in zip(trials, running, strict=True)
+    ]
+    return _ranked([*rows, *_from_cases(model.machine, deciding)])
 
 
 def _rests(value: KeyValue, moved: str, before: Mapping[str, Judged], judged: Sequence[Judged]) -> RestsOn:
@@ -160,10 +167,11 @@ def _rests(value: KeyValue, moved: str, before: Mapping[str, Judged], judged: Se
 
 
 def _ranked(rows: Sequence[RestsOn]) -> tuple[RestsOn, ...]:
-    """The worst of each key, the furthest first."""
+    """The worst of each key, the furthest first; an axis that may have a mode or not is always named."""
     worst: dict[str, RestsOn] = {}
     for row in rows:
-        if row.share >= LEAST_SHARE and (row.key not in worst or row.share > worst[row.key].share):
+        matters = row.share >= LEAST_SHARE or row.key.endswith(".modes")
+        if matters and (row.key not in worst or row.share > worst[row.key].share):
             worst[row.key] = row
     return tuple(sorted(worst.values(), key=lambda row: -row.share)[:_MOST_SHOWN])
 
@@ -171,15 +179,11 @@ def _ranked(rows: Sequence[RestsOn]) -> tuple[RestsOn, ...]:
 def _trials(machine: Machine, moving: str) -> Iterator[_Trial]:
     """What is tried, the most likely to matter first."""
     unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
-    order: tuple[Callable[[Machine, Mapping[str, KeyValue], str], Iterator[_Trial]], ...] = (
-        _filters,
-        _unknown_axes,
-        _frequencies,
-        _shares,
-        _periods,
-    )
-    for part in order:
-        yield from part(machine, unmeasured, moving)
+    yield from _filters(machine, unmeasured)
+    yield from (trial for axis, trial in _unknown_axes(machine).items() if axis in moving)
+    yield from _frequencies(machine, unmeasured, moving)
+    yield from _shares(machine, unmeasured, moving)
+    yield from _periods(machine, unmeasured)
 
 
 def _changed(machine: Machine, key: str, value: object) -> Iterator[Machine]:
@@ -190,7 +194,7 @@ def _changed(machine: Machine, key: str, value: object) -> Iterator[Machine]:
         return
 
 
-def _filters(machine: Machine, unmeasured: Mapping[str, KeyValue], _moving: str) -> Iterator[_Trial]:
+def _filters(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_Trial]:
     key = "controller.shaped_time_constant_s"
     if key in unmeasured:
         now = machine.controller.shaped_time_constant_s
@@ -199,19 +203,17 @@ def _filters(machine: Machine, unmeasured: Mapping[str, KeyValue], _moving: str)
             yield _Trial(unmeasured[key], f"{other:g} s", each)
 
 
-def _unknown_axes(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -> Iterator[_Trial]:
-    """An axis of which nobody knows whether it has a mode, with one."""
+def _unknown_axes(machine: Machine) -> dict[str, _Trial]:
+    """Axes of which nobody knows whether they have a mode, each with one."""
     values = {value.key: value for value in machine.values()}
-    for letter in moving:
-        axis = getattr(machine.axes, letter)
-        if axis.modes or (axis.rigid and f"axes.{letter}.rigid" not in unmeasured):
+    trials = {}
+    for letter, axis in zip("xyz", machine.axes.as_tuple(), strict=True):
+        if axis.modes or (axis.rigid and not values[f"axes.{letter}.rigid"].unmeasured):
             continue
-        try:
-            other = machine.with_values({f"axes.{letter}.rigid": False, f"axes.{letter}.modes": [_MODE]})
-        except MachineError:
-            continue
+        other = machine.with_values({f"axes.{letter}.rigid": False, f"axes.{letter}.modes": [_MODE]})
         said = f"a mode of {_MODE['frequency_hz']:g} Hz"
-        yield _Trial(_as_assumed(values[f"axes.{letter}.modes"]), said, other)
+        trials[letter] = _Trial(_as_assumed(values[f"axes.{letter}.modes"]), said, other)
+    return trials
 
 
 def _as_assumed(value: KeyValue) -> KeyValue:
@@ -250,7 +252,7 @@ def _shares(machine: Machine, unmeasured: Mapping[str, KeyValue], moving: str) -
                 yield _Trial(unmeasured[f"{stem}.{name}"], f"{percent:+g} %", each)
 
 
-def _periods(machine: Machine, unmeasured: Mapping[str, KeyValue], _moving: str) -> Iterator[_Trial]:
+def _periods(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_Trial]:
     key = "controller.interpolation_period_s"
     if key in unmeasured:
         free = machine.with_values("emission.block_period_s", None)
@@ -259,26 +261,20 @@ def _periods(machine: Machine, unmeasured: Mapping[str, KeyValue], _moving: str)
             yield _Trial(unmeasured[key], f"{period:g} s", each)
 
 
-def _from_cases(
-    machine: Machine,
-    cases: Sequence[Case],
-    found: RegionFigures,
-    before: Mapping[str, Judged],
-    limits: RegionLimits,
-) -> Iterator[RestsOn]:
+def _from_cases(machine: Machine, region: _Region) -> Iterator[RestsOn]:
     """What was played anyway and counts for nothing: the other rule of block timing, look-ahead on, an empty buffer."""
     unmeasured = {value.key: value for value in machine.values() if value.unmeasured}
-    for case, played in zip(cases, found.cases, strict=True):
-        if case.counts:
-            continue
-        said = f"case {case.name}"
-        if case.look_ahead:
-            key = "controller.motion"
-        elif case.starved_s > 0.0:
-            key, said = "controller.block_time_s", f"longer: the buffer runs empty, {said}"
-        elif case.nominal:
-            key = "controller.block_end"
-        else:
-            continue
-        if key in unmeasured:
-            yield _rests(unmeasured[key], said, before, judge_region(played, limits))
+    for case, played in zip(region.judge.cases, region.figures.cases, strict=True):
+        key, said = _key_of(case)
+        if not case.counts and key in unmeasured:
+            yield _rests(unmeasured[key], said, region.before, judge_region(played, region.limits))
+
+
+def _key_of(case: Case) -> tuple[str, str]:
+    """The value that a case is about, and what it would be; empty where it is about none."""
+    said = f"case {case.name}"
+    if case.look_ahead:
+        return "controller.motion", said
+    if case.starved_s > 0.0:
+        return "controller.block_time_s", f"longer: the buffer runs empty, {said}"
+    return ("controller.block_end", said) if case.nominal else ("", "")

@@ -110,5 +110,5 @@ class Draft:
             table[name] = dict(zip("xyz", value, strict=True))
             return Xyz(*value)
         table[name] = value
-        shown: Value = "; ".join(f"{k} = {v}" for k, v in value.items()) if isinstance(value, dict) else value
+        shown: Value = "; ".join(f"{k} = {v}" for k, v in value.items()) or "none" if isinstance(value, dict) else value
         return shown

@@ -134,9 +134,11 @@ class ParameterImport(Result):
         if not self.ok:
             return f"{self.dump}: nothing in it says anything about the motion or the programs: no machine"
         keys = len({row.key for row in self.read} | {row.key for row in self.tables_read})
+        values = self.machine.values()
+        assumed, inherited = sum(v.assumed for v in values), sum(v.origin == "inherited" for v in values)
         return (
-            f"{self.dump}: {keys} keys of {self.machine.name} read, {len(self.assumed)} assumed, "
-            f"{len(self.missing)} parameters missing or not understood"
+            f"{self.dump}: {keys} keys of {self.machine.name} read, {inherited} inherited, {assumed} assumed; "
+            f"{len(self.missing)} parameters missing, not understood or not used"
         )
 
     @property
@@ -174,7 +176,7 @@ class ParameterImport(Result):
             Table("read", read, [list(rows) for _, rows in groupby(self.read, key=lambda row: row.key)]),
             Table("read from tables", tables, self.tables_read),
             Table("assumed", assumed, self.assumed),
-            Table("missing or not understood", missing, self.missing),
+            Table("missing, not understood or not used", missing, self.missing),
         ]
         return [table for table in found if table.rows]
 
