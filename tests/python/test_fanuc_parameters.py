@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from shapegcode.cli import main
 from shapegcode.errors import MachineError
 from shapegcode.machine import Machine
 from shapegcode.machine.fanuc_import import import_parameters
+from shapegcode.machine.fanuc_tables import ControlTables, read_table
 from shapegcode.machine.result import ParameterImport
 from shapegcode.results.json import schema
 
@@ -342,3 +344,14 @@ def test_command_with_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     capsys.readouterr()
     assert main(["machine", "import", *files[1:], "-o", str(output), "--force"]) == 2
     assert "parameter dump" in capsys.readouterr().err
+
+
+@given(st.lists(st.sampled_from("G10L85P2XR#500=[](),.-+*/% \nAN4"), max_size=120))
+def test_any_table_is_read_or_refused_with_its_line(characters: list[str]) -> None:
+    tables = ControlTables()
+    try:
+        read_table("".join(["%\nG10L10P1R1.\n", *characters]).encode(), "T.TXT", tables)
+    except MachineError as refused:
+        assert re.match(r"T\.TXT:\d+: ", str(refused))
+    else:
+        assert 1 in tables.tools[10]

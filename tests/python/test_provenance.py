@@ -16,6 +16,7 @@ import shapegcode as sg
 from acceptance import Judged, convert, machine_with
 from judge import Mode, contour_error_um, play, residual_um, response, starts
 from shapegcode.cli import main
+from shapegcode.conversion.rests import _Region
 from shapegcode.identification.mode import Estimate, IdentifiedMode
 from shapegcode.identification.update import update_modes
 from shapegcode.settings.remarks import origin_of, remarks_of, with_remarks
@@ -402,3 +403,22 @@ def test_an_axis_that_moves_elsewhere_is_named_too() -> None:
     keys = {"input.tool_change_unknown_axes": "XYZ", "axes.z.modes": []}
     conversion = convert(text, unmeasured_machine(keys, {})).conversion
     assert [row.key for row in conversion.rests_on] == ["axes.z.modes"]
+
+
+def test_what_it_rests_on_costs_no_more_than_the_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Motion played with its contour for unmeasured values: no more than four times the program, or a minute."""
+    played: list[float] = []
+    whole = _Region.play
+
+    def counted(region: _Region, trial: Any, *, contour: bool) -> Any:
+        figures = whole(region, trial, contour=contour)
+        played.append(figures.time_s if contour else 0.0)
+        return figures
+
+    monkeypatch.setattr(_Region, "play", counted)
+    text = PART.replace("F6000", "F60")  # some two minutes in one region
+    machine = machine_with({}).with_remarks({value.key: "assumed" for value in machine_with({}).values()})
+    conversion = convert(text, machine, shape_all=True).conversion
+    assert conversion.cutting_time_s.emitted > 90.0
+    assert len(played) >= 8
+    assert 0.0 < sum(played) <= 4.01 * conversion.cutting_time_s.emitted
