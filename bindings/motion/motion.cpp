@@ -45,7 +45,11 @@ void register_motion(py::module_& module) {
       .def_readwrite("contour_acceleration_mm_per_s2", &MotionLimits::contour_acceleration_mm_per_s2,
                      "Of a change of direction, per axis, on arcs and along polylines, shape (3,).")
       .def_readwrite("feed_override", &MotionLimits::feed_override, "Scales the programmed feeds.")
-      .def_readwrite("arc_feed_ratio", &MotionLimits::arc_feed_ratio, "Feed on arcs relative to the programmed one.");
+      .def_readwrite("arc_feed_ratio", &MotionLimits::arc_feed_ratio, "Feed on arcs relative to the programmed one.")
+      .def_readwrite("feed_spread_s", &MotionLimits::feed_spread_s,
+                     "Time by which a lower programmed feed is reached before its segment and kept behind it, s.")
+      .def_readwrite("feed_excess_ratio", &MotionLimits::feed_excess_ratio,
+                     "Share by which a neighbour may be faster without that.");
 
   py::class_<FilterTolerance>(
       module, "FilterTolerance",

@@ -54,6 +54,11 @@ void register_simulation(py::module_& module) {
       .def_readwrite("measure_contour", &PlaybackOptions::measure_contour, "Deviations and orbit errors.")
       .def_readwrite("measure_command", &PlaybackOptions::measure_command,
                      "False: the deviation of the response alone, no orbit errors.")
+      .def_readwrite("feed_window_s", &PlaybackOptions::feed_window_s,
+                     "Time over which the speed is held against the programmed feed, beside four and sixteen times it, "
+                     "s; 0: not measured.")
+      .def_readwrite("feed_slack_mm", &PlaybackOptions::feed_slack_mm,
+                     "Way within that time that rounding may add, mm.")
       .def_readwrite("last_seconds", &PlaybackOptions::last_seconds,
                      "Blocks only: play the last so many seconds; 0: all.")
       .def_readwrite("starved_blocks", &PlaybackOptions::starved_blocks,
@@ -64,6 +69,13 @@ void register_simulation(py::module_& module) {
       .def_readwrite("starved_memory_s", &PlaybackOptions::starved_memory_s,
                      "How much of the run behind such a wait is looked at, s; 0: all.")
       .def_readwrite("record_samples", &PlaybackOptions::record_samples, "Samples kept for pictures; 0: none.");
+
+  py::class_<FeedExcess>(module, "FeedExcess",
+                         "Where a motion is fastest against the programmed feed at the same place.")
+      .def_readonly("speed_mm_per_s", &FeedExcess::speed_mm_per_s, "Speed there, mm/s.")
+      .def_readonly("programmed_mm_per_s", &FeedExcess::programmed_mm_per_s, "Feed programmed there, mm/s.")
+      .def_readonly("line", &FeedExcess::line, "Line of the segment that is programmed there.")
+      .def_property_readonly("ratio", &FeedExcess::ratio, "Speed over feed; 0 where nothing was measured.");
 
   py::class_<StarvedFigures>(module, "StarvedFigures", "What a wait for the next block does to a run.")
       .def_readonly("block", &StarvedFigures::block, "The set-points wait behind it.")
@@ -88,6 +100,7 @@ void register_simulation(py::module_& module) {
       .def_readonly("orbit_error_percent", &PlaybackFigures::orbit_error_percent, "Per arc of the path.")
       .def_readonly("response_orbit_error_percent", &PlaybackFigures::response_orbit_error_percent,
                     "The same of the response, where asked for.")
+      .def_readonly("feed_excess", &PlaybackFigures::feed_excess, "Of the command, where asked for.")
       .def_readonly("end_mm", &PlaybackFigures::end_mm, "Last set-point, (3,), mm.")
       .def_readonly("starved", &PlaybackFigures::starved, "One per PlaybackOptions.starved_blocks.")
       .def_property_readonly(

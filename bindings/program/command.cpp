@@ -48,6 +48,8 @@ void register_shaped_command(py::module_& module) {
                      "How the modes vary with the position of the axis that is followed, for the response as target.")
       .def_readwrite("axis_shapers", &ShapingOptions::axis_shapers,
                      "A shaper for each of X, Y and Z, of one mean delay, in place of the common one; empty: none.")
+      .def_readwrite("feed_excess_ratio", &ShapingOptions::feed_excess_ratio,
+                     "Share by which the shaped command may run faster along the path than programmed.")
       .def_readwrite("least_feed_mm_per_s", &ShapingOptions::least_feed_mm_per_s,
                      "What the controller can run: no run is slowed below it, mm/s.")
       .def_readwrite("contour_smoothness", &ShapingOptions::contour_smoothness,

@@ -34,6 +34,10 @@ struct MotionLimits {
   Vector3 contour_acceleration_mm_per_s2 = Vector3::Constant(none);    ///< per axis, of a change of direction (1737)
   double feed_override = 1.0;                                          ///< scales the programmed feeds
   double arc_feed_ratio = 1.0;                                         ///< feed on arcs relative to the programmed feed
+  /// A lower programmed feed is reached so long before its segment, and left so long behind it: what follows the
+  /// look-ahead mixes the motion of this time to both sides.
+  double feed_spread_s = 0.0;
+  double feed_excess_ratio = 0.0;  ///< by this share a neighbour may be faster without that
 };
 
 /// Within what a filter behind the interpolation must stay at corners and on arcs. Without spread it limits nothing.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -29,6 +30,10 @@ struct PlaybackOptions {
   bool measure_contour = true;          ///< deviation of command and response and orbit errors
   bool measure_command = true;          ///< false: the response alone; no figures of the command, no orbit errors
   bool measure_response_orbit = false;  ///< orbit errors of the response too, where the contour is measured
+  /// Largest speed against the programmed feed, over this time and four and sixteen times it; 0: not measured. Needs the
+  /// deviation of the command.
+  double feed_window_s = 0.0;
+  double feed_slack_mm = 0.0;  ///< of the way within such a time: what rounding may add
   /// Blocks only: play no more than the last so many seconds (0: all). Enough for the residual where older vibration
   /// has decayed; peak and contour figures then speak of that part alone.
   double last_seconds = 0.0;
@@ -43,6 +48,17 @@ struct PlaybackOptions {
   double settling_limit_s = 1.0;
   /// Keep at most so many samples of command and response for pictures (0: none); longer runs keep their beginning.
   std::size_t record_samples = 0;
+};
+
+/// Where a motion is fastest against the programmed feed at the same place.
+struct FeedExcess {
+  double speed_mm_per_s = 0.0;
+  double programmed_mm_per_s = 0.0;
+  std::uint32_t line = 0;  ///< of the segment that is programmed there
+  /// Speed over programmed feed; 0 where nothing was measured.
+  [[nodiscard]] double ratio() const noexcept {
+    return programmed_mm_per_s > 0.0 ? speed_mm_per_s / programmed_mm_per_s : 0.0;
+  }
 };
 
 /// What a wait for the next block does to a run.
@@ -68,6 +84,7 @@ struct PlaybackFigures {
   DeviationStats response;
   std::vector<double> orbit_error_percent;           ///< per arc of the path, of the command
   std::vector<double> response_orbit_error_percent;  ///< the same of the response, where asked for
+  FeedExcess feed_excess;                            ///< of the command, where asked for
   Vector3 end_mm = Vector3::Zero();
   std::vector<StarvedFigures> starved;  ///< one per PlaybackOptions::starved_blocks
   Samples recorded_command;

@@ -11,6 +11,7 @@ constexpr std::size_t read_ahead = 1024;
 constexpr int attempts = 6;
 constexpr double stiffer = 20.0;  // factor of the smoothness where a limit would be left
 constexpr double stiffest = 1e12;
+constexpr double used_share = 0.9;  // of the speed above the programmed one: the rest is for rounding
 
 }  // namespace
 
@@ -64,31 +65,85 @@ void RunCorrector::decide_to(std::size_t row) {
 
 void RunCorrector::correct(std::size_t begin, std::size_t end, std::size_t accepted) {
   const std::size_t m = end - begin;
-  // Windows are short against the way between two shapers that are followed: the nearest one serves.
-  const double place = rows_.place(begin + m / 2);
+  std::array<bool, axis_count> acts{};
   for (std::size_t axis = 0; axis < axis_count; ++axis) {
-    ContourSolver& solver = solvers_[static_cast<std::size_t>(std::lround(place))][axis];
-    const std::size_t past = solver.reach() + 2;
+    const std::size_t reach = solver(begin, end, axis).reach();
     const double* error = rows_.error(axis, begin);
-    double* correction = rows_.correction(axis, begin);
+    const double* correction = rows_.correction(axis, begin);
     const auto still = [](double value) { return std::abs(value) <= 1e-9; };
-    if (std::all_of(error, error + m + solver.reach(), still) && std::all_of(correction - past, correction, still)) {
+    acts[axis] = !std::all_of(error, error + m + reach, still) ||
+                 !std::all_of(correction - static_cast<std::ptrdiff_t>(reach + 2), correction, still);
+    if (!acts[axis]) {
       continue;
     }
-    window_.assign(correction - past, correction + m);
-    stiffness_.clear();
+    stiffness_[axis].clear();
     for (int attempt = 0;; ++attempt) {
-      solver.solve({error, m + solver.reach()}, window_, stiffness_);
-      std::copy(window_.begin() + static_cast<std::ptrdiff_t>(past), window_.end(), correction);
+      solve(begin, end, axis);
       if (attempt > attempts || !asks_too_much(begin, end, axis)) {
         break;
       }
       if (attempt == attempts) {
-        std::ranges::fill(stiffness_, stiffest);
+        std::ranges::fill(stiffness_[axis], stiffest);
       }
     }
-    std::fill(correction + (accepted - begin), correction + m, 0.0);
   }
+  for (int attempt = 0; attempt <= attempts && runs_too_fast(begin, end); ++attempt) {
+    for (std::size_t axis = 0; axis < axis_count; ++axis) {
+      if (acts[axis]) {
+        stiffen(m + 2, axis);
+        if (attempt == attempts) {
+          std::ranges::fill(stiffness_[axis], stiffest);
+        }
+        solve(begin, end, axis);
+      }
+    }
+    raised_.clear();
+  }
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    if (acts[axis]) {
+      double* correction = rows_.correction(axis, begin);
+      std::fill(correction + (accepted - begin), correction + m, 0.0);
+    }
+  }
+}
+
+// Windows are short against the way between two shapers that are followed: the nearest one serves.
+ContourSolver& RunCorrector::solver(std::size_t begin, std::size_t end, std::size_t axis) {
+  return solvers_[static_cast<std::size_t>(std::lround(rows_.place(begin + (end - begin) / 2)))][axis];
+}
+
+void RunCorrector::solve(std::size_t begin, std::size_t end, std::size_t axis) {
+  const std::size_t m = end - begin;
+  ContourSolver& by = solver(begin, end, axis);
+  const auto past = static_cast<std::ptrdiff_t>(by.reach() + 2);
+  double* correction = rows_.correction(axis, begin);
+  window_.assign(correction - past, correction + m);
+  by.solve({rows_.error(axis, begin), m + by.reach()}, window_, stiffness_[axis]);
+  std::copy(window_.begin() + past, window_.end(), correction);
+}
+
+// One step per look, however many rows complain.
+void RunCorrector::blame(std::size_t row, std::size_t begin, std::size_t end) {
+  const auto acting = static_cast<std::size_t>(rows_.filter().shaper_rows()) + 4;
+  for (std::size_t k = std::max(row - std::min(row, acting), begin); k < std::min(row + 3, end + 2); ++k) {
+    raised_.push_back(k - begin);
+  }
+}
+
+bool RunCorrector::stiffen(std::size_t rows, std::size_t axis) {
+  std::ranges::sort(raised_);
+  raised_.erase(std::unique(raised_.begin(), raised_.end()), raised_.end());
+  if (raised_.empty()) {
+    return false;
+  }
+  std::vector<double>& stiffness = stiffness_[axis];
+  if (stiffness.empty()) {
+    stiffness.assign(rows, 1.0);
+  }
+  for (const std::size_t k : raised_) {
+    stiffness[k] *= stiffer;
+  }
+  return true;
 }
 
 bool RunCorrector::asks_too_much(std::size_t begin, std::size_t end, std::size_t axis) {
@@ -112,28 +167,40 @@ bool RunCorrector::asks_too_much(std::size_t begin, std::size_t end, std::size_t
     speed_limit = std::max(speed_limit, speed);
     acceleration_limit = std::max(acceleration_limit, acceleration);
   });
-  bool found = false;
   look(true, [&](std::size_t row, double speed, double acceleration) {
-    if (speed <= speed_limit * (1.0 + 1e-6) && acceleration <= acceleration_limit * (1.0 + 1e-6)) {
-      return;
-    }
-    if (stiffness_.empty()) {
-      stiffness_.assign(end - begin + 2, 1.0);
-    }
-    found = true;
-    // One step per look, however many rows complain.
-    const std::size_t low = row - std::min(row, shaper_rows + 4);
-    for (std::size_t k = std::max(low, begin); k < std::min(row + 3, end + 2); ++k) {
-      raised_.push_back(k - begin);
+    if (speed > speed_limit * (1.0 + 1e-6) || acceleration > acceleration_limit * (1.0 + 1e-6)) {
+      blame(row, begin, end);
     }
   });
-  std::ranges::sort(raised_);
-  raised_.erase(std::unique(raised_.begin(), raised_.end()), raised_.end());
-  for (const std::size_t k : raised_) {
-    stiffness_[k] *= stiffer;
-  }
+  const bool found = stiffen(end - begin + 2, axis);
   raised_.clear();
   return found;
+}
+
+bool RunCorrector::runs_too_fast(std::size_t begin, std::size_t end) {
+  const double ratio = rows_.filter().feed_excess_ratio;
+  if (!std::isfinite(ratio)) {
+    return false;
+  }
+  const double period = 2.0 * rows_.filter().half_period_s;
+  const auto at = [&](std::ptrdiff_t row, bool corrected) {
+    return Vector3(rows_.shaped(0, row, corrected), rows_.shaped(1, row, corrected), rows_.shaped(2, row, corrected));
+  };
+  const auto from = static_cast<std::ptrdiff_t>(begin + begin % 2);
+  const auto to = static_cast<std::ptrdiff_t>(end) + rows_.filter().shaper_rows() + 4;
+  Vector3 plain = at(from - 2, false);
+  Vector3 last = at(from - 2, true);
+  for (std::ptrdiff_t row = from; row <= to; row += 2) {
+    const Vector3 next_plain = at(row, false);
+    const Vector3 next = at(row, true);
+    const double allowed = (1.0 + used_share * ratio) * period * rows_.programmed_feed(row);
+    if ((next - last).norm() > std::max(allowed, (next_plain - plain).norm() * (1.0 + 1e-6))) {
+      blame(static_cast<std::size_t>(row), begin, end);
+    }
+    plain = next_plain;
+    last = next;
+  }
+  return !raised_.empty();
 }
 
 }  // namespace shapegcode

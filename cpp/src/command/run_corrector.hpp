@@ -18,7 +18,8 @@ struct RunLimits {
 /// Corrects the command of a run before shaping so that the shaped command or the response keeps to the path: windows
 /// around the rows that would leave it, solved per axis, carried on where they are long. The correction is zero at both
 /// ends of the run: nothing moves before the start and nothing is added behind the stop. Where the corrected command
-/// would ask more of an axis than `limits`, the correction is made smoother there, down to none.
+/// would ask more of an axis than `limits`, or run faster along the path than the filter's share of the programmed feed
+/// allows, the correction is made smoother there, down to none.
 class RunCorrector {
  public:
   RunCorrector(RunReader& rows, const RunLimits& limits);
@@ -30,8 +31,17 @@ class RunCorrector {
 
  private:
   void correct(std::size_t begin, std::size_t end, std::size_t accepted);
-  /// Whether the corrected command leaves a limit that the plain one keeps; where it does, `stiffness_` is raised.
+  [[nodiscard]] ContourSolver& solver(std::size_t begin, std::size_t end, std::size_t axis);
+  void solve(std::size_t begin, std::size_t end, std::size_t axis);
+  /// Whether the corrected command leaves a limit that the plain one keeps; where it does, the axis' stiffness is
+  /// raised.
   [[nodiscard]] bool asks_too_much(std::size_t begin, std::size_t end, std::size_t axis);
+  /// The same of the speed along the path: the stiffness of all axes is raised.
+  [[nodiscard]] bool runs_too_fast(std::size_t begin, std::size_t end);
+  /// Notes the rows of a window whose corrections act at `row`.
+  void blame(std::size_t row, std::size_t begin, std::size_t end);
+  /// One step of stiffness for all that were noted; false if none were.
+  bool stiffen(std::size_t rows, std::size_t axis);
 
   RunReader& rows_;
   RunLimits limits_;
@@ -40,7 +50,7 @@ class RunCorrector {
   std::size_t scan_ = 0;     // rows looked at for something to correct
   std::size_t decided_ = 0;  // rows whose correction is final
   std::vector<double> window_;
-  std::vector<double> stiffness_;
+  std::array<std::vector<double>, axis_count> stiffness_;
   std::vector<std::size_t> raised_;
 };
 

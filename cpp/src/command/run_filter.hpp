@@ -8,6 +8,7 @@
 #include "shapegcode/command.hpp"
 #include "shapegcode/filter.hpp"
 #include "shapegcode/mode.hpp"
+#include "shapegcode/motion.hpp"
 
 namespace shapegcode {
 
@@ -35,6 +36,7 @@ struct RunFilter {
   double mean_delay_s;                                               ///< of the shaper
   std::vector<std::array<std::vector<double>, axis_count>> kernels;  ///< one per shaper that is followed
   double smoothness;
+  double feed_excess_ratio = MotionLimits::none;  ///< see ShapingOptions
 
  private:
   int longest_ = 0;

@@ -60,13 +60,15 @@ void RunReader::read_command() {
     command_[axis].push_back(position[static_cast<Eigen::Index>(axis)]);
     correction_[axis].push_back(0.0);
   }
+  const Segment& on = (*path_)[ahead_.segment()];
+  if (read_ == 0) feed_.assign(static_cast<std::size_t>(history_), on.feed_mm_per_s);
+  feed_.push_back(on.feed_mm_per_s);
   if (filter_.following) {
     const double here = position[filter_.following->axis()];
     if (read_ == 0) place_.assign(static_cast<std::size_t>(history_), filter_.following->place(here));
     const Column& along = command_[static_cast<std::size_t>(filter_.following->axis())];
     place_.push_back(filter_.following->place(0.5 * (here + along[along.size() - 2])));
   }
-  const Segment& on = (*path_)[ahead_.segment()];
   if (on.kind == SegmentKind::arc && read_ < rows_in_) {
     arcs_.push_back({read_, static_cast<std::int8_t>(on.normal)});
   }
@@ -174,6 +176,16 @@ double RunReader::shaped(std::size_t axis, std::ptrdiff_t row, bool corrected) c
   return sum;
 }
 
+double RunReader::programmed_feed(std::ptrdiff_t row) const noexcept {
+  const auto delay = static_cast<std::ptrdiff_t>(std::lround(filter_.mean_delay_s / filter_.half_period_s));
+  const auto last = static_cast<std::ptrdiff_t>(feed_.size()) - 1;
+  double feed = 0.0;
+  for (std::ptrdiff_t k = row - delay - 1; k <= row - delay + 1; ++k) {
+    feed = std::max(feed, feed_[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k - base_, 0, last))]);
+  }
+  return feed;
+}
+
 void RunReader::forget(std::size_t out) {
   const auto keep = static_cast<std::ptrdiff_t>(out) - history_;
   if (keep - base_ < static_cast<std::ptrdiff_t>(forget_after)) {
@@ -187,6 +199,7 @@ void RunReader::forget(std::size_t out) {
       drop(error_[axis]);
     }
   }
+  drop(feed_);
   if (filter_.following) {
     drop(place_);
   }

@@ -47,6 +47,8 @@ class RunReader {
   [[nodiscard]] double* correction(std::size_t axis, std::size_t row) noexcept {
     return correction_[axis].data() + index(row);
   }
+  /// The programmed feed where the shaped command is at a row, or a row beside it, in mm/s.
+  [[nodiscard]] double programmed_feed(std::ptrdiff_t row) const noexcept;
   /// Place of a row in the set of shapers that are followed; 0 without one.
   [[nodiscard]] double place(std::size_t row) const noexcept { return place_.empty() ? 0.0 : place_[index(row)]; }
   /// Whether a row's deviation is worth a correction.
@@ -96,6 +98,7 @@ class RunReader {
   std::ptrdiff_t base_ = 0;                 // row of the first entry of the columns
   std::size_t read_ = 0;                    // rows read
   std::array<Column, axis_count> command_;  // before shaping
+  Column feed_;                             // programmed, of the command before shaping
   Column place_;                            // in the set of shapers that are followed, else empty
   std::array<Column, axis_count> error_;    // to be corrected
   std::array<Column, axis_count> correction_;

@@ -80,6 +80,14 @@ RegionShaper::State::State(std::shared_ptr<const Path> path, const Fir& shaper,
               options_.modes, options_.block_period_s, options_.contour_smoothness,
               {options_.following, options_.mode_tables}),
       marks_(marked_segments.begin(), marked_segments.end()) {
+  filter_.feed_excess_ratio = options_.feed_excess_ratio;
+  if (std::isfinite(options_.feed_excess_ratio)) {
+    // A shaper delays by half its length, or so: what it mixes lies that far to both sides.
+    const double last_tap_s = filter_.shaper_rows() * filter_.half_period_s;
+    options_.limits.feed_excess_ratio = options_.feed_excess_ratio;
+    options_.limits.feed_spread_s =
+        std::max(filter_.mean_delay_s, last_tap_s - filter_.mean_delay_s) + 0.5 * options_.rest_at_stop_s;
+  }
   const double ticks = options_.block_period_s / options_.interpolation_period_s;
   if (!(ticks >= 1.0 - 1e-9) || !(std::abs(ticks - std::round(ticks)) <= 1e-6)) {
     throw Error(ErrorKind::argument,

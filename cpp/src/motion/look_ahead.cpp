@@ -28,6 +28,8 @@ void check_limits(const MotionLimits& limits, const FilterTolerance& filter) {
   require_limit(limits.feed_override, "feed override", "");
   require_limit(limits.arc_feed_ratio, "arc feed ratio", "");
   require_not_below_zero(limits.jerk_time_s, "jerk time", "s");
+  require_not_below_zero(limits.feed_spread_s, "spread of feeds", "s");
+  require_not_below_zero(limits.feed_excess_ratio, "excess of feeds", "");
   require_limit(filter.contour_tolerance_mm, "contour tolerance", "mm");
   require_limit(limits.centripetal_acceleration_mm_per_s2, "centripetal acceleration", "mm/s2");
   for (int i = 0; i < axis_count; ++i) {
@@ -134,24 +136,14 @@ void extend(Zone& zone, double limit, double reach) {
   }
 }
 
-std::vector<Piece> make_pieces(const Path& path, const MotionLimits& limits, const std::vector<double>& speed,
-                               const std::vector<double>& corner, double jerk_s) {
+// Zones on both sides of every junction: `limits(from, into)` is the speed that reaches over it and the way it reaches.
+template <class Limit>
+void sweep_zones(const Path& path, Limit&& limit, std::vector<Zone>& at_start, std::vector<Zone>& at_end) {
   const std::size_t n = path.size();
-  std::vector<Piece> pieces;
-  pieces.reserve(n);
-  if (jerk_s <= 0.0) {
-    for (std::size_t i = 0; i < n; ++i) {
-      pieces.push_back({path[i].length_mm, speed[i], segment_acceleration(path[i], speed[i], limits), 0.0});
-    }
-    return pieces;
-  }
-  std::vector<Zone> at_start(n);
-  std::vector<Zone> at_end(n);
-  const auto sweep = [&](std::size_t from, std::size_t into, double corner_limit, Zone carry,
-                         std::vector<Zone>& zones) {
-    const double limit = std::min(corner_limit, speed[from]);
-    if (limit < speed[into]) {
-      extend(carry, limit, 0.5 * limit * jerk_s);
+  const auto sweep = [&](std::size_t from, std::size_t into, Zone carry, std::vector<Zone>& zones) {
+    const Zone own = limit(from, into);
+    if (own.limit < MotionLimits::none) {
+      extend(carry, own.limit, own.reach);
     }
     zones[into] = carry;
     const double left = carry.reach - path[into].length_mm;
@@ -159,30 +151,87 @@ std::vector<Piece> make_pieces(const Path& path, const MotionLimits& limits, con
   };
   Zone carry;
   for (std::size_t i = 1; i < n; ++i) {
-    carry = sweep(i - 1, i, corner[i], carry, at_start);
+    carry = sweep(i - 1, i, carry, at_start);
   }
   carry = Zone{};
   for (std::size_t i = n - 1; i > 0; --i) {
-    carry = sweep(i, i - 1, corner[i], carry, at_end);
+    carry = sweep(i, i - 1, carry, at_end);
   }
-  for (std::size_t i = 0; i < n; ++i) {
-    const double length = path[i].length_mm;
-    const double head = std::min(at_start[i].reach, length);
-    const double tail = std::max(length - at_end[i].reach, 0.0);
-    double marks[4] = {0.0, std::min(head, tail), std::max(head, tail), length};
-    for (int k = 0; k < 3; ++k) {
+}
+
+// Slow stretches that reach over junctions: corners for the jerk time, programmed feeds for what a filter mixes.
+class Zones {
+ public:
+  Zones(const Path& path, const MotionLimits& limits, const std::vector<double>& speed,
+        const std::vector<double>& corner, double jerk_s)
+      : n_(path.size()) {
+    if (jerk_s > 0.0) {
+      add(path, [&](std::size_t from, std::size_t into) {
+        const double least = std::min(corner[std::max(from, into)], speed[from]);
+        return least < speed[into] ? Zone{least, 0.5 * least * jerk_s} : Zone{};
+      });
+    }
+    if (limits.feed_spread_s > 0.0) {
+      add(path, [&](std::size_t from, std::size_t into) {
+        const double feed = path[from].feed_mm_per_s * limits.feed_override;
+        return feed * (1.0 + limits.feed_excess_ratio) < speed[into] ? Zone{feed, feed * (limits.feed_spread_s + 0.5 * jerk_s)} : Zone{};
+      });
+    }
+  }
+
+  [[nodiscard]] bool empty() const noexcept { return sides_.empty(); }
+
+  // The borders of a segment's stretches, and the limit between two of them.
+  void split(std::size_t i, double length, double limit, std::vector<std::pair<double, double>>& stretches) const {
+    std::vector<double> marks{0.0, length};
+    for (const auto& [at_start, at_end] : sides_) {
+      marks.push_back(std::min(at_start[i].reach, length));
+      marks.push_back(std::max(length - at_end[i].reach, 0.0));
+    }
+    std::ranges::sort(marks);
+    for (std::size_t k = 0; k + 1 < marks.size(); ++k) {
       const double middle = 0.5 * (marks[k] + marks[k + 1]);
       if (marks[k + 1] <= marks[k]) {
         continue;
       }
-      double limit = speed[i];
-      if (middle < head) {
-        limit = std::min(limit, at_start[i].limit);
+      double least = limit;
+      for (const auto& [at_start, at_end] : sides_) {
+        if (middle < at_start[i].reach) {
+          least = std::min(least, at_start[i].limit);
+        }
+        if (middle > length - at_end[i].reach) {
+          least = std::min(least, at_end[i].limit);
+        }
       }
-      if (middle > tail) {
-        limit = std::min(limit, at_end[i].limit);
-      }
-      pieces.push_back({marks[k + 1] - marks[k], limit, segment_acceleration(path[i], limit, limits), 0.0});
+      stretches.emplace_back(marks[k + 1] - marks[k], least);
+    }
+  }
+
+ private:
+  template <class Limit>
+  void add(const Path& path, Limit&& limit) {
+    auto& [at_start, at_end] = sides_.emplace_back(std::vector<Zone>(n_), std::vector<Zone>(n_));
+    sweep_zones(path, limit, at_start, at_end);
+  }
+
+  std::size_t n_;
+  std::vector<std::pair<std::vector<Zone>, std::vector<Zone>>> sides_;  // at the start and at the end of each segment
+};
+
+std::vector<Piece> make_pieces(const Path& path, const MotionLimits& limits, const std::vector<double>& speed,
+                               const Zones& zones) {
+  std::vector<Piece> pieces;
+  pieces.reserve(path.size());
+  std::vector<std::pair<double, double>> stretches;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    stretches.clear();
+    if (zones.empty()) {
+      stretches.emplace_back(path[i].length_mm, speed[i]);
+    } else {
+      zones.split(i, path[i].length_mm, speed[i], stretches);
+    }
+    for (const auto& [length, limit] : stretches) {
+      pieces.push_back({length, limit, segment_acceleration(path[i], limit, limits), 0.0});
     }
   }
   return pieces;
@@ -191,8 +240,8 @@ std::vector<Piece> make_pieces(const Path& path, const MotionLimits& limits, con
 // Highest speeds where pieces meet. With a jerk time the corner limits are already limits of the pieces around the
 // corner.
 std::vector<double> piece_boundaries(const Path& path, const std::vector<Piece>& pieces,
-                                     const std::vector<double>& corner, double jerk_s) {
-  if (jerk_s <= 0.0) {
+                                     const std::vector<double>& corner, const Zones& zones) {
+  if (zones.empty()) {
     return corner;
   }
   std::vector<double> boundary(pieces.size() + 1, MotionLimits::none);
@@ -395,8 +444,9 @@ SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const Filt
     fastest_acceleration = std::max(fastest_acceleration, segment_acceleration(path[i], speed[i], limits));
   }
   const double jerk_s = jerk_time(limits, fastest_acceleration);
-  std::vector<Piece> pieces = make_pieces(path, limits, speed, corner, jerk_s);
-  const std::vector<double> boundary = piece_boundaries(path, pieces, corner, jerk_s);
+  const Zones zones(path, limits, speed, corner, jerk_s);
+  std::vector<Piece> pieces = make_pieces(path, limits, speed, zones);
+  const std::vector<double> boundary = piece_boundaries(path, pieces, corner, zones);
   pass_speeds(pieces, boundary);
   PhaseList list;
   for (std::size_t i = 0; i < pieces.size(); ++i) {

@@ -9,6 +9,7 @@
 
 #include "base/checks.hpp"
 #include "play/axis_plant.hpp"
+#include "play/feed_meter.hpp"
 #include "play/filter_chain.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/measure/contour.hpp"
@@ -49,6 +50,7 @@ class Recorder {
         response_tracker_(command_tracker_),
         orbit_(tracks_contour_ ? path : a_point()),
         response_orbit_(tracks_response_orbit_ ? path : a_point()),
+        feed_(path, options),
         command_reach_(tracks_contour_ ? path : a_point()),
         response_reach_(command_reach_) {}
 
@@ -83,7 +85,11 @@ class Recorder {
     before_last_ = last_;
     last_ = command;
     if (tracks_command_) {
-      figures_.command.add(command_tracker_.step(command));
+      const double deviation = command_tracker_.step(command);
+      figures_.command.add(deviation);
+      if (feed_.measures()) {
+        feed_.step(command, command_tracker_, deviation);
+      }
       orbit_.step(command, command_tracker_.segment());
       command_reach_.step(command, command_tracker_.s_mm());
     }
@@ -108,6 +114,7 @@ class Recorder {
     figures_.settling_s = rest.settling_s;
     figures_.peak_acceleration_mm_per_s2 = acceleration_ / (options_.period_s * options_.period_s);
     figures_.end_mm = last_;
+    figures_.feed_excess = feed_.largest();
     if (tracks_contour_) {
       if (options_.measure_command) {
         figures_.orbit_error_percent = orbit_.percent();
@@ -210,6 +217,7 @@ class Recorder {
   ContourTracker response_tracker_;
   OrbitError orbit_;
   OrbitError response_orbit_;
+  detail::FeedMeter feed_;
   CornerReach command_reach_;
   CornerReach response_reach_;
   PlaybackFigures figures_;

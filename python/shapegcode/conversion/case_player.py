@@ -31,6 +31,7 @@ class CasePlayer:
         target: what the contour tolerance is about.
         offset: from the region's positions to the machine's.
         tracker: of the programmed path.
+        increment_mm: least increment of the text.
     """
 
     blocks: _core.Path
@@ -40,6 +41,7 @@ class CasePlayer:
     target: Target
     offset: Offset
     tracker: _core.ContourTracker
+    increment_mm: float
 
     def nominal(self, rule: _core.BlockEnd) -> _core.PlaybackFigures:
         """Blocks at 100 %; under the controller's own rule also with an empty buffer where a stop excites most."""
@@ -47,7 +49,7 @@ class CasePlayer:
         return self.model.play_emitted(
             self.blocks, self.path, rule, offset=self.offset,
             starved_blocks=_core.fastest_block_ends(self.blocks) if own else (),
-            memory_s=self.model.vibration_memory_s, tracker=self.tracker,
+            memory_s=self.model.vibration_memory_s, tracker=self.tracker, increment_mm=self.increment_mm,
         )  # fmt: skip
 
     def planned(self) -> _core.PlaybackFigures | None:

@@ -40,6 +40,8 @@ from shapegcode.shaping.grid import Grid, choose_grid
 __all__ = ["convert"]
 
 _CONTOUR_MARGIN = 0.95  # of the tolerance: the rest is for rounding and for what the simple bound leaves out
+_SLOWER = 0.98  # than what would just be slow enough
+_LEAST_FEED_SHARE = 0.5  # of the programmed feed: what runs too fast at that is not the feed's doing
 _HELPED = 0.98  # of what was reached before: less room that brings no more is taken back
 _ATTEMPTS = 8  # each with less room for the regions that left the contour tolerance; few need more than two
 
@@ -161,6 +163,7 @@ class _Run:
         self.writer = TextWriter(program, self.model, self.grid)
         self.judge = Judge(self.model)
         self.reasons = [why_kept(region, machine, self.grid) for region in program.regions]
+        self.feed_share = [1.0] * len(program.regions)
         self.room_um = [machine.tolerance.contour_um * _CONTOUR_MARGIN] * len(program.regions)
         self.kept: dict[int, KeptRegion] = {}
         self.spending = None if budget is None else Spending(budget, program, machine)
@@ -237,8 +240,9 @@ class _Run:
         # Of what was given up for a budget, or gains nothing, one sentence speaks for all.
         given_up = {} if self.spending is None else self.spending.given_up
         written = self.writer.write(
-            self.reasons, self.room_um, {*given_up, *self.kept}, on_progress, with_loads=self.spending is not None
-        )
+            self.reasons, self.room_um, self.feed_share, {*given_up, *self.kept}, on_progress,
+            with_loads=self.spending is not None,
+        )  # fmt: skip
         for index, reason in written.no_room.items():
             self.reasons[index] = reason
         return written
@@ -254,9 +258,22 @@ class _Run:
             figures = self.judge.measure(
                 emitted, written.placed, originals, self.pool, partial(self.on_progress, "round trip")
             )
-            if attempt + 1 == _ATTEMPTS or not self._tighten(tried, written, figures):
+            slower = self._slow_down(written, figures)
+            if attempt + 1 == _ATTEMPTS or not (self._tighten(tried, written, figures) or slower):
                 break
         return _Settled(written, emitted, figures)
+
+    def _slow_down(self, written: Written, figures: list[RegionFigures]) -> bool:
+        """Give regions that run faster along the path than the machine allows a lower feed. False if there are none."""
+        limit = 1.0 + self.machine.tolerance.feed_excess_ratio
+        places = {id(region): index for index, region in enumerate(self.program.regions)}
+        slower = False
+        for place, region in zip(written.placed, figures, strict=True):
+            index, ratio = places[id(place.region)], region.feed_excess.ratio
+            if ratio > limit and self.feed_share[index] > _LEAST_FEED_SHARE:
+                self.feed_share[index] = max(_LEAST_FEED_SHARE, self.feed_share[index] * _SLOWER * limit / ratio)
+                slower = True
+        return slower
 
     def _tighten(self, tried: dict[int, _Attempt], written: Written, figures: list[RegionFigures]) -> bool:
         """Give regions that left the contour tolerance less room, so that they run slower. False if there is none.
@@ -319,6 +336,7 @@ class _Run:
                 machine.tolerance.residual_ratio,
                 machine.tolerance.residual_floor_um,
                 machine.tolerance.residual_floor_increments,
+                machine.tolerance.feed_excess_ratio,
             ),
             warnings=tuple(warnings),
             budget=self.spending.outcome(self.grid, written) if self.spending is not None else None,

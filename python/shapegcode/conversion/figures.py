@@ -14,6 +14,7 @@ __all__ = [
     "AppliedLimits",
     "BlockCount",
     "CaseVerdict",
+    "FeedExcess",
     "FollowingShapers",
     "FrequencyResidual",
     "GridTaps",
@@ -103,6 +104,7 @@ class AppliedLimits:
         residual_ratio: of the original's residual vibration.
         residual_floor_um: residual vibration below this passes.
         residual_floor_increments: likewise, in least increments.
+        feed_excess_ratio: share by which the set-points may run faster than programmed.
     """
 
     contour_um: float
@@ -110,6 +112,7 @@ class AppliedLimits:
     residual_ratio: float
     residual_floor_um: float
     residual_floor_increments: float
+    feed_excess_ratio: float
 
 
 @dataclass(frozen=True)
@@ -196,6 +199,33 @@ def _share(case: CaseVerdict) -> float:
 
 
 @dataclass(frozen=True)
+class FeedExcess:
+    """Where the emitted blocks are fastest against the feed that is programmed at the same place of the path.
+
+    The speed is that of the set-points along their own way, over one, four or sixteen shortest blocks, less two
+    increments by which rounding may lengthen it; places are matched by the way travelled, not by time.
+
+    Attributes:
+        ratio: speed over programmed feed; 1: as programmed.
+        speed_mm_per_min: of the set-points.
+        programmed_mm_per_min: at the same place.
+        line: that programs this feed, of the original.
+    """
+
+    ratio: float
+    speed_mm_per_min: float
+    programmed_mm_per_min: float
+    line: int
+
+    def __str__(self) -> str:
+        """For people."""
+        return (
+            f"runs at {self.speed_mm_per_min:.1f} mm/min where line {self.line} programs "
+            f"{self.programmed_mm_per_min:.1f}, {(self.ratio - 1.0) * 100.0:.0f} % faster"
+        )
+
+
+@dataclass(frozen=True)
 class RegionVerdict:
     """One region as programmed and as emitted, beside its limits.
 
@@ -206,6 +236,7 @@ class RegionVerdict:
         residual_vibration_um: largest |table - command| while they rest; emitted: worse of both rules of block timing.
         residual_limit_um: what the emitted one is judged by.
         contour_error_um: of the emitted blocks, of what the tolerance is about.
+        feed_excess: where they run fastest against the programmed feed.
         misses: every tolerance that it leaves, in words.
     """
 
@@ -215,6 +246,7 @@ class RegionVerdict:
     residual_vibration_um: Pair[Xyz[float]]
     residual_limit_um: Xyz[float]
     contour_error_um: float
+    feed_excess: FeedExcess
     misses: tuple[str, ...]
 
     def over_limit(self) -> Iterator[tuple[float, float]]:
@@ -236,6 +268,7 @@ class PlayedFigures:
         override_residual: residual vibration of the emitted program at 80, 90, 110 and 120 %.
         frequency_residual: with every mode off by its uncertainty; empty where none states one.
         slowed_blocks: emitted blocks that step an axis by more than the corner limit of the look-ahead.
+        feed_excess: where the emitted blocks run fastest against the programmed feed; null where nothing was shaped.
         cases: every case in which the emitted program was played.
         worst_case: the one that decides; null where nothing was shaped.
         regions: in the order of the program.
@@ -248,6 +281,7 @@ class PlayedFigures:
     override_residual: tuple[OverrideResidual, ...]
     frequency_residual: tuple[FrequencyResidual, ...]
     slowed_blocks: int
+    feed_excess: FeedExcess | None
     cases: tuple[CaseVerdict, ...]
     worst_case: CaseVerdict | None
     regions: tuple[RegionVerdict, ...]

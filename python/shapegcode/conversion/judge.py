@@ -23,6 +23,7 @@ from shapegcode.conversion.cases import (
 )
 from shapegcode.conversion.figures import (
     CaseVerdict,
+    FeedExcess,
     FrequencyResidual,
     OverrideResidual,
     PlayedFigures,
@@ -57,6 +58,12 @@ class RegionFigures:
     emitted: tuple[_core.PlaybackFigures, ...]
     cases: tuple[CaseFigures, ...]
     slowed_blocks: int
+
+    @property
+    def feed_excess(self) -> FeedExcess:
+        """Where the emitted blocks run fastest against the programmed feed, in the worse rule."""
+        worst = max((run.feed_excess for run in self.emitted), key=lambda each: each.ratio)
+        return FeedExcess(worst.ratio, worst.speed_mm_per_s * 60.0, worst.programmed_mm_per_s * 60.0, worst.line)
 
     @property
     def emitted_s(self) -> float:
@@ -107,6 +114,7 @@ class Judge:
             player = CasePlayer(
                 place.blocks(emitted), place.region.path, self._model, self.cases, self.target,
                 self._model.offset(place.region), _core.ContourTracker(place.region.path),
+                least_increment_mm(self._machine, place.region.exit.units),
             )  # fmt: skip
             runs = [pool.submit(player.nominal, rule) for rule in BLOCK_ENDS]
             planned = pool.submit(player.planned)
@@ -198,6 +206,7 @@ class Judge:
                 if case.mode == ALL_MODES and case.override == 1.0
             ),
             slowed_blocks=sum(region.slowed_blocks for region in figures),
+            feed_excess=max((region.feed_excess for region in figures), key=lambda each: each.ratio, default=None),
             cases=cases,
             worst_case=worst_counted(cases),
             regions=self.verdicts(figures, placed, block_period_s),
@@ -235,6 +244,9 @@ class Judge:
         limits = self.limits(figures, place)
         after = np.max([run.residual_mm for run in figures.emitted], axis=0)
         misses = [*region_misses(self.cases, figures.cases, limits), *_haste(figures, place, block_period_s)]
+        excess, allowed = figures.feed_excess, self._machine.tolerance.feed_excess_ratio
+        if excess.ratio > 1.0 + allowed:
+            misses.append(f"{excess}, limit {allowed * 100.0:g} %")
         return RegionVerdict(
             lines=place.original_lines,
             emitted_lines=(place.first_line, place.last_line),
@@ -242,6 +254,7 @@ class Judge:
             residual_vibration_um=Pair(largest_xyz_um([figures.original.residual_mm]), largest_xyz_um([after])),
             residual_limit_um=Xyz(*limits.residual_um.tolist()),
             contour_error_um=max(getattr(run, limits.target).max_abs_mm for run in figures.emitted) * 1e3,
+            feed_excess=excess,
             misses=tuple(misses),
         )
 

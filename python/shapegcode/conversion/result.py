@@ -154,7 +154,7 @@ class Conversion(PlayedFigures, Result):
         """Original against emitted; the cases of the verdict; what it rests on. None where nothing was shaped."""
         if self.nothing_shaped:
             return []
-        groups = [self._times(), *self._vibrations(), *self._contours(), self._orbits(), self._sizes()]
+        groups = [self._times(), *self._vibrations(), *self._contours(), self._orbits(), self._feeds(), self._sizes()]
         cases = [case_table(self.cases, self.worst_case)] if self.cases else []
         return [before_after_table(groups), *cases, *([rests_table(self.rests_on)] if self.rests_on else [])]
 
@@ -200,6 +200,16 @@ class Conversion(PlayedFigures, Result):
             return []
         name = "orbit error" if len(errors) == 1 else f"largest orbit error of {len(errors)} arcs"
         return [BeforeAfter(name, "%", None, max(errors, key=abs), 4)]
+
+    def _feeds(self) -> list[BeforeAfter]:
+        if self.feed_excess is None:
+            return []
+        above = max(0.0, self.feed_excess.ratio - 1.0) * 100.0
+        return [
+            BeforeAfter(
+                "speed above the programmed feed", "%", None, above, limit=self.limits.feed_excess_ratio * 100.0
+            )
+        ]
 
     def _sizes(self) -> list[BeforeAfter]:
         """Figures of the emitted program and its shaper."""

@@ -98,12 +98,15 @@ class TextWriter:
         self._model = model
         self.grid = grid
         self._regions = RegionWriter(model, grid)
-        self._shaped: dict[int, tuple[float, EmittedRegion]] = {}  # by region: its room, and what it came to
+        self._shaped: dict[
+            int, tuple[tuple[float, float], EmittedRegion]
+        ] = {}  # by region: room and feed, and what it came to
 
     def write(
         self,
         reasons: Sequence[str],
         room_um: Sequence[float],
+        feed_share: Sequence[float],
         untold: Collection[int] = (),
         on_progress: Step = lambda _done, _total: None,
         *,
@@ -114,6 +117,7 @@ class TextWriter:
         Args:
             reasons: why a region keeps its text, per region; empty: it is shaped.
             room_um: deviation that its feed is planned for, per region, µm.
+            feed_share: of the programmed feed that it is planned with, per region.
             untold: indices of kept regions that need no warning of their own.
             on_progress: called with regions done and regions in all.
             with_loads: measure what each region asks of memory, line and control.
@@ -133,7 +137,7 @@ class TextWriter:
         # Moves that stay as they are: all, less those of the regions that are shaped.
         shaped_moves = sum(len(each.path) for each, why in zip(regions, reasons, strict=True) if not why)
         kept_moves = core.move_count - shaped_moves
-        for index, (region, reason, room) in enumerate(zip(regions, reasons, room_um, strict=True)):
+        for index, (region, reason) in enumerate(zip(regions, reasons, strict=True)):
             between = core.slice(position, region.text_begin)
             position = region.text_end
             line += between.count(b"\n")
@@ -141,7 +145,8 @@ class TextWriter:
             if not reason:
                 size -= region.text_end - region.text_begin
                 try:
-                    shaped = self._shape(index, region, room, self._room(size, blocks + kept_moves))
+                    aim = room_um[index], feed_share[index]
+                    shaped = self._shape(index, region, aim, self._room(size, blocks + kept_moves))
                 except NoRoomError as error:
                     written.no_room[index] = str(error)
             if shaped is None:
@@ -175,16 +180,17 @@ class TextWriter:
         controller = self._machine.controller
         return Room(controller.max_program_bytes - size, controller.max_program_moves - moves, self._machine)
 
-    def _shape(self, index: int, region: _core.Region, room_um: float, room: Room) -> EmittedRegion:
-        """The region's text; one whose tolerance is as it was in the text before is not shaped again."""
-        if index not in self._shaped or self._shaped[index][0] != room_um:
-            self._shaped[index] = (room_um, self._shaped_anew(region, room_um, room))
+    def _shape(self, index: int, region: _core.Region, aim: tuple[float, float], room: Room) -> EmittedRegion:
+        """The region's text; one whose tolerance and feed are as they were in the text before is not shaped again."""
+        if index not in self._shaped or self._shaped[index][0] != aim:
+            self._shaped[index] = (aim, self._shaped_anew(region, *aim, room))
         shaped = self._shaped[index][1]
         room.require(len(shaped.text), shaped.blocks)
         return shaped
 
-    def _shaped_anew(self, region: _core.Region, room_um: float, room: Room) -> EmittedRegion:
+    def _shaped_anew(self, region: _core.Region, room_um: float, feed_share: float, room: Room) -> EmittedRegion:
         limits = self._model.limits(arc_feed_ratio=self._machine.shaping.arc_feed_ratio)
+        limits.feed_override = feed_share
         try:
             return self._regions.write(self._program, region, limits, self._regions.tolerance(room_um), room)
         except _core.ArgumentError as error:

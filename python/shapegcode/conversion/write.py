@@ -182,6 +182,7 @@ class RegionWriter:
         options.target = _TARGETS[self._machine.shaping.contour]
         options.modes = plant.modes
         options.axis_shapers = list(grid.axis_firs)
+        options.feed_excess_ratio = self._machine.tolerance.feed_excess_ratio
         options.least_feed_mm_per_s = self._machine.controller.minimum_feed_mm_per_min / 60.0
         if grid.track is not None and (start := offset[grid.track.axis]) is not None:
             options.following = grid.track.following(start)

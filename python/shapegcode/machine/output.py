@@ -199,6 +199,13 @@ class Tolerance(TomlTable):
         unit="increments",
         default=5.0,
     )
+    feed_excess_ratio: Annotated[NonNegative, Field(ge=0.01, le=10)] = key(
+        "share by which the set-points may run faster along the path than the program says at the same place, counted "
+        "over one, four and sixteen shortest blocks less the two increments by which rounding may lengthen a block; "
+        "corrections of the contour keep to it, and ask for 0.01 at least",
+        unit="1",
+        default=0.05,
+    )
 
 
 class Verdict(TomlTable):

@@ -277,6 +277,7 @@ class MachineModel:
         starved_blocks: Sequence[int] = (),
         memory_s: float = 0.0,
         tracker: _core.ContourTracker | None = None,
+        increment_mm: float | None = None,
     ) -> _core.PlaybackFigures:
         """Emitted blocks as the controller plays them, measured against the programmed path.
 
@@ -295,6 +296,8 @@ class MachineModel:
             starved_blocks: behind each of these, tried one by one, the buffer is empty for `verdict.starved_s`.
             memory_s: how long after that its vibration is looked at; 0: to the end.
             tracker: of the programmed path, shared by several runs; None: one of its own.
+            increment_mm: least increment of the text: the speed is held against the programmed feed, less the two
+                increments by which rounding may lengthen a way; None: it is not.
 
         Returns:
             The figures, positions in mm.
@@ -304,6 +307,9 @@ class MachineModel:
         if tracker is not None:
             options.tracker = tracker
         options.measure_command = command_contour
+        if increment_mm is not None:
+            options.feed_window_s = max(self.machine.controller.block_time_s, self.period_s)
+            options.feed_slack_mm = 2.0 * increment_mm
         options.last_seconds = last_seconds
         options.record_samples = record_samples
         if starved_blocks:

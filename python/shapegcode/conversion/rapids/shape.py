@@ -202,7 +202,7 @@ def _without_contour(model: MachineModel) -> MachineModel:
     """The same machine for moves in the air: their contour is neither corrected nor judged."""
     machine = model.machine
     shaping = machine.shaping.model_copy(update={"contour": "off"})
-    tolerance = machine.tolerance.model_copy(update={"contour_um": math.inf})
+    tolerance = machine.tolerance.model_copy(update={"contour_um": math.inf, "feed_excess_ratio": math.inf})
     return MachineModel(machine.model_copy(update={"shaping": shaping, "tolerance": tolerance}))
 
 

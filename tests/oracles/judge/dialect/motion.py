@@ -183,14 +183,16 @@ class Motion:
         r = data.get("R", self.initial_level)
         z = data.get("bottom", r)
         over = BlockWords([w for w in block.words if w.letter != "XYZ"[normal]], self.line, self.calculator)
+        # Operator's manuals: scaling does not act on the depth of a peck and its return.
+        factor = abs(float(self.transform.factors[normal]))
         for _ in range(repeats):
             if any("XYZ"[k] in over for k in self.axes[:2]):
                 end = self.transform.forward(self.programmed_target(over))
                 end[normal] = self.position[normal]
                 self.straight("rapid", end)
             cycle = cycles.Cycle(
-                self.modal["cycle"], self.initial_level, r, z, data.get("Q", 0.0), data.get("P", 0.0),
-                self.modal["return_level"] == "G99", self.peck_clearance_mm,
+                self.modal["cycle"], self.initial_level, r, z, data.get("Q", 0.0) / factor, data.get("P", 0.0),
+                self.modal["return_level"] == "G99", self.peck_clearance_mm / factor,
             )  # fmt: skip
             for what, amount in cycles.steps(cycle):
                 self.cycle_step(what, amount)

@@ -1,0 +1,70 @@
+#include "play/feed_meter.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace shapegcode::detail {
+namespace {
+
+constexpr std::array<std::size_t, 3> window_periods{1, 4, 16};
+constexpr double least_gain = 1e-6;  // what is faster by less than this share is as fast
+
+}  // namespace
+
+FeedMeter::FeedMeter(const Path& path, const PlaybackOptions& options)
+    : path_(&path), period_s_(options.period_s), slack_mm_(options.feed_slack_mm) {
+  if (!(options.feed_window_s > 0.0) || path.size() == 0) {
+    return;
+  }
+  const double samples = std::max(1.0, std::round(options.feed_window_s / options.period_s));
+  for (std::size_t i = 0; i < windows_.size(); ++i) {
+    windows_[i] = window_periods[i] * static_cast<std::size_t>(samples);
+  }
+  rows_.resize(windows_.back() + 1);
+}
+
+void FeedMeter::step(const Vector3& command, const ContourTracker& tracker, double deviation_mm) noexcept {
+  Row& now = rows_[count_ % rows_.size()];
+  double travelled = 0.0;
+  if (count_ > 0) {
+    const Row& last = row(count_ - 1);
+    travelled = last.travelled_mm + (command - last.position).norm();
+  }
+  now = {command, travelled, std::abs(deviation_mm), tracker.segment()};
+  for (const std::size_t window : windows_) {
+    if (count_ >= window) {
+      compare(row(count_ - window), now, static_cast<double>(window) * period_s_);
+    }
+  }
+  ++count_;
+}
+
+void FeedMeter::compare(const Row& from, const Row& to, double time_s) noexcept {
+  const double speed = (to.travelled_mm - from.travelled_mm - slack_mm_) / time_s;
+  const auto beats = [&](double feed) { return speed > largest_.ratio() * (1.0 + least_gain) * feed; };
+  if (!(speed > 0.0) || !beats((*path_)[to.segment].feed_mm_per_s)) {
+    return;
+  }
+  // A place is as good as the motion is near the path: of short segments that all lie there each may be meant.
+  const double near = 2.0 * std::max(from.deviation_mm, to.deviation_mm) + slack_mm_;
+  std::size_t first = std::min(from.segment, to.segment);
+  std::size_t last = std::max(from.segment, to.segment);
+  while (first > 0 && (from.position - (*path_)[first].start_mm).norm() <= near) {
+    --first;
+  }
+  while (last + 1 < path_->size() && (to.position - (*path_)[last].end_mm).norm() <= near) {
+    ++last;
+  }
+  std::size_t fastest = first;
+  for (std::size_t i = first + 1; i <= last; ++i) {
+    if ((*path_)[i].feed_mm_per_s > (*path_)[fastest].feed_mm_per_s) {
+      fastest = i;
+    }
+  }
+  const Segment& programmed = (*path_)[fastest];
+  if (beats(programmed.feed_mm_per_s)) {
+    largest_ = {speed, programmed.feed_mm_per_s, programmed.line};
+  }
+}
+
+}  // namespace shapegcode::detail

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "shapegcode/measure/contour.hpp"
+#include "shapegcode/path.hpp"
+#include "shapegcode/play.hpp"
+
+namespace shapegcode::detail {
+
+/// Finds where a motion is fastest against the programmed feed of the place at which it is, over one, four and sixteen
+/// of `PlaybackOptions::feed_window_s`. Places are those that a tracker of the path finds; near several short segments
+/// the highest feed of those within the deviation counts. Without a window it measures nothing.
+class FeedMeter {
+ public:
+  /// `path` stays the caller's.
+  FeedMeter(const Path& path, const PlaybackOptions& options);
+
+  [[nodiscard]] bool measures() const noexcept { return !rows_.empty(); }
+  /// The next set-point, of which `tracker` has just been told and found that it lies `deviation_mm` off.
+  void step(const Vector3& command, const ContourTracker& tracker, double deviation_mm) noexcept;
+  [[nodiscard]] const FeedExcess& largest() const noexcept { return largest_; }
+
+ private:
+  struct Row {
+    Vector3 position = Vector3::Zero();
+    double travelled_mm = 0.0;
+    double deviation_mm = 0.0;
+    std::size_t segment = 0;
+  };
+
+  [[nodiscard]] const Row& row(std::size_t index) const noexcept { return rows_[index % rows_.size()]; }
+  void compare(const Row& from, const Row& to, double time_s) noexcept;
+
+  const Path* path_;
+  double period_s_;
+  double slack_mm_;
+  std::array<std::size_t, 3> windows_{};
+  std::vector<Row> rows_;  // a ring as long as the longest window
+  std::size_t count_ = 0;
+  FeedExcess largest_;
+};
+
+}  // namespace shapegcode::detail
