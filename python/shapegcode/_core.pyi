@@ -731,6 +731,14 @@ class MotionLimits:
     def corner_speed_difference_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
         ...
     @property
+    def feed_excess_ratio(self) -> float:
+        """
+        Share by which a neighbour may be faster without that.
+        """
+    @feed_excess_ratio.setter
+    def feed_excess_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def feed_override(self) -> float:
         """
         Scales the programmed feeds.

@@ -138,6 +138,26 @@ TEST_CASE("look-ahead: a feed step between collinear lines is run on the faster 
   CHECK(speed_at(profile, first) == doctest::Approx(50.0).epsilon(1e-9));
 }
 
+TEST_CASE("look-ahead: what a filter mixes passes from a lower feed only where the path says a higher one") {
+  MotionLimits limits = accelerating(1000.0);
+  limits.feed_spread_s = 0.02;
+  limits.feed_excess_ratio = 0.05;
+  // 5 mm/s in the middle: reached .1 mm before it and left .1 mm behind it; 49 is no lower feed than 50.
+  const Path path = row_of_lines({20.0, 1.0, 20.0, 10.0}, {50.0, 5.0, 50.0, 49.0});
+  const SpeedProfile profile = plan_speed(path, limits);
+  check_joined(profile, 51.0);
+  std::size_t cursor = 0;
+  const auto speed = [&](double distance) { return speed_at(profile, profile.time_s(distance, cursor)); };
+  CHECK(speed(19.9 + 1e-6) == doctest::Approx(5.0).epsilon(1e-3));
+  CHECK(speed(21.1 - 1e-6) == doctest::Approx(5.0).epsilon(1e-3));
+  CHECK(speed(19.9 - 0.1) == doctest::Approx(std::sqrt(25.0 + 2.0 * 1000.0 * 0.1)).epsilon(1e-3));
+  CHECK(speed(41.0 - 0.5) == doctest::Approx(50.0));
+  limits.feed_spread_s = 0.0;
+  const double saved = profile.duration_s() - plan_speed(path, limits).duration_s();
+  CHECK(saved > 0.0);
+  CHECK(saved < 0.04);
+}
+
 TEST_CASE("look-ahead: collinear lines of one feed are one move") {
   const SpeedProfile profile =
       plan_speed(row_of_lines({0.1, 30.0, 0.001, 20.0}, {100, 100, 100, 100}), accelerating(1000.0));

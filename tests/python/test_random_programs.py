@@ -1,7 +1,7 @@
 """Programs at random, converted by the package and judged by an interpreter, a player and a plant that share nothing
 with it: the same motion, the same figures, the same time, and no more speed than is programmed.
 
-A seed gives one program: `python -c "from judge.draws import draw; print(draw(7).text)"` with tests/oracles on the path.
+A seed gives one program: `PYTHONPATH=tests/oracles python -c "from judge.draws import draw; print(draw(7).text)"`.
 """
 
 from __future__ import annotations

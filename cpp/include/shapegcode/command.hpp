@@ -94,8 +94,9 @@ struct ShapingOptions {
   std::optional<FollowingFir> following;
   AxisModeTables mode_tables;
   double least_feed_mm_per_s = 0.0;  ///< what the controller can run: no run is slowed below it for the tolerance
-  /// Share by which the shaped command may run faster along the path than programmed, > 0. The correction of the contour
-  /// keeps to it; what a slower programmed feed asks is asked so early that the shaper has passed it on in time.
+  /// Share by which the shaped command may run faster along the path than programmed, > 0. The correction of the
+  /// contour keeps to it; what a slower programmed feed asks is asked so early that the shaper has passed it on in
+  /// time.
   double feed_excess_ratio = MotionLimits::none;
   /// Weight of the correction's second differences on half the block grid. Less of it follows the path more closely and
   /// asks for more beside the modes' frequencies, which shows where these are off: docs/contour.md.

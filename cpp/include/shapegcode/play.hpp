@@ -30,8 +30,8 @@ struct PlaybackOptions {
   bool measure_contour = true;          ///< deviation of command and response and orbit errors
   bool measure_command = true;          ///< false: the response alone; no figures of the command, no orbit errors
   bool measure_response_orbit = false;  ///< orbit errors of the response too, where the contour is measured
-  /// Largest speed against the programmed feed, over this time and four and sixteen times it; 0: not measured. Needs the
-  /// deviation of the command.
+  /// Largest speed against the programmed feed, over this time and four and sixteen times it; 0: not measured. Needs
+  /// the deviation of the command.
   double feed_window_s = 0.0;
   double feed_slack_mm = 0.0;  ///< of the way within such a time: what rounding may add
   /// Blocks only: play no more than the last so many seconds (0: all). Enough for the residual where older vibration

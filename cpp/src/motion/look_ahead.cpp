@@ -174,7 +174,9 @@ class Zones {
     if (limits.feed_spread_s > 0.0) {
       add(path, [&](std::size_t from, std::size_t into) {
         const double feed = path[from].feed_mm_per_s * limits.feed_override;
-        return feed * (1.0 + limits.feed_excess_ratio) < speed[into] ? Zone{feed, feed * (limits.feed_spread_s + 0.5 * jerk_s)} : Zone{};
+        return feed * (1.0 + limits.feed_excess_ratio) < speed[into]
+                   ? Zone{feed, feed * (limits.feed_spread_s + 0.5 * jerk_s)}
+                   : Zone{};
       });
     }
   }
