@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -1143,6 +1143,76 @@ class CodeBindings:
     @tool_program.setter
     def tool_program(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+class WorkLimits:
+    """
+    What a program may ask at most, counted while it is read.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def bytes(self) -> int:
+        """
+        Of texts that are read, and of the plain text they come to.
+        """
+    @bytes.setter
+    def bytes(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def feed_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Highest speed of each axis while cutting, mm/s.
+        """
+    @feed_mm_per_s.setter
+    def feed_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def m_function_s(self) -> float:
+        """
+        Time of any other M code, s.
+        """
+    @m_function_s.setter
+    def m_function_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def moves(self) -> int:
+        """
+        Moves, dwells, and blocks with machine functions.
+        """
+    @moves.setter
+    def moves(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rapid_mm_per_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Of each axis in a rapid, mm/s.
+        """
+    @rapid_mm_per_s.setter
+    def rapid_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def seconds(self) -> float:
+        """
+        Least time, s.
+        """
+    @seconds.setter
+    def seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def steps(self) -> int:
+        """
+        Lines executed, each as often as it runs.
+        """
+    @steps.setter
+    def steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def tool_change_s(self) -> float:
+        """
+        Time of an M06, s.
+        """
+    @tool_change_s.setter
+    def tool_change_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
 class ReaderOptions:
     """
     The controller's settings that change how a text is read.
@@ -1246,6 +1316,14 @@ class ReaderOptions:
     def least_increment_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def limits(self) -> WorkLimits:
+        """
+        What a program may ask at most.
+        """
+    @limits.setter
+    def limits(self, arg0: WorkLimits) -> None:
+        ...
+    @property
     def load_program(self) -> bool:
         """
         Called with an O number that the file does not hold; gives (name, bytes) or None.
@@ -1254,28 +1332,12 @@ class ReaderOptions:
     def load_program(self, arg1: typing.Any) -> None:
         ...
     @property
-    def max_cycle_moves(self) -> int:
-        """
-        Moves that all drilling cycles of a program come to.
-        """
-    @max_cycle_moves.setter
-    def max_cycle_moves(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    @property
     def max_line_length(self) -> int:
         """
         Characters.
         """
     @max_line_length.setter
     def max_line_length(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
-        ...
-    @property
-    def max_steps(self) -> int:
-        """
-        Blocks executed behind the first call or jump.
-        """
-    @max_steps.setter
-    def max_steps(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
     @property
     def offset_memory(self) -> str:
@@ -1532,6 +1594,11 @@ class ProgramText:
         Cutting moves under G41 or G42, kept as they stand.
         """
     @property
+    def least_time_s(self) -> float:
+        """
+        At its feeds, as far as the axes reach them; with dwells, without acceleration, s.
+        """
+    @property
     def line_count(self) -> int:
         """
         Lines.
@@ -1540,6 +1607,11 @@ class ProgramText:
     def line_end(self) -> str:
         """
         Line end of the text.
+        """
+    @property
+    def move_count(self) -> int:
+        """
+        Moves, dwells, and blocks with machine functions.
         """
     @property
     def other_moves(self) -> list:

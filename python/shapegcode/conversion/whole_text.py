@@ -98,9 +98,8 @@ class TextWriter:
         self._model = model
         self.grid = grid
         self._regions = RegionWriter(model, grid)
-        self._shaped: dict[
-            int, tuple[tuple[float, float], EmittedRegion]
-        ] = {}  # by region: room and feed, and what it came to
+        # By region: tolerance and feed for which it was shaped, and what it came to.
+        self._shaped: dict[int, tuple[tuple[float, float], EmittedRegion]] = {}
 
     def write(
         self,
