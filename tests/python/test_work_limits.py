@@ -170,3 +170,20 @@ def test_a_region_whose_blocks_have_no_room_keeps_its_text_and_is_named() -> Non
         assert zigzag.encode() in converted.text
         assert any(f"controller.{key}" in warning for warning in converted.warnings)
         assert len(converted.text) < of_whole if key == "max_program_bytes" else converted.blocks.emitted < of_whole
+
+
+def test_of_very_many_sections_short_runs_are_measured_together_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    from shapegcode.metrology import jobs
+
+    zigzag = "".join(f"X{k % 2}.Y{k}.\n" for k in range(1, 61))
+    machine = sg.Machine.load("vx500")
+    program = sg.Program.from_text(f"{HEAD}G01 F2000\n{zigzag}{END}", machine)
+    each = sg.measure(program, machine, 6.0)
+    assert len(each.programs[0].regions[0].sections) == 60
+    assert not any("measured together" in warning for warning in each.warnings)
+    monkeypatch.setattr(jobs, "_MOST_SECTIONS", 20)
+    joined = sg.measure(program, machine, 6.0)
+    assert len(joined.programs[0].regions[0].sections) <= 20
+    assert any("measured together as curves" in warning for warning in joined.warnings)
+    # Nothing is lost: the worst place is found in both.
+    assert joined.programs[0].contour_error_um == each.programs[0].contour_error_um

@@ -64,7 +64,7 @@ struct CodeBindings {
 /// the line where it is passed: what is too much is never expanded first.
 struct WorkLimits {
   std::uint64_t steps = 10'000'000;  ///< lines executed, each as often as it runs
-  std::uint64_t moves = 1'000'000;   ///< moves, dwells, and blocks with machine functions
+  std::uint64_t moves = 800'000;     ///< moves, dwells, and blocks with machine functions
   std::uint64_t bytes = 33'554'432;  ///< of texts that are read, and of the plain text that they come to
   double seconds = 100'000.0;        ///< least time: moves at their feed, but no faster than the axes are; dwells
   Vector3 feed_mm_per_s = Vector3::Constant(std::numeric_limits<double>::infinity());   ///< of each axis while cutting

@@ -128,7 +128,7 @@ SectionMetrology::SectionMetrology(const Path& path, std::vector<PathSection> se
       walls_(path_, sections_, options.tool_radius_mm, options.station_spacing_mm),
       vibration_(options.period_s, options.band_mm),
       command_(path_),
-      response_(path_) {
+      response_(command_) {
   constexpr double missing = std::numeric_limits<double>::quiet_NaN();
   std::size_t cursor = 0;
   for (std::size_t i = 0; i < sections_.size(); ++i) {

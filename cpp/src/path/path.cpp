@@ -12,11 +12,16 @@
 namespace shapegcode {
 namespace {
 
+constexpr std::size_t few_segments = 512;
 constexpr double largest_gap_mm = 1e-6;
 
 }  // namespace
 
 Path::Path(std::vector<Segment> segments) : segments_(std::move(segments)) {
+  // A vector that grew holds room for as many again. Of a large one that room was never touched, and so is no memory.
+  if (segments_.size() < few_segments) {
+    segments_.shrink_to_fit();
+  }
   distance_mm_.reserve(segments_.size() + 1);
   double distance = 0.0;
   distance_mm_.push_back(distance);

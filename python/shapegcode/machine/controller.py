@@ -246,7 +246,7 @@ class Controller(TomlTable):
         "moves that a program may come to, with the pecks of drilling cycles, dwells and blocks with M, S, T; each "
         "takes some 400 bytes of memory",
         unit="moves",
-        default=1_000_000,
+        default=800_000,
     )
     max_program_bytes: Annotated[int, Strict(), Field(ge=1, le=4 * 10**9)] = key(
         "largest text that is read, with the programs that it calls, largest plain text that it is expanded to, and "

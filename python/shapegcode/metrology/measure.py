@@ -121,6 +121,7 @@ def measure(
                     *machine_warnings(machine),
                     *region_range_warnings(program.regions, machine),
                     *_spacing_warnings(regions, station_spacing_mm),
+                    *_section_warnings(jobs),
                 ],
             )
         )
@@ -154,6 +155,15 @@ def _spacing_warnings(regions: Iterable[MeasuredRegion], asked_mm: float) -> Ite
                 f"lines {region.lines[0]} to {region.lines[1]}: so long a path that its walls are measured every "
                 f"{region.station_spacing_mm:.3g} mm, not every {asked_mm:g} mm"
             )
+
+
+def _section_warnings(jobs: Iterable[Job]) -> Iterator[str]:
+    joined_mm = max((job.joined_mm for job in jobs), default=0.0)
+    if joined_mm > 0.0:
+        yield (
+            f"so many sections that runs of lines and arcs below {joined_mm:.3g} mm are measured together as curves; "
+            "--lines picks places"
+        )
 
 
 @dataclass(frozen=True)
