@@ -79,3 +79,35 @@ def test_ball_bar_circle_with_the_filter_of_1622(ms: int, bits: str) -> None:
     assert max(contour) > 2.0, "the case must show the filter"
     assert theirs == pytest.approx(max(contour), rel=0.05), (theirs, max(contour))
     assert report["residual_vibration_um"]["emitted"]["x"] == pytest.approx(max(residual), rel=0.05, abs=0.2)
+
+
+LOOP = "%\nO0001\nG21G90G17\nG0X0Y0\n#1=0\nWHILE[#1LT3]DO1\nG1X[#1*10.]F500\n#1=#1+1\nEND1\nM30\n%\n"
+
+
+@pytest.mark.parametrize(("channel", "alarm"), [(17, False), (4, False), (0, True)])
+def test_a_loop_is_an_alarm_only_where_programs_come_over_a_serial_line(channel: int, alarm: bool) -> None:
+    """A dump holds 0103 whether the line is used or not; 0020 says where programs come from."""
+    text = DUMP.format(ms=24, bits="00000001").replace("N00020Q1P4", f"N00020Q1P{channel}")
+    machine = sg.import_parameters(text.encode(), source="HM2.TXT").machine
+    found = sg.check(sg.Program.from_text(LOOP, machine), machine)
+    assert ("macro_in_dnc" in [each.code for each in found.findings]) == alarm
+
+
+def test_look_ahead_that_is_on_at_the_start_is_left_and_may_be_left_on() -> None:
+    text = DUMP.format(ms=24, bits="00000001").replace("N01610", "N01604Q1P00000001\nN01610")
+    found = sg.import_parameters(text.encode(), source="HM2.TXT").machine
+    mode = {"frequency_hz": MODE.frequency_hz, "damping_ratio": MODE.damping_ratio}
+    judged = convert(BALL_BAR, found.with_values({"axes.x.modes": [mode], "tolerance.contour_um": 120.0}))
+    lines = judged.emitted.splitlines()
+    off, on = lines.index("G05.1Q0"), lines.index("G05.1Q1")
+    cuts = [place for place, line in enumerate(lines) if "F" in line and place > lines.index("G0X-60.Y50.")]
+    assert off < cuts[0] < cuts[-1] < on
+    (case,) = [each for each in judged.conversion.cases if each.look_ahead]
+    assert case.counts
+
+
+def test_a_tool_change_that_is_a_macro_is_a_call() -> None:
+    text = DUMP.format(ms=24, bits="00000001").replace("N01610", "N06071Q1P6\nN01610")
+    machine = sg.import_parameters(text.encode(), source="HM2.TXT").machine
+    program = sg.Program.from_text("%\nO0001\nG21G90G17\nG0X0Y0\nT1M6\nG0X0Y0\nG1X10.F500\nM30\n%\n", machine)
+    assert any("9001" in warning for warning in program.warnings)

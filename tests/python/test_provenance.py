@@ -368,7 +368,7 @@ def test_verdict_rests_on_a_mode_of_another_machine() -> None:
 
 def test_what_is_measured_is_nothing_to_rest_on() -> None:
     judged = convert(PART, unmeasured_machine({}, {}))
-    assert judged.conversion.rests_on == ()
+    assert (judged.conversion.rests_on, judged.conversion.unmeasured_tried) == ((), 0)
     assert not any("rests on" in str(table.title) for table in judged.conversion.tables())
 
 

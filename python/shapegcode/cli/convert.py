@@ -133,6 +133,10 @@ def run(args: argparse.Namespace) -> int:
         notes.append(summary(result.kept, result.least_gain_um))
     if target == failed and output.exists():
         notes.append(f"{output} is of an earlier run and was left alone")
+    if result.unmeasured_tried and not result.rests_on:
+        notes.append(
+            f"the verdict rests on nothing that nobody measured: {result.unmeasured_tried} values moved, none matters"
+        )
     return runner.finish(result, args, notes=notes, output=(target, result.text))
 
 

@@ -317,6 +317,7 @@ class _Run:
         warnings = self._warnings(written, figures)
         if rapids is not None:
             warnings += rapids.warnings
+        rests, tried = self._rests_on(settled, figures)
         return Conversion(
             **vars(figures),
             program=program.source,
@@ -343,16 +344,17 @@ class _Run:
             rapids=rapids.outcome if rapids is not None else None,
             kept=tuple(self.kept[index] for index in sorted(self.kept)),
             least_gain_um=machine.shaping.least_gain_um,
-            rests_on=self._rests_on(settled, figures),
+            rests_on=rests,
+            unmeasured_tried=tried,
             text=judged(written.text, good=figures.within_tolerance),
             emitted=settled.emitted,
             placed=tuple(written.placed),
             model=self.model,
         )
 
-    def _rests_on(self, settled: _Settled, figures: PlayedFigures) -> tuple[RestsOn, ...]:
+    def _rests_on(self, settled: _Settled, figures: PlayedFigures) -> tuple[tuple[RestsOn, ...], int]:
         if figures.worst_case is None:
-            return ()
+            return (), 0
         return rests_on(
             self.model, self.judge, settled.figures, settled.written.placed, settled.emitted, figures.worst_case.lines,
             self.pool,

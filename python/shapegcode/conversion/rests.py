@@ -122,7 +122,7 @@ def rests_on(
     emitted: Program,
     deciding_lines: tuple[int, int],
     pool: Executor,
-) -> tuple[RestsOn, ...]:
+) -> tuple[tuple[RestsOn, ...], int]:
     """The unmeasured values that matter for a program, those first that move its verdict furthest towards a limit.
 
     Args:
@@ -135,7 +135,8 @@ def rests_on(
         pool: runs the playbacks.
 
     Returns:
-        At most eight values, none that moves a figure by less than a hundredth of its limit.
+        At most eight values, none that moves a figure by less than a hundredth of its limit, but for axes that may
+        have a mode or not; and how many were tried.
     """
     regions = [_Region(found, place, emitted, judge) for found, place in zip(figures, placed, strict=True)]
     deciding = next(region for region in regions if region.place.original_lines == deciding_lines)
@@ -153,7 +154,8 @@ def rests_on(
         _rests(trial.value, trial.moved, region.before, judge_region(run.result(), region.limits))
         for (region, trial), run in zip(trials, running, strict=True)
     ]
-    return _ranked([*rows, *_from_cases(model.machine, deciding)])
+    rows += _from_cases(model.machine, deciding)
+    return _ranked(rows), len({row.key for row in rows})
 
 
 def _rests(value: KeyValue, moved: str, before: Mapping[str, Judged], judged: Sequence[Judged]) -> RestsOn:

@@ -56,6 +56,7 @@ class Conversion(PlayedFigures, Result):
         kept: regions that keep their text because shaping them gains too little, or would miss a tolerance.
         least_gain_um: what is too little.
         rests_on: values that nobody measured on this machine, by how far each moves the deciding figure to its limit.
+        unmeasured_tried: how many such values were moved.
         text: the emitted program, as a file holds it.
         emitted: the same, read back.
         placed: the shaped regions and their places in it.
@@ -82,6 +83,7 @@ class Conversion(PlayedFigures, Result):
     kept: tuple[KeptRegion, ...] = ()
     least_gain_um: float = 0.0
     rests_on: tuple[RestsOn, ...] = ()
+    unmeasured_tried: int = 0
     text: bytes = field(metadata=hidden())
     emitted: Program = field(metadata=hidden())
     placed: tuple[Placed, ...] = field(metadata=hidden())
@@ -156,7 +158,11 @@ class Conversion(PlayedFigures, Result):
             return []
         groups = [self._times(), *self._vibrations(), *self._contours(), self._orbits(), self._feeds(), self._sizes()]
         cases = [case_table(self.cases, self.worst_case)] if self.cases else []
-        return [before_after_table(groups), *cases, *([rests_table(self.rests_on)] if self.rests_on else [])]
+        return [
+            before_after_table(groups),
+            *cases,
+            *([rests_table(self.rests_on, self.unmeasured_tried)] if self.rests_on else []),
+        ]
 
     def _times(self) -> list[BeforeAfter]:
         pairs = (("cycle time", self.cycle_time_s), ("cutting time", self.cutting_time_s))

@@ -118,11 +118,12 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
     )
 
 
-def rests_table(rows: Sequence[RestsOn]) -> Table:
+def rests_table(rows: Sequence[RestsOn], tried: int) -> Table:
     """The values that nobody measured on this machine and that the verdict rests on.
 
     Args:
         rows: those that move it furthest first.
+        tried: how many values were moved.
 
     Returns:
         The table.
@@ -140,7 +141,7 @@ def rests_table(rows: Sequence[RestsOn]) -> Table:
         "what the verdict rests on: values that nobody measured on this machine",
         columns,
         rows,
-        caption="one at a time, in the region that comes nearest to a limit",
+        caption=f"{tried} values moved, one at a time, in the region that comes nearest to a limit",
         row_style=lambda row: "red" if row.moved_um > row.limit_um else "",
     )
 
