@@ -250,6 +250,9 @@ def test_a_mode_measured_on_a_rigid_axis_takes_that_back(started: Path) -> None:
     rigid = update_modes(text, "x", [identified(47.0)], source="tap", rigid="y").text
     back = update_modes(rigid, "y", [identified(130.0)], source="tap")
     assert (back.machine.axes.y.rigid, len(back.machine.axes.y.modes)) == (False, 1)
+    assert "axes.y.rigid" not in {value.key for value in back.machine.values() if value.unmeasured}
+    z = update_modes(text, "z", [identified(60.0)], source="tap", keep_modes="xy")
+    assert "axes.z.rigid" not in {value.key for value in z.machine.values() if value.unmeasured}
     with pytest.raises(sg.ArgumentError, match="cannot be rigid"):
         update_modes(text, "x", [identified(47.0)], source="tap", rigid="x", keep_modes="y")
 

@@ -25,6 +25,7 @@ from shapegcode.settings.edit import (
     take_tail,
 )
 from shapegcode.settings.keys import toml
+from shapegcode.settings.remarks import remarks_of
 
 __all__ = ["ModeTables"]
 
@@ -71,6 +72,7 @@ class ModeTables:
         self.name = f"axes.{self.axis}.modes"
         self.old: list[dict[str, Any]] = list(self.data["axes"][self.axis].get("modes", []))
         self.expected: list[dict[str, Any]] = []
+        self._rigid_remark = remarks_of(text).get(f"axes.{axis}.rigid", "")
         self.home = self._axis_table()
         self.tables: list[Table] = next(
             (item.body for key, item in self.home.value.body if isinstance(item, AoT) and _is_modes(key, item)),
@@ -120,9 +122,11 @@ class ModeTables:
         added = [self._table(mode, share_of[id(mode)], meaning) for mode in fresh]
         self._insert(stay, added, left)
         self._tell_sum(modes)
-        if self.data["axes"][self.axis].get("rigid"):
-            self._say_rigid(False, "a mode was measured")
+        said = self.data["axes"][self.axis].get("rigid")
+        if said:
             self.notes.append("it was said to be rigid: that is taken back")
+        if said or (said is False and self._rigid_remark.startswith("assumed")):
+            self._say_rigid(False, "a mode was measured")
         text = self.document.as_string()
         self._check(text)
         return text.removesuffix(self._last_end)
