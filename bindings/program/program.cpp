@@ -93,6 +93,12 @@ std::function<std::optional<SourceText>(std::int64_t)> program_loader(py::object
   };
 }
 
+// Text of a program as Python's; any byte is a character.
+py::str latin1(const std::string& text) {
+  return py::reinterpret_steal<py::str>(
+      PyUnicode_DecodeLatin1(text.data(), static_cast<Py_ssize_t>(text.size()), nullptr));
+}
+
 py::list findings(const std::vector<Finding>& all) {
   py::list list;
   for (const Finding& finding : all) {
@@ -206,6 +212,8 @@ void register_gcode(py::module_& module) {
       .def_readwrite("retained_variables", &ReaderOptions::retained_variables, "#500 ... #999.")
       .def_readwrite("bindings", &ReaderOptions::bindings, "Codes bound to programs.")
       .def_readwrite("program", &ReaderOptions::program, "O number to play of a file with several; -1: the first.")
+      .def_readwrite("program_index", &ReaderOptions::program_index,
+                     "The same by its place among `list_programs`, whatever its name, and alone; -1: by number.")
       .def_property(
           "load_program", [](const ReaderOptions& self) { return static_cast<bool>(self.load_program); },
           [](ReaderOptions& self, py::object loader) { self.load_program = program_loader(std::move(loader)); },
@@ -298,6 +306,7 @@ void register_gcode(py::module_& module) {
             return py::make_tuple(origin.line, self.files[origin.file]);
           },
           py::arg("line"), "(line, file) of the source from which a line of `text` comes.")
+      .def_readonly("called", &Program::called, "Places of programs of the file that others called, see list_programs.")
       .def_readonly("program_numbers", &Program::program_numbers, "All O numbers in the file.")
       .def_readonly("expanded_radii_mm", &Program::expanded_radii_mm,
                     "D number to radius, mm, where cutter compensation was expanded.")
@@ -315,6 +324,28 @@ void register_gcode(py::module_& module) {
           },
           py::arg("first_line"), py::arg("last_line"),
           "The cutting moves of the regions within a range of lines of the source, as one path.");
+
+  py::class_<ProgramEntry>(module, "ProgramEntry", "A program of a file that may hold several.")
+      .def_readonly("number", &ProgramEntry::number, "O number; -1: it has none.")
+      .def_property_readonly(
+          "name", [](const ProgramEntry& self) { return latin1(self.name); },
+          "Of a line <NAME> or O<NAME>, with its brackets; empty: none.")
+      .def_property_readonly(
+          "folder", [](const ProgramEntry& self) { return latin1(self.folder); },
+          "Of the &F= line before it, as written; empty: none.")
+      .def_readonly("first_line", &ProgramEntry::first_line, "From 1.")
+      .def_readonly("text_begin", &ProgramEntry::text_begin, "Byte offset of its first line.")
+      .def_readonly("text_end", &ProgramEntry::text_end, "Byte offset behind its last line.");
+
+  module.def(
+      "list_programs",
+      [](const py::bytes& bytes) {
+        const auto text = static_cast<std::string>(bytes);
+        const py::gil_scoped_release release;
+        return list_programs(text);
+      },
+      py::arg("text"),
+      "The programs of a text (bytes) in the order in which they stand. Raises ProgramError where it cannot be read.");
 
   module.def(
       "read_program",

@@ -99,3 +99,30 @@ TEST_CASE("tape: a macro that asks what only the control knows is a call that no
   CHECK(program.final_state.position_mm == Vector3(20, 0, 0));
   CHECK(program.regions.size() == 1);
 }
+
+TEST_CASE("tape: the programs of a memory punch, each with number or name, folder, line and bytes") {
+  const std::string text =
+      "LEADER\n%\n&F=/A B/\nO0001(X)\nM30\n:0002\nM99\n&F=/B/\r\nO1\nM30\n<PART>\nM30\nO<OTHER>\nM30\n%\n";
+  const std::vector<ProgramEntry> found = list_programs(text);
+  REQUIRE(found.size() == 5);
+  const std::int64_t numbers[5] = {1, 2, 1, -1, -1};
+  const char* const names[5] = {"", "", "", "<PART>", "<OTHER>"};
+  const char* const folders[5] = {"/A B/", "/A B/", "/B/", "/B/", "/B/"};
+  const std::uint32_t lines[5] = {3, 6, 8, 11, 13};
+  for (std::size_t k = 0; k < 5; ++k) {
+    CHECK(found[k].number == numbers[k]);
+    CHECK(found[k].name == names[k]);
+    CHECK(found[k].folder == folders[k]);
+    CHECK(found[k].first_line == lines[k]);
+    CHECK(found[k].text_end == (k < 4 ? found[k + 1].text_begin : text.rfind('%')));
+  }
+  // Read by its place a program stands alone, and says which others it called.
+  ReaderOptions options;
+  options.program_index = 2;
+  CHECK(read_program(text, options).text == "%\n&F=/B/\nO1\nM30\n%\n");
+  options.program_index = 5;
+  CHECK_THROWS_AS((void)read_program(text, options), Error);
+  options.program_index = 0;
+  const std::string calls = "%\nO1\nM98 P3\nM30\nO2\nM99\nO3\nM98 P2\nM99\n%\n";
+  CHECK(read_program(calls, options).called == std::vector<std::size_t>{1, 2});
+}

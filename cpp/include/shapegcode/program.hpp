@@ -89,7 +89,8 @@ struct ReaderOptions {
   char offset_memory = 'C';                                             ///< A, B or C: see SystemVariables
   std::map<int, double> retained_variables;                             ///< #500 ... #999
   CodeBindings bindings;
-  std::int64_t program = -1;  ///< O number to play of a file that holds several; -1: the first
+  std::int64_t program = -1;        ///< O number to play of a file that holds several; -1: the first
+  std::int64_t program_index = -1;  ///< the same by its place among `list_programs`, whatever its name; -1: by number
   std::function<std::optional<SourceText>(std::int64_t)> load_program;  ///< programs that the file does not hold
   std::array<std::int64_t, 2> opaque_programs = {9000, 9999};           ///< if not found: called, but not looked into
   int subprogram_nesting = 10;
@@ -177,6 +178,7 @@ struct Program {
   std::vector<LineOrigin> origins;            ///< one per line of `text`; empty if not expanded
   std::vector<std::string> files;             ///< names; the first is empty and stands for the program's own file
   std::vector<std::int64_t> program_numbers;  ///< all O numbers in the file
+  std::vector<std::size_t> called;            ///< programs of the file that others called, as `list_programs` counts
   std::vector<Finding> alarms;                ///< with ReaderOptions::collect_alarms
   std::map<int, double> expanded_radii_mm;    ///< D number -> radius, where cutter compensation was expanded
   std::uint32_t compensated_moves = 0;        ///< cutting moves under G41/G42 that were expanded
@@ -196,6 +198,20 @@ struct Program {
   ModalState final_state;
   std::vector<ModalState> probed;  ///< state behind each of ReaderOptions::probe_lines
 };
+
+/// A program of a file that may hold several.
+struct ProgramEntry {
+  std::int64_t number = -1;  ///< O number; -1: it has none
+  std::string name;          ///< of a line "<NAME>" or "O<NAME>", with its brackets; empty: none
+  std::string folder;        ///< of the "&F=" line before it, as written; empty: none
+  std::uint32_t first_line = 1;
+  std::size_t text_begin = 0;  ///< bytes: its lines, with those of its folder and of what stands before its O line
+  std::size_t text_end = 0;
+};
+
+/// The programs of a text in the order in which they stand. Throws Error(program) where its frame of '%' lines or its O
+/// numbers are none that can be read.
+[[nodiscard]] std::vector<ProgramEntry> list_programs(const std::string& text);
 
 /// Reads a program text into regions of canonical moves (FANUC milling dialect; see docs/dialect.md for what is read,
 /// passed through and refused). Pure function of its arguments. Throws Error(program) with line and column.

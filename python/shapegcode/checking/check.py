@@ -43,13 +43,14 @@ _LOST_S = 1e-3  # by a run with short blocks: less is no reason to change the pr
 _MOST_ALARMS = 200
 
 
-def check(program: Program | str | Path, machine: Machine, *, program_number: int | None = None) -> Check:
+def check(program: Program | str | Path, machine: Machine, *, program_number: int | str | None = None) -> Check:
     """Check a program: what the control would refuse, and what it would not run as programmed.
 
     Args:
         program: the file, or what was read of one: a program with alarms can only be checked as a file or a text.
         machine: whose controller would run it.
-        program_number: O number to play of a file that holds several; None: the first.
+        program_number: which program of a file that holds several: its O number, or an address as in
+            `shapegcode.program.several`; None: the first.
 
     Returns:
         The findings, and what short blocks and a serial line cost.
@@ -71,7 +72,7 @@ def check_text(
     machine: Machine,
     *,
     source: str = "<text>",
-    program_number: int | None = None,
+    program_number: int | str | None = None,
     folder: Path | None = None,
 ) -> Check:
     """Check a program text, as `check` does a file.
@@ -80,7 +81,8 @@ def check_text(
         text: of the program.
         machine: whose controller would run it.
         source: its name in findings.
-        program_number: O number to play of a text that holds several; None: the first.
+        program_number: which program of a text that holds several: its O number, or an address as in
+            `shapegcode.program.several`; None: the first.
         folder: where programs that it calls are looked for too.
 
     Returns:

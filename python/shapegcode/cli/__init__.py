@@ -147,6 +147,9 @@ def _run(argv: list[str]) -> int:
     selected = next((word for word in argv if not word.startswith("-")), None)
     args = _build_parser(selected).parse_args(argv)
     try:
+        if getattr(args, "program", None) == "all":
+            several = importlib.import_module(f"{__name__}.several")
+            return int(several.run_all(args))
         return int(args.run(args))
     finally:
         # A full disk behind a redirected output shows only here.

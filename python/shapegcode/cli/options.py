@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shapegcode.cli.typed import program_number
+from shapegcode.cli.typed import program_choice
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -49,13 +49,14 @@ def add_plots_argument(
 
 
 def add_program_argument(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--program O1234``."""
+    """Declare ``--program O1234``; ``all`` is taken up by `shapegcode.cli.several`."""
     parser.add_argument(
         "--program",
         metavar="O1234",
-        type=program_number,
+        type=program_choice,
         default=None,
-        help="program to read of a file that holds several (default: the first)",
+        help="program to read of a file that holds several (default: the first): its number, /FOLDER/O1234 where "
+        "folders of a memory punch hold the same one, <NAME>, #3 for the third one; all: each that no other one calls",
     )
 
 

@@ -22,6 +22,7 @@ from shapegcode.cli import console as terminal
 from shapegcode.io.atomic import write_bytes
 
 if TYPE_CHECKING:
+    from shapegcode.cli.gathered import Gathered
     from shapegcode.results.result import Result
     from shapegcode.results.table import Table
 
@@ -88,11 +89,22 @@ def progress(description: str, args: argparse.Namespace) -> Iterator[terminal.Pr
         yield bar
 
 
-def _write_program(target: str | Path, content: bytes) -> None:
+def write_program(target: str | Path, content: bytes) -> None:
+    """Write a program; "-" is standard output."""
     if str(target) == "-":
         sys.stdout.buffer.write(content)
     else:
         write_bytes(target, content)
+
+
+def _write(report: dict[str, Any], json: str | None, output: tuple[str | Path, bytes] | None) -> None:
+    if json not in (None, "-"):
+        terminal.write_json(report, str(json))
+    if output is not None:
+        # Last of all, so that no program stands there when something else could not be written.
+        write_program(*output)
+    if json == "-":
+        terminal.write_json(report, json)
 
 
 def finish(
@@ -130,16 +142,13 @@ def finish(
     if plots is not None:
         pictures = result.save_plots(plots)
         report["plots"] = pictures
-    target = getattr(args, "json", None)
     if output is not None:
         report["output"] = str(output[0])
-    if target not in (None, "-"):
-        terminal.write_json(report, target)
-    if output is not None:
-        # Last of all, so that no program stands there when something else could not be written.
-        _write_program(*output)
-    if target == "-":
-        terminal.write_json(report, target)
+    several: Gathered | None = getattr(args, "several", None)
+    if several is not None:
+        several.add(report, output)
+    else:
+        _write(report, getattr(args, "json", None), output)
     console = terminal.output_console(standard_output(args))
 
     def say(text: str, style: str | None = None) -> None:
@@ -154,7 +163,7 @@ def finish(
         console.print(warning_table(said))
     for note in notes:
         say(note)
-    for file in (*wrote, *([output[0]] if output is not None else [])):
+    for file in (*wrote, *([output[0]] if output is not None and several is None else [])):
         say(f"wrote {file}")
     if plots is not None:
         say(f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: none are drawn of this")

@@ -34,6 +34,28 @@ def program_number(text: str) -> int:
     return int(match[1])
 
 
+def program_choice(text: str) -> int | str:
+    """Which program of a file: its O number, an address, or all of them.
+
+    Args:
+        text: as it is typed.
+
+    Returns:
+        The number; else the text: ``all``, ``/FOLDER/O12``, ``<NAME>`` or ``#3``.
+
+    Raises:
+        ArgumentTypeError: none of these.
+    """
+    if text == "all" or re.fullmatch(r"#[1-9][0-9]{0,8}|(.*/)?<[^<>]+>|.*/[Oo]?[0-9]{1,8}", text):
+        return text
+    try:
+        return program_number(text)
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: must be a program number, O1 ... O99999999, /FOLDER/O1, <NAME>, #3 for the third one, or all"
+        ) from None
+
+
 def axes(text: str) -> str:
     """Axes such as ``XZ``, ``x,z`` or ``"x z"``.
 

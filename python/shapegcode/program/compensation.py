@@ -18,7 +18,7 @@ _NOT_KNOWN = "the radius of offset D"
 _SLACK_MM = 0.0005  # a radius that differs by more is another one
 
 
-def read_for_conversion(path: str | Path, machine: Machine, *, program_number: int | None = None) -> Program:
+def read_for_conversion(path: str | Path, machine: Machine, *, program_number: int | str | None = None) -> Program:
     """Read a program as `convert` wants it: compensation expanded only if `input.compensation` says so.
 
     Raises:

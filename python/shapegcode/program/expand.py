@@ -17,7 +17,7 @@ def expand(
     machine: Machine,
     *,
     compensation: Literal["expand", "keep"] = "expand",
-    program_number: int | None = None,
+    program_number: int | str | None = None,
 ) -> Expansion:
     """Work out subprogram calls, custom macros, coordinate modes, corner words and cutter compensation.
 
@@ -25,7 +25,8 @@ def expand(
         program: what to expand, or its file; of a `Program` counts how it was read.
         machine: whose controller reads it.
         compensation: "expand": G41/G42 become plain moves of the tool's centre; "keep": they stay as they stand.
-        program_number: O number to play of a file that holds several; None: the first.
+        program_number: which program of a file that holds several: its O number, or an address as in
+            `shapegcode.program.several`; None: the first.
 
     Returns:
         The plain program, and where each of its lines comes from.

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.reading import program_bytes, program_loader, reader_options
+from shapegcode.program.several import place_of
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -41,7 +42,7 @@ class Program:
         path: str | Path,
         machine: Machine | None = None,
         *,
-        program_number: int | None = None,
+        program_number: int | str | None = None,
         expand_compensation: bool = True,
         collect_alarms: bool = False,
     ) -> Program:
@@ -52,7 +53,8 @@ class Program:
         Args:
             path: the file.
             machine: whose controller reads it.
-            program_number: O number to play of a file that holds several; None: the first.
+            program_number: which program of a file that holds several: its O number, or an address as in
+                `shapegcode.program.several`; None: the first.
             expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
             collect_alarms: go on behind an alarm and keep all in `core.alarms`.
 
@@ -85,7 +87,7 @@ class Program:
         source: str = "<text>",
         emitted: bool = False,
         probe_lines: Sequence[int] = (),
-        program_number: int | None = None,
+        program_number: int | str | None = None,
         expand_compensation: bool = True,
         collect_alarms: bool = False,
         folder: Path | None = None,
@@ -100,7 +102,8 @@ class Program:
             source: names the text in messages.
             emitted: the text was written by shapegcode: its arcs are FANUC's, whatever the original's were.
             probe_lines: ascending line numbers behind which the modal state is kept.
-            program_number: O number to play of a text that holds several; None: the first.
+            program_number: which program of a text that holds several: its O number, or an address as in
+                `shapegcode.program.several`; None: the first.
             expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
             collect_alarms: go on behind an alarm and keep all in `core.alarms`.
             folder: where programs that it calls are looked for; None: nowhere but in the text and the machine's
@@ -116,11 +119,13 @@ class Program:
 
         machine = machine or Machine.load("vx500")
         data = text.encode() if isinstance(text, str) else text
+        index = None if program_number is None else _index(data, program_number, source)
         options = reader_options(
             machine,
             emitted=emitted,
             probe_lines=probe_lines,
-            program_number=program_number,
+            program_number=program_number if isinstance(program_number, int) and index is None else None,
+            program_index=index,
             expand_compensation=expand_compensation,
             collect_alarms=collect_alarms,
         )
@@ -195,6 +200,17 @@ class Program:
         """
         first, file = self.core.origin(region.first_line)
         return located_error(file or self.source, first, 1, f"{self.lines(region)}: {message}")
+
+
+def _index(data: bytes, wanted: int | str, source: str) -> int | None:
+    """Place of a program in its file; None where its number says enough, or is not there."""
+    if isinstance(wanted, str):
+        return place_of(data, wanted, source)
+    try:
+        numbers = [entry.number for entry in _core.list_programs(data)]
+    except ProgramError:
+        return None  # the reading says it, with its place
+    return place_of(data, f"O{wanted}", source) if numbers.count(wanted) > 1 else None
 
 
 def least_increment_mm(machine: Machine, units: int) -> float:

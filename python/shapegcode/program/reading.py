@@ -24,6 +24,7 @@ def reader_options(
     emitted: bool = False,
     probe_lines: Sequence[int] = (),
     program_number: int | None = None,
+    program_index: int | None = None,
     expand_compensation: bool = True,
     collect_alarms: bool = False,
 ) -> _core.ReaderOptions:
@@ -34,6 +35,7 @@ def reader_options(
         emitted: the text was written by shapegcode: its arcs are FANUC's, whatever the original's were.
         probe_lines: ascending line numbers behind which the modal state is kept.
         program_number: O number to play of a file that holds several; None: the first.
+        program_index: the same by its place in the file; None: by number.
         expand_compensation: G41/G42 become plain moves; False: they are kept as they stand.
         collect_alarms: go on behind an alarm.
 
@@ -60,6 +62,7 @@ def reader_options(
     options.retained_variables = {int(name): value for name, value in machine.input.variables.items()}
     options.bindings = _bindings(machine)
     options.program = -1 if program_number is None else program_number
+    options.program_index = -1 if program_index is None else program_index
     options.opaque_programs = list(machine.input.opaque_programs)
     options.subprogram_nesting = machine.controller.nesting_limit_subprogram
     options.limits = _limits(machine, emitted=emitted)

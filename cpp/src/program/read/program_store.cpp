@@ -56,6 +56,19 @@ int end_number(std::string_view line) {
 
 // The lines that begin a program (O, a colon, a name in < >) or a folder (&F=), in their order. Only those characters
 // are looked at: a plain program of a million lines has hardly any.
+std::string_view line_at(std::string_view text, std::size_t begin) {
+  return text.substr(begin, text.find('\n', begin) - begin);
+}
+
+// What stands behind the first of one character, up to the first of another one or to the end, without blanks around.
+std::string between(std::string_view line, char open, char close) {
+  const std::size_t begin = std::min(line.find(open), line.size() - 1) + 1;
+  std::string_view inside = line.substr(begin, line.find(close, begin) - begin);
+  inside.remove_prefix(std::min(inside.find_first_not_of(" \t\r"), inside.size()));
+  const std::size_t last = inside.find_last_not_of(" \t\r");
+  return std::string(inside.substr(0, last == std::string_view::npos ? 0 : last + 1));
+}
+
 class ProgramHeads {
  public:
   enum class Kind : std::uint8_t { number, name, folder };
@@ -271,15 +284,21 @@ void ProgramStore::add(const std::string& text, const TapeFrame& frame, std::uin
     }
     if (headed) {
       const std::uint32_t folder = unit->folder;
+      const std::string folder_name = unit->folder_name;
       close(head->begin);
       unit = unit_at(here, -1);
       unit->folder = folder;
+      unit->folder_name = folder_name;
       headed = false;
     }
     if (head->kind == ProgramHeads::Kind::folder) {
       ++unit->folder;
+      unit->folder_name = between(line_at(text, head->begin), '=', '\r');
     } else {
       unit->number = head->number;  // what stands before the first head belongs to its program
+      if (head->kind == ProgramHeads::Kind::name) {
+        unit->name = "<" + between(line_at(text, head->begin), '<', '>') + ">";
+      }
       headed = true;
     }
   }

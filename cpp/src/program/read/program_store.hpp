@@ -38,6 +38,9 @@ struct ProgramUnit {
   std::int64_t number = -1;  ///< -1: the text has no O line, or a name; 0: O0000
   std::uint32_t file = 0;
   std::uint32_t folder = 0;  ///< of a memory punch, counted by its "&F=" lines
+  std::string folder_name;   ///< as written; of the program behind such a line and those that follow
+  std::string name;          ///< "<NAME>" with its brackets; empty: none
+  bool called = false;       ///< by another one
   const std::string* text = nullptr;
   LinePlace first;
   std::size_t end = 0;

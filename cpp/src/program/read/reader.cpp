@@ -73,6 +73,13 @@ void Reader::load_main() {
     }
   }
   ProgramUnit* main = options_.program < 0 ? store_.units().front().get() : store_.find(options_.program);
+  if (options_.program_index >= 0) {
+    const auto index = static_cast<std::size_t>(options_.program_index);
+    if (index >= store_.units().size()) {
+      fail(fmt::format("the file holds {} programs, number {} is asked for", store_.units().size(), index + 1));
+    }
+    main = store_.units()[index].get();
+  }
   if (main == nullptr) {
     throw alarm_error(
         78,
@@ -84,8 +91,8 @@ void Reader::load_main() {
   control_.program = main->number;
   frames_.push_back({main, main->first, {}, false, false, false, 1, {}});
   here_ = main->first;
-  if (main != store_.units().front().get()) {
-    // Another program than the first: what is written is this one alone.
+  if (main != store_.units().front().get() || options_.program_index >= 0) {
+    // Another program than the first, or one of several: what is written is this one alone.
     expand_from(0);
     if (framed_) {
       put_raw("%", {1, 0});
@@ -392,6 +399,11 @@ void Reader::finish() {
     }
   }
   interpreter_.finish();
+  for (std::size_t k = 0; k < store_.units().size(); ++k) {
+    if (store_.units()[k]->called) {
+      program_.called.push_back(k);
+    }
+  }
   if (program_.expanded) {
     if (framed_) {
       put_raw("%", {program_.line_count, 0});
@@ -403,7 +415,7 @@ void Reader::finish() {
   std::ranges::copy_if(program_.program_numbers, std::back_inserter(others), [this](std::int64_t number) {
     return number != program_.program_number && !called_.contains(number);
   });
-  if (!others.empty()) {
+  if (!others.empty() && options_.program_index < 0) {
     program_.warnings.push_back({1,
                                  fmt::format("O{} is played; the file also holds {} (--program picks another)",
                                              program_.program_number, program_names(others)),
@@ -429,6 +441,17 @@ void Reader::finish() {
 }  // namespace shapegcode::detail
 
 namespace shapegcode {
+
+std::vector<ProgramEntry> list_programs(const std::string& text) {
+  detail::ProgramStore store;
+  store.add(text, detail::find_frame(text), 0);
+  std::vector<ProgramEntry> entries;
+  entries.reserve(store.units().size());
+  for (const auto& unit : store.units()) {
+    entries.push_back({unit->number, unit->name, unit->folder_name, unit->first.line, unit->first.at, unit->end});
+  }
+  return entries;
+}
 
 Program read_program(std::string text, const ReaderOptions& options) {
   std::vector<std::int64_t> shut;

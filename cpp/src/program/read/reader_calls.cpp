@@ -313,6 +313,7 @@ bool Reader::enter(std::int64_t number, const MacroArguments& arguments, bool ma
           column);
   }
   called_.insert(number);
+  unit->called = true;
   if (macro) {
     variables_.push_level(arguments.locals, here_.line, column);
   }

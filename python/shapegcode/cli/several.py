@@ -1,0 +1,133 @@
+"""``--program all``: a command over every program of a file, one after the other.
+
+Each program that no other one of the file calls is done as if it stood alone. What the command shows follows program
+by program; the JSON is a list; pictures go into a folder for each, tables (--csv, --npz) into a file for each; programs
+that a command writes go into one file again, where those that were called, and those that could not be read, stand as
+they were.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shapegcode.cli.gathered import Gathered
+
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
+
+__all__ = ["run_all"]
+
+_TABLES = ("csv", "npz")
+
+
+def run_all(args: argparse.Namespace) -> int:
+    """Run a command for every program of its file that no other one calls.
+
+    Args:
+        args: of the command, with ``--program all``.
+
+    Returns:
+        The worst exit code of all runs.
+
+    Raises:
+        ProgramError, MachineError, ArgumentError: bad input: of the command, or of the file as a whole.
+        OSError: a file cannot be read or written.
+    """
+    from shapegcode._core import ArgumentError, ProgramError
+    from shapegcode.cli.options import load_machine
+    from shapegcode.cli.runner import check_files
+    from shapegcode.program.reading import program_bytes
+    from shapegcode.program.several import programs_of
+
+    for name in _TABLES:
+        if getattr(args, name, None) == "-":
+            raise ArgumentError(f"--{name} - with --program all: each program needs a file of its own, name one")
+    machine = load_machine(args)
+    check_files(args)
+    source = args.input if hasattr(args, "input") else args.inputs[0]
+    text = program_bytes(source, machine.controller.max_program_bytes)
+    try:
+        several = Gathered(str(source), text, programs_of(text))
+    except ProgramError as error:
+        raise ProgramError(f"{source}:{error.line}:{error.column}: {error}") from None
+    called = _called(several, machine)
+    code = 0
+    for place in several.places:
+        if place.index not in called:
+            several.at = place.index
+            code = max(code, _run_one(args, several))
+    _finish(args, several, called)
+    return code
+
+
+def _called(several: Gathered, machine: Machine) -> set[int]:
+    """Places of programs that another one of the file calls: they are done there."""
+    from shapegcode._core import ProgramError
+    from shapegcode.program import Program
+
+    called: set[int] = set()
+    folder = Path(several.source).parent
+    for place in several.places:
+        try:
+            program = Program.from_text(
+                several.text, machine, program_number=f"#{place.index + 1}", collect_alarms=True, folder=folder
+            )
+        except ProgramError:
+            continue  # its own run says why
+        called |= set(program.core.called) - {place.index}
+    # Programs that call each other in a ring are done all the same.
+    return called if len(called) < len(several.places) else set()
+
+
+def _run_one(args: argparse.Namespace, several: Gathered) -> int:
+    from shapegcode._core import ProgramError
+    from shapegcode.cli.console import output_console
+    from shapegcode.cli.runner import standard_output
+
+    one = argparse.Namespace(**vars(args))
+    one.program, one.several = f"#{several.at + 1}", several
+    label = several.address.strip("/<>#").replace("/", "-").replace("<", "").replace(">", "")
+    if getattr(args, "plots", None) is not None:
+        one.plots = str(Path(args.plots) / label)
+    for name in _TABLES:
+        if (target := getattr(args, name, None)) is not None:
+            setattr(one, name, str(Path(target).with_stem(f"{Path(target).stem}-{label}")))
+    console = output_console(standard_output(args))
+    console.print(f"{several.address}:", style="bold", markup=False)
+    try:
+        code = int(args.run(one))
+    except ProgramError as error:
+        console.print(f"not done: {error}", style="bold red", markup=False, soft_wrap=True)
+        several.add({"ok": False, "error": str(error)}, None)
+        code = 2
+    console.print()
+    return code
+
+
+def _finish(args: argparse.Namespace, several: Gathered, called: set[int]) -> None:
+    """Write the one JSON and the one program, and say it."""
+    from shapegcode.cli import console as terminal
+    from shapegcode.cli.runner import standard_output, write_program
+
+    target = getattr(args, "json", None)
+    outputs = {str(output) for output, _ in several.written.values()}
+    # Where one of the programs misses its tolerance, the file as a whole goes beside the one that was asked for.
+    asked = getattr(args, "output", None)
+    output = next((name for name in sorted(outputs) if name != str(asked)), str(asked)) if outputs else None
+    for report in several.reports:
+        if output is not None and "output" in report:
+            report["output"] = output
+    if target not in (None, "-"):
+        terminal.write_json(several.reports, target)
+    if output is not None:
+        write_program(output, several.joined())
+    if target == "-":
+        terminal.write_json(several.reports, target)
+    console = terminal.output_console(standard_output(args))
+    if called:
+        names = ", ".join(several.places[index].address for index in sorted(called))
+        console.print(f"called by others and done there: {names}", markup=False, soft_wrap=True)
+    if output is not None:
+        console.print(f"wrote {output}", markup=False, soft_wrap=True)

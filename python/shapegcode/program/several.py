@@ -1,0 +1,111 @@
+"""A file that holds several programs, as a control punches its memory: what they are called, and which one is meant."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+
+from shapegcode import _core
+
+__all__ = ["ProgramPlace", "place_of", "programs_of"]
+
+_PLACE = re.compile(r"#([1-9][0-9]{0,8})")
+_NUMBER = re.compile(r"[Oo:]?0*([1-9][0-9]{0,7})")
+
+
+@dataclass(frozen=True)
+class ProgramPlace:
+    """One program of a file.
+
+    Attributes:
+        index: how many programs stand before it.
+        address: what picks this one and no other: its number ``O0001``, its name ``<PART>``, either behind its folder
+            (``/USER/O0001``) where it stands in several; ``#3``, the third one, where nothing else tells them apart.
+        first_line: from 1.
+        text_begin: byte at which its lines begin.
+        text_end: byte behind them.
+    """
+
+    index: int
+    address: str
+    first_line: int
+    text_begin: int
+    text_end: int
+
+
+def programs_of(text: bytes) -> tuple[ProgramPlace, ...]:
+    """The programs of a text, in the order in which they stand.
+
+    Args:
+        text: of the file.
+
+    Returns:
+        One place for each; at least one.
+
+    Raises:
+        ProgramError: the text is cut off, or two programs of one folder have the same number.
+    """
+    entries = _core.list_programs(text)
+    short = [_own_name(entry) for entry in entries]
+    long = [_with_folder(entry) for entry in entries]
+    plain, full = Counter(short), Counter(long)
+    # A line that ends with LF CR CR ends behind both.
+    begins = [entry.text_begin + _carriage_returns(text, entry.text_begin) for entry in entries]
+    ends = [*begins[1:], entries[-1].text_end]
+    places = []
+    for index, (entry, own, whole) in enumerate(zip(entries, short, long, strict=True)):
+        address = own if own and plain[own] == 1 else whole if own and full[whole] == 1 else f"#{index + 1}"
+        places.append(ProgramPlace(index, address, entry.first_line, begins[index], ends[index]))
+    return tuple(places)
+
+
+def place_of(text: bytes, wanted: str, source: str) -> int:
+    """Which program of a text is meant.
+
+    Args:
+        text: of the file.
+        wanted: ``O1234``, ``<NAME>``, either behind its folder, or ``#3`` for the third one.
+        source: names the text in messages.
+
+    Returns:
+        How many programs stand before it.
+
+    Raises:
+        ProgramError: there is none of that name, or more than one: the message lists what to ask for.
+    """
+    entries, places = _core.list_programs(text), programs_of(text)
+    if match := _PLACE.fullmatch(wanted):
+        found = [index for index in range(len(places)) if index == int(match[1]) - 1]
+    else:
+        folder, _, name = wanted.rpartition("/")
+        own = f"O{int(match[1]):04d}" if (match := _NUMBER.fullmatch(name)) else name
+        found = [
+            index
+            for index, entry in enumerate(entries)
+            if _own_name(entry) == own and (not folder or entry.folder.strip("/") == folder.strip("/"))
+        ]
+    if len(found) == 1:
+        return found[0]
+    known = ", ".join(places[index].address for index in found) or _listed([place.address for place in places])
+    said = (
+        f"holds several programs {wanted}: say which, {known}" if found else f"holds no program {wanted} (but {known})"
+    )
+    raise _core.ProgramError(f"{source}:1:1: the file {said}")
+
+
+def _carriage_returns(text: bytes, at: int) -> int:
+    return len(text[at : at + 2]) - len(text[at : at + 2].lstrip(b"\r"))
+
+
+def _own_name(entry: _core.ProgramEntry) -> str:
+    return f"O{entry.number:04d}" if entry.number >= 0 else entry.name
+
+
+def _with_folder(entry: _core.ProgramEntry) -> str:
+    return f"{entry.folder.rstrip('/')}/{_own_name(entry)}"
+
+
+def _listed(addresses: list[str], most: int = 20) -> str:
+    more = len(addresses) - most
+    return ", ".join(addresses[:most]) + (f" and {more} more" if more > 0 else "")

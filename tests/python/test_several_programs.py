@@ -1,0 +1,162 @@
+"""A file of several O programs: `--program all`, and one number in two folders of a memory punch."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import shapegcode as sg
+from command import run
+from shapegcode.program.several import programs_of
+
+HEAD = "G21 G90 G17 G54\nG00 X0 Y0 Z5.\n"
+CUT = "G01 X{x}. F3000\nY40.\nX0\n"
+SUB = "O0003(CALLED)\nG01 Y10. F3000\nM99\n"
+
+
+def program(name: str, x: int, calls: str = "") -> str:
+    return f"{name}\n{HEAD}{CUT.format(x=x)}{calls}M30\n"
+
+
+PUNCH = (
+    "(LEADER)\n%\n"
+    + "&F=/ONE/\n"
+    + program("O0001(FIRST)", 30, "M98 P0003\n")
+    + program("O0002", 60)
+    + SUB
+    + "&F=/TWO/\n"
+    + program("O0001(OTHER)", 90)
+    + program("<PART-7>", 120)
+    + "%\n"
+)
+DONE = ["/ONE/O0001", "O0002", "/TWO/O0001", "<PART-7>"]
+LENGTH_S = [(2 * x + 40) / 50.0 for x in (30, 60, 90, 120)]  # at F3000, without acceleration
+
+
+def punch(folder: Path, text: str = PUNCH) -> Path:
+    (folder / "all.nc").write_bytes(text.encode())
+    return folder / "all.nc"
+
+
+def test_addresses_pick_one_program_and_no_other(tmp_path: Path) -> None:
+    path, machine = punch(tmp_path), sg.Machine.load("vx500")
+    assert [place.address for place in programs_of(PUNCH.encode())] == [*DONE[:2], "O0003", *DONE[2:]]
+    for address, seconds in zip(DONE, LENGTH_S, strict=True):
+        read = sg.Program.read(path, machine, program_number=address)
+        cut = sum(region.path.programmed_time_s for region in read.regions)
+        assert cut == pytest.approx(seconds + (0.6 if address == DONE[0] else 0.0), rel=1e-6), address
+    # A line alone between two programs of one number: which is meant must be said.
+    with pytest.raises(sg.ProgramError, match=r"several programs O1: say which, /ONE/O0001, /TWO/O0001"):
+        sg.Program.read(path, machine, program_number=1)
+    for wanted in ("/TWO/O0002", "<OTHER>", "#9"):
+        with pytest.raises(sg.ProgramError, match=f"no program {wanted}"):
+            sg.Program.read(path, machine, program_number=wanted)
+    assert sg.Program.read(path, machine, program_number="#2").core.program_number == 2
+    # What stands alone is the program alone, as it was written.
+    assert sg.Program.read(path, machine, program_number="#2").expanded_text.decode() == f"%\n{program('O0002', 60)}%\n"
+
+
+def test_two_programs_without_any_difference_in_name_have_places(tmp_path: Path) -> None:
+    text = "%\n<A>\nM30\n<A>\nM30\n%\n"
+    assert [place.address for place in programs_of(text.encode())] == ["#1", "#2"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["time"], ["check"], ["simulate"], ["measure", "--tool-diameter", "6mm"]],
+    ids=lambda words: words[0],
+)
+def test_every_program_has_its_table_and_its_place_in_the_json(words: list[str], tmp_path: Path) -> None:
+    punch(tmp_path)
+    told = run(tmp_path, words[0], "all.nc", "-m", "vx500", "--program", "all", "--json", "r.json", *words[1:])
+    reports = json.loads((tmp_path / "r.json").read_text())
+    assert [report["program_address"] for report in reports] == DONE
+    lines = told.stdout.splitlines()
+    assert [line.rstrip(":") for line in lines if line.rstrip(":") in DONE] == DONE
+    assert "called by others and done there: O0003" in lines
+    alone = run(tmp_path, words[0], "all.nc", "-m", "vx500", "--program", "O2", "--json", "one.json", *words[1:])
+    one = json.loads((tmp_path / "one.json").read_text())
+    ours = {key: value for key, value in reports[1].items() if key != "program_address"}
+    # Alone it is told that the file holds others.
+    for report in (one, ours):
+        for key in ("warnings", "findings", "counts", "counts_by_code", "programs"):
+            report.pop(key, None)
+    assert ours == one
+    assert told.returncode >= alone.returncode
+
+
+def test_time_of_all_is_the_time_of_each(tmp_path: Path) -> None:
+    path, machine = punch(tmp_path), sg.Machine.load("vx500")
+    run(tmp_path, "time", "all.nc", "-m", "vx500", "--program", "all", "--json", "r.json", "--csv", "blocks.csv")
+    for report in json.loads((tmp_path / "r.json").read_text()):
+        read = sg.Program.read(path, machine, program_number=report["program_address"])
+        assert report["cycle_time_s"] == pytest.approx(sg.cycle_time(read, machine).cycle_time_s)
+    assert sorted(each.name for each in tmp_path.glob("blocks*")) == [
+        "blocks-O0002.csv", "blocks-ONE-O0001.csv", "blocks-PART-7.csv", "blocks-TWO-O0001.csv",
+    ]  # fmt: skip
+    refused = run(tmp_path, "time", "all.nc", "-m", "vx500", "--program", "all", "--csv", "-")
+    assert refused.returncode == 2 and "a file of its own" in refused.stderr
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\n\r\r"], ids=["LF", "CR LF", "LF CR CR"])
+def test_convert_writes_one_file_with_every_program_in_its_place(end: str, tmp_path: Path) -> None:
+    original = PUNCH.replace("\n", end)
+    punch(tmp_path, original)
+    told = run(
+        tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--all", "-o", "out.nc", "--json", "r.json"
+    )
+    assert told.returncode == 0, told.stderr
+    emitted = (tmp_path / "out.nc").read_bytes()
+    reports = json.loads((tmp_path / "r.json").read_text())
+    assert [report["output"] for report in reports] == ["out.nc"] * 4
+    assert [place.address for place in programs_of(emitted)] == [*DONE[:2], "O0003", *DONE[2:]]
+    assert emitted.count(b"(VERDICT WITHIN TOLERANCE       )") == 4
+    # No line has another end than the file's, and what is called stands to the letter.
+    assert emitted.count(b"\n") == emitted.count(end.encode())
+    assert SUB.replace("\n", end).encode() in emitted
+    assert emitted.startswith(b"(LEADER)" + end.encode() + b"%" + end.encode() + b"&F=/ONE/")
+    assert emitted.endswith(b"M30" + end.encode() + b"%" + end.encode())
+    machine = sg.Machine.load("vx500")
+    for address in DONE:
+        was = sg.Program.from_text(original, machine, program_number=address)
+        now = sg.Program.from_text(emitted, machine, program_number=address)
+        ends = [sum((region.path.end_mm - region.path.start_mm) for region in each.regions) for each in (was, now)]
+        assert ends[1] == pytest.approx(ends[0], abs=1e-6)
+        assert sum(region.blocks for region in now.regions) > sum(region.blocks for region in was.regions)
+
+
+def test_expand_leaves_what_needs_nothing_to_the_letter(tmp_path: Path) -> None:
+    plain = "%\n" + program("O0001", 30) + program("O0002", 60) + "%\n"
+    punch(tmp_path, plain)
+    assert run(tmp_path, "expand", "all.nc", "-m", "vx500", "--program", "all", "-o", "out.nc").returncode == 0
+    assert (tmp_path / "out.nc").read_bytes() == plain.encode()
+
+
+def test_a_program_that_cannot_be_read_does_not_stop_the_others(tmp_path: Path) -> None:
+    bad = f"O0005\n{HEAD}G02 X10. I3. F500\nM30\n"
+    punch(tmp_path, "%\n" + program("O0001", 30) + bad + program("O0002", 60) + "%\n")
+    told = run(
+        tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--all", "-o", "out.nc", "--json", "r.json"
+    )
+    assert told.returncode == 2
+    assert "not done: all.nc:12:" in told.stdout and "off its radius" in told.stdout
+    reports = json.loads((tmp_path / "r.json").read_text())
+    assert [report["ok"] for report in reports] == [True, False, True]
+    assert bad.encode() in (tmp_path / "out.nc").read_bytes()
+
+
+def test_one_program_out_of_tolerance_sends_the_file_beside_the_one_asked_for(tmp_path: Path) -> None:
+    punch(tmp_path, "%\n" + program("O0001", 30) + program("O0002", 60) + "%\n")
+    told = run(
+        tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--all", "-o", "out.nc",
+        "--set", "tolerance.residual_floor_um=1e-6", "--set", "tolerance.residual_ratio=1e-9",
+        "--set", "tolerance.residual_floor_increments=0",
+    )  # fmt: skip
+    if told.returncode == 2:
+        pytest.fail(told.stderr)
+    assert told.returncode == 1
+    assert not (tmp_path / "out.nc").exists()
+    (written,) = (path for path in tmp_path.iterdir() if path.name.startswith("out.nc"))
+    assert b"DO NOT RUN" in written.read_bytes()
