@@ -234,6 +234,67 @@ TEST_CASE("contour: two laps of a circle drawn with short lines are two laps") {
   }
 }
 
+namespace {
+
+/// Vibrates in X and Y while it creeps along; the largest distance of the foot from where the point is on the path,
+/// counted along the path, and the largest error of the deviation against the whole path.
+struct Followed {
+  double along_mm = 0.0;
+  double deviation_mm = 0.0;
+  double missed_mm = 0.0;
+};
+Followed creep(const Path& path, double step, double amplitude, double swing) {
+  ContourTracker tracker(path);
+  shapegcode::CornerReach reach(path);
+  std::size_t cursor = 0;
+  Followed worst;
+  const int last = static_cast<int>(path.length_mm() / step);
+  for (int k = 0; k <= last; ++k) {
+    const double s = std::min(step * k, path.length_mm());
+    const double vibration = amplitude * std::sin(swing * k);
+    const Vector3 p = path.point(s, cursor) + Vector3(vibration, 0.6 * vibration, 0.0);
+    const double deviation = std::abs(tracker.step(p));
+    reach.step(p, tracker.s_mm());
+    worst.along_mm = std::max(worst.along_mm, std::abs(tracker.s_mm() - s));
+    worst.deviation_mm = std::max(worst.deviation_mm, std::abs(deviation - nearest_of_all(path, p)));
+  }
+  reach.step(path[path.size() - 1].end_mm, tracker.s_mm());
+  worst.missed_mm = reach.largest_mm();
+  return worst;
+}
+
+}  // namespace
+
+TEST_CASE("contour: small figures traced again and again under vibration are followed pass by pass") {
+  const Vector3 origin = Vector3::Zero();
+  for (const double radius : {0.1, 0.3, 0.6, 2.0}) {
+    const Vector3 start(radius, 0.0, 0.0);
+    const Segment left = make_arc(start, start, origin, 2.0 * pi, 2, 50.0);
+    const Segment right = make_arc(start, start, origin, -2.0 * pi, 2, 50.0);
+    const Vector3 top(0.5 * radius, radius, 0.0);
+    const std::vector<Path> paths = {
+        Path({left, left, left}),                                                        // one circle three times
+        Path({left, right, left, right}),                                                // there and back
+        polyline({origin, start, top, origin, start, top, origin}),                      // a triangle twice
+        polyline({origin, start, origin, start, origin, start, origin}),                 // a line there and back
+        Path({make_line(origin, start, 50), left, left, make_line(start, origin, 50)}),  // a ball bar
+    };
+    for (std::size_t i = 0; i < paths.size(); ++i) {
+      for (const double swing : {0.13, 0.29, 0.82}) {
+        const double amplitude = 0.01 * radius;
+        const Followed worst = creep(paths[i], 0.0005, amplitude, swing);
+        CAPTURE(radius);
+        CAPTURE(i);
+        CAPTURE(swing);
+        // Near a tip a vibration may take the foot over it and back.
+        CHECK(worst.along_mm < 20.0 * amplitude + 0.002);
+        CHECK(worst.missed_mm < 2.0 * amplitude + 0.0005);
+        CHECK(worst.deviation_mm < 2.0 * amplitude);
+      }
+    }
+  }
+}
+
 TEST_CASE("contour: random polylines of 1 um to 100 mm pieces under vibration, against a search of the whole path") {
   std::mt19937_64 generator(7);
   std::uniform_real_distribution<double> unit(0.0, 1.0);

@@ -104,6 +104,10 @@ Vector3 ContourTracker::end_tangent(std::size_t piece) const noexcept {
   return arc < 0 ? geometry_->pieces[piece].direction : geometry_->arcs[static_cast<std::size_t>(arc)].end_tangent;
 }
 
+const Vector3& ContourTracker::direction_at(std::size_t piece, const Foot& foot) const noexcept {
+  return geometry_->arc_of[piece] < 0 ? geometry_->pieces[piece].direction : foot.tangent;
+}
+
 inline ContourTracker::Foot ContourTracker::foot_on(std::size_t piece, const Vector3& p,
                                                     const Window& window) const noexcept {
   if (geometry_->arc_of[piece] >= 0) return foot_on_arc(piece, p, window);
@@ -236,16 +240,15 @@ std::size_t ContourTracker::group_before(std::size_t end, const Vector3& p, doub
 
 ContourTracker::Found ContourTracker::search(const Vector3& p, double move, const Window& window) const noexcept {
   Found best{foot_on(cursor_, p, window), cursor_, 0.0};
+  const Foot start = best.foot;
   const double advance = geometry_->pieces[cursor_].s + best.foot.along - s_;
   bool retreats = advance < 0.0;
   Window forward = window;
-  if (advance < 0.5 * move) {
-    // A filtered command turns back before it reaches the tip: the return leg lies as far behind the tip.
-    const double to_end = geometry_->pieces[cursor_].length - best.foot.along;
-    if (to_end < longest_turn_mm) {
-      forward.end = std::max(
-          forward.end, geometry_->pieces[cursor_].s + geometry_->pieces[cursor_].length + to_end + window_margin_mm);
-    }
+  // A filtered command turns back before it reaches the tip: the return leg lies as far behind the tip.
+  const double to_tip = geometry_->pieces[cursor_].length - best.foot.along;
+  if (advance < 0.5 * move && to_tip < longest_turn_mm) {
+    const double tip = geometry_->pieces[cursor_].s + geometry_->pieces[cursor_].length;
+    forward.end = std::max(forward.end, tip + to_tip + window_margin_mm);
   }
   for (std::size_t i = cursor_ + 1; i < geometry_->pieces.size() && geometry_->pieces[i].s <= forward.end; ++i) {
     const double limit = retreats ? best.foot.distance2 * (1.0 + retreat_tie_relative) + retreat_tie_absolute_mm2
@@ -255,7 +258,13 @@ ContourTracker::Found ContourTracker::search(const Vector3& p, double move, cons
       continue;
     }
     const Foot foot = foot_on(i, p, forward);
-    if (foot.distance2 < limit) {
+    if (foot.distance2 >= limit) continue;
+    // A return leg runs back: another turn of a circle does not. Far ahead it is one only as far behind the tip as the
+    // point was before it, and nearer: a vibration along the path is no reason to jump.
+    const bool nearer = foot.distance2 < best.foot.distance2 * (1.0 - tie_relative) - tie_absolute_mm2;
+    const bool back = direction_at(i, foot).dot(direction_at(cursor_, start)) < 0.0;
+    const bool within = geometry_->pieces[i].s + foot.along <= window.end;
+    if (within ? nearer || back : nearer && back && i == cursor_ + 1 && 2.0 * foot.along > to_tip) {
       best = {foot, i, 0.0};
       retreats = false;
     }

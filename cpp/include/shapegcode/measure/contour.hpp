@@ -107,6 +107,8 @@ class ContourTracker {
   [[nodiscard]] std::size_t group_before(std::size_t end, const Vector3& p, double limit2) const noexcept;
   [[nodiscard]] Found search(const Vector3& p, double move, const Window& window) const noexcept;
   [[nodiscard]] double lateral_side(const Found& found, double distance) const noexcept;
+  /// Direction of travel at a foot, of any length.
+  [[nodiscard]] const Vector3& direction_at(std::size_t piece, const Foot& foot) const noexcept;
   [[nodiscard]] Vector3 start_tangent(std::size_t piece) const noexcept;
   [[nodiscard]] Vector3 end_tangent(std::size_t piece) const noexcept;
 
