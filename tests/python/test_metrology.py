@@ -350,7 +350,7 @@ def test_the_band_narrows_and_the_radius_moves_as_the_model_must() -> None:
     bands = [row.sections[1].wall_deviation_um.left.band or 0.0 for row in (unshaped, ideal, kept)]
     assert bands[0] == pytest.approx(49.0, abs=1.0)
     assert bands[1] == pytest.approx(24.0, abs=1.0)
-    assert bands[2] < 10.0
+    assert bands[2] < 12.0
     radii = [arc_of(row).radius_deviation_um for row in (unshaped, ideal)]
     assert radii[0] == pytest.approx(20.0, abs=2.0)
     assert radii[1] == pytest.approx(-13.0, abs=1.0)
