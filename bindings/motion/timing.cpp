@@ -68,6 +68,10 @@ void define_model(py::module_& module) {
   py::enum_<InPosition>(module, "InPosition", "Where the wait for in-position comes from.")
       .value("measured", InPosition::measured)
       .value("servo_lag", InPosition::servo_lag);
+  py::enum_<ShapedRegions>(module, "ShapedRegions", "Which cuts of a program are played as shaped blocks.")
+      .value("marked", ShapedRegions::marked, "Regions that the program says it of.")
+      .value("all", ShapedRegions::all)
+      .value("none", ShapedRegions::none);
 
   py::class_<ControllerModel>(module, "ControllerModel",
                               "What decides how long a program takes, and what acceleration does to the path.")
@@ -95,12 +99,22 @@ void define_model(py::module_& module) {
       .def_readwrite("feed_forward_ratio", &ControllerModel::feed_forward_ratio,
                      "Per axis, 0 ... 1, shape (3,) (2092).")
       .def_readwrite("in_position_width_mm", &ControllerModel::in_position_width_mm, "Per axis, mm, shape (3,) (1826).")
+      .def_readwrite("shaped_regions", &ControllerModel::shaped_regions, "What is played as shaped blocks.")
+      .def_readwrite("shaped_filter_shape", &ControllerModel::shaped_filter_shape, "Behind shaped blocks.")
+      .def_readwrite("shaped_time_constant_s", &ControllerModel::shaped_time_constant_s,
+                     "Behind shaped blocks, s; 0: no filter.")
+      .def_readwrite("shaped_bell_time_s", &ControllerModel::shaped_bell_time_s,
+                     "Behind shaped blocks, linear: second moving average, s; 0: none.")
+      .def_readwrite("shaped_block_end", &ControllerModel::shaped_block_end,
+                     "When a shaped block's successor starts; ceil is the slower rule.")
       .def_readwrite("feed_override", &ControllerModel::feed_override, "Scales every programmed feed.")
       .def_readwrite("rapid_override", &ControllerModel::rapid_override,
                      "Scales the rapid rates; the acceleration of a rapid stays.")
       .def_readwrite("tool_change_s", &ControllerModel::tool_change_s, "M06, s.")
       .def_readwrite("m_function_s", &ControllerModel::m_function_s, "Every other M code, s.");
 
+  module.def("for_shaped_blocks", &for_shaped_blocks, py::arg("model"),
+             "The same controller while shaped blocks run: block by block at their feed, without look-ahead.");
   module.def("acceleration_filters", &acceleration_filters, py::arg("model"),
              "Filters behind interpolation in order, none, one or two.");
   module.def(

@@ -262,6 +262,8 @@ void register_gcode(py::module_& module) {
       .def_readonly("exit", &Region::exit, "Modal state after it.")
       .def_readonly("incremental", &Region::incremental, "Moves an axis of unknown position: its origin is arbitrary.")
       .def_readonly("exact_stop_at_end", &Region::exact_stop_at_end, "Ends with G09 or in G61.")
+      .def_readonly("shaped", &Region::shaped, "Whether the program says that these are blocks that were shaped.")
+      .def_readonly("was_rapid", &Region::was_rapid, "Whether these shaped blocks stand in place of a rapid.")
       .def_readonly("look_ahead_mode", &Region::look_ahead_mode,
                     "The program switched a look-ahead mode on before it (G05.1 Q1, G08 P1, G05 P10000).")
       .def_readonly("blocks", &Region::blocks, "Source blocks with a cutting move.");

@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramEntry', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramEntry', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -1531,6 +1531,11 @@ class Region:
         Its moves.
         """
     @property
+    def shaped(self) -> bool:
+        """
+        Whether the program says that these are blocks that were shaped.
+        """
+    @property
     def text_begin(self) -> int:
         """
         Byte offset of its first line.
@@ -1539,6 +1544,11 @@ class Region:
     def text_end(self) -> int:
         """
         Byte offset behind its last line.
+        """
+    @property
+    def was_rapid(self) -> bool:
+        """
+        Whether these shaped blocks stand in place of a rapid.
         """
 class ProgramText:
     """
@@ -3946,6 +3956,56 @@ class InPosition:
     @property
     def value(self) -> int:
         ...
+class ShapedRegions:
+    """
+    Which cuts of a program are played as shaped blocks.
+    
+    Members:
+    
+      marked : Regions that the program says it of.
+    
+      all
+    
+      none
+    """
+    __members__: typing.ClassVar[dict[str, ShapedRegions]]
+    all: typing.ClassVar[ShapedRegions]
+    marked: typing.ClassVar[ShapedRegions]
+    none: typing.ClassVar[ShapedRegions]
+    @typing.overload
+    def __eq__(self, other: ShapedRegions) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: ShapedRegions) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
 class ControllerModel:
     """
     What decides how long a program takes, and what acceleration does to the path.
@@ -4111,6 +4171,46 @@ class ControllerModel:
         """
     @rapid_time_constant_s.setter
     def rapid_time_constant_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def shaped_bell_time_s(self) -> float:
+        """
+        Behind shaped blocks, linear: second moving average, s; 0: none.
+        """
+    @shaped_bell_time_s.setter
+    def shaped_bell_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def shaped_block_end(self) -> BlockEnd:
+        """
+        When a shaped block's successor starts; ceil is the slower rule.
+        """
+    @shaped_block_end.setter
+    def shaped_block_end(self, arg0: BlockEnd) -> None:
+        ...
+    @property
+    def shaped_filter_shape(self) -> FilterShape:
+        """
+        Behind shaped blocks.
+        """
+    @shaped_filter_shape.setter
+    def shaped_filter_shape(self, arg0: FilterShape) -> None:
+        ...
+    @property
+    def shaped_regions(self) -> ShapedRegions:
+        """
+        What is played as shaped blocks.
+        """
+    @shaped_regions.setter
+    def shaped_regions(self, arg0: ShapedRegions) -> None:
+        ...
+    @property
+    def shaped_time_constant_s(self) -> float:
+        """
+        Behind shaped blocks, s; 0: no filter.
+        """
+    @shaped_time_constant_s.setter
+    def shaped_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def time_constant_s(self) -> float:
@@ -5608,6 +5708,10 @@ def fit_modes(forces: collections.abc.Sequence[typing.Annotated[numpy.typing.Arr
         ArgumentError: Records as in arma_driven, a start or option outside its range, or too few samples.
     
     Source: L. Ljung, System Identification, ch. 7; G. Golub, V. Pereyra 2003.
+    """
+def for_shaped_blocks(model: ControllerModel) -> ControllerModel:
+    """
+    The same controller while shaped blocks run: block by block at their feed, without look-ahead.
     """
 def gaussian_low_pass(profile_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], spacing_mm: typing.SupportsFloat | typing.SupportsIndex, cutoff_mm: typing.SupportsFloat | typing.SupportsIndex) -> numpy.ndarray:
     """

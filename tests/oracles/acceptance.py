@@ -147,7 +147,7 @@ def contour_limit_um(machine: sg.Machine, report: Mapping[str, Any]) -> float:
 
 
 def inserted_lines(machine: sg.Machine) -> list[str]:
-    lines = [*machine.emission.prologue, *machine.emission.epilogue]
+    lines = ["(SHAPED)", *machine.emission.prologue, *machine.emission.epilogue]
     if machine.emission.prefill_dwell_s > 0:
         lines.append(f"G04P{round(machine.emission.prefill_dwell_s * 1e3)}")
     return lines

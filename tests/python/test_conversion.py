@@ -339,7 +339,8 @@ def test_every_region_starts_with_a_full_safe_line() -> None:
     lines = judged.emitted.split("\n")
     for _, moves, entry in judged.regions():
         first = entry["emitted_lines"][0] - judged.header_lines
-        line = lines[first - 1]
+        assert lines[first - 1].rstrip() == "(SHAPED)"
+        line = lines[first]
         assert re.fullmatch(r"(N\d+)?G1[789]G9[01]G94G40G64G01(X\S+)?(Y\S+)?(Z\S+)?F\d+\.\d*\r?", line), line
         assert moves[0].length == pytest.approx(0.0, abs=1e-9) or np.isnan(moves[0].start).any()
 

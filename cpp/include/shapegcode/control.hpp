@@ -102,6 +102,13 @@ enum class InPosition : std::uint8_t {
   servo_lag,  ///< until the position error of a first-order servo loop is within the width (1825, 1826)
 };
 
+/// Which cuts of a program are played as shaped blocks.
+enum class ShapedRegions : std::uint8_t {
+  marked,  ///< regions that the program says it of
+  all,     ///< every cut
+  none,
+};
+
 /// Everything that decides how long a program takes on a controller, and what its acceleration does to the path.
 /// Plain values; the numbers in the comments are FANUC parameters.
 struct ControllerModel {
@@ -129,11 +136,20 @@ struct ControllerModel {
   Vector3 feed_forward_ratio = Vector3::Zero();            ///< servo_lag, 0 ... 1 (2092)
   Vector3 in_position_width_mm = Vector3::Constant(0.02);  ///< servo_lag (1826)
 
+  ShapedRegions shaped_regions = ShapedRegions::marked;
+  FilterShape shaped_filter_shape = FilterShape::linear;  ///< behind shaped blocks
+  double shaped_time_constant_s = 0.0;                    ///< likewise; 0: none
+  double shaped_bell_time_s = 0.0;                        ///< likewise, linear: second moving average; 0: none
+  BlockEnd shaped_block_end = BlockEnd::ceil;             ///< between shaped blocks
+
   double feed_override = 1.0;   ///< scales every programmed feed
   double rapid_override = 1.0;  ///< scales the rapid rates; the acceleration of a rapid stays what it is
   double tool_change_s = 0.0;   ///< M06
   double m_function_s = 0.0;    ///< every other M code
 };
+
+/// The same controller while shaped blocks run: block by block at their feed, without look-ahead.
+[[nodiscard]] ControllerModel for_shaped_blocks(const ControllerModel& model);
 
 /// Throws Error(argument) on a value that no controller can have; the message names it.
 void check(const ControllerModel& model);

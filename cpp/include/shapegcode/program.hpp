@@ -143,6 +143,8 @@ struct Region {
   bool incremental = false;        ///< moves an axis whose position is not known: origin arbitrary, G91
   bool exact_stop_at_end = false;  ///< the last block carried G09 or stood in G61
   bool look_ahead_mode = false;    ///< the program switched a look-ahead mode on before it (G05.1 Q1, G08 P1)
+  bool shaped = false;             ///< the program says that these are shaped blocks: (SHAPED) behind its header
+  bool was_rapid = false;          ///< likewise, in place of a rapid: (SHAPED RAPID)
   std::uint32_t blocks = 0;        ///< source blocks with a cutting move
 };
 

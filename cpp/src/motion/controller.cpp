@@ -32,10 +32,22 @@ void add_average(std::vector<Fir>& filters, double time_s, double period_s) {
 
 }  // namespace
 
+ControllerModel for_shaped_blocks(const ControllerModel& model) {
+  ControllerModel shaped = model;
+  shaped.motion = MotionKind::after_interpolation;
+  shaped.filter_shape = model.shaped_filter_shape;
+  shaped.time_constant_s = model.shaped_time_constant_s;
+  shaped.bell_time_s = model.shaped_bell_time_s;
+  shaped.block_end = model.shaped_block_end;
+  return shaped;
+}
+
 void check(const ControllerModel& model) {
   require(model.period_s >= 1e-5 && model.period_s <= 1.0, "interpolation period", model.period_s, "s", "1e-5 to 1 s");
   require_ramp("acceleration time constant", model.time_constant_s);
   require_ramp("bell time", model.bell_time_s);
+  require_ramp("time constant behind shaped blocks", model.shaped_time_constant_s);
+  require_ramp("bell time behind shaped blocks", model.shaped_bell_time_s);
   require_ramp("look-ahead filter time constant", model.look_ahead_filter_time_constant_s);
   require_ramp("rapid bell time", model.rapid_bell_time_s);
   require_wait("tool change", model.tool_change_s);

@@ -21,8 +21,8 @@ class Clock {
         model_(model),
         per_block_(per_block),
         limits_(detail::overridden_limits(model)),
-        filters_(acceleration_filters(model)),
-        filter_periods_(filter_periods(filters_)),
+        ordinary_(model),
+        shaped_(for_shaped_blocks(model)),
         changes_by_t_(!detail::has_tool_change(program)) {}
 
   CycleTime run() {
@@ -48,6 +48,15 @@ class Clock {
   }
 
  private:
+  // The controller as it plays a run.
+  struct Playing {
+    explicit Playing(ControllerModel controller)
+        : model(std::move(controller)), filters(acceleration_filters(model)), periods(filter_periods(filters)) {}
+    ControllerModel model;
+    std::vector<Fir> filters;
+    int periods;  // that the filters add to a run
+  };
+
   void region(const Region& region) {
     RegionTime row;
     row.first_line = region.first_line;
@@ -55,7 +64,7 @@ class Clock {
     row.tool = time_.tools[tool_].tool;
     row.start_s = now_s();
     row.length_mm = region.path->length_mm();
-    const TimeParts parts = cutting_run(*region.path, region.exact_stop_at_end);
+    const TimeParts parts = cutting_run(*region.path, region.exact_stop_at_end, detail::plays_shaped(region, model_));
     row.cutting_s = parts.cutting_s;
     row.acceleration_s = parts.acceleration_s;
     row.in_position_s = parts.in_position_s;
@@ -71,7 +80,7 @@ class Clock {
       std::vector<Segment> run;
       at = detail::gather_run(program_, at, run);
       const bool stop = run.back().stop_at_end;
-      add(cutting_run(Path(std::move(run)), stop));
+      add(cutting_run(Path(std::move(run)), stop, detail::plays_shaped_outside(model_)));
       return at;
     }
     const Segment& segment = move.segment;
@@ -111,21 +120,23 @@ class Clock {
     }
   }
 
-  TimeParts cutting_run(const Path& path, bool exact_stop) {
+  TimeParts cutting_run(const Path& path, bool exact_stop, bool shaped) {
     time_.cutting_length_mm += path.length_mm();
-    return model_.motion == MotionKind::look_ahead ? planned_run(path, exact_stop) : overlapped_run(path, exact_stop);
+    const Playing& playing = shaped ? shaped_ : ordinary_;
+    return playing.model.motion == MotionKind::look_ahead ? planned_run(path, exact_stop, playing)
+                                                          : overlapped_run(path, exact_stop, playing);
   }
 
   // Paper 004: a block's successor starts ceil(l / (F T_I)) T_I behind it, and the filters end the run.
-  TimeParts overlapped_run(const Path& path, bool exact_stop) {
+  TimeParts overlapped_run(const Path& path, bool exact_stop, const Playing& playing) {
     const std::size_t first_row = time_.blocks.size();
     double periods = 0.0;
     for (const Segment& segment : path.segments()) {
-      const double feed = detail::checked_feed(segment, model_);
-      const double block = block_periods(segment.length_mm, feed, model_.period_s, model_.block_end);
+      const double feed = detail::checked_feed(segment, playing.model);
+      const double block = block_periods(segment.length_mm, feed, playing.model.period_s, playing.model.block_end);
       if (per_block_) {
-        time_.blocks.push_back({segment.line, BlockKind::cutting, now_s() + periods * model_.period_s,
-                                block * model_.period_s, segment.length_mm > 0.0 ? feed : 0.0});
+        time_.blocks.push_back({segment.line, BlockKind::cutting, now_s() + periods * playing.model.period_s,
+                                block * playing.model.period_s, segment.length_mm > 0.0 ? feed : 0.0});
       }
       periods += block;
     }
@@ -134,35 +145,35 @@ class Clock {
       return parts;
     }
     const double whole = whole_periods(periods);
-    parts.cutting_s = periods * model_.period_s;
-    parts.acceleration_s = (whole - periods + filter_periods_) * model_.period_s;
+    parts.cutting_s = periods * playing.model.period_s;
+    parts.acceleration_s = (whole - periods + playing.periods) * playing.model.period_s;
     if (exact_stop) {
-      parts.in_position_s = detail::wait_behind_blocks(path, whole - periods, filters_, model_);
+      parts.in_position_s = detail::wait_behind_blocks(path, whole - periods, playing.filters, playing.model);
     }
     if (per_block_) {
       const std::span<BlockTime> rows = std::span(time_.blocks).subspan(first_row);
-      detail::lower_to_reached(rows, model_);
+      detail::lower_to_reached(rows, playing.model);
       rows.back().duration_s += parts.acceleration_s + parts.in_position_s;
     }
     return parts;
   }
 
-  TimeParts planned_run(const Path& path, bool exact_stop) {
+  TimeParts planned_run(const Path& path, bool exact_stop, const Playing& playing) {
     TimeParts parts;
     if (!(path.length_mm() > 0.0)) {
       return parts;
     }
     for (const Segment& segment : path.segments()) {
       if (segment.length_mm > 0.0) {
-        parts.cutting_s += segment.length_mm / detail::checked_feed(segment, model_);
+        parts.cutting_s += segment.length_mm / detail::checked_feed(segment, playing.model);
       }
     }
     const SpeedProfile profile = plan_speed(path, limits_);
-    const detail::PlannedEnd end = detail::planned_end(profile, filters_, model_);
+    const detail::PlannedEnd end = detail::planned_end(profile, playing.filters, playing.model);
     parts.cutting_s = std::min(parts.cutting_s, end.duration_s);  // rounding only
     parts.acceleration_s = end.duration_s - parts.cutting_s;
     if (exact_stop) {
-      parts.in_position_s = detail::wait_behind_profile(path, profile, end, model_);
+      parts.in_position_s = detail::wait_behind_profile(path, profile, end, playing.model);
     }
     if (per_block_) {
       detail::append_rows(path, profile, now_s(), time_.blocks);
@@ -199,8 +210,8 @@ class Clock {
   const ControllerModel& model_;
   bool per_block_;
   MotionLimits limits_;
-  std::vector<Fir> filters_;
-  int filter_periods_;
+  Playing ordinary_;
+  Playing shaped_;
   bool changes_by_t_;
   std::int64_t selected_ = -1;
   std::size_t tool_ = 0;  // in use, index into time_.tools

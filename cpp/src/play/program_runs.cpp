@@ -97,6 +97,12 @@ std::size_t gather_run(const Program& program, std::size_t at, std::vector<Segme
   return at;
 }
 
+bool plays_shaped(const Region& region, const ControllerModel& model) noexcept {
+  return model.shaped_regions == ShapedRegions::all || (model.shaped_regions == ShapedRegions::marked && region.shaped);
+}
+
+bool plays_shaped_outside(const ControllerModel& model) noexcept { return model.shaped_regions == ShapedRegions::all; }
+
 double checked_feed(const Segment& segment, const ControllerModel& model) {
   if (segment.length_mm > 0.0 && !(segment.feed_mm_per_s > 0.0)) {
     throw Error(ErrorKind::argument, "block without a feed greater than zero", segment.line);

@@ -24,6 +24,10 @@ inline constexpr int tool_change_code = 6;
 /// Collects the cutting moves from step `at` on that follow each other without a stop; returns the step behind them.
 [[nodiscard]] std::size_t gather_run(const Program& program, std::size_t at, std::vector<Segment>& run);
 
+/// Whether a region, and whether a cut outside of the regions, is played as shaped blocks.
+[[nodiscard]] bool plays_shaped(const Region& region, const ControllerModel& model) noexcept;
+[[nodiscard]] bool plays_shaped_outside(const ControllerModel& model) noexcept;
+
 /// Controlled feed of a block; throws Error(argument) where a move has none.
 [[nodiscard]] double checked_feed(const Segment& segment, const ControllerModel& model);
 

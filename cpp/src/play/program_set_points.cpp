@@ -40,8 +40,10 @@ std::uint32_t ProgramSetPoints::Cut::line() const {
 ProgramSetPoints::ProgramSetPoints(const Program& program, const ControllerModel& model, Waits waits)
     : program_(program),
       model_(checked(model)),
+      shaped_model_(for_shaped_blocks(model)),
       waits_(waits),
       filters_(acceleration_filters(model)),
+      shaped_filters_(acceleration_filters(shaped_model_)),
       servo_(model.position_gain_per_s, model.feed_forward_ratio, model.period_s) {
   time_.region_s.reserve(program_.regions.size());
   set_point_ = first_position();
@@ -116,7 +118,7 @@ bool ProgramSetPoints::open_step() {
       in_region_ = true;
       region_start_periods_ = periods_cutting_ + periods_waiting_ + measured_s_ / model_.period_s;
       ++at_;
-      open_cut(region.path, region.exact_stop_at_end, true);
+      open_cut(region.path, region.exact_stop_at_end, true, plays_shaped(region, model_));
       break;
     }
     case StepKind::function:
@@ -160,7 +162,7 @@ void ProgramSetPoints::open_other_move(std::uint32_t line) {
     std::vector<Segment> run;
     at_ = gather_run(program_, at_, run);
     const bool stop = run.back().stop_at_end;
-    open_cut(std::make_shared<const Path>(std::move(run)), stop, false);
+    open_cut(std::make_shared<const Path>(std::move(run)), stop, false, plays_shaped_outside(model_));
     return;
   }
   ++at_;
@@ -183,32 +185,35 @@ void ProgramSetPoints::open_rapid(const Segment& segment) {
   active_ = std::move(rapid);
 }
 
-void ProgramSetPoints::open_cut(const std::shared_ptr<const Path>& programmed, bool exact_stop, bool is_region) {
+void ProgramSetPoints::open_cut(const std::shared_ptr<const Path>& programmed, bool exact_stop, bool is_region,
+                                bool shaped) {
   if (!(programmed->length_mm() > 0.0)) {
     return;
   }
+  const ControllerModel& model = shaped ? shaped_model_ : model_;
   next_.kind = BlockKind::cutting;
   active_ = Cut{};
   Cut& cut = std::get<Cut>(active_);
   cut.path = programmed;
   cut.exact_stop = exact_stop;
   cut.is_region = is_region;
-  if (model_.motion == MotionKind::look_ahead) {
-    auto profile = std::make_shared<const SpeedProfile>(plan_speed(*programmed, overridden_limits(model_)));
-    cut.smoothed = profile->jerk_time_s() > 1.5 * model_.period_s || !filters_.empty();
-    cut.player.emplace<Interpolator>(programmed, std::move(profile), model_.period_s);
+  cut.filters = shaped ? &shaped_filters_ : &filters_;
+  if (model.motion == MotionKind::look_ahead) {
+    auto profile = std::make_shared<const SpeedProfile>(plan_speed(*programmed, overridden_limits(model)));
+    cut.smoothed = profile->jerk_time_s() > 1.5 * model.period_s || !cut.filters->empty();
+    cut.player.emplace<Interpolator>(programmed, std::move(profile), model.period_s);
   } else {
     cut.blocks = programmed->segments();
     for (Segment& block : cut.blocks) {
-      block.feed_mm_per_s = checked_feed(block, model_);
+      block.feed_mm_per_s = checked_feed(block, model);
     }
-    cut.smoothed = !filters_.empty();
-    cut.player.emplace<BlockPlayer>(cut.blocks, model_.period_s, model_.block_end);
+    cut.smoothed = !cut.filters->empty();
+    cut.player.emplace<BlockPlayer>(cut.blocks, model.period_s, model.block_end);
   }
   Vector3 position;
   cut.step(position);
   cut.end = position;
-  filters_.reset(position);
+  cut.filters->reset(position);
   start_at(position);
 }
 
@@ -229,7 +234,7 @@ bool ProgramSetPoints::step_cut(Cut& cut) {
     cut.smoothed = (set_point_ - cut.end).cwiseAbs().maxCoeff() > 1e-14 * (1.0 + cut.end.cwiseAbs().maxCoeff());
   }
   Vector3 position = cut.end;
-  filters_.step(position);
+  cut.filters->step(position);
   give(position);
   periods_cutting_ += 1.0;
   return true;

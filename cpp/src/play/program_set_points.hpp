@@ -60,6 +60,7 @@ class ProgramSetPoints {
     bool draining = false;
     bool exact_stop = false;
     bool is_region = false;
+    FilterChain* filters = nullptr;
 
     bool step(Vector3& position);
     [[nodiscard]] std::uint32_t line() const;
@@ -79,7 +80,7 @@ class ProgramSetPoints {
   void open_functions(const MachineFunction& function);
   void open_other_move(std::uint32_t line);
   void open_rapid(const Segment& segment);
-  void open_cut(const std::shared_ptr<const Path>& programmed, bool exact_stop, bool is_region);
+  void open_cut(const std::shared_ptr<const Path>& programmed, bool exact_stop, bool is_region, bool shaped);
   void open_arrival(const std::array<bool, axis_count>& moved);
   void open_wait(double seconds);
   /// The coordinates at the start of a motion hold; nothing moves.
@@ -91,8 +92,10 @@ class ProgramSetPoints {
 
   const Program& program_;
   const ControllerModel& model_;
+  ControllerModel shaped_model_;
   Waits waits_;
   FilterChain filters_;
+  FilterChain shaped_filters_;
   ServoLag servo_;
   std::variant<std::monostate, Cut, Rapid, Wait, InPositionWait> active_;
   std::size_t at_ = 0;  // step of the program that comes next

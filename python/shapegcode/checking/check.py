@@ -23,6 +23,7 @@ from shapegcode.checking.result import (
 )
 from shapegcode.checking.runs import BlockTable, Breaker, CuttingRun, block_table, look_ahead_breakers
 from shapegcode.machine import Machine
+from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program
 from shapegcode.program.reading import program_bytes
 
@@ -107,6 +108,7 @@ def check_text(
         found.append(_finding("alarm", "alarm", error.alarm, error.file or source, error.line, error.column, message))
     else:
         found += _reader_findings(program)
+        found += (_at(program, "warning", code, 1, message) for code, message in shaped_warnings(program, machine))
         table = block_table(program, machine)
         found += _breaker_findings(program, look_ahead_breakers(program, machine, table))
         found += _feed_findings(program, table)

@@ -32,6 +32,7 @@ _SLOW_MOTION = 1e-4
 _RESOLUTION_S = _PERIOD_S * _SLOW_MOTION
 _NO_LIMIT = 1e12
 _ROUNDING = 1e-6
+_TICK_SLACK = 1e-5
 _FIRST_PLACES = 20
 
 # What a stop between two cutting moves does, worst first.
@@ -140,15 +141,20 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     run_starts = _run_starts(program, lines, cutting)
     block_starts = np.flatnonzero(run_starts | (np.diff(lines, prepend=-1) != 0))
     run_of_block = np.cumsum(run_starts)[block_starts] - 1
-    duration = np.add.reduceat(rows["duration_s"], block_starts) * _SLOW_MOTION
+    limited_s = np.add.reduceat(rows["duration_s"], block_starts) * _SLOW_MOTION
     programmed = np.add.reduceat(free["duration_s"], block_starts) * _SLOW_MOTION
     feed = free["feed_mm_per_s"][block_starts] * (60.0 / _SLOW_MOTION)
     line = lines[block_starts]
 
+    # The control takes a shaped block for whole periods: its F is rounded up so that it ends just before the last one.
+    period_s = machine.controller.interpolation_period_s
+    whole = np.ceil(limited_s / period_s - _TICK_SLACK) * period_s
+    duration = np.where(_in_shaped_region(program, line), whole, limited_s)
+
     block_time = machine.controller.block_time_s
     short = duration < block_time * (1.0 - _ROUNDING)
-    ratio = programmed / np.maximum(duration, _RESOLUTION_S)
-    slowed = (ratio < 1.0 - _ROUNDING) & (duration - programmed > 2.0 * _RESOLUTION_S)
+    ratio = programmed / np.maximum(limited_s, _RESOLUTION_S)
+    slowed = (ratio < 1.0 - _ROUNDING) & (limited_s - programmed > 2.0 * _RESOLUTION_S)
     clamped = tuple(_clamped_feeds(line[slowed], feed[slowed], ratio[slowed]))
     line_bytes = _line_offsets(program)
     bounds = np.append(np.flatnonzero(np.diff(run_of_block, prepend=-1)), line.size).tolist()
@@ -175,6 +181,15 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     return BlockTable(tuple(runs), lines, lines_of[_RAPID], lines_of[_DWELL], firsts, clamped)
 
 
+def _in_shaped_region(program: Program, lines: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+    """Which lines stand in regions that are shaped blocks."""
+    shaped = [region for region in program.regions if region.shaped]
+    firsts = np.array([region.first_line for region in shaped], dtype=np.int64)
+    lasts = np.array([0, *(region.last_line for region in shaped)], dtype=np.int64)
+    inside: npt.NDArray[np.bool_] = lines <= lasts[np.searchsorted(firsts, lines, side="right")]
+    return inside
+
+
 def _clamped_feeds(
     line: npt.NDArray[np.int64], feed: npt.NDArray[np.float64], ratio: npt.NDArray[np.float64]
 ) -> Iterator[ClampedFeed]:
@@ -192,7 +207,7 @@ def _clamped_feeds(
 
 def _timed(program: Program, machine: Machine, *, with_limits: bool) -> npt.NDArray[Any]:
     """One row per move in slow motion, without any acceleration: length over feed."""
-    model = controller_model(machine, feed_override=_SLOW_MOTION)
+    model = controller_model(machine, feed_override=_SLOW_MOTION, shaped=False)
     model.motion = _core.MotionKind.after_interpolation
     model.filter_shape = _core.FilterShape.linear
     model.block_end = _core.BlockEnd.carry

@@ -28,7 +28,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--shaped",
         action="store_true",
-        help="IN was written by shapegcode: play its blocks at their feed, without look-ahead",
+        help="play every cut as shaped blocks: at their feed, without look-ahead; needed only where the header of a "
+        "shaped program is missing, which says which of them are",
+    )
+    parser.add_argument(
+        "--against",
+        metavar="ORIGINAL",
+        default=None,
+        help="measure the contour error against the path of this program, such as the original of a shaped one; "
+        "without it against IN's own path",
     )
     parser.add_argument(
         "--plant",
@@ -74,21 +82,21 @@ def run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from shapegcode.cli import runner
+    from shapegcode.model.shaped_program import shaped_note
     from shapegcode.program import Program
-    from shapegcode.program.program import written_by_shapegcode
     from shapegcode.simulation.simulate import play_motion, simulate
 
     runner.check_files(args)
     machine = load_machine(args)
     with runner.progress(f"playing {args.input}", args) as bar:
         program = Program.read(args.input, machine, program_number=args.program)
-        # A program of ours says so; played as an ordinary one it would show figures of nothing.
-        shaped = args.shaped or written_by_shapegcode(program)
+        shaped = True if args.shaped else None
         simulation = simulate(
             program,
             machine,
             plant=args.plant,
             shaped=shaped,
+            against=args.against,
             record_samples=0,
             on_progress=lambda done, total: bar.update(_REGIONS_SHARE * done / total),
         )
@@ -103,6 +111,7 @@ def run(args: argparse.Namespace) -> int:
             every=args.every,
             on_progress=lambda done: bar.update(_REGIONS_SHARE + (1.0 - _REGIONS_SHARE) * done),
         )
-    notes = ["played block by block at its feed, as a shaped program, against its own path"] if shaped else []
+    said = shaped_note(program)
+    notes = [said] if said and shaped is None else []
     wrote = [name for name in (args.csv, args.npz) if name not in (None, "-")]
     return runner.finish(replace(simulation, motion=motion), args, notes=notes, wrote=wrote)

@@ -52,6 +52,7 @@ def run(args: argparse.Namespace) -> int:
     """
     from shapegcode.cli import runner
     from shapegcode.io.atomic import write_lines
+    from shapegcode.model.shaped_program import shaped_note
     from shapegcode.program import Program
     from shapegcode.timing.cycle_time import cycle_time
 
@@ -72,6 +73,5 @@ def run(args: argparse.Namespace) -> int:
         write_lines(args.csv, time.csv_lines())
     free = sum(block.kind in ("tool_change", "function") and block.duration_s <= 0.0 for block in time.blocks)
     note = f"tool changes and M codes count 0 s on this machine ({free} in the program)"
-    return runner.finish(
-        time if args.blocks else time.without_blocks(), args, tables=time.tables(), notes=[note] if free else []
-    )
+    notes = [*([said] if (said := shaped_note(program)) else []), *([note] if free else [])]
+    return runner.finish(time if args.blocks else time.without_blocks(), args, tables=time.tables(), notes=notes)

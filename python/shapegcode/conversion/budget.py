@@ -196,6 +196,8 @@ def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_p
 
 def _block_bytes(shaped: EmittedRegion) -> FloatArray:
     """Characters of each block with its line end; comment lines count with the block that follows."""
+    if shaped.blocks == 0:  # a region shorter than an increment
+        return np.zeros(0)
     text = np.frombuffer(shaped.text, dtype=np.uint8)[shaped.blocks_begin : shaped.blocks_end]
     ends = np.flatnonzero(text == ord("\n")) + 1
     begins = np.concatenate([[0], ends[:-1]])

@@ -22,18 +22,20 @@ from shapegcode.conversion.figures import (
     UsedShaper,
 )
 from shapegcode.conversion.judge import Judge, RegionFigures
+from shapegcode.conversion.operating import at_the_control
 from shapegcode.conversion.rapids.shape import ShapedRapids, shape_rapids
 from shapegcode.conversion.readback import read_back
 from shapegcode.conversion.rests import RestsOn, rests_on
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.spending import Spending, keepable
 from shapegcode.conversion.warnings import played_warnings, text_warnings
-from shapegcode.conversion.whole_text import TextWriter, Written, judged, why_kept
+from shapegcode.conversion.whole_text import TextWriter, Written, why_kept
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import machine_warnings, region_range_warnings
-from shapegcode.program import Program, written_by_shapegcode
+from shapegcode.program import Program
 from shapegcode.program.compensation import read_for_conversion, require_decision
+from shapegcode.program.stamp import judged
 from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid, choose_grid
 
@@ -106,7 +108,7 @@ def convert(
     if not isinstance(program, Program):
         program = read_for_conversion(program, machine)
     require_decision(program, machine)
-    if written_by_shapegcode(program):
+    if program.stamp is not None:
         raise _core.ProgramError(
             f"{program.source}:1:1: written by shapegcode already (its header says so): convert the original"
         )
@@ -239,10 +241,7 @@ class _Run:
             self.writer = TextWriter(self.program, self.model, grid)
         # Of what was given up for a budget, or gains nothing, one sentence speaks for all.
         given_up = {} if self.spending is None else self.spending.given_up
-        written = self.writer.write(
-            self.reasons, self.room_um, self.feed_share, {*given_up, *self.kept}, on_progress,
-            with_loads=self.spending is not None,
-        )  # fmt: skip
+        written = self.writer.write(self.reasons, self.room_um, self.feed_share, {*given_up, *self.kept}, on_progress)
         for index, reason in written.no_room.items():
             self.reasons[index] = reason
         return written
@@ -309,11 +308,6 @@ class _Run:
         core = program.core
         figures = self.judge.summarise(settled.figures, written.placed, self.grid.block_period_s)
         cutting = figures.region_time_s()
-        kept_s = sum(
-            play.result().duration_s for play, reason in zip(self.originals, self.reasons, strict=True) if reason
-        )
-        other_s = kept_s + self.model.other_time_s(core)
-        added_s = machine.emission.prefill_dwell_s * len(written.placed) + (rapids.extra_s if rapids else 0.0)
         warnings = self._warnings(written, figures)
         if rapids is not None:
             warnings += rapids.warnings
@@ -322,7 +316,7 @@ class _Run:
             **vars(figures),
             program=program.source,
             machine=machine.name,
-            cycle_time_s=Pair(cutting.original + other_s, cutting.emitted + other_s + added_s),
+            cycle_time_s=self._cycle_time_s(settled, cutting, rapids),
             cutting_time_s=cutting,
             block_period_s=self.grid.block_period_s,
             shaper=_used_shaper(self.grid),
@@ -346,6 +340,9 @@ class _Run:
             least_gain_um=machine.shaping.least_gain_um,
             rests_on=rests,
             unmeasured_tried=tried,
+            at_the_control=at_the_control(
+                written.text, written.placed, written.loads, figures, machine, self.grid.block_period_s
+            ),
             text=judged(written.text, good=figures.within_tolerance),
             emitted=settled.emitted,
             placed=tuple(written.placed),
@@ -359,6 +356,16 @@ class _Run:
             self.model, self.judge, settled.figures, settled.written.placed, settled.emitted, figures.worst_case.lines,
             self.pool,
         )  # fmt: skip
+
+    def _cycle_time_s(self, settled: _Settled, cutting: Pair[float], rapids: ShapedRapids | None) -> Pair[float]:
+        """What `shapegcode time` says of both texts."""
+        original_s = self.model.cycle_time_s(self.program.core)
+        if self.machine.emission.header:
+            return Pair(original_s, self.model.cycle_time_s(settled.emitted.core))
+        # Nothing in such a text says which regions are shaped.
+        added_s = self.machine.emission.prefill_dwell_s * len(settled.written.placed)
+        added_s += rapids.extra_s if rapids else 0.0
+        return Pair(original_s, original_s - cutting.original + cutting.emitted + added_s)
 
     def _warnings(self, written: Written, figures: PlayedFigures) -> list[str]:
         program, machine = self.program, self.machine

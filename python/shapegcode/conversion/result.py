@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 from shapegcode.conversion.benefit import KeptRegion
 from shapegcode.conversion.budget import BudgetOutcome
 from shapegcode.conversion.figures import AppliedLimits, BlockCount, PlayedFigures, UsedShaper
+from shapegcode.conversion.operating import ControlNote, control_table
 from shapegcode.conversion.rapids.result import RapidsOutcome
 from shapegcode.conversion.readback import Placed
 from shapegcode.conversion.rests import RestsOn
@@ -57,6 +58,7 @@ class Conversion(PlayedFigures, Result):
         least_gain_um: what is too little.
         rests_on: values that nobody measured on this machine, by how far each moves the deciding figure to its limit.
         unmeasured_tried: how many such values were moved.
+        at_the_control: what to heed when it is loaded and run; empty where nothing was shaped.
         text: the emitted program, as a file holds it.
         emitted: the same, read back.
         placed: the shaped regions and their places in it.
@@ -84,6 +86,7 @@ class Conversion(PlayedFigures, Result):
     least_gain_um: float = 0.0
     rests_on: tuple[RestsOn, ...] = ()
     unmeasured_tried: int = 0
+    at_the_control: tuple[ControlNote, ...] = ()
     text: bytes = field(metadata=hidden())
     emitted: Program = field(metadata=hidden())
     placed: tuple[Placed, ...] = field(metadata=hidden())
@@ -158,11 +161,8 @@ class Conversion(PlayedFigures, Result):
             return []
         groups = [self._times(), *self._vibrations(), *self._contours(), self._orbits(), self._feeds(), self._sizes()]
         cases = [case_table(self.cases, self.worst_case)] if self.cases else []
-        return [
-            before_after_table(groups),
-            *cases,
-            *([rests_table(self.rests_on, self.unmeasured_tried)] if self.rests_on else []),
-        ]
+        rests = [rests_table(self.rests_on, self.unmeasured_tried)] if self.rests_on else []
+        return [before_after_table(groups), *cases, *rests, control_table(self.at_the_control)]
 
     def _times(self) -> list[BeforeAfter]:
         pairs = (("cycle time", self.cycle_time_s), ("cutting time", self.cutting_time_s))

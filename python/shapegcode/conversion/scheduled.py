@@ -11,7 +11,6 @@ from shapegcode.conversion.convert import convert
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.scheduled_motion import ShapedMotion
 from shapegcode.conversion.scheduled_result import ScheduledConversion
-from shapegcode.conversion.whole_text import marked_out_of_tolerance
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
 from shapegcode.feed.figures import feed_figures
@@ -22,6 +21,7 @@ from shapegcode.feed.survey import survey
 from shapegcode.feed.travel import OrdinaryMotion, travel_emitted
 from shapegcode.machine import Machine
 from shapegcode.program import Program
+from shapegcode.program.stamp import judged
 from shapegcode.shaping.grid import choose_grid
 
 __all__ = ["convert_scheduled"]
@@ -89,7 +89,7 @@ def convert_scheduled(
             break
         margin += excess + _MORE_MARGIN
     warnings = tuple(dict.fromkeys([*emitted.warnings, *conversion.warnings]))
-    text = conversion.text if emitted.ok else marked_out_of_tolerance(conversion.text)
+    text = conversion.text if emitted.ok else judged(conversion.text, good=False)
     return ScheduledConversion(**vars(conversion) | {"text": text, "warnings": warnings}, feed_schedule=emitted)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from shapegcode import _core
 from shapegcode.conversion.budget import TransferLoad, measure_load
@@ -12,38 +12,16 @@ from shapegcode.conversion.spending import keepable
 from shapegcode.conversion.write import EmittedRegion, NoRoomError, RegionWriter, Room
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.shaped_program import stamp_of_machine
 from shapegcode.program import Program
 from shapegcode.program.compensation import guard_lines, header_lines
 from shapegcode.shaping.grid import Grid
 
-__all__ = ["TextWriter", "Written", "judged", "marked_out_of_tolerance", "why_kept"]
+__all__ = ["TextWriter", "Written", "why_kept"]
 
-_COMMENT_WIDTH = 60
 _MOST_PERIODS = 10_000_000  # of a region: what fits into half a gigabyte
-# One length, so that the verdict can take its place without moving a line.
-_VERDICT_PENDING, _VERDICT_GOOD, _VERDICT_BAD = (
-    b"(VERDICT PENDING                )",
-    b"(VERDICT WITHIN TOLERANCE       )",
-    b"(OUT OF TOLERANCE - DO NOT RUN  )",
-)
-
-_OVERRIDE_NOTE = {
-    "ask": "SET FEED OVERRIDE 100 PCT",
-    "lock": "FEED OVERRIDE IS OFF IN SHAPED MOVES",
-    "any": "BLOCKS OF ONE DURATION FOR ANY FEED OVERRIDE",
-}
 
 Step = Callable[[int, int], None]
-
-
-def judged(text: bytes, *, good: bool) -> bytes:
-    """An emitted program with the verdict in its header."""
-    return text.replace(_VERDICT_PENDING, _VERDICT_GOOD if good else _VERDICT_BAD, 1)
-
-
-def marked_out_of_tolerance(text: bytes) -> bytes:
-    """An emitted program that misses a limit which only its caller knows of, with the verdict in its header."""
-    return text.replace(_VERDICT_GOOD, _VERDICT_BAD, 1)
 
 
 def why_kept(region: _core.Region, machine: Machine, grid: Grid) -> str:
@@ -70,7 +48,7 @@ class Written:
         kept_warnings: a sentence for every region that keeps its text.
         planned_um: per index of a shaped region the deviation that its feed was planned for, µm, where the contour is
             kept by a target.
-        loads: per index of a shaped region what it asks of memory, line and control, where that was asked for.
+        loads: per index of a shaped region what it asks of memory, line and control.
         no_room: per index of a region that was to be shaped and keeps its text why there is no room for it.
     """
 
@@ -108,8 +86,6 @@ class TextWriter:
         feed_share: Sequence[float],
         untold: Collection[int] = (),
         on_progress: Step = lambda _done, _total: None,
-        *,
-        with_loads: bool = False,
     ) -> Written:
         """The whole text.
 
@@ -119,7 +95,6 @@ class TextWriter:
             feed_share: of the programmed feed that it is planned with, per region.
             untold: indices of kept regions that need no warning of their own.
             on_progress: called with regions done and regions in all.
-            with_loads: measure what each region asks of memory, line and control.
 
         Returns:
             The text, and where its shaped regions stand.
@@ -162,9 +137,8 @@ class TextWriter:
                 written.placed.append(Placed(region, line, line + text.count(b"\n") - 1))
                 if shaped.planned_um > 0.0:
                     written.planned_um[index] = shaped.planned_um
-                if with_loads:
-                    bits = self._machine.controller.dnc_bits_per_character
-                    written.loads[index] = measure_load(region, shaped, self.grid, bits)
+                bits = self._machine.controller.dnc_bits_per_character
+                written.loads[index] = measure_load(region, shaped, self.grid, bits)
                 on_progress(index + 1, len(regions))
             line += text.count(b"\n")
             parts += [between, text]
@@ -215,26 +189,14 @@ class TextWriter:
     def _header(self) -> list[str]:
         from shapegcode import __version__
 
-        grid, own = self.grid, self._model.shaped_filter
-        shape = " EXPONENTIAL" if own.shape == "exponential" and own.time_constant_s else ""
-        shape += f" BELL {own.bell_time_s * 1e3:g} MS" if own.bell_time_s else ""
-        modes = [
-            f"{axis} {mode.frequency_hz:g} HZ {mode.damping_ratio:g}"
-            for axis, modes in zip("XYZ", self._model.options().modes, strict=True)
-            for mode in modes
-        ]
-        lines = [
-            f"SHAPEGCODE {__version__} MACHINE {self._machine.name}",
-            *(f"MODE {mode}" for mode in modes),
-            f"BLOCK PERIOD {grid.block_period_s * 1e3:g} MS SHAPER {grid.duration_s * 1e3:g} MS",
-            *([f"{len(grid.track.nodes)} SHAPERS FOLLOW {'XYZ'[grid.track.axis]}"] if grid.track else []),
-            _OVERRIDE_NOTE[self._machine.emission.override],
-            f"TIME CONSTANT AFTER INTERPOLATION {own.time_constant_s * 1e3:g} MS{shape}",
-        ]
-        first, *rest = (f"({_plain(line)[:_COMMENT_WIDTH]})" for line in lines)
-        return [first, _VERDICT_PENDING.decode(), *rest]
-
-
-def _plain(text: str) -> str:
-    """Only what a FANUC comment may hold: capitals, digits and plain signs."""
-    return "".join(c if c.isalnum() or c in " .-" else " " for c in text.upper())
+        grid = self.grid
+        notes = [f"{len(grid.track.nodes)} SHAPERS FOLLOW {'XYZ'[grid.track.axis]}"] if grid.track else []
+        stamp = replace(
+            stamp_of_machine(self._machine, version=__version__),
+            block_period_ms=f"{grid.block_period_s * 1e3:g}",
+            shaper_ms=f"{grid.duration_s * 1e3:g}",
+            family=grid.family,
+            override=self._machine.emission.override,
+            notes=tuple(notes),
+        )
+        return stamp.lines()

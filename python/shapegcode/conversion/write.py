@@ -14,6 +14,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel, OwnFilter
 from shapegcode.model.modes import NO_OFFSET, Offset
 from shapegcode.program import MM_PER_INCH, Program, least_increment_mm
+from shapegcode.program.stamp import REGION_MARK
 from shapegcode.shaping.grid import Grid
 
 _DEGREE = math.pi / 180.0
@@ -145,12 +146,14 @@ class RegionWriter:
     Args:
         model: of the machine; its file says how motion is shaped and text is written.
         grid: block period and shapers.
+        mark: comment before each region, where the machine file asks for comments.
     """
 
-    def __init__(self, model: MachineModel, grid: Grid) -> None:
+    def __init__(self, model: MachineModel, grid: Grid, mark: str = REGION_MARK) -> None:
         self._machine = model.machine
         self._model = model
         self._grid = grid
+        self._mark = mark
 
     def tolerance(self, contour_tolerance_um: float = math.inf) -> _core.FilterTolerance:
         """See `filter_tolerance`."""
@@ -299,6 +302,8 @@ class RegionWriter:
         lock = emission.lock_lines if emission.override == "lock" else ()
         lines = [*lock, *emission.prologue, _safe_line(region, start, writer.position_decimals, fastest)]
         lines[0] = number + lines[0]
+        if emission.header:
+            lines.insert(0, self._mark)
         if emission.prefill_dwell_s > 0.0:
             lines.append(f"G04P{round(emission.prefill_dwell_s * 1e3)}")
         return _lines(lines, writer)

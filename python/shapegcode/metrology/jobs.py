@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
-import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.program import Program
+from shapegcode.program.pairing import paired_regions
 
 __all__ = ["Job", "jobs_of"]
 
-_SAME_PLACE_MM = 0.005
 _SHORT_MM = 0.5
 _MOST_SECTIONS = 20_000  # of a program: each is a row with its walls
 _LARGEST_FACTOR = 2.0**20
@@ -36,16 +33,13 @@ class Job:
     joined_mm: float = 0.0
 
 
-def jobs_of(
-    program: Program, nominal: Program, machine: Machine, shaped: bool, lines: Sequence[tuple[int, int]] | None
-) -> list[Job]:
+def jobs_of(program: Program, nominal: Program, machine: Machine, lines: Sequence[tuple[int, int]] | None) -> list[Job]:
     """Pairs of regions that are measured, those without a section left out.
 
     Args:
         program: what is measured.
         nominal: whose path it is measured against.
         machine: whose modes say what a short section is.
-        shaped: shapegcode wrote the program.
         lines: sections by lines of the nominal program, first and last; None: by direction and centre.
 
     Returns:
@@ -54,8 +48,8 @@ def jobs_of(
     Raises:
         ArgumentError: no cut in the given lines.
     """
-    pairs = [pair for pair in _paired(program, nominal) if pair[1].path.length_mm > 0.0]
-    own_blocks = shaped and nominal is program
+    pairs = [pair for pair in paired_regions(program, nominal) if pair[1].path.length_mm > 0.0]
+    own_blocks = program.shaped_regions > 0 and nominal is program
     joined = 1.0 if lines is not None else _joined(pairs, machine, own_blocks=own_blocks)
     jobs = []
     for played, region in pairs:
@@ -88,34 +82,6 @@ def _joined(pairs: Sequence[tuple[_core.Region, _core.Region]], machine: Machine
             break
         factor *= 2.0
     return factor
-
-
-def _paired(program: Program, nominal: Program) -> Iterator[tuple[_core.Region, _core.Region]]:
-    """Regions of a program beside those of the nominal one, found by where they start and end."""
-    if program is nominal:
-        yield from ((region, region) for region in program.regions)
-        return
-    candidates = iter(program.regions)
-    for region in nominal.regions:
-        for candidate in candidates:
-            if _same_ends(candidate.path, region.path):
-                yield candidate, region
-                break
-        else:
-            raise _core.ArgumentError(
-                f"{program.source}: no cut from {_place(region.path.start_mm)} to {_place(region.path.end_mm)} as "
-                f"{nominal.source} has in {nominal.lines(region)}: it was not made from that program, or its rapids "
-                "are shaped into the cuts; measure it without --against"
-            )
-
-
-def _same_ends(one: _core.Path, other: _core.Path) -> bool:
-    ends = ((one.start_mm, other.start_mm), (one.end_mm, other.end_mm))
-    return all(float(np.abs(a - b).max()) <= _SAME_PLACE_MM for a, b in ends)
-
-
-def _place(position_mm: npt.ArrayLike) -> str:
-    return " ".join(f"{axis}{value:.3f}" for axis, value in zip("XYZ", np.asarray(position_mm), strict=True))
 
 
 def _short_mm(path: _core.Path, machine: Machine, *, own_blocks: bool) -> float:

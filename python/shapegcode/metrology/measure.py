@@ -22,8 +22,8 @@ from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measure
 from shapegcode.metrology.section import MeasuredSection, WallProfile
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import machine_warnings, region_range_warnings
+from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program, given_program
-from shapegcode.program.program import written_by_shapegcode
 
 __all__ = ["measure", "measure_samples"]
 
@@ -53,7 +53,8 @@ def measure(
 ) -> Measurement:
     """Measure one program, or several side by side.
 
-    A program that shapegcode wrote is played block by block at its feed, any other with the controller's own motion.
+    Regions that shapegcode shaped, as the program's header says, are played block by block at their feed, all others
+    with the controller's own motion.
 
     Args:
         programs: what to measure: one or several, or their files.
@@ -87,7 +88,7 @@ def measure(
         raise _core.ArgumentError("no program to measure")
     settings = _Settings(tool_diameter_mm, band_um, station_spacing_mm, cutoff_mm, lambda_s_mm)
     settings.check()
-    shaped = [written_by_shapegcode(program) for program in several]
+    shaped = [program.shaped_regions > 0 for program in several]
     if against is not None:
         against = given_program(against, machine)
     elif len(several) > 1 and not shaped[0] and all(shaped[1:]):
@@ -107,8 +108,8 @@ def measure(
     measured = []
     for program, is_shaped, counts in zip(several, shaped, _judged(beside), strict=True):
         nominal = against or program
-        jobs = jobs_of(program, nominal, machine, is_shaped, lines)
-        regions = list(_measured_regions(jobs, machine, plant, is_shaped, settings, one_done))
+        jobs = jobs_of(program, nominal, machine, lines)
+        regions = list(_measured_regions(jobs, machine, plant, settings, one_done))
         measured.append(
             MeasuredProgram.of(
                 regions,
@@ -120,6 +121,7 @@ def measure(
                     *program.warnings,
                     *machine_warnings(machine),
                     *region_range_warnings(program.regions, machine),
+                    *(why for _, why in shaped_warnings(program, machine)),
                     *_spacing_warnings(regions, station_spacing_mm),
                     *_section_warnings(jobs),
                 ],
@@ -245,14 +247,13 @@ def _measured_regions(
     jobs: Iterable[Job],
     machine: Machine,
     plant: str,
-    shaped: bool,
     settings: _Settings,
     on_done: Callable[[], None],
 ) -> Iterator[MeasuredRegion]:
     """Every region of a program, played and measured."""
     kept = 0
     for number, job in enumerate(jobs, start=1):
-        samples = _samples(job, machine, plant, shaped)
+        samples = _samples(job, machine, plant)
         lines = (job.nominal.first_line, job.nominal.last_line)
         period_s, keep = machine.controller.interpolation_period_s, kept < _MOST_PROFILE_STATIONS
         region = _measured(samples, job.path, job.sections, settings, period_s, lines, number, keep_walls=keep)
@@ -290,7 +291,7 @@ def _wall(metrology: _core.SectionMetrology, index: int) -> WallProfile:
     return WallProfile(distance_mm, left * 1e3, right * 1e3, point, normal)
 
 
-def _samples(job: Job, machine: Machine, plant: str, shaped: bool) -> Iterator[tuple[FloatArray, FloatArray]]:
+def _samples(job: Job, machine: Machine, plant: str) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Command and response of a region, and what follows the stop until vibration and servo lag have decayed."""
     model = MachineModel(machine)
     memory_s = max(model.vibration_memory_s, _LEAST_REST_S)
@@ -299,6 +300,6 @@ def _samples(job: Job, machine: Machine, plant: str, shaped: bool) -> Iterator[t
         memory_s = max(memory_s, _MILLIONTH / min(machine.controller.position_gain_per_s.as_tuple()))
     rest_s = min(memory_s, _LONGEST_REST_S)
     options = model.options(plant=plant, offset=model.offset(job.played))
-    stream = model.playing(shaped=shaped).stream(job.played.path, options, rest_s)
+    stream = model.playing(shaped=job.played.shaped).stream(job.played.path, options, rest_s)
     while len(chunk := stream.read(_CHUNK_SAMPLES)) > 0:
         yield chunk.command_mm, chunk.response_mm

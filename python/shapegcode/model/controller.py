@@ -9,7 +9,7 @@ from shapegcode.machine import Machine
 
 
 def controller_model(
-    machine: Machine, *, feed_override: float = 1.0, rapid_override: float = 1.0
+    machine: Machine, *, feed_override: float = 1.0, rapid_override: float = 1.0, shaped: bool | None = None
 ) -> _core.ControllerModel:
     """The controller of a machine as the core times and plays it.
 
@@ -17,6 +17,7 @@ def controller_model(
         machine: the machine.
         feed_override: scales every programmed feed, 1 = as programmed.
         rapid_override: scales the rapid rates, 1 = full.
+        shaped: whether cuts are played as shaped blocks; None: those of which the program says so.
 
     Returns:
         The model, times in s, speeds in mm/s.
@@ -40,6 +41,11 @@ def controller_model(
     model.position_gain_per_s = controller.position_gain_per_s.as_tuple()
     model.feed_forward_ratio = controller.feed_forward_ratio.as_tuple()
     model.in_position_width_mm = [width * 1e-3 for width in controller.in_position_width_um.as_tuple()]
+    kinds = _core.ShapedRegions
+    model.shaped_regions = kinds.marked if shaped is None else kinds.all if shaped else kinds.none
+    model.shaped_filter_shape = getattr(_core.FilterShape, controller.shaped_filter_shape)
+    model.shaped_time_constant_s = controller.shaped_time_constant_s
+    model.shaped_bell_time_s = controller.shaped_bell_time_s
     model.feed_override = feed_override
     model.rapid_override = rapid_override
     model.tool_change_s = machine.times.tool_change_s

@@ -78,12 +78,21 @@ class PlayingController:
         look_ahead = self.model.motion == _core.MotionKind.look_ahead
         return _core.plan_speed(path, self.model.limits) if look_ahead else None
 
-    def play(self, path: _core.Path, options: _core.PlaybackOptions) -> _core.PlaybackFigures:
-        """A path played from rest to rest and measured against itself.
+    def play(
+        self,
+        path: _core.Path,
+        options: _core.PlaybackOptions,
+        *,
+        against: _core.Path | None = None,
+        block_end: _core.BlockEnd | None = None,
+    ) -> _core.PlaybackFigures:
+        """A path played from rest to rest and measured against itself or another one.
 
         Args:
             path: the blocks.
             options: plant and what is measured; the filters become the controller's.
+            against: what it is measured against; None: itself.
+            block_end: rule of block timing, where there is no look-ahead; None: the controller's own.
 
         Returns:
             The figures, positions in mm.
@@ -91,8 +100,9 @@ class PlayingController:
         options.axis_filters = self.filters
         profile = self._planned(path)
         if profile is not None:
-            return _core.play_path(path, profile, options)
-        return _core.play_blocks(path, path, self.model.block_end, 1.0, options)
+            given = () if against is None else (against,)
+            return _core.play_path(path, profile, options, *given)
+        return _core.play_blocks(path, against or path, block_end or self.model.block_end, 1.0, options)
 
     def stream(self, path: _core.Path, options: _core.PlaybackOptions, rest_s: float) -> _core.PlayedStream:
         """The same motion piece by piece, and what the plant does for a while behind its end.
@@ -162,12 +172,8 @@ class MachineModel:
     @cached_property
     def shaped(self) -> PlayingController:
         """The controller as it plays shaped blocks: one by one, without look-ahead."""
-        model = controller_model(self.machine)
-        controller = self.machine.controller
-        model.motion = _core.MotionKind.after_interpolation
-        model.filter_shape = getattr(_core.FilterShape, controller.shaped_filter_shape)
-        model.time_constant_s = controller.shaped_time_constant_s
-        model.bell_time_s = controller.shaped_bell_time_s
+        model = _core.for_shaped_blocks(controller_model(self.machine))
+        model.block_end = self.own_rule
         return PlayingController(model)
 
     @cached_property

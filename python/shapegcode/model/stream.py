@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.machine import Machine
+from shapegcode.model.controller import controller_model
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import Offset
 from shapegcode.program import Program, given_program
@@ -101,7 +102,7 @@ def stream(
     machine: Machine,
     *,
     plant: str = "modal",
-    shaped: bool = False,
+    shaped: bool | None = None,
     lines: tuple[int, int] | None = None,
     chunk_samples: int = _CHUNK_SAMPLES,
 ) -> Iterator[Chunk]:
@@ -115,7 +116,7 @@ def stream(
         program: what to play, or its file.
         machine: controller and plant.
         plant: "modal" or "feed-drive".
-        shaped: the program was emitted by shapegcode, see `simulate`.
+        shaped: cuts are shaped blocks, see `simulate`.
         lines: give what happens in these lines alone, first and last, of the expanded text; the program is played from
             its start in any case.
         chunk_samples: rows of a piece, at most.
@@ -137,7 +138,7 @@ def stream(
     model = MachineModel(machine)
     offsets, known = _offsets(program, model)
     options = model.options(plant=plant, offset=known)
-    controller = model.playing(shaped=shaped).model
+    controller = controller_model(machine, shaped=shaped)
     played = _core.PlayedStream.of_program(program.core, controller, options, offsets, REST_S)
     return _chunks(played, model.period_s, lines, chunk_samples)
 

@@ -6,7 +6,6 @@ from shapegcode.program.program import (
     given_program,
     least_increment_mm,
     located_error,
-    written_by_shapegcode,
 )
 from shapegcode.program.reading import program_loader, reader_options
 
@@ -18,5 +17,4 @@ __all__ = [
     "located_error",
     "program_loader",
     "reader_options",
-    "written_by_shapegcode",
 ]

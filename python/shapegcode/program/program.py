@@ -12,6 +12,7 @@ from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.reading import program_bytes, program_loader, reader_options
 from shapegcode.program.several import place_of
+from shapegcode.program.stamp import STAMP_BEGIN, Stamp, stamp_of
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -122,7 +123,8 @@ class Program:
         index = None if program_number is None else _index(data, program_number, source)
         options = reader_options(
             machine,
-            emitted=emitted,
+            # What shapegcode wrote has FANUC's arcs, whatever those of its original were.
+            emitted=emitted or STAMP_BEGIN in data,
             probe_lines=probe_lines,
             program_number=program_number if isinstance(program_number, int) and index is None else None,
             program_index=index,
@@ -151,6 +153,16 @@ class Program:
         """Runs of cutting moves between two stops, in order."""
         # Made anew by the core at every call: kept, as a program may have a hundred thousand.
         return self.core.regions
+
+    @property
+    def stamp(self) -> Stamp | None:
+        """What its header says, if the converter wrote it; else None."""
+        return stamp_of(self.text)
+
+    @property
+    def shaped_regions(self) -> int:
+        """How many of its regions are blocks that were shaped, as its header and the marks in it say."""
+        return sum(region.shaped for region in self.regions)
 
     @property
     def warnings(self) -> list[str]:
@@ -244,14 +256,3 @@ def given_program(program: Program | str | Path, machine: Machine) -> Program:
         ProgramError, OSError: see :meth:`Program.read`.
     """
     return program if isinstance(program, Program) else Program.read(program, machine)
-
-
-_HEADER_MARK = b"(SHAPEGCODE "
-
-
-_HEADER_REACH = 4096
-
-
-def written_by_shapegcode(program: Program) -> bool:
-    """Whether the header comment of this tool stands in the program."""
-    return _HEADER_MARK in program.core.slice(0, _HEADER_REACH)

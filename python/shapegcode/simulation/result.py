@@ -15,7 +15,7 @@ from shapegcode.results.json import hidden, sparse
 from shapegcode.results.result import Plot, Result, Xyz
 from shapegcode.results.table import Column, Table, xyz_columns
 
-__all__ = ["Motion", "RegionRun", "Simulation"]
+__all__ = ["Motion", "RegionRun", "ShapedFigures", "Simulation"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -29,16 +29,20 @@ class RegionRun:
 
     Attributes:
         lines: first and last of the program, from 1.
+        shaped: played as shaped blocks.
+        was_rapid: shaped blocks in place of a rapid.
         time_s: until the set-points rest.
         residual_vibration_um: largest |response - command| of each axis once the set-points rest.
         settling_time_s: from that instant until it stays within the band; None: not within the limit, or no band.
         period_s: time between two samples.
-        path: as programmed.
+        path: what it is measured against.
         figures: what the core measured, with the samples that were recorded.
         replay: plays it again and keeps as many samples as one says.
     """
 
     lines: tuple[int, int]
+    shaped: bool
+    was_rapid: bool
     time_s: float
     residual_vibration_um: Xyz[float]
     settling_time_s: Xyz[float | None]
@@ -56,6 +60,27 @@ class RegionRun:
     def response_mm(self) -> FloatArray:
         """The table at the same instants, (n, 3)."""
         return self.figures.recorded_response
+
+
+@dataclass(frozen=True)
+class ShapedFigures:
+    """The regions of a program that are shaped blocks, in the worse of both rules of timing, as `convert` reports them.
+
+    Shaped rapids are left out.
+
+    Attributes:
+        regions: how many there are.
+        cutting_time_s: until the set-points rest.
+        residual_vibration_um: largest |response - command| of each axis once the set-points rest.
+        peak_vibration_um: before that.
+        contour_error_um: against the path that the simulation names.
+    """
+
+    regions: int
+    cutting_time_s: float
+    residual_vibration_um: Xyz[float]
+    peak_vibration_um: Xyz[float]
+    contour_error_um: Tracks[ContourError]
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +147,8 @@ class Simulation(Result):
         program: name of the program.
         machine: name of the machine.
         plant: "modal" or "feed-drive".
-        shaped: it was played block by block at its feed, as a program that shapegcode wrote.
+        shaped: regions of it were played block by block at their feed, as shapegcode writes them.
+        measured_against: the program whose path the contour error is measured against; its own name for its own path.
         cycle_time_s: whole program: regions, rapids with in-position wait, dwells, drilling cycles.
         cutting_time_s: the regions alone, until the set-points rest.
         residual_vibration_um: largest |response - command| of each axis once the set-points rest.
@@ -130,10 +156,11 @@ class Simulation(Result):
         settling_time_s: from that instant until it stays within the band; None: not within the limit, or no band.
         settling_band_um: of the machine file (`tolerance.residual_floor_um`); 0: none.
         settling_limit_s: how long it is looked at.
-        contour_error_um: against the program's own path.
+        contour_error_um: against the path of `measured_against`.
         orbit_error_percent: of the command on each arc.
         response_orbit_error_percent: of the table, likewise.
         regions: the cutting regions in order.
+        of_shaped: the shaped regions alone; None: there are none.
         motion: the whole program in time; None: not asked for.
         warnings: of the program and of the machine.
     """
@@ -142,6 +169,7 @@ class Simulation(Result):
     machine: str
     plant: str
     shaped: bool
+    measured_against: str
     cycle_time_s: float
     cutting_time_s: float
     residual_vibration_um: Xyz[float]
@@ -154,6 +182,7 @@ class Simulation(Result):
     response_orbit_error_percent: tuple[float, ...]
     regions: tuple[RegionRun, ...]
     warnings: tuple[str, ...]
+    of_shaped: ShapedFigures | None = None
     motion: Motion | None = field(default=None, metadata=sparse())
 
     @property
@@ -171,8 +200,13 @@ class Simulation(Result):
         return (
             f"{takes}, {self.cutting_time_s:.2f} s of it in cutting regions; {_NAMES[self.plant][0]} "
             f"{axis.upper()} {self.residual_vibration_um[axis]:.2f} µm, contour error {self._contour.max:.2f} µm "
+            f"{'against its own blocks ' if self.shaped and self._own_path else ''}"
             f"({self.plant} plant)"
         )
+
+    @property
+    def _own_path(self) -> bool:
+        return self.measured_against == self.program
 
     @property
     def _contour(self) -> ContourError:
@@ -181,8 +215,10 @@ class Simulation(Result):
     @property
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
+        if self.shaped and self._own_path:
+            return "simulate it with --against ORIGINAL: only then is the contour error that of the part"
         if self.shaped:
-            return "shapegcode measure ORIGINAL SHAPED measures it against the programmed path"
+            return "shapegcode measure ORIGINAL SHAPED shows where on the part the errors are"
         return "shapegcode convert shapes this program and shows what it gains"
 
     def tables(self) -> list[Table]:
@@ -196,6 +232,12 @@ class Simulation(Result):
             (f"{residual} µm", lambda axis: f"{self.residual_vibration_um[axis]:.2f}"),
             (f"{peak} µm", lambda axis: f"{self.peak_vibration_um[axis]:.2f}"),
         ]
+        if self.of_shaped is not None and self.of_shaped.regions < len(self.regions):
+            part, name = self.of_shaped, f"{self.of_shaped.regions} shaped regions alone"
+            rows += [
+                (f"{residual} µm, {name}", lambda axis: f"{part.residual_vibration_um[axis]:.2f}"),
+                (f"{peak} µm, {name}", lambda axis: f"{part.peak_vibration_um[axis]:.2f}"),
+            ]
         if self.settling_band_um > 0.0:
             rows.append((f"settling to ±{self.settling_band_um:g} µm, ms", self._settling))
         columns = (
@@ -208,15 +250,26 @@ class Simulation(Result):
         time_s = self.settling_time_s[axis]
         return f"over {self.settling_limit_s * 1e3:.0f}" if time_s is None else f"{time_s * 1e3:.0f}"
 
+    @property
+    def _path_name(self) -> str:
+        if not self._own_path:
+            return f"the path of {Path(self.measured_against).name}"
+        return "the program's own blocks, not the part's contour" if self.shaped else "the program's path"
+
     def _contour_table(self) -> Table:
         rows: list[tuple[str, str, str]] = []
         for track, name in CONTOURS.items():
             error = getattr(self.contour_error_um, track)
             rows.append((f"{name} µm", f"{error.max:.2f}", f"{error.rms:.2f}"))
         orbits = {"command": self.orbit_error_percent, "table": self.response_orbit_error_percent}
+        if self.of_shaped is not None and self.of_shaped.regions < len(self.regions):
+            for track, name in CONTOURS.items():
+                error = getattr(self.of_shaped.contour_error_um, track)
+                shown = f"{name} µm, {self.of_shaped.regions} shaped regions alone"
+                rows.append((shown, f"{error.max:.2f}", f"{error.rms:.2f}"))
         rows += [(f"orbit error of the {name} %", f"{max(of):.4f}", "") for name, of in orbits.items() if of]
         columns = (
-            Column("cutting regions, against the program's path", value=lambda row: row[0], text=True),
+            Column(f"cutting regions, against {self._path_name}", value=lambda row: row[0], text=True),
             Column("largest", value=lambda row: row[1]),
             Column("RMS", value=lambda row: row[2]),
         )

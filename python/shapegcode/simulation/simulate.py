@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -12,18 +12,22 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.machine import Machine
+from shapegcode.model.controller import controller_model
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import Offset, machine_warnings, region_range_warnings
+from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.model.stream import stream
 from shapegcode.program import Program, given_program
+from shapegcode.program.pairing import paired_regions
 from shapegcode.results.figures import ContourError, Tracks, largest_xyz_um
 from shapegcode.results.result import Xyz
 from shapegcode.simulation.files import csv_file, npz_file
 from shapegcode.simulation.motion import MotionRecorder
-from shapegcode.simulation.result import Motion, RegionRun, Simulation
+from shapegcode.simulation.result import Motion, RegionRun, ShapedFigures, Simulation
 
 __all__ = ["play_motion", "simulate"]
 
+_RULES = (_core.BlockEnd.ceil, _core.BlockEnd.carry)
 # How long behind a stop its settling time is looked for. A drive is integrated all that time.
 _SHORTEST_REST_S, _LONGEST_REST_S, _DRIVE_REST_S = 0.5, 10.0, 0.5
 
@@ -33,7 +37,8 @@ def simulate(
     machine: Machine,
     *,
     plant: str = "modal",
-    shaped: bool = False,
+    shaped: bool | None = None,
+    against: Program | str | Path | None = None,
     record_samples: int = 200_000,
     on_progress: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> Simulation:
@@ -46,8 +51,11 @@ def simulate(
         machine: controller and plant.
         plant: "modal" for the modes behind an ideal servo, "feed-drive" for `axes.*.drive`; what is said of vibration
             then holds the lag of the servo loop.
-        shaped: the program was emitted by shapegcode: blocks are played at their feed, without look-ahead and with
-            `controller.shaped_time_constant_s`.
+        shaped: whether cuts are shaped blocks: played at their feed, without look-ahead, behind the control's own
+            filter (`controller.shaped_time_constant_s`), in the worse of both rules of block timing. None: those
+            regions of which the program says so, as one that shapegcode wrote does.
+        against: the program whose path the contour error is measured against, such as the original of a shaped one;
+            None: the program's own path.
         record_samples: samples of command and response kept per region, at most; 0: figures only.
         on_progress: called with regions done and regions in all.
 
@@ -57,39 +65,57 @@ def simulate(
     Raises:
         ProgramError: the program cannot be read.
         OSError: its file cannot be read.
-        ArgumentError: there is no such plant, or a limit of the machine is not usable.
+        ArgumentError: there is no such plant, a limit of the machine is not usable, or `against` has a cut that the
+            program has not.
         MachineError: the machine has no feed drives.
         NumericError: the integrator of a feed drive fails.
     """
     program = given_program(program, machine)
     model, band_um = MachineModel(machine), machine.tolerance.residual_floor_um
     limit_s = _rest_s(model, plant)
-    runs = []
+    nominal = {}
+    if against is not None:
+        against = given_program(against, machine)
+        nominal = {mine.first_line: other.path for mine, other in paired_regions(program, against)}
+    runs: list[RegionRun] = []
+    played: list[_core.PlaybackFigures] = []
+    of_shaped: list[_core.PlaybackFigures] = []
     for done, region in enumerate(program.regions, start=1):
-        replay = partial(_play, region.path, model, plant, shaped, model.offset(region), band_um, limit_s)
-        figures = replay(record_samples)
+        as_shaped = region.shaped if shaped is None else shaped
+        path = nominal.get(region.first_line)
+        replay = partial(_play, region.path, path, model, plant, as_shaped, model.offset(region), band_um, limit_s)
+        figures = [replay(record_samples)]
+        if as_shaped:
+            figures += [replay(0, block_end=rule) for rule in _RULES if rule != model.own_rule]
         runs.append(
             RegionRun(
                 lines=(region.first_line, region.last_line),
-                time_s=figures.duration_s,
-                residual_vibration_um=largest_xyz_um([figures.residual_mm]),
-                settling_time_s=_settling_s([figures], band_um),
+                shaped=as_shaped,
+                was_rapid=region.was_rapid,
+                time_s=max(each.duration_s for each in figures),
+                residual_vibration_um=largest_xyz_um(each.residual_mm for each in figures),
+                settling_time_s=_settling_s(figures, band_um),
                 period_s=model.period_s,
-                path=region.path,
-                figures=figures,
+                path=path or region.path,
+                figures=figures[0],
                 replay=replay,
             )
         )
+        played += figures
+        of_shaped += figures if as_shaped and not region.was_rapid else []
         on_progress(done, len(program.regions))
-    played = [run.figures for run in runs]
-    cutting_s = sum((figures.duration_s for figures in played), start=0.0)
+    own = [run.figures for run in runs]
+    cutting_s = math.fsum(run.time_s for run in runs)
     warnings = [*program.warnings, *machine_warnings(machine), *region_range_warnings(program.regions, machine)]
+    if shaped is None:
+        warnings += [why for _, why in shaped_warnings(program, machine)]
     return Simulation(
         program=program.source,
         machine=machine.name,
         plant=plant,
-        shaped=shaped,
-        cycle_time_s=cutting_s + model.other_time_s(program.core),
+        shaped=any(run.shaped for run in runs),
+        measured_against=(against or program).source,
+        cycle_time_s=_core.time_program(program.core, controller_model(machine, shaped=shaped)).total_s,
         cutting_time_s=cutting_s,
         residual_vibration_um=largest_xyz_um(figures.residual_mm for figures in played),
         peak_vibration_um=largest_xyz_um(figures.peak_mm for figures in played),
@@ -100,10 +126,9 @@ def simulate(
             ContourError.of(figures.command for figures in played),
             ContourError.of(figures.response for figures in played),
         ),
-        orbit_error_percent=tuple(error for figures in played for error in figures.orbit_error_percent),
-        response_orbit_error_percent=tuple(
-            error for figures in played for error in figures.response_orbit_error_percent
-        ),
+        orbit_error_percent=tuple(error for figures in own for error in figures.orbit_error_percent),
+        response_orbit_error_percent=tuple(error for figures in own for error in figures.response_orbit_error_percent),
+        of_shaped=_shaped_figures([run for run in runs if run.shaped and not run.was_rapid], of_shaped),
         regions=tuple(runs),
         warnings=tuple(warnings),
     )
@@ -114,7 +139,7 @@ def play_motion(
     machine: Machine,
     *,
     plant: str = "modal",
-    shaped: bool = False,
+    shaped: bool | None = None,
     lines: tuple[int, int] | None = None,
     csv: str | Path | None = None,
     npz: str | Path | None = None,
@@ -129,7 +154,7 @@ def play_motion(
         program: what to play, or its file.
         machine: controller and plant.
         plant: "modal" or "feed-drive", see `simulate`.
-        shaped: the program was emitted by shapegcode, see `simulate`.
+        shaped: cuts are shaped blocks, see `simulate`.
         lines: look at what happens in these lines alone, see `stream`.
         csv: file of one line per sample; "-": standard output.
         npz: NumPy archive with the same columns.
@@ -149,7 +174,7 @@ def play_motion(
     program = given_program(program, machine)
     model = MachineModel(machine)
     chunks = stream(program, machine, plant=plant, shaped=shaped, lines=lines)
-    whole_s = _core.time_program(program.core, model.playing(shaped=shaped).model).total_s or model.period_s
+    whole_s = _core.time_program(program.core, controller_model(machine, shaped=shaped)).total_s or model.period_s
     recorder = MotionRecorder(model.period_s)
     with contextlib.ExitStack() as files:
         written = [
@@ -167,8 +192,24 @@ def play_motion(
     return recorder.result(program.source, lines=lines, every=every, **names)
 
 
+def _shaped_figures(runs: Sequence[RegionRun], played: Sequence[_core.PlaybackFigures]) -> ShapedFigures | None:
+    if not runs:
+        return None
+    return ShapedFigures(
+        regions=len(runs),
+        cutting_time_s=math.fsum(run.time_s for run in runs),
+        residual_vibration_um=largest_xyz_um(figures.residual_mm for figures in played),
+        peak_vibration_um=largest_xyz_um(figures.peak_mm for figures in played),
+        contour_error_um=Tracks(
+            ContourError.of(figures.command for figures in played),
+            ContourError.of(figures.response for figures in played),
+        ),
+    )
+
+
 def _play(
-    path: _core.Path,
+    blocks: _core.Path,
+    path: _core.Path | None,
     model: MachineModel,
     plant: str,
     shaped: bool,
@@ -176,13 +217,15 @@ def _play(
     band_um: float,
     limit_s: float,
     record_samples: int,
+    *,
+    block_end: _core.BlockEnd | None = None,
 ) -> _core.PlaybackFigures:
     options = model.options(plant=plant, offset=offset)
     options.record_samples = record_samples
     options.measure_response_orbit = True
     options.settling_band_mm = band_um * 1e-3
     options.settling_limit_s = limit_s
-    return model.playing(shaped=shaped).play(path, options)
+    return model.playing(shaped=shaped).play(blocks, options, against=path, block_end=block_end)
 
 
 def _rest_s(model: MachineModel, plant: str) -> float:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from shapegcode.io.atomic import write_text
+from shapegcode.program.operating import OVERRIDE
 from shapegcode.results.json import to_text
 from shapegcode.testcut.cut import CornerDetails, MeasuringPass
 from shapegcode.testcut.design_result import CutDesign
@@ -112,7 +113,7 @@ class _Writer:
         far = self._y(-_RAW_MM - 3.0 * self.radius), self._y(self.walls[-1])
         yield f"TOOL AXIS: X{left:g} TO {right:g}, Y{min(far):.1f} TO {max(far):.1f},"
         yield f"Z-{cut.axial_depth_mm:g} TO {_CLEAR_Z_MM:g}: KEEP IT FREE OF CLAMPS"
-        yield "OVERRIDE 100 PERCENT, NO LOOK-AHEAD MODE THAT CHANGES F"
+        yield f"{OVERRIDE.comment}, NO LOOK-AHEAD MODE THAT CHANGES F"
         yield f"AT EACH M00: START A NEW RECORD, FX FY, {rate} HZ OR MORE,"
         yield "FX ALONG +X, FY ALONG +Y, THEN CYCLE START;"
         yield "STOP THE RECORD AT THE NEXT STOP. ONE FILE PER PASS"

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.controller import controller_model
+from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program, given_program
 from shapegcode.timing.result import PARTS, BlockTime, CycleTime, RegionTime, ToolTime
 
@@ -36,6 +37,9 @@ def cycle_time(
     rapid_override: float = 1.0,
 ) -> CycleTime:
     """Time of a program on a machine as it is: nothing is shaped.
+
+    Of a program that shapegcode wrote, as its header says, the shaped regions are timed block by block at their feed,
+    in the slower rule of block timing: as `convert` reports it.
 
     Moves of an axis whose position the program does not tell (before its first absolute word, after M06, G28, G53)
     count what is known of them.
@@ -74,7 +78,8 @@ def cycle_time(
         tools=tuple(_tool_time(tool) for tool in timed.tools),
         regions=tuple(_regions(timed.regions, program, feed_override)),
         blocks=tuple(_blocks(timed.blocks, program)) if per_block else (),
-        warnings=tuple(program.warnings),
+        shaped_regions=program.shaped_regions,
+        warnings=(*program.warnings, *(why for _, why in shaped_warnings(program, machine))),
     )
 
 

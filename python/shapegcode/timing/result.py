@@ -148,7 +148,8 @@ class CycleTime(TimeParts, Result):
         tools: per tool, in the order of first use.
         regions: per region, in order.
         blocks: per block, in order; empty unless asked for.
-        warnings: what the reader noticed.
+        shaped_regions: how many of the regions are shaped blocks, as the program's header says; 0: it has none.
+        warnings: what the reader noticed; why the verdict in a header of shapegcode does not hold here.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "difference_percent": float | None}
@@ -160,6 +161,7 @@ class CycleTime(TimeParts, Result):
     tools: tuple[ToolTime, ...]
     regions: tuple[RegionTime, ...]
     blocks: tuple[BlockTime, ...]
+    shaped_regions: int
     warnings: tuple[str, ...]
 
     @property

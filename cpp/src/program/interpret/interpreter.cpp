@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "base/text.hpp"
 #include "program/interpret/interpreter_impl.hpp"
@@ -10,6 +11,10 @@ namespace shapegcode::detail {
 namespace {
 
 constexpr std::size_t most_warnings_of_one_kind = 100;
+// Comments of a shaped program: its header begins so, and each shaped region has the mark before it.
+constexpr std::string_view shaped_header = "(SHAPEGCODE ";
+constexpr std::string_view shaped_mark = "(SHAPED)";
+constexpr std::string_view shaped_rapid_mark = "(SHAPED RAPID)";
 
 }  // namespace
 
@@ -95,12 +100,27 @@ void Interpreter::note(std::size_t segment) {
   }
 }
 
+// A shaped program says so in its header, and before each shaped region.
+void Interpreter::read_header_comments() {
+  for (std::size_t i = 0; i < block_->comment_count; ++i) {
+    const std::string_view comment = block_->comments[i];
+    emitted_ = emitted_ || comment.starts_with(shaped_header);
+    if (emitted_ && (comment == shaped_mark || comment == shaped_rapid_mark)) {
+      close_region();
+      shaped_next_ = true;
+      rapid_next_ = comment == shaped_rapid_mark;
+    }
+  }
+}
+
 void Interpreter::close_region() {
   if (region_ == nullptr) {
     return;
   }
   region_->notes.resize(notes_kept_);
   if (!segments_.empty()) {
+    region_->shaped = std::exchange(shaped_next_, false);
+    region_->was_rapid = std::exchange(rapid_next_, false);
     region_->path = std::make_shared<const Path>(std::move(segments_));
     add_step(StepKind::region, program_.regions.size());
     program_.steps.back().line = region_->first_line;
@@ -181,6 +201,7 @@ void Interpreter::execute(const ParsedBlock& block, std::uint32_t line, const Li
   if (block_->word_count > 0) {
     ++program_.block_count;
   }
+  read_header_comments();
   const ModalState before = state_;
   const std::uint32_t foreign_before = foreign_;
   LineFlow flow;

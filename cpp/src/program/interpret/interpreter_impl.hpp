@@ -111,6 +111,7 @@ class Interpreter {
   void add_step(StepKind kind, std::size_t index);
   void note(std::size_t segment);
   void tell_further_warnings();
+  void read_header_comments();
   void warn_once(std::uint32_t& seen, const std::string& message);
   [[noreturn]] void fail(const std::string& message, std::uint32_t column = 0) const;
   [[noreturn]] void alarm(int number, const std::string& message, std::uint32_t column = 0) const;
@@ -137,7 +138,10 @@ class Interpreter {
   bool distance_given_ = false;
   bool units_given_ = false;
   bool ended_ = false;
-  bool look_ahead_ = false;  ///< a look-ahead mode was switched on by the program
+  bool emitted_ = false;      ///< the header comment of a shaped program was seen
+  bool shaped_next_ = false;  ///< what is cut next is shaped blocks
+  bool rapid_next_ = false;   ///< likewise, in place of a rapid
+  bool look_ahead_ = false;   ///< a look-ahead mode was switched on by the program
   Vector3 local_offset_ = Vector3::Zero();
   std::array<bool, axis_count> local_offset_uncertain_ = {false, false, false};  ///< set in a '/' block
   CannedCycle cycle_;

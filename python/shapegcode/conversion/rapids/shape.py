@@ -28,6 +28,7 @@ from shapegcode.conversion.write import RegionWriter
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program, least_increment_mm
+from shapegcode.program.stamp import RAPID_MARK
 from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid
 
@@ -107,7 +108,7 @@ class _RapidShaper:
     ) -> None:
         self.emitted, self.placed, self.grid, self.pool = emitted, placed, grid, pool
         self.model, self.machine = model, model.machine
-        self.writer = RegionWriter(model, grid)
+        self.writer = RegionWriter(model, grid, RAPID_MARK)
         self.judge = Judge(model)
         self.plant = RapidPlant(model)
 

@@ -1,0 +1,112 @@
+"""What the header of an emitted program says, held against its text and against the machine that shall run it."""
+
+from __future__ import annotations
+
+from shapegcode.machine import Machine
+from shapegcode.model.modes import axis_modes
+from shapegcode.program import Program
+from shapegcode.program.stamp import Stamp, text_mark
+
+__all__ = ["shaped_note", "shaped_warnings", "stamp_of_machine"]
+
+_WHOLE = 1e-6
+
+
+def stamp_of_machine(machine: Machine, *, version: str = "") -> Stamp:
+    """The part of a header that the machine alone decides.
+
+    Args:
+        machine: whose modes and filter stand in it.
+        version: of shapegcode.
+
+    Returns:
+        The header without block period and shaper.
+    """
+    modes = [
+        f"{axis} {mode.frequency_hz:g} HZ {mode.damping_ratio:g}"
+        for axis, modes in zip("XYZ", axis_modes(machine), strict=True)
+        for mode in modes
+    ]
+    return Stamp(version, machine.name, tuple(modes), "", "", "", _own_filter(machine))
+
+
+def _own_filter(machine: Machine) -> str:
+    controller = machine.controller
+    time_s, bell_s = controller.shaped_time_constant_s, controller.shaped_bell_time_s
+    exponential = " EXPONENTIAL" if controller.shaped_filter_shape == "exponential" and time_s else ""
+    bell = f" BELL {bell_s * 1e3:g} MS" if bell_s else ""
+    return f"{time_s * 1e3:g} MS{exponential}{bell}"
+
+
+def shaped_warnings(program: Program, machine: Machine) -> list[tuple[str, str]]:
+    """Why the verdict in the header of an emitted program does not hold here.
+
+    Args:
+        program: any; one without the converter's header has nothing to warn of.
+        machine: that shall run it.
+
+    Returns:
+        Pairs of a short stable name and a sentence: "edited", "other_machine", "other_period", "unmarked".
+    """
+    stamp = program.stamp
+    if stamp is None:
+        return []
+    found = []
+    if (mark := text_mark(program.text)) != stamp.mark:
+        found.append(
+            (
+                "edited",
+                f"the text was changed since it was shaped (its header says {stamp.mark}, it comes to {mark}): the "
+                "verdict in its header does not hold for it; convert the original again",
+            )
+        )
+    if difference := stamp.difference(stamp_of_machine(machine)):
+        found.append(
+            ("other_machine", f"shaped for another machine ({difference}): it is no remedy for this one's vibration")
+        )
+    if why := _other_period(stamp, machine):
+        found.append(("other_period", why))
+    if not program.shaped_regions:
+        found.append(
+            (
+                "unmarked",
+                "its header says that it is shaped, but no region is marked (SHAPED): played as an ordinary program "
+                "(simulate --shaped plays all of it as shaped blocks)",
+            )
+        )
+    return found
+
+
+def _other_period(stamp: Stamp, machine: Machine) -> str:
+    controller, stated_s = machine.controller, machine.emission.block_period_s
+    try:
+        period_s = float(stamp.block_period_ms) * 1e-3
+    except ValueError:
+        return f"its header gives no block period: {stamp.block_period_ms!r}"
+    ticks = period_s / controller.interpolation_period_s
+    said = f"its blocks last {stamp.block_period_ms} ms"
+    if abs(ticks - round(ticks)) > _WHOLE:
+        tick_ms = controller.interpolation_period_s * 1e3
+        return f"{said}, which is no whole number of this control's periods of {tick_ms:g} ms"
+    if period_s < controller.block_time_s * (1.0 - _WHOLE):
+        return f"{said}, this control needs {controller.block_time_s * 1e3:g} ms for a block: it starves"
+    if stated_s is not None and abs(stated_s - period_s) > _WHOLE * period_s:
+        return f"{said}, emission.block_period_s is {stated_s * 1e3:g} ms here"
+    return ""
+
+
+def shaped_note(program: Program) -> str:
+    """How a program is played, in one sentence; empty for one without shaped regions.
+
+    Args:
+        program: any.
+
+    Returns:
+        The sentence.
+    """
+    shaped, whole = program.shaped_regions, len(program.regions)
+    if not shaped:
+        return ""
+    others = "" if shaped == whole else f"; the other {whole - shaped} as the control plays any program"
+    how = f"{shaped} of {whole} regions are played block by block at their feed"
+    return f"its header says that it is shaped: {how}{others}"

@@ -1,0 +1,67 @@
+"""What an operator must heed at the control: one sentence for reports and pages, one comment for programs.
+
+Programs that shapegcode emits, its test cuts and its characterization tests say it with the same words.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["FEED_HOLD", "FIRST_RUN", "OVERRIDE", "OVERRIDES", "RESTART", "SINGLE_BLOCK", "Habit"]
+
+
+@dataclass(frozen=True)
+class Habit:
+    """One thing to heed.
+
+    Attributes:
+        topic: what it is about, in a word or two.
+        comment: for programs: capitals, 60 characters at most.
+        sentence: the same for people who read.
+    """
+
+    topic: str
+    comment: str
+    sentence: str
+
+
+OVERRIDE = Habit(
+    "override",
+    "SET FEED OVERRIDE 100 PCT",
+    "feed override 100 %: any other setting changes the time of every block, and the blocks no longer fit the modes",
+)
+OVERRIDE_LOCKED = Habit(
+    "override",
+    "FEED OVERRIDE IS OFF IN SHAPED MOVES",
+    "the program switches the feed override off in shaped moves and gives it back behind them: there only feed hold "
+    "acts",
+)
+OVERRIDE_ANY = Habit(
+    "override",
+    "BLOCKS OF ONE DURATION FOR ANY FEED OVERRIDE",
+    "the feed override may be turned: blocks of one duration are stretched alike; least vibration stays at 100 %",
+)
+OVERRIDES = {"ask": OVERRIDE, "lock": OVERRIDE_LOCKED, "any": OVERRIDE_ANY}
+"""By `emission.override`."""
+SINGLE_BLOCK = Habit(
+    "single block",
+    "NO SINGLE BLOCK IN SHAPED CUTS",
+    "no single block inside of shaped cuts: the control would stop at every line, some milliseconds apart; to look at "
+    "the way use the graphic display, or single block between the cuts",
+)
+FEED_HOLD = Habit(
+    "feed hold",
+    "AFTER FEED HOLD GO ON AT 100 PCT",
+    "feed hold is safe and may shake the machine once, since the control brakes by its own rule; cycle start goes on",
+)
+RESTART = Habit(
+    "restart",
+    "RESTART ONLY AT THE LINE BEHIND A SHAPED COMMENT",
+    "restart only where a cut begins; never in the middle of one: its blocks are sums of the moves before them",
+)
+FIRST_RUN = Habit(
+    "first run",
+    "FIRST RUN ABOVE THE PART WITHOUT TOOL",
+    "first run above the part: shift Z of the work offset by more than the deepest cut, no tool, spindle off, rapid "
+    "override 25 %, feed override 100 %",
+)

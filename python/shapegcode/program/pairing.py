@@ -1,0 +1,55 @@
+"""Regions of a program beside those of the program that it was made from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.program.program import Program
+
+__all__ = ["paired_regions"]
+
+_SAME_PLACE_MM = 0.005
+
+
+def paired_regions(program: Program, nominal: Program) -> Iterator[tuple[_core.Region, _core.Region]]:
+    """Regions of a program beside those of the nominal one, found by where they start and end.
+
+    Args:
+        program: what is played.
+        nominal: whose path it shall follow; may be the same.
+
+    Returns:
+        Pairs in the order of the nominal program. Regions of `program` that it does not have (a rapid that was shaped)
+        are left out.
+
+    Raises:
+        ArgumentError: a region of the nominal program has no partner.
+    """
+    if program is nominal:
+        yield from ((region, region) for region in program.regions)
+        return
+    candidates = iter(program.regions)
+    for region in nominal.regions:
+        for candidate in candidates:
+            if _same_ends(candidate.path, region.path):
+                yield candidate, region
+                break
+        else:
+            raise _core.ArgumentError(
+                f"{program.source}: no cut from {_place(region.path.start_mm)} to {_place(region.path.end_mm)} as "
+                f"{nominal.source} has in {nominal.lines(region)}: it was not made from that program; leave out "
+                "--against"
+            )
+
+
+def _same_ends(one: _core.Path, other: _core.Path) -> bool:
+    ends = ((one.start_mm, other.start_mm), (one.end_mm, other.end_mm))
+    return all(float(np.abs(a - b).max()) <= _SAME_PLACE_MM for a, b in ends)
+
+
+def _place(position_mm: npt.ArrayLike) -> str:
+    return " ".join(f"{axis}{value:.3f}" for axis, value in zip("XYZ", np.asarray(position_mm), strict=True))

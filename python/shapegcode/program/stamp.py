@@ -1,0 +1,201 @@
+"""The header of an emitted program: written by the converter, read by everything that is given such a program.
+
+(SHAPEGCODE 0.1.0 MACHINE VX500)
+(VERDICT WITHIN TOLERANCE       )
+(TEXT 8A1F00C3)
+(MODE X 46 HZ 0.02)
+(BLOCK PERIOD 5 MS SHAPER 20 MS ZVD)
+(SET FEED OVERRIDE 100 PCT)
+(NO SINGLE BLOCK IN SHAPED CUTS)
+(RESTART ONLY AT THE LINE BEHIND A SHAPED COMMENT)
+(FIRST RUN ABOVE THE PART WITHOUT TOOL)
+(TIME CONSTANT AFTER INTERPOLATION 0 MS)
+
+Only capitals, digits, spaces, points and minus signs stand in it: what any control keeps in a comment.
+"""
+
+from __future__ import annotations
+
+import re
+import zlib
+from dataclasses import dataclass
+
+from shapegcode.program.operating import FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK
+
+__all__ = ["RAPID_MARK", "REGION_MARK", "STAMP_BEGIN", "Stamp", "judged", "stamp_of", "text_mark"]
+
+REGION_MARK = "(SHAPED)"
+"""Stands before each shaped region."""
+
+RAPID_MARK = "(SHAPED RAPID)"
+"""Stands before shaped blocks in place of a rapid."""
+
+STAMP_BEGIN = b"(SHAPEGCODE "
+"""How the header begins."""
+
+_WIDTH = 60
+# One length, so that the verdict can take its place without moving a line; likewise the mark of the text.
+_PENDING, _GOOD, _BAD = (
+    b"(VERDICT PENDING                )",
+    b"(VERDICT WITHIN TOLERANCE       )",
+    b"(OUT OF TOLERANCE - DO NOT RUN  )",
+)
+_NO_MARK = "0" * 8
+_MARK_PENDING = f"(TEXT {_NO_MARK})".encode()
+_COMMENT = re.compile(rb"\(([^()\r\n]*)\)[ \t]*[\r\n]*")
+# What a control or an editor may change without changing the program: comments, blanks, %; then N and O words.
+_UNIMPORTANT = re.compile(rb"\([^()\r\n]*\)|[ \t%]+")
+_LINE_HEAD = re.compile(rb"(?<=\n)(/\d?)?(?:N\d+)?(?:[O:]\d+)?")
+_LINE_ENDS = re.compile(rb"[\r\n]+")
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """What the header of an emitted program says; texts are as a comment holds them.
+
+    Attributes:
+        version: of shapegcode.
+        machine: its name.
+        modes: such as "X 46 HZ 0.02", in the order of the machine file.
+        block_period_ms: of the shaped blocks.
+        shaper_ms: duration of the shaper.
+        family: of the shaper; empty: not said.
+        own_filter: how the control itself smooths shaped blocks, such as "24 MS" or "48 MS BELL 24 MS".
+        mark: of the text, see `text_mark`; eight zeros: not yet known.
+        override: which of `OVERRIDES` the text is for.
+        notes: further lines.
+    """
+
+    version: str
+    machine: str
+    modes: tuple[str, ...]
+    block_period_ms: str
+    shaper_ms: str
+    family: str
+    own_filter: str
+    mark: str = _NO_MARK
+    override: str = "ask"
+    notes: tuple[str, ...] = ()
+
+    def lines(self) -> list[str]:
+        """The header, its verdict still open."""
+        first, *rest = (
+            f"({plain_comment(line)[:_WIDTH]})"
+            for line in (
+                f"SHAPEGCODE {self.version} MACHINE {self.machine}",
+                f"TEXT {self.mark}",
+                *(f"MODE {mode}" for mode in self.modes),
+                f"BLOCK PERIOD {self.block_period_ms} MS SHAPER {self.shaper_ms} MS {self.family}".rstrip(),
+                *self.notes,
+                *(habit.comment for habit in (OVERRIDES[self.override], SINGLE_BLOCK, RESTART, FIRST_RUN)),
+                f"TIME CONSTANT AFTER INTERPOLATION {self.own_filter}",
+            )
+        )
+        return [first, _PENDING.decode(), *rest]
+
+    def difference(self, other: Stamp) -> str:
+        """In what the machine of another header differs, in words; empty: in nothing that counts.
+
+        Args:
+            other: as a machine would have it.
+
+        Returns:
+            The first difference.
+        """
+        pairs = (
+            ("machine", self.machine, other.machine),
+            ("modes", ", ".join(self.modes) or "none", ", ".join(other.modes) or "none"),
+            ("time constant after interpolation", self.own_filter, other.own_filter),
+        )
+        for name, ours, theirs in pairs:
+            if _shown(ours) != _shown(theirs):
+                return f"{name}: {_shown(ours)} in the program, {_shown(theirs)} here"
+        return ""
+
+
+def _shown(text: str) -> str:
+    # As far as a comment shows it.
+    return plain_comment(text)[: _WIDTH // 2]
+
+
+def plain_comment(text: str) -> str:
+    """Only what a FANUC comment may hold: capitals, digits and plain signs.
+
+    Args:
+        text: any.
+
+    Returns:
+        The same with blanks in place of everything else.
+    """
+    return "".join(c if c.isalnum() or c in " .-" else " " for c in text.upper())
+
+
+def stamp_of(text: bytes) -> Stamp | None:
+    """The header of a program that the converter wrote.
+
+    Args:
+        text: of any program.
+
+    Returns:
+        What it says; None: the converter did not write this program.
+    """
+    begin = text.find(STAMP_BEGIN)
+    if begin < 0:
+        return None
+    lines = []
+    while match := _COMMENT.match(text, begin):
+        lines.append(match[1].decode("latin-1").strip())
+        begin = match.end()
+
+    def found(pattern: str) -> list[re.Match[str]]:
+        return [match for line in lines if (match := re.fullmatch(pattern, line))]
+
+    head = found(r"SHAPEGCODE (\S+) MACHINE (.*)")
+    period = found(r"BLOCK PERIOD (\S+) MS SHAPER (\S+) MS ?(.*)")
+    if not head or not period:
+        return None
+    mark, constant = found(r"TEXT ([0-9A-F]{8})"), found(r"TIME CONSTANT AFTER INTERPOLATION (.*)")
+    return Stamp(
+        version=head[0][1],
+        machine=head[0][2],
+        modes=tuple(mode[1] for mode in found(r"MODE (.*)")),
+        block_period_ms=period[0][1],
+        shaper_ms=period[0][2],
+        family=period[0][3],
+        own_filter=constant[0][1] if constant else "",
+        mark=mark[0][1] if mark else _NO_MARK,
+    )
+
+
+def text_mark(text: bytes) -> str:
+    """Eight digits that stand for what a program does.
+
+    Comments, blanks, kinds of line end, N words, the program's number and `%` do not count: what a control or an
+    editor changes in passing.
+
+    Args:
+        text: of the program.
+
+    Returns:
+        The CRC-32 of the rest.
+    """
+    kept = _LINE_ENDS.sub(b"\n", b"\n" + _UNIMPORTANT.sub(b"", text).upper())
+    kept = _LINE_ENDS.sub(b"\n", _LINE_HEAD.sub(rb"\1", kept)).strip()
+    return f"{zlib.crc32(kept):08X}"
+
+
+def judged(text: bytes, *, good: bool) -> bytes:
+    """An emitted program with verdict and mark in its header.
+
+    Args:
+        text: with an open verdict, or one that was good before.
+        good: the verdict.
+
+    Returns:
+        The text, as long as it was.
+    """
+    for before in (_PENDING, _GOOD):
+        text = text.replace(before, _GOOD if good else _BAD, 1)
+        if good:
+            break
+    return text.replace(_MARK_PENDING, f"(TEXT {text_mark(text)})".encode(), 1)
