@@ -151,6 +151,7 @@ def _region(case: Case, programmed: list[Move], blocks: list[Move], entry: dict[
         theirs = entry["residual_vibration_um"]["emitted"][axis]
         if not agree(ours, theirs):
             found.append(f"residual {axis} {ours:.3f} um, report {theirs:.3f}")
+    found += _original(case, programmed, entry)
     lasts = max(rest_index(points, still_mm=1e-9) for points in runs) * case.tick_s
     if abs(lasts - entry["time_s"]["emitted"]) > 1e-6 + 1e-9 * lasts:
         found.append(f"takes {lasts:.6f} s, report {entry['time_s']['emitted']:.6f}")
@@ -170,6 +171,26 @@ def _region(case: Case, programmed: list[Move], blocks: list[Move], entry: dict[
         if theirs > max(in_order, missed) * (1.0 + RELATIVE) + ABSOLUTE_UM + rounded:
             found.append(f"contour {nearest:.2f} um, in order {in_order:.2f}, missed {missed:.2f}, report {theirs:.2f}")
     return found + _speeds(case, runs, programmed, way)
+
+
+def _original(case: Case, programmed: list[Move], entry: dict[str, Any]) -> list[str]:
+    """The region as programmed, where the control smooths after interpolation: what the judge can play itself."""
+    controller = case.machine.controller
+    # A tick's dust decides how long a line lasts whose ends are computed places.
+    if controller.motion != "after_interpolation" or _COMPUTED.search(case.drawn.text):
+        return []
+    ticks = round(controller.time_constant_s / case.tick_s)
+    points = play(programmed, period_s=case.tick_s, block_end=controller.block_end, acceleration_samples=ticks)
+    residual = residual_um(points, case.modes, case.tick_s, still_mm=1e-9)
+    lasts = rest_index(points, still_mm=1e-9) * case.tick_s
+    found = [
+        f"original: residual {axis} {ours:.3f} um, report {theirs:.3f}"
+        for axis, ours in zip("xyz", residual, strict=True)
+        if not agree(ours, theirs := entry["residual_vibration_um"]["original"][axis])
+    ]
+    if abs(lasts - entry["time_s"]["original"]) > 1e-6 + 1e-9 * lasts:
+        found.append(f"original: takes {lasts:.6f} s, report {entry['time_s']['original']:.6f}")
+    return found
 
 
 def _set_points(case: Case, blocks: list[Move], rule: BlockEnd) -> Vector:

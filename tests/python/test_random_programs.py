@@ -15,28 +15,37 @@ import pytest
 from judge.dialect import play
 from judge.draws import draw
 from random_verdict import Case, complaints, convert, read
+from second_reading import compare
 
 QUICK = range(16)
 MANY = range(len(QUICK), len(QUICK) + 500)
 CHUNK = 20
 #: On paths of some hundredths of a millimetre that run over themselves the report's tracker may lose its place; it then
-#: claims a contour error that is not there. Never less than there is.
-LOST = {10, 72, 97, 99, 130, 194, 256, 297, 324, 407, 418, 457}
+#: claims a contour error that is not there (never less than there is). So often in a chunk, and in this quick seed.
+OVERSTATED, QUICK_OVERSTATED = 2, {10}
 
 
 def judged(seed: int) -> list[str]:
     """What the judge and the report of a seed's program differ in, each with the seed."""
-    found = complaints(convert(draw(seed), shape_all=True))
+    case = convert(draw(seed), shape_all=True)
+    offsets = {name: tuple(place) for name, place in case.drawn.keys["input.work_offsets"].items()}
+    compare(case.drawn.text, case.machine, place_mm=1.001 * case.increment_mm, work_offsets=offsets)
+    found = complaints(case)
     if seed % 4 == 0:  # regions that gain little keep their text
         found += [f"kept regions: {what}" for what in complaints(convert(draw(seed), shape_all=False))]
-    if seed in LOST:
-        found = [what for what in found if not re.search(r"in order .* report", what)]
     return [f"seed {seed}: {what}" for what in found]
+
+
+def is_overstated(complaint: str) -> bool:
+    """Whether it is about a contour error that is larger in the report than it is."""
+    return bool(re.search(r"contour .* in order .* report", complaint))
 
 
 @pytest.mark.parametrize("seed", QUICK)
 def test_the_report_is_the_judges(seed: int) -> None:
     found = judged(seed)
+    if seed in QUICK_OVERSTATED:
+        found = [what for what in found if not is_overstated(what)]
     assert not found, "\n".join([*found, draw(seed).text])
 
 
@@ -44,6 +53,9 @@ def test_the_report_is_the_judges(seed: int) -> None:
 @pytest.mark.parametrize("first", range(MANY.start, MANY.stop, CHUNK))
 def test_many_reports_are_the_judges(first: int) -> None:
     found = [what for seed in range(first, min(first + CHUNK, MANY.stop)) for what in judged(seed)]
+    too_much = {what.split(":")[0] for what in found if is_overstated(what)}
+    assert len(too_much) <= OVERSTATED, "\n".join(found)
+    found = [what for what in found if not is_overstated(what)]
     assert not found, "\n".join(found)
 
 
