@@ -49,6 +49,10 @@ void register_simulation(py::module_& module) {
       .def_readwrite("drives", &PlaybackOptions::drives,
                      "Feed drives of X, Y and Z in place of the modes; none: modes alone.")
       .def_readwrite("settling_band_mm", &PlaybackOptions::settling_band_mm, "Of the settling time, mm; 0: none.")
+      .def_readwrite(
+          "arrived_mm", &PlaybackOptions::arrived_mm,
+          "Drives: the residual is the swing of the table against its motor once that is so near, mm; 0: the "
+          "whole error from the stop on.")
       .def_readwrite("settling_limit_s", &PlaybackOptions::settling_limit_s,
                      "How long behind the stop it is looked for; with drives the residual too, s.")
       .def_readwrite("measure_contour", &PlaybackOptions::measure_contour, "Deviations and orbit errors.")

@@ -3020,6 +3020,14 @@ class PlaybackOptions:
     def __init__(self) -> None:
         ...
     @property
+    def arrived_mm(self) -> float:
+        """
+        Drives: the residual is the swing of the table against its motor once that is so near, mm; 0: the whole error from the stop on.
+        """
+    @arrived_mm.setter
+    def arrived_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def axis_filters(self) -> list[Fir]:
         """
         Filters after the set-points, in order.

@@ -46,6 +46,9 @@ struct PlaybackOptions {
   double settling_band_mm = 0.0;  ///< of the settling time; 0: not measured
   /// How long behind the stop the settling time is looked for; with drives the residual too.
   double settling_limit_s = 1.0;
+  /// Drives: the residual is how far the table still swings against its motor once the motor is as near to the command;
+  /// 0: |response - command| from the stop on, the lag of the servo loop included.
+  double arrived_mm = 0.0;
   /// Keep at most so many samples of command and response for pictures (0: none); longer runs keep their beginning.
   std::size_t record_samples = 0;
 };

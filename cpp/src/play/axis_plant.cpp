@@ -1,5 +1,7 @@
 #include "play/axis_plant.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -21,7 +23,8 @@ ModalPlant modal_plant(const PlaybackOptions& options) {
 
 }  // namespace
 
-AxisPlant::AxisPlant(const PlaybackOptions& options) : period_s_(options.period_s), modal_(modal_plant(options)) {
+AxisPlant::AxisPlant(const PlaybackOptions& options)
+    : period_s_(options.period_s), arrived_mm_(options.arrived_mm), modal_(modal_plant(options)) {
   if (!options.drives.empty() && options.drives.size() != axis_count) {
     throw Error(ErrorKind::argument,
                 fmt::format("{} feed drives: must be none or one each for X, Y and Z", options.drives.size()));
@@ -66,10 +69,45 @@ void AxisPlant::reset_peak() noexcept {
   drive_peak_ = drive_deflection_.cwiseAbs();
 }
 
+// Largest swing of each table against its motor from the period on in which the motor has arrived; what the motor holds
+// it by in the end (friction, backlash) is no swing.
+Vector3 AxisPlant::swing_behind_motors(const Vector3& command, double limit_s) const {
+  AxisPlant plant = *this;
+  const auto periods = static_cast<std::size_t>(whole_periods(limit_s / period_s_));
+  std::vector<Vector3> swings(periods);
+  std::array<std::size_t, axis_count> arrived{};
+  for (std::size_t k = 0; k < periods; ++k) {
+    const Vector3 response = plant.step(command);
+    for (std::size_t i = 0; i < drives_.size(); ++i) {
+      const auto axis = static_cast<Eigen::Index>(i);
+      const double motor = plant.drives_[i].motor_mm();
+      swings[k][axis] = response[axis] - motor;
+      if (std::abs(motor - command[axis]) > arrived_mm_) {
+        arrived[i] = k + 1;
+      }
+    }
+  }
+  Vector3 largest = Vector3::Zero();
+  for (std::size_t i = 0; i < drives_.size(); ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    // One that never arrives has swung all the time.
+    for (std::size_t k = arrived[i] < periods ? arrived[i] : 0; k < periods; ++k) {
+      largest[axis] = std::max(largest[axis], std::abs(swings[k][axis] - swings.back()[axis]));
+    }
+  }
+  return largest;
+}
+
 AtRest AxisPlant::at_rest(const Vector3& command, double band_mm, double limit_s) const {
   AtRest result;
   if (drives_.empty()) {
     result.residual_mm = modal_.residual_peak();
+    if (!(band_mm > 0.0)) {
+      return result;
+    }
+  }
+  if (!drives_.empty() && arrived_mm_ > 0.0) {
+    result.residual_mm = swing_behind_motors(command, limit_s);
     if (!(band_mm > 0.0)) {
       return result;
     }
@@ -80,7 +118,7 @@ AtRest AxisPlant::at_rest(const Vector3& command, double band_mm, double limit_s
     plant.reset_peak();
     plant.step(command);
     const Vector3 peak = plant.peak();
-    if (!drives_.empty()) {
+    if (!drives_.empty() && arrived_mm_ <= 0.0) {
       result.residual_mm = result.residual_mm.cwiseMax(peak);
     }
     for (Eigen::Index axis = 0; axis < axis_count && band_mm > 0.0; ++axis) {

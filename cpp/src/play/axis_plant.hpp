@@ -40,8 +40,10 @@ class AxisPlant {
 
  private:
   Vector3 step_drives(const Vector3& command);
+  [[nodiscard]] Vector3 swing_behind_motors(const Vector3& command, double limit_s) const;
 
   double period_s_;
+  double arrived_mm_;
   ModalPlant modal_;
   std::vector<FeedDrive> drives_;
   Vector3 drive_deflection_ = Vector3::Zero();

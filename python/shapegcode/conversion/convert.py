@@ -332,6 +332,7 @@ class _Run:
                 machine.tolerance.residual_floor_um,
                 machine.tolerance.residual_floor_increments,
                 machine.tolerance.feed_excess_ratio,
+                machine.verdict.plant,
             ),
             warnings=tuple(warnings),
             budget=self.spending.outcome(self.grid, written) if self.spending is not None else None,

@@ -105,6 +105,7 @@ class AppliedLimits:
         residual_floor_um: residual vibration below this passes.
         residual_floor_increments: likewise, in least increments.
         feed_excess_ratio: share by which the set-points may run faster than programmed.
+        plant: behind which the programs were played, "modal" or "feed-drive".
     """
 
     contour_um: float
@@ -113,6 +114,7 @@ class AppliedLimits:
     residual_floor_um: float
     residual_floor_increments: float
     feed_excess_ratio: float
+    plant: str
 
 
 @dataclass(frozen=True)

@@ -211,6 +211,12 @@ class Tolerance(TomlTable):
 class Verdict(TomlTable):
     """The stated band: which of the cases that are played decide. All are shown; 100 % override always counts."""
 
+    plant: Literal["modal", "feed-drive"] = key(
+        'what stands behind the command: "modal": the modes behind an ideal servo, so that servo lag is no part of the '
+        'verdict; "feed-drive": motor, screw, friction and servo loops of axes.*.drive with the modes, where they are '
+        "known: the contour error then holds their lag, and the residual is the swing of the table behind its motor",
+        default="modal",
+    )
     override_percent: tuple[_Override, _Override] = key(
         "lowest and highest feed override under which the program will run: every case in between must be good. The "
         "header of a program asks for 100 %, so only that counts unless you state more",

@@ -8,8 +8,9 @@ import numpy as np
 
 from shapegcode import _core
 from shapegcode.errors import MachineError, Problem
-from shapegcode.machine import Axis, Machine
+from shapegcode.machine import Machine
 from shapegcode.machine.drive import Drive
+from shapegcode.model.modes import axis_modes
 
 _UM = 1e-6  # m
 _N_PER_UM = 1e6  # N/m
@@ -17,14 +18,16 @@ _MM = 1e-3  # m
 _GROWING_PER_S = 1e-3  # real part of a pole above which a loop grows
 
 
-def drive_parameters(machine: Machine) -> list[_core.FeedDriveParameters]:
+def drive_parameters(machine: Machine, shift: float = 0.0, only: str | None = None) -> list[_core.FeedDriveParameters]:
     """The feed drives of X, Y and Z, referred to the travel of the tables.
 
-    Position gain and feed-forward are those of the controller; the modes of the axes ride on the tables, at their
-    nominal frequencies.
+    Position gain and feed-forward are those of the controller; the modes of the axes ride on the tables, those that
+    vary with a position at their nominal frequency.
 
     Args:
         machine: with a table ``[axes.x.drive]``, and so for y and z.
+        shift: share of each mode's stated uncertainty by which it is off, see `axis_modes`.
+        only: the one mode that is off; None: all of them.
 
     Returns:
         Parameters of X, Y and Z, in SI units.
@@ -42,8 +45,10 @@ def drive_parameters(machine: Machine) -> list[_core.FeedDriveParameters]:
     gains = machine.controller.position_gain_per_s.as_tuple()
     ratios = machine.controller.feed_forward_ratio.as_tuple()
     parameters = [
-        _of_axis(axis, axis.drive, gain, ratio)
-        for axis, gain, ratio in zip(machine.axes.as_tuple(), gains, ratios, strict=True)
+        _of_axis(modes, axis.drive, gain, ratio)
+        for axis, modes, gain, ratio in zip(
+            machine.axes.as_tuple(), axis_modes(machine, shift, only), gains, ratios, strict=True
+        )
         if axis.drive is not None
     ]
     unstable = [
@@ -85,7 +90,7 @@ def _instability(name: str, drive: _core.FeedDriveParameters, gain_per_s: float)
     ]
 
 
-def _of_axis(axis: Axis, drive: Drive, gain_per_s: float, ratio: float) -> _core.FeedDriveParameters:
+def _of_axis(modes: list[_core.Mode], drive: Drive, gain_per_s: float, ratio: float) -> _core.FeedDriveParameters:
     rad_per_m = 2.0 * math.pi / (drive.screw_lead_mm * _MM)
     motor_mass = drive.motor_inertia_kg_m2 * rad_per_m**2
     reduced_mass = motor_mass * drive.table_mass_kg / (motor_mass + drive.table_mass_kg)
@@ -108,7 +113,7 @@ def _of_axis(axis: Axis, drive: Drive, gain_per_s: float, ratio: float) -> _core
         motor_friction=_core.FrictionParameters(
             viscous_n_s_per_m=drive.motor_friction_viscous_n_m_s_per_rad * rad_per_m**2
         ),
-        modes=[_core.Mode(mode.frequency_hz, mode.damping_ratio, mode.participation) for mode in axis.modes],
+        modes=modes,
     )
 
 

@@ -25,6 +25,7 @@ __all__ = ["PLANTS", "MachineModel", "OwnFilter", "PlayingController"]
 PLANTS = ("modal", "feed-drive")
 """The plants that there are: modes behind an ideal servo, or motor, ball screw and table with their servo loops."""
 
+_DRIVE_REST_S = 0.5  # how long behind a stop the error of feed drives is looked at
 _LEAST_DECAY_PER_S = 0.01  # below it a mode has no damping to speak of
 
 FloatArray = npt.NDArray[np.float64]
@@ -245,8 +246,37 @@ class MachineModel:
             options.modes = axis_modes(self.machine, shift, only)
             options.mode_tables = mode_tables(self.machine, shift, offset, only)
         else:
-            options.drives = drive_parameters(self.machine)
+            options.drives = drive_parameters(self.machine, shift, only)
         options.axis_filters = list(filters)
+        return options
+
+    def verdict_options(
+        self,
+        *,
+        filters: Sequence[_core.Fir] = (),
+        shift: float = 0.0,
+        only: str | None = None,
+        offset: Offset = NO_OFFSET,
+    ) -> _core.PlaybackOptions:
+        """Options with the plant of the verdict.
+
+        Behind feed drives the residual is the swing of the table against its motor once that has arrived: the lag that
+        runs out at a stop is no vibration.
+
+        Args:
+            filters: see `options`, and so the others.
+            shift: likewise.
+            only: likewise.
+            offset: likewise.
+
+        Returns:
+            The options of the core.
+        """
+        plant = self.machine.verdict.plant
+        options = self.options(plant=plant, filters=filters, shift=shift, only=only, offset=offset)
+        if plant != "modal":
+            options.settling_limit_s = _DRIVE_REST_S
+            options.arrived_mm = min(self.machine.controller.in_position_width_um.as_tuple()) * 1e-3
         return options
 
     def play_original(
@@ -262,7 +292,7 @@ class MachineModel:
         Returns:
             The figures, positions in mm.
         """
-        options = self.options(offset=offset)
+        options = self.verdict_options(offset=offset)
         options.record_samples = record_samples
         return self.ordinary.play(path, options)
 
@@ -308,7 +338,7 @@ class MachineModel:
         Returns:
             The figures, positions in mm.
         """
-        options = self.options(filters=self.shaped.filters, shift=shift, only=only, offset=offset)
+        options = self.verdict_options(filters=self.shaped.filters, shift=shift, only=only, offset=offset)
         options.measure_contour = contour
         if tracker is not None:
             options.tracker = tracker
@@ -338,7 +368,8 @@ class MachineModel:
             The figures, positions in mm.
         """
         ticks = round(self.machine.controller.look_ahead_filter_time_constant_s / self.period_s)
-        options = self.options(filters=[_core.Fir.moving_average(ticks)] if ticks > 1 else [], offset=offset)
+        filters = [_core.Fir.moving_average(ticks)] if ticks > 1 else []
+        options = self.verdict_options(filters=filters, offset=offset)
         return _core.play_path(blocks, _core.plan_speed(blocks, self.limits()), options, path)
 
     def cycle_time_s(self, program: _core.ProgramText) -> float:
