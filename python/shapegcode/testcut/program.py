@@ -113,7 +113,8 @@ class _Writer:
         far = self._y(-_RAW_MM - 3.0 * self.radius), self._y(self.walls[-1])
         yield f"TOOL AXIS: X{left:g} TO {right:g}, Y{min(far):.1f} TO {max(far):.1f},"
         yield f"Z-{cut.axial_depth_mm:g} TO {_CLEAR_Z_MM:g}: KEEP IT FREE OF CLAMPS"
-        yield f"{OVERRIDE.comment}, NO LOOK-AHEAD MODE THAT CHANGES F"
+        yield OVERRIDE.comment
+        yield "NO LOOK-AHEAD MODE THAT CHANGES F"
         yield f"AT EACH M00: START A NEW RECORD, FX FY, {rate} HZ OR MORE,"
         yield "FX ALONG +X, FY ALONG +Y, THEN CYCLE START;"
         yield "STOP THE RECORD AT THE NEXT STOP. ONE FILE PER PASS"
