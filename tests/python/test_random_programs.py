@@ -20,9 +20,6 @@ from second_reading import compare
 QUICK = range(16)
 MANY = range(len(QUICK), len(QUICK) + 500)
 CHUNK = 20
-#: On paths of some hundredths of a millimetre that run over themselves the report's tracker may lose its place; it then
-#: claims a contour error that is not there (never less than there is). So often in a chunk, and in this quick seed.
-OVERSTATED, QUICK_OVERSTATED = 2, {10}
 
 
 def judged(seed: int) -> list[str]:
@@ -36,16 +33,9 @@ def judged(seed: int) -> list[str]:
     return [f"seed {seed}: {what}" for what in found]
 
 
-def is_overstated(complaint: str) -> bool:
-    """Whether it is about a contour error that is larger in the report than it is."""
-    return bool(re.search(r"contour .* in order .* report", complaint))
-
-
 @pytest.mark.parametrize("seed", QUICK)
 def test_the_report_is_the_judges(seed: int) -> None:
     found = judged(seed)
-    if seed in QUICK_OVERSTATED:
-        found = [what for what in found if not is_overstated(what)]
     assert not found, "\n".join([*found, draw(seed).text])
 
 
@@ -53,9 +43,6 @@ def test_the_report_is_the_judges(seed: int) -> None:
 @pytest.mark.parametrize("first", range(MANY.start, MANY.stop, CHUNK))
 def test_many_reports_are_the_judges(first: int) -> None:
     found = [what for seed in range(first, min(first + CHUNK, MANY.stop)) for what in judged(seed)]
-    too_much = {what.split(":")[0] for what in found if is_overstated(what)}
-    assert len(too_much) <= OVERSTATED, "\n".join(found)
-    found = [what for what in found if not is_overstated(what)]
     assert not found, "\n".join(found)
 
 
