@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "shapegcode/error.hpp"
@@ -410,5 +411,96 @@ TEST_CASE("contour tracker: many short pieces within a step are the one line tha
     const double deviation = many.step(p);
     CHECK(deviation == doctest::Approx(one.step(p)).epsilon(1e-9));
     CHECK(std::abs(many.s_mm() - one.s_mm()) < 1e-9);
+  }
+}
+
+namespace {
+
+// Largest deviation of a point that shakes about a place moving along a path, as the tracker sees it, and as a search
+// of everything within reach of that place does. Both in mm.
+struct Seen {
+  double tracker = 0.0;
+  double search = 0.0;
+  double differ = 0.0;
+};
+
+Seen follow(const Path& path, double feed_mm_per_s, double amplitude_mm) {
+  constexpr double period_s = 1e-3;
+  constexpr int steps = 400;
+  const double reach = 2.0 * amplitude_mm + 0.02;
+  ContourTracker driven(path);
+  ContourTracker tracker(path);
+  Seen seen;
+  std::size_t cursor = 0;
+  for (double time_s = 0.0; time_s * feed_mm_per_s < path.length_mm(); time_s += period_s) {
+    const double s = time_s * feed_mm_per_s;
+    const Vector3 command = path.point(s, cursor);
+    driven.step(command);
+    Vector3 p = command;
+    p[0] += amplitude_mm * std::sin(251.3 * time_s);
+    p[1] += amplitude_mm * (std::cos(284.0 * time_s) - 1.0);
+    const double tracked = std::abs(tracker.step(p, driven.reach_of(p)));
+    double nearest = std::numeric_limits<double>::infinity();
+    std::size_t near = cursor;
+    const double first = std::max(0.0, s - reach);
+    const double last = std::min(path.length_mm(), s + reach);
+    for (int k = 0; k <= steps; ++k) {
+      nearest = std::min(nearest, (path.point(first + (last - first) * k / steps, near) - p).norm());
+    }
+    seen.tracker = std::max(seen.tracker, tracked);
+    seen.search = std::max(seen.search, nearest);
+    seen.differ = std::max(seen.differ, std::abs(tracked - nearest));
+  }
+  return seen;
+}
+
+std::vector<Segment> circles(double radius, int turns, bool to_and_fro, double pitch) {
+  std::vector<Segment> path;
+  double z = 0.0;
+  for (int k = 0; k < turns; ++k) {
+    const double sweep = to_and_fro && k % 2 == 1 ? -2.0 * std::numbers::pi : 2.0 * std::numbers::pi;
+    path.push_back(make_arc({radius, 0, z}, {radius, 0, z - pitch}, {0, 0, z}, sweep, 2, 1.0));
+    z -= pitch;
+  }
+  return path;
+}
+
+std::vector<Segment> squares(double side, int turns, bool back) {
+  const Vector3 corners[4] = {{0, 0, 0}, {side, 0, 0}, {side, side, 0}, {0, side, 0}};
+  std::vector<Segment> path;
+  for (int k = 0; k < 4 * turns; ++k) {
+    path.push_back(make_line(corners[k % 4], corners[(k + 1) % 4], 1.0));
+  }
+  for (int k = 4 * turns; back && k-- > 0;) {
+    path.push_back(make_line(corners[(k + 1) % 4], corners[k % 4], 1.0));
+  }
+  return path;
+}
+
+}  // namespace
+
+TEST_CASE("contour: a path that runs over itself is followed on its own pass, however small and slow") {
+  // Slower than the vibration is quick: the point moves backward most of the time.
+  for (const double feed : {0.05, 0.5}) {
+    for (const double radius : {0.05, 0.1, 0.5}) {
+      for (const auto& [name, path] : {std::pair{"turns", circles(radius, 6, false, 0.0)},
+                                       {"to and fro", circles(radius, 6, true, 0.0)},
+                                       {"helix of 1 um", circles(radius, 6, false, 0.001)},
+                                       {"square three times", squares(radius, 3, false)},
+                                       {"square and back", squares(radius, 1, true)}}) {
+        CAPTURE(std::string(name));
+        CAPTURE(feed);
+        CAPTURE(radius);
+        const Path followed(path);
+        if (followed.length_mm() / feed > 40.0) {
+          continue;  // enough of it is seen on the smaller ones
+        }
+        const Seen seen = follow(followed, feed, 0.003);
+        CHECK(seen.search < 0.008);
+        // At a tip, within the vibration, the one leg is as good as the other.
+        CHECK(seen.differ < (std::string(name) == "to and fro" ? 0.006 : 0.0005));
+        CHECK(seen.tracker == doctest::Approx(seen.search).epsilon(0.05));
+      }
+    }
   }
 }

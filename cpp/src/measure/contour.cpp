@@ -238,7 +238,8 @@ std::size_t ContourTracker::group_before(std::size_t end, const Vector3& p, doub
   return passed;
 }
 
-ContourTracker::Found ContourTracker::search(const Vector3& p, double move, const Window& window) const noexcept {
+ContourTracker::Found ContourTracker::search(const Vector3& p, double move, const Window& window,
+                                             double bound) const noexcept {
   Found best{foot_on(cursor_, p, window), cursor_, 0.0};
   const Foot start = best.foot;
   const double advance = geometry_->pieces[cursor_].s + best.foot.along - s_;
@@ -248,7 +249,7 @@ ContourTracker::Found ContourTracker::search(const Vector3& p, double move, cons
   const double to_tip = geometry_->pieces[cursor_].length - best.foot.along;
   if (advance < 0.5 * move && to_tip < longest_turn_mm) {
     const double tip = geometry_->pieces[cursor_].s + geometry_->pieces[cursor_].length;
-    forward.end = std::max(forward.end, tip + to_tip + window_margin_mm);
+    forward.end = std::max(forward.end, std::min(tip + to_tip + window_margin_mm, bound));
   }
   for (std::size_t i = cursor_ + 1; i < geometry_->pieces.size() && geometry_->pieces[i].s <= forward.end; ++i) {
     const double limit = retreats ? best.foot.distance2 * (1.0 + retreat_tie_relative) + retreat_tie_absolute_mm2
@@ -310,14 +311,16 @@ PathSide ContourTracker::side() const noexcept {
   return lateral_ > 0.0 ? PathSide::left : PathSide::right;
 }
 
-double ContourTracker::step(const Vector3& p) noexcept {
+double ContourTracker::step(const Vector3& p, double up_to_mm) noexcept {
   // The sum of the components' sizes bounds the step's length without a square root.
   const double move = (p - last_).lpNorm<1>();
   if (!std::isfinite(move)) return std::numeric_limits<double>::quiet_NaN();
   const double retreat = furthest_ - s_;
   const double behind = move + deviation_ + window_margin_mm;
   const double ahead = 2.0 * move + 4.0 * (deviation_ + retreat) + window_margin_mm + retreat;
-  Found found = search(p, move, {s_ - behind, s_ + ahead});
+  // What was passed before stays in reach, whatever the caller knows.
+  const double bound = std::max(up_to_mm, s_);
+  Found found = search(p, move, {s_ - behind, std::min(s_ + ahead, bound)}, bound);
   double distance = std::sqrt(found.foot.distance2);
   bool jumped = false;
 
@@ -325,7 +328,7 @@ double ContourTracker::step(const Vector3& p) noexcept {
   if (growing_ >= growing_until_lost && std::has_single_bit(growing_)) {
     // Widened at 8, 16, 32 … samples only: the cost stays proportional to the samples.
     const double factor = static_cast<double>(growing_) * static_cast<double>(growing_) / 16.0;
-    const Found wide = search(p, move, {s_ - factor * behind, s_ + factor * ahead});
+    const Found wide = search(p, move, {s_ - factor * behind, std::min(s_ + factor * ahead, bound)}, bound);
     // An overshoot beside another pass is not a lost track: only a much nearer foot is worth the jump.
     if (wide.foot.distance2 < 0.25 * found.foot.distance2) {
       found = wide;

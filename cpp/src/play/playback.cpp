@@ -92,6 +92,8 @@ class Recorder {
       }
       orbit_.step(command, command_tracker_.segment());
       command_reach_.step(command, command_tracker_.s_mm());
+    } else if (tracks_contour_) {
+      command_tracker_.step(command);  // says how far the response can be
     }
     if (tracks_contour_) {
       figures_.response.add(follow(response));
@@ -156,7 +158,7 @@ class Recorder {
  private:
   // Deviation of the response from the path, with all that hangs on where its foot is.
   double follow(const Vector3& response) {
-    const double deviation = response_tracker_.step(response);
+    const double deviation = response_tracker_.step(response, command_tracker_.reach_of(response));
     response_reach_.step(response, response_tracker_.s_mm());
     if (tracks_response_orbit_) {
       response_orbit_.step(response, response_tracker_.segment());

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -48,8 +49,12 @@ class ContourTracker {
  public:
   /// The point is expected at the path's start. Throws Error(argument) on a path without segments.
   explicit ContourTracker(const Path& path);
-  /// Signed deviation in mm of the next sample; NaN, and no change of state, if `p` is not finite.
-  double step(const Vector3& p) noexcept;
+  /// Signed deviation in mm of the next sample; NaN, and no change of state, if `p` is not finite. `up_to_mm`: how far
+  /// from the path's start its foot may lie at most, for one who knows where the point is driven from: a point that
+  /// vibrates moves backward and forward faster than it travels, and would slip to a later pass; see `reach_of`.
+  double step(const Vector3& p, double up_to_mm = std::numeric_limits<double>::infinity()) noexcept;
+  /// The furthest foot of a point that is driven by another one, whose foot is the last of this tracker.
+  [[nodiscard]] double reach_of(const Vector3& p) const noexcept { return s_ + 2.0 * (p - last_).norm() + reach_mm; }
   /// Segment index of the last foot point.
   [[nodiscard]] std::size_t segment() const noexcept { return cursor_; }
   /// Side on which the last sample lies.
@@ -58,6 +63,8 @@ class ContourTracker {
   [[nodiscard]] double s_mm() const noexcept { return s_; }
 
  private:
+  static constexpr double reach_mm = 0.01;
+
   /// What a search needs of one segment: exactly one cache line.
   struct Piece {
     Vector3 start;
@@ -105,7 +112,8 @@ class ContourTracker {
   /// How many pieces from `first` on, or before `end`, need not be looked at one by one; 0: none.
   [[nodiscard]] std::size_t group_from(std::size_t first, const Vector3& p, double limit2) const noexcept;
   [[nodiscard]] std::size_t group_before(std::size_t end, const Vector3& p, double limit2) const noexcept;
-  [[nodiscard]] Found search(const Vector3& p, double move, const Window& window) const noexcept;
+  /// `bound`: no foot lies further from the path's start.
+  [[nodiscard]] Found search(const Vector3& p, double move, const Window& window, double bound) const noexcept;
   [[nodiscard]] double lateral_side(const Found& found, double distance) const noexcept;
   /// Direction of travel at a foot, of any length.
   [[nodiscard]] const Vector3& direction_at(std::size_t piece, const Foot& foot) const noexcept;
