@@ -49,9 +49,9 @@ def cuts(text: str, lines: list[int]) -> list[Move]:
 
 def test_corrections_on_small_arcs_keep_the_feed() -> None:
     free, measured = converted(SMALL_ARCS, tolerance__feed_excess_ratio=10.0)
-    assert measured.ratio > 1.1, "the case has lost its point"
+    assert measured.ratio > 1.07, "the case has lost its point"
     assert free.feed_excess is not None
-    assert free.feed_excess.ratio == pytest.approx(measured.ratio, abs=0.03)
+    assert free.feed_excess.ratio == pytest.approx(measured.ratio, abs=0.05)
     assert free.feed_excess.line == measured.line
     kept, measured = converted(SMALL_ARCS)
     assert measured.ratio <= 1.05

@@ -75,8 +75,9 @@ def import_parameters(
         _require_limits(draft, file)
         machine = Machine.from_data(draft.data, file)
         _remark_the_rest(draft, machine, base)
-    else:
+    else:  # nothing of the dump is in it, nor what was decided for it
         machine = base or Machine.load("vx500")
+        draft.remarks.clear()
     for number, largest in dict(draft.values.differing).items():
         draft.assume(f"parameter {number}", largest, "differs between the axes; the largest counts")
     return ParameterImport(
