@@ -60,9 +60,14 @@ class Rs274:
         return [self._program, "-g", "-t", self._tools, "-v", self._variables, program]
 
 
+#: More than the machine file allows by itself: what is measured here needs more than half a gigabyte.
+ROOM = {"controller.max_program_moves": 10**8, "controller.max_program_bytes": 4 * 10**9}
+
+
 def convert(program: Path, output: Path) -> Run:
     """`shapegcode convert` for the built-in VX500, with round trip and plant."""
     command = [Path(sys.executable).with_name("shapegcode"), "convert", program, "-m", "vx500", "-o", output]
+    command += [word for key, value in ROOM.items() for word in ("--set", f"{key}={value}")]
     return _launch(command, os.environ, accepted=(0, 1))  # 1: written, but out of tolerance
 
 
