@@ -117,3 +117,43 @@ def test_the_builders_own_codes_lock_where_macros_cannot() -> None:
 def test_a_lock_is_refused_where_no_variable_can_be_set(keys: dict[str, Any], why: str) -> None:
     with pytest.raises(sg.MachineError, match=re.escape(why)):
         machine_with({**LOCK, **keys})
+
+
+@pytest.mark.parametrize(
+    ("keys", "why"),
+    [
+        ({"emission.lock_lines": []}, "emission.lock_lines"),
+        ({"emission.unlock_lines": []}, "emission.unlock_lines"),
+        ({"emission.prologue": ["#33=5", "G08P0"]}, "uses #33"),
+        ({"shaping.rapids": True}, "shaping.rapids"),
+    ],
+)
+def test_a_lock_that_could_not_be_given_back_is_refused(keys: dict[str, Any], why: str) -> None:
+    with pytest.raises(sg.MachineError, match=re.escape(why)):
+        machine_with({**LOCK, **keys})
+
+
+def test_the_operator_reads_the_worst_position_and_where_to_begin_again() -> None:
+    machine = machine_with({})
+    conversion = sg.convert(path_program(200, machine), machine, shape_all=True)
+    notes = {note.topic: note.text for note in conversion.at_the_control}
+    worst = max((case for case in conversion.cases if case.override != 1.0), key=lambda each: max(each.residual_um))
+    assert f"at {worst.override:.0%} up to {max(worst.residual_um):.1f} µm".replace("%", " %") in notes["override"]
+    locked = machine_with(LOCK)
+    conversion = sg.convert(path_program(200, locked), locked, shape_all=True)
+    lines = conversion.text.decode().split("\n")
+    restart = next(note.text for note in conversion.at_the_control if note.topic == "restart")
+    for line in map(int, re.findall(r"line (\d+)", restart)):
+        assert lines[line - 1] == "#33=#3004"
+        assert lines[line - 2] == "(SHAPED)"
+
+
+def test_a_locked_program_is_not_expanded_and_own_marks_are_refused() -> None:
+    machine = machine_with(LOCK)
+    conversion = sg.convert(path_program(200, machine), machine, shape_all=True)
+    emitted = sg.Program.from_text(conversion.text, machine, source="shaped.nc")
+    with pytest.raises(sg.ProgramError, match="lock the feed override"):
+        sg.expand(emitted, machine)
+    text = PATH.replace("G00X0.\nM30", "G00X0.\n(SHAPED)\nM30")
+    with pytest.raises(sg.ProgramError, match=r"part\.nc:9:1: the comment \(SHAPED\)"):
+        sg.convert(sg.Program.from_text(text, machine, source="part.nc"), machine)

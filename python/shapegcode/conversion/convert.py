@@ -35,7 +35,7 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import machine_warnings, region_range_warnings
 from shapegcode.program import Program
 from shapegcode.program.compensation import read_for_conversion, require_decision
-from shapegcode.program.stamp import judged
+from shapegcode.program.stamp import RAPID_MARK, REGION_MARK, STAMP_BEGIN, judged
 from shapegcode.results.result import Pair
 from shapegcode.shaping.grid import Grid, choose_grid
 
@@ -112,6 +112,7 @@ def convert(
         raise _core.ProgramError(
             f"{program.source}:1:1: written by shapegcode already (its header says so): convert the original"
         )
+    _refuse_own_marks(program)
     # Plays the originals, and what was emitted, on all cores.
     pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
     try:
@@ -119,6 +120,18 @@ def convert(
         return run.conversion(shape_all=shape_all)
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _refuse_own_marks(program: Program) -> None:
+    """A comment of an original that the emitted program would say of its own blocks."""
+    text = program.core.slice(0, program.core.size)
+    for mark in (REGION_MARK.encode(), RAPID_MARK.encode(), STAMP_BEGIN):
+        if (at := text.find(mark)) >= 0:
+            line = text.count(b"\n", 0, at) + 1
+            raise _core.ProgramError(
+                f"{program.place(line)}:1: the comment {mark.decode()} is how a shaped program marks its own blocks: "
+                "give it other words"
+            )
 
 
 @dataclass(frozen=True)

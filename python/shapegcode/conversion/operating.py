@@ -16,7 +16,6 @@ from shapegcode.results.table import Column, Table
 __all__ = ["ControlNote", "at_the_control", "control_table"]
 
 _NAMED_LINES = 4
-_SAFE_LINE = re.compile(rb"(N\d+)?G1[789]G9[01]G94")
 _TAPE_CHARACTERS_PER_M = 1000.0 / 2.54  # a row of holes every tenth of an inch
 
 
@@ -106,9 +105,12 @@ def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_perio
 
 
 def _at_other_overrides(figures: PlayedFigures) -> Iterator[str]:
-    worst = max(figures.override_residual, key=lambda each: max(each.residual_um), default=None)
+    turned = [case for case in figures.cases if case.override != 1.0 and case.mode is None]
+    worst = max(turned, key=lambda each: max(each.residual_um), default=None)
     if worst is not None:
         yield f"at {worst.override * 100:.0f} % up to {max(worst.residual_um):.1f} µm of vibration stay"
+    if any(not case.counts for case in turned):
+        yield "the contour at other settings is measured where verdict.override_percent states them"
 
 
 def _restart_lines(text: bytes, placed: Sequence[Placed]) -> str:
@@ -116,7 +118,8 @@ def _restart_lines(text: bytes, placed: Sequence[Placed]) -> str:
     named = []
     for place in placed[:_NAMED_LINES]:
         rows = range(place.first_line, place.last_line + 1)
-        at = next((row for row in rows if _SAFE_LINE.match(lines[row - 1].strip())), place.first_line)
+        # Behind the comment: lines that lock the override or switch a mode belong to the cut.
+        at = next((row for row in rows if not lines[row - 1].lstrip().startswith(b"(")), place.first_line)
         number = re.match(rb"N\d+", lines[at - 1].strip())
         named.append(f"{number[0].decode()} (line {at})" if number else f"line {at}")
     more = f" and {len(placed) - len(named)} more" if len(placed) > len(named) else ""

@@ -9,6 +9,7 @@ number is not known for real machines, the remark *assumed*; :func:`key_document
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
@@ -30,6 +31,7 @@ from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem
 from shapegcode.settings.remarks import DEFAULT, inherited, remarks_of, with_remarks
 
+_VARIABLE = re.compile(r"#\d+")
 _USUAL_DIAL_PERCENT = (70.0, 120.0)  # as far as operators turn it without thinking
 
 __all__ = [
@@ -96,8 +98,26 @@ class Machine(TomlTable):
     @model_validator(mode="after")
     def _override_can_be_locked(self) -> Machine:
         emission, controller = self.emission, self.controller
-        variables = any("#" in line for line in (*emission.lock_lines, *emission.unlock_lines))
-        if emission.override == "lock" and variables and not controller.holds_macros:
+        if emission.override != "lock":
+            return self
+        for name, lines in (("lock_lines", emission.lock_lines), ("unlock_lines", emission.unlock_lines)):
+            if not lines:
+                raise KeyProblem(f"emission.{name}", [], 'must say something with emission.override = "lock"')
+        variables = set(_VARIABLE.findall(" ".join((*emission.lock_lines, *emission.unlock_lines))))
+        own = variables - {"#3003", "#3004"}
+        for name, lines in (("prologue", emission.prologue), ("epilogue", emission.epilogue)):
+            if used := own & set(_VARIABLE.findall(" ".join(lines))):
+                raise KeyProblem(
+                    f"emission.{name}", list(lines), f"uses {min(used)}, in which emission.lock_lines keep the switch"
+                )
+        if variables and self.shaping.rapids:
+            raise KeyProblem(
+                "shaping.rapids",
+                True,
+                'does not go with emission.override = "lock" and variables in emission.lock_lines: name the builder\'s '
+                'own codes there, such as ["M49"] and ["M48"], or use "any"',
+            )
+        if variables and not controller.holds_macros:
             why = f"controller.dnc_baud = {controller.dnc_baud}" if controller.macros else "controller.macros = false"
             raise KeyProblem(
                 "emission.override",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
+from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.program.program import Program
 from shapegcode.program.result import Expansion
@@ -39,6 +40,12 @@ def expand(
         whole = compensation == "expand"
         program = Program.read(program, machine, program_number=program_number, expand_compensation=whole)
     core = program.core
+    if program.stamp is not None and core.expanded:
+        # The control keeps the switch of the override in a variable: worked out here, it would be overwritten.
+        raise _core.ProgramError(
+            f"{program.source}:1:1: written by shapegcode (its header says so), and plain but for the lines that lock "
+            "the feed override: these only the control can work out"
+        )
     return Expansion(
         program.source,
         machine.name,

@@ -39,7 +39,7 @@ OVERRIDE_LOCKED = Habit(
 OVERRIDE_ANY = Habit(
     "override",
     "BLOCKS OF ONE DURATION FOR ANY FEED OVERRIDE",
-    "the feed override may be turned: blocks of one duration are stretched alike; least vibration stays at 100 %",
+    "blocks of one duration: a turned feed override stretches all alike; least vibration stays at 100 %",
 )
 OVERRIDES = {"ask": OVERRIDE, "lock": OVERRIDE_LOCKED, "any": OVERRIDE_ANY}
 """By `emission.override`."""
