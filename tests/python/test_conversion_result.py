@@ -12,7 +12,8 @@ import pytest
 import shapegcode as sg
 from acceptance import machine_with
 from shapegcode.conversion.figures import RegionVerdict
-from shapegcode.conversion.tables import BeforeAfter
+from shapegcode.conversion.rests import RestsOn
+from shapegcode.conversion.tables import BeforeAfter, case_table, rests_table
 from shapegcode.results.json import schema
 from shapegcode.results.result import Pair, Xyz
 
@@ -154,3 +155,24 @@ def test_an_option_is_a_key_of_the_machine_file(options: dict[str, Any], keys: d
 def test_an_option_is_checked_as_a_key_of_the_machine_file(options: dict[str, Any], said: str) -> None:
     with pytest.raises(sg.MachineError, match=said):
         converted(**options)
+
+
+def test_what_a_verdict_rests_on_fits_80_columns_without_a_broken_word() -> None:
+    longest = RestsOn(
+        "controller.interpolation_period_s", "0.001 s", "inherited", "longer, case starved 20 ms",
+        "contour error of the response", 12.3, 279.8, 20.0,
+    )  # fmt: skip
+    law = replace(longest, key="controller.motion", value="after_interpolation", origin="assumed")
+    lines = str(rests_table([longest, law], 6)).splitlines()
+    assert max(map(len, lines)) <= 80 and len(lines) <= 10
+    words = {word for line in lines for word in line.split()}
+    assert {longest.key, "inherited", "after_interpolation", "contour", "279.8", "20.0", "limit", "starved"} <= words
+    assert any("20\N{NO-BREAK SPACE}ms" in line for line in lines)
+
+
+def test_an_override_stays_on_the_line_of_its_percent() -> None:
+    conversion = converted()
+    case = conversion.cases[0]
+    crowded = replace(case, name="override 110 %", share_of_limit=123.45, residual_um=Xyz(1234.56, 1234.56, 1234.56))
+    text = str(case_table([crowded], None))
+    assert "110\N{NO-BREAK SPACE}%" in text and max(map(len, text.splitlines())) <= 80

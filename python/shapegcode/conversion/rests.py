@@ -278,5 +278,5 @@ def _key_of(case: Case) -> tuple[str, str]:
     if case.look_ahead:
         return "controller.motion", said
     if case.starved_s > 0.0:
-        return "controller.block_time_s", f"longer: the buffer runs empty, {said}"
+        return "controller.block_time_s", f"longer, {said}"
     return ("controller.block_end", said) if case.nominal else ("", "")

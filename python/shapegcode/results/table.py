@@ -8,6 +8,7 @@ A table fits 80 columns: numbers stay whole, texts wrap between words, and a col
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -18,9 +19,10 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
     from rich.table import Table as RichTable
 
-__all__ = ["Column", "Table", "share_percent", "warning_table", "xyz_columns"]
+__all__ = ["NO_BREAK", "Column", "Table", "share_percent", "warning_table", "xyz_columns"]
 
-_NO_BREAK = "\N{NO-BREAK SPACE}"
+NO_BREAK = "\N{NO-BREAK SPACE}"
+"""Holds the words of a cell on one line."""
 _NARROWEST = 12
 
 
@@ -132,15 +134,16 @@ class Table:
             box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0),
         )  # fmt: skip
         rows = [[_whole(column, column.cell(row)) for column in shown] for row in self.rows]
-        for column, place in zip(shown, _widths(shown, rows, width), strict=True):
+        widths = _widths(shown, rows, width)
+        for column, place in zip(shown, widths, strict=True):
             side: Literal["left", "right"] = "left" if column.text or column.left else "right"
             table.add_column(column.heading, justify=side, width=place, overflow="fold")
         for rank, (row, cells) in enumerate(zip(self.rows, rows, strict=True)):
             if rank in self.sections and rank > 0:
                 table.add_section()
             styled = [
-                Text(cell, style=column.style(row) if column.style else "")
-                for column, cell in zip(shown, cells, strict=True)
+                Text(_wrapped(cell, place) if column.text else cell, style=column.style(row) if column.style else "")
+                for column, cell, place in zip(shown, cells, widths, strict=True)
             ]
             table.add_row(*styled, style=self.row_style(row) if self.row_style else None)
         return table
@@ -174,9 +177,16 @@ def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int
     return found
 
 
+def _wrapped(cell: str, width: int) -> str:
+    """rich breaks a line at NO_BREAK as well."""
+    return "\n".join(
+        line for part in cell.split("\n") for line in textwrap.wrap(part, width, break_on_hyphens=False) or [""]
+    )
+
+
 def _whole(column: Column, cell: str) -> str:
     """A figure with its interval or unit is one word."""
-    return cell if column.text or column.left else cell.replace(" ", _NO_BREAK)
+    return cell if column.text or column.left else cell.replace(" ", NO_BREAK)
 
 
 def xyz_columns(cell: Callable[[str, Any], object], *, digits: int | None = None) -> tuple[Column, ...]:
