@@ -129,8 +129,15 @@ class Conversion(PlayedFigures, Result):
         return (
             f"{verdict}: residual vibration {axis.upper()} "
             f"{vibration.original[axis]:.1f} → {vibration.emitted[axis]:.1f} µm, "
-            f"contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, time {percent(change)}"
+            f"contour {target.original.max:.1f} → {target.emitted.max:.1f} µm, time {percent(change)}{self._share}"
         )
+
+    @property
+    def _share(self) -> str:
+        """Of which cuts the figures are, where some keep their text."""
+        left = len(self.kept) + (len(self.budget.given_up) if self.budget is not None else 0)
+        shaped = len(self.regions)
+        return f" ({shaped} of {shaped + left} cuts shaped, the others as before)" if left else ""
 
     @property
     def _gave_up(self) -> bool:
