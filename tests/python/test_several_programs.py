@@ -160,3 +160,30 @@ def test_one_program_out_of_tolerance_sends_the_file_beside_the_one_asked_for(tm
     assert not (tmp_path / "out.nc").exists()
     (written,) = (path for path in tmp_path.iterdir() if path.name.startswith("out.nc"))
     assert b"DO NOT RUN" in written.read_bytes()
+
+
+def test_each_emitted_program_is_held_against_its_own_header(tmp_path: Path) -> None:
+    punch(tmp_path)
+    done = run(tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--all", "-o", "out.nc")
+    assert done.returncode == 0, done.stderr
+
+    def codes() -> dict[str, set[str]]:
+        run(tmp_path, "check", "out.nc", "-m", "vx500", "--program", "all", "--json", "r.json")
+        reports = json.loads((tmp_path / "r.json").read_text())
+        return {report["program_address"]: set(report["counts_by_code"]) for report in reports}
+
+    found = codes()
+    # O0003 was called; now its moves stand in O0001, and it is no program to run.
+    assert list(found) == DONE
+    assert not any({"edited", "unmarked"} & each for each in found.values())
+    told = run(tmp_path, "time", "out.nc", "-m", "vx500", "--program", "all")
+    assert "nothing calls any more, as the shaped programs hold their moves: O0003" in told.stdout
+    alone = run(tmp_path, "check", "out.nc", "-m", "vx500", "--program", "O3")
+    assert "no region is marked" not in alone.stdout and "was changed" not in alone.stdout
+    for number in (2, "O2", "#2"):
+        assert sg.Program.read(tmp_path / "out.nc", program_number=number).own_text.startswith(b"O0002")
+    # A change in one is told of that one alone.
+    text = (tmp_path / "out.nc").read_text()
+    at = text.index("Y", text.index("(SHAPED)", text.index("O0002")))
+    (tmp_path / "out.nc").write_text(f"{text[:at]}Y1{text[at + 1 :]}")
+    assert [address for address, each in codes().items() if "edited" in each] == ["O0002"]

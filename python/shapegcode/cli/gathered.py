@@ -37,6 +37,17 @@ class Gathered:
         """Of the program that is being done."""
         return self.places[self.at].address
 
+    def names(self, indices: set[int]) -> str:
+        """Addresses of some of the programs, in their order.
+
+        Args:
+            indices: of the programs.
+
+        Returns:
+            The addresses in one line.
+        """
+        return ", ".join(self.places[index].address for index in sorted(indices))
+
     def add(self, report: dict[str, Any], output: tuple[Path | str, bytes] | None) -> None:
         """Keep what a run wants written.
 

@@ -3,12 +3,14 @@
 Each program that no other one of the file calls is done as if it stood alone. What the command shows follows program
 by program; the JSON is a list; pictures go into a folder for each, tables (--csv, --npz) into a file for each; programs
 that a command writes go into one file again, where those that were called, and those that could not be read, stand as
-they were.
+they were. In a file that holds shaped programs those subprograms are left out that nothing calls any more: what they
+did stands in the shaped text.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 __all__ = ["run_all"]
 
 _TABLES = ("csv", "npz")
+_COMMENT = re.compile(rb"\([^()\r\n]*\)")
+_RETURNS, _ENDS = re.compile(rb"M *0*99(?!\d)"), re.compile(rb"M *0*(?:2|30)(?!\d)")
 
 
 def run_all(args: argparse.Namespace) -> int:
@@ -53,12 +57,13 @@ def run_all(args: argparse.Namespace) -> int:
     except ProgramError as error:
         raise ProgramError(f"{source}:{error.line}:{error.column}: {error}") from None
     called = _called(several, machine)
+    left = _left_over(several) - called
     code = 0
     for place in several.places:
-        if place.index not in called:
+        if place.index not in called | left:
             several.at = place.index
             code = max(code, _run_one(args, several))
-    _finish(args, several, called)
+    _finish(args, several, called, left)
     return code
 
 
@@ -79,6 +84,17 @@ def _called(several: Gathered, machine: Machine) -> set[int]:
         called |= set(program.core.called) - {place.index}
     # Programs that call each other in a ring are done all the same.
     return called if len(called) < len(several.places) else set()
+
+
+def _left_over(several: Gathered) -> set[int]:
+    """Places of subprograms beside shaped programs, whose text has taken in what they called."""
+    from shapegcode.program.stamp import STAMP_BEGIN
+
+    if STAMP_BEGIN not in several.text:
+        return set()
+    texts = [several.text[place.text_begin : place.text_end] for place in several.places]
+    plain = [b"" if STAMP_BEGIN in text else _COMMENT.sub(b"", text).upper() for text in texts]
+    return {index for index, text in enumerate(plain) if _RETURNS.search(text) and not _ENDS.search(text)}
 
 
 def _run_one(args: argparse.Namespace, several: Gathered) -> int:
@@ -106,7 +122,7 @@ def _run_one(args: argparse.Namespace, several: Gathered) -> int:
     return code
 
 
-def _finish(args: argparse.Namespace, several: Gathered, called: set[int]) -> None:
+def _finish(args: argparse.Namespace, several: Gathered, called: set[int], left: set[int]) -> None:
     """Write the one JSON and the one program, and say it."""
     from shapegcode.cli import console as terminal
     from shapegcode.cli.runner import standard_output, write_program
@@ -127,7 +143,9 @@ def _finish(args: argparse.Namespace, several: Gathered, called: set[int]) -> No
         terminal.write_json(several.reports, target)
     console = terminal.output_console(standard_output(args))
     if called:
-        names = ", ".join(several.places[index].address for index in sorted(called))
-        console.print(f"called by others and done there: {names}", markup=False, soft_wrap=True)
+        console.print(f"called by others and done there: {several.names(called)}", markup=False, soft_wrap=True)
+    if left:
+        said = "subprograms that nothing calls any more, as the shaped programs hold their moves"
+        console.print(f"{said}: {several.names(left)}", markup=False, soft_wrap=True)
     if output is not None:
         console.print(f"wrote {output}", markup=False, soft_wrap=True)

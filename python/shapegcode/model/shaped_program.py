@@ -52,7 +52,7 @@ def shaped_warnings(program: Program, machine: Machine) -> list[tuple[str, str]]
     if stamp is None:
         return []
     found = []
-    if (mark := text_mark(program.text)) != stamp.mark:
+    if (mark := text_mark(program.own_text)) != stamp.mark:
         found.append(
             (
                 "edited",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from shapegcode import _core
 from shapegcode._core import ProgramError
 from shapegcode.program.reading import program_bytes, program_loader, reader_options
-from shapegcode.program.several import place_of
+from shapegcode.program.several import place_of, programs_of
 from shapegcode.program.stamp import STAMP_BEGIN, Stamp, stamp_of
 
 if TYPE_CHECKING:
@@ -30,12 +30,14 @@ class Program:
         source: name for messages.
         unexpanded: the text that was read, where the core's is the plain program that it comes to.
         folder: where programs that it calls are looked for.
+        number: which program of the text it is, as it was asked for; None: the first.
     """
 
     core: _core.ProgramText
     source: str
     unexpanded: bytes | None = None
     folder: Path | None = None
+    number: int | str | None = None
 
     @classmethod
     def read(
@@ -141,12 +143,25 @@ class Program:
             hint = _absolute_centre_hint(data, options) if _ARC_OFF_RADIUS in str(error) else ""
             raise located_error(error.file or source, error.line, error.column, f"{error}{hint}", error.alarm) from None
 
-        return cls(core, source, data if core.expanded else None, folder)
+        return cls(core, source, data if core.expanded else None, folder, program_number)
 
     @property
     def text(self) -> bytes:
         """The text that was read, to the letter."""
         return self.core.text if self.unexpanded is None else self.unexpanded
+
+    @cached_property
+    def own_text(self) -> bytes:
+        """The lines of this program alone, of a text that holds several; else the whole text."""
+        try:
+            places = programs_of(self.text)
+            index = 0 if self.number is None else _index(self.text, self.number, self.source)
+            if index is None:
+                (index,) = (place.index for place in places if place.address == f"O{self.number:04d}")
+        except (ProgramError, ValueError):
+            return self.text  # in a file of its own
+        place = places[index]
+        return self.text if len(places) == 1 else self.text[place.text_begin : place.text_end]
 
     @cached_property
     def regions(self) -> list[_core.Region]:
@@ -157,7 +172,7 @@ class Program:
     @property
     def stamp(self) -> Stamp | None:
         """What its header says, if the converter wrote it; else None."""
-        return stamp_of(self.text)
+        return stamp_of(self.own_text)
 
     @property
     def shaped_regions(self) -> int:
