@@ -28,7 +28,7 @@ def test_dump_with_q_and_axes_in_another_order() -> None:
     machine = import_parameters(DUMPS / "with_q.txt").machine
     controller = machine.controller
     assert [axis.rapid_mm_per_min for axis in machine.axes.as_tuple()] == [20000, 18000, 15000]
-    assert [axis.max_feed_mm_per_min for axis in machine.axes.as_tuple()] == [9000, 9000, 7000]
+    assert [axis.max_feed_mm_per_min for axis in machine.axes.as_tuple()] == [8000, 8000, 6000]
     assert [axis.max_acceleration_mm_s2 for axis in machine.axes.as_tuple()] == [900, 900, 700]
     assert (controller.motion, controller.law) == ("look_ahead", "jerk_limited")
     assert (controller.look_ahead_filter_time_constant_s, controller.bell_time_s) == (0.02, 0.04)
@@ -52,6 +52,25 @@ def test_old_dump_with_bell_keeps_the_radial_error_of_the_manual() -> None:
     assert machine.axes.y.modes == ()
     assert controller.rapid_path == "non_linear"
     assert controller.centripetal_acceleration_mm_s2 == 500
+
+
+CLAMPS = b"""%
+N01420Q1A1P30000.0A2P30000.0A3P20000.0
+N01422Q1P10000.0
+N01430Q1A1P12000.0A2P10000.0A3P8000.0
+N01432Q1A1P9000.0A2P15000.0A3P12000.0
+N01604Q1P00000001
+N01660Q1A1P3000.0A2P3000.0A3P2500.0
+N01769Q1P24
+%
+"""
+
+
+def test_shaped_cuts_run_with_the_look_ahead_off_and_keep_the_smallest_clamp() -> None:
+    found = import_parameters(CLAMPS, source="d.txt")
+    assert [axis.max_feed_mm_per_min for axis in found.machine.axes.as_tuple()] == [9000, 10000, 8000]
+    assert found.machine.emission.prologue == ("G05.1Q0",)
+    assert found.remarks["axes.z.max_feed_mm_per_min"] == "FANUC 1430, the smallest (1422: 10000, 1432: 12000)"
 
 
 VALUES = st.tuples(*[st.integers(1, 9000)] * 3)

@@ -97,7 +97,7 @@ def case_table(cases: Sequence[CaseVerdict], worst: CaseVerdict | None) -> Table
         The table.
     """
     columns = (
-        Column("case", value="name", left=True),
+        Column("case", value=lambda case: _unbroken(case.name), text=True),
         *(
             Column(axis.upper(), value=f"residual_um.{axis}", digits=2)
             for axis in "xyz"

@@ -60,7 +60,7 @@ def _limits_and_law(draft: Draft) -> bool:
             _look_ahead_filter(draft, filter_ms / 1000)
         if bell_ms is not None:
             draft.set("controller.bell_time_s", bell_ms / 1000, 1772)
-    _cutting_feeds(draft, before)
+    _cutting_feeds(draft)
     if not before:
         _after_interpolation(draft)
     if numbers and acceleration:
@@ -89,16 +89,19 @@ def _look_ahead_filter(draft: Draft, time_s: float) -> None:
         draft.set(key, average_s, 1769, 1602, note=note)
 
 
-def _cutting_feeds(draft: Draft, before: bool) -> None:
+def _cutting_feeds(draft: Draft) -> None:
+    """The smallest clamp: 1430 holds with the look-ahead off, as shaped cuts run, 1432 with it on, 1422 always."""
     values = draft.values
     found = {n: values.per_axis(n, unit="mm/min") for n in (1422, 1430, 1432)}
     for k, name in enumerate("xyz"):
         usable = {n: feeds[k] for n, feeds in found.items() if feeds and feeds[k] > 0}
-        per_axis = 1432 if before and 1432 in usable else 1430
-        usable.pop(1430 if per_axis == 1432 else 1432, None)
         if usable:
             number = min(usable, key=lambda n: usable[n])
-            draft.set(f"axes.{name}.max_feed_mm_per_min", usable[number], number, axis=values.axes[k])
+            key = f"axes.{name}.max_feed_mm_per_min"
+            draft.set(key, usable[number], number, axis=values.axes[k])
+            others = [f"{n}: {feed:g}" for n, feed in usable.items() if n != number]
+            if others:
+                draft.remarks[key] += f", the smallest ({', '.join(others)})"
 
 
 def _after_interpolation_s(draft: Draft) -> tuple[float, float, str, str] | None:

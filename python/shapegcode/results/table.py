@@ -178,10 +178,11 @@ def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int
 
 
 def _wrapped(cell: str, width: int) -> str:
-    """rich breaks a line at NO_BREAK as well."""
-    return "\n".join(
+    """In lines that fit; done here, as rich breaks a line at NO_BREAK as well. What is printed has plain spaces."""
+    lines = "\n".join(
         line for part in cell.split("\n") for line in textwrap.wrap(part, width, break_on_hyphens=False) or [""]
     )
+    return lines.replace(NO_BREAK, " ")
 
 
 def _whole(column: Column, cell: str) -> str:
