@@ -508,3 +508,42 @@ def test_full_disk_leaves_no_half_file(folder: Path, name: str, existing: bool) 
     assert sorted(os.listdir(folder)) == before
     if existing:
         assert (folder / "motion").read_text() == "as it was"
+
+
+POCKET = """G21 G90 G17 G40
+G00 X0 Y0 Z5.
+G01 Z-3. F300
+G41 D2 X30. F2500
+Y20.
+X-30.
+Y-20.
+X30.
+Y5.
+G40 X0 Y0
+M30
+"""
+
+
+def test_an_original_of_unknown_radius_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "pocket.nc").write_text(f"%\nO0002\n{POCKET}%\n")
+    known = ["--set", "input.tool_radius_mm.2=5"]
+    words = ["convert", "pocket.nc", "-m", "vx500", *known, "--compensation", "expand", "--all", "-o", "part.nc"]
+    assert main(words) == 0
+    capsys.readouterr()
+    message = refused(capsys, "--against", "pocket.nc")
+    assert "pocket.nc:6: the radius of offset D2 is not known" in message
+    assert "input.tool_radius_mm" in message
+    assert main(["simulate", "part.nc", "-m", "vx500", "--against", "pocket.nc", *known, "--json", "s.json"]) == 0
+    limit = sg.Machine.load("vx500").tolerance.contour_um
+    assert json.loads((folder / "s.json").read_text())["contour_error_um"]["response"]["max"] < 2.0 * limit
+    # What has no radius on either side follows its own path.
+    assert main(["simulate", "pocket.nc", "-m", "vx500", "--against", "pocket.nc"]) == 0
+    assert main(["measure", "pocket.nc", "part.nc", "-m", "vx500", "--tool-diameter", "10mm"]) == 2
+
+
+def test_the_original_is_the_program_of_the_same_number(folder: Path) -> None:
+    first, second = (f"G21 G90 G17\nG00 X0 Y0 Z5.\nG01 X{x}. F3000\nY40.\nM30\n" for x in (30, 60))
+    (folder / "two.nc").write_text(f"%\nO0001\n{first}O0002\n{second}%\n")
+    (folder / "part.nc").write_text(f"%\nO0002\n{second}%\n")
+    assert main(["simulate", "part.nc", "-m", "vx500", "--program", "O2", "--against", "two.nc"]) == 0
+    assert main(["simulate", "part.nc", "-m", "vx500", "--against", "two.nc"]) == 2

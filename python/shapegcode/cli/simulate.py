@@ -91,12 +91,13 @@ def run(args: argparse.Namespace) -> int:
     with runner.progress(f"playing {args.input}", args) as bar:
         program = Program.read(args.input, machine, program_number=args.program)
         shaped = True if args.shaped else None
+        against = None if args.against is None else Program.read(args.against, machine, program_number=args.program)
         simulation = simulate(
             program,
             machine,
             plant=args.plant,
             shaped=shaped,
-            against=args.against,
+            against=against,
             record_samples=0,
             on_progress=lambda done, total: bar.update(_REGIONS_SHARE * done / total),
         )

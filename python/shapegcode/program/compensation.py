@@ -13,8 +13,10 @@ if TYPE_CHECKING:
 
     from shapegcode.machine import Machine
 
+RADIUS_NOT_KNOWN = "the radius of offset D"
+"""How the reader's warning of a G41 or G42 begins whose radius nothing gives."""
+
 _KEPT = "cutter compensation is on and not expanded"
-_NOT_KNOWN = "the radius of offset D"
 _SLACK_MM = 0.0005  # a radius that differs by more is another one
 
 
@@ -39,7 +41,7 @@ def require_decision(program: Program, machine: Machine) -> None:
     """
     core, policy = program.core, machine.input.compensation
     if policy == "expand":
-        unknown = next((w for w in core.warnings if w[3].startswith(_NOT_KNOWN)), None)
+        unknown = next((w for w in core.warnings if w[3].startswith(RADIUS_NOT_KNOWN)), None)
         if unknown is not None:
             line, _, _, message, file = unknown
             reason = message.partition(":")[0]

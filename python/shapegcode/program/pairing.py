@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.program.compensation import RADIUS_NOT_KNOWN
 from shapegcode.program.program import Program
 
 __all__ = ["paired_regions"]
@@ -27,11 +28,14 @@ def paired_regions(program: Program, nominal: Program) -> Iterator[tuple[_core.R
         are left out.
 
     Raises:
-        ArgumentError: a region of the nominal program has no partner.
+        ArgumentError: a region of the nominal program has no partner, or its path is not known: it has G41 or G42 with
+            a radius that nothing gives.
     """
     if program is nominal:
         yield from ((region, region) for region in program.regions)
         return
+    if nominal.core.kept_compensated_moves > program.core.kept_compensated_moves:
+        raise _core.ArgumentError(_unknown_radius(nominal))
     candidates = iter(program.regions)
     for region in nominal.regions:
         for candidate in candidates:
@@ -44,6 +48,15 @@ def paired_regions(program: Program, nominal: Program) -> Iterator[tuple[_core.R
                 f"{nominal.source} has in {nominal.lines(region)}: it was not made from that program; leave out "
                 "--against"
             )
+
+
+def _unknown_radius(nominal: Program) -> str:
+    said = (warning for warning in nominal.warnings if RADIUS_NOT_KNOWN in warning)
+    why = next(said, f"{nominal.source}: cutter compensation is on and not expanded").partition(" (")[0]
+    return (
+        f"{why}: the path of the original is not known, and a shaped program cannot be measured against it: set "
+        "input.tool_radius_mm to the radius that it was shaped with, in the machine file or with --set"
+    )
 
 
 def _same_ends(one: _core.Path, other: _core.Path) -> bool:
