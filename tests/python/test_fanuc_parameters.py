@@ -73,6 +73,29 @@ def test_shaped_cuts_run_with_the_look_ahead_off_and_keep_the_smallest_clamp() -
     assert found.remarks["axes.z.max_feed_mm_per_min"] == "FANUC 1430, the smallest (1422: 10000, 1432: 12000)"
 
 
+def test_what_no_key_comes_from_is_listed_and_an_open_axis_is_asked_for() -> None:
+    dump = CLAMPS.replace(b"N01430Q1A1P12000.0", b"N01430Q1A1P9500.0").replace(
+        b"N01432Q1A1P9000.0", b"N01432Q1A1P9900.0"
+    )
+    dump = dump.replace(b"%\nN01420", b"%\nN00020Q1P17\nN00103Q1P12\nN01020Q1A1P88A2P89A3P90\nN01420")
+    dump = dump.replace(b"P24\n%", b"P24\nN09998Q1P0\nN09999Q1P0\n%")
+    base = Machine.load("vx500")
+    found = import_parameters(dump, base, keep_modes="x", rigid="z", source="d.txt")
+    said = {row.parameter: (row.line, row.why) for row in found.missing if row.line}
+    assert said["1432"][0] == 8 and "1422, 1430, 1432" in said["1432"][1]
+    assert said["1020"][0] == 4 and "read" in said["1020"][1]
+    assert said["103"][0] == 3 and said["103"][1].startswith("read")
+    assert said[""] == (12, "2 parameters not known here and not read, such as 9998")
+    listed = {row.parameter for row in (*found.read, *found.missing)}
+    assert {str(row.parameter) for row in found.read} | {"20", "1020", "1604"} <= {str(each) for each in listed}
+    assumed = sum(value.assumed and value.key.startswith("axes.z.drive") for value in found.machine.values())
+    count = re.search(r" (\d+) assumed \(and (\d+) that were assumed in the machine of --from\)", found.answer)
+    assert count and int(count[1]) == len(found.assumed) and int(count[2]) >= assumed
+    assert found.next_step.startswith("tap Y, ")
+    assert "tap" not in import_parameters(dump, base, keep_modes="xy", rigid="z", source="d.txt").next_step
+    assert "assumed in the machine" not in import_parameters(dump, source="d.txt").answer
+
+
 VALUES = st.tuples(*[st.integers(1, 9000)] * 3)
 
 

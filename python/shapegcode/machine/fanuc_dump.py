@@ -51,6 +51,7 @@ class Dump:
         repeated: (number, line) of records that give a value again, for another path.
         strange: (line, text) of lines that are no records.
         records: how many records it has.
+        others: parameters that were not wanted, with the line of the first record of each.
     """
 
     file: str
@@ -60,6 +61,7 @@ class Dump:
     repeated: list[tuple[int, int]] = field(default_factory=list)
     strange: list[tuple[int, str]] = field(default_factory=list)
     records: int = 0
+    others: dict[int, int] = field(default_factory=dict)
 
     def get(self, number: int, axis: int | None = None) -> Entry | None:
         """The value of a parameter for an axis (1, 2, ...), or of the first path; None where the dump has none."""
@@ -109,6 +111,8 @@ def read_dump(data: bytes, file: str, wanted: Container[int]) -> Dump:
         dump.with_q |= record[2] is not None
         if int(record[1]) in wanted:
             _take(dump, record, line)
+        else:
+            dump.others.setdefault(int(record[1]), line)
     if not dump.records:
         raise bad("no parameter record (N01420Q1A1P24000.0 or N01825 A1 P 3000); is this a CNC-PARA.TXT?")
     return dump

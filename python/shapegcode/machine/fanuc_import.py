@@ -28,6 +28,12 @@ __all__ = ["import_parameters"]
 
 _EXPECTED = (20, 1013, 1401, 1420, 1430, 1604, 1610, 1620, 1622, 1660, 1735, 1783, 1820, 1825, 1826, 3401, 3402, 3410)
 _LONGEST_NAME = 60
+_CLAMP = "read, but not the smallest of the clamps 1422, 1430, 1432 for any axis"
+_NO_KEY = {
+    1020: "read: it says which of A1, A2, ... is X, Y, Z; no key holds it",
+    **dict.fromkeys((1422, 1430, 1432), _CLAMP),
+}
+"""Why a parameter that was read made no key, where there is more to say."""
 
 
 def import_parameters(
@@ -125,6 +131,14 @@ def _list_missing(draft: Draft) -> None:
     for number in _EXPECTED:
         if number not in held and str(number) not in listed:
             draft.miss(number, "not in the dump")
+    used = {row.parameter for row in draft.read}
+    for number in sorted(held - used):
+        if str(number) not in listed:
+            draft.miss(number, _NO_KEY.get(number, "read, but no key comes from it here"))
+    if others := draft.dump.others:
+        first = min(others)
+        count = f"{len(others)} parameter{'' if len(others) == 1 else 's'}"
+        draft.miss("", f"{count} not known here and not read, such as {first}", others[first])
     if not draft.dump.complete:
         draft.miss("", "no % at the end: the dump may be cut")
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 
+from shapegcode.machine.axes import Axis
 from shapegcode.machine.machine import Machine
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Result, Xyz
@@ -135,9 +136,13 @@ class ParameterImport(Result):
             return f"{self.dump}: nothing in it says anything about the motion or the programs: no machine"
         keys = len({row.key for row in self.read} | {row.key for row in self.tables_read})
         values = self.machine.values()
-        assumed, inherited = sum(v.assumed for v in values), sum(v.origin == "inherited" for v in values)
+        here = {row.key for row in self.assumed}
+        inherited = sum(v.origin == "inherited" for v in values)
+        before = sum(v.assumed and v.key not in here and not v.remark.endswith("not measured") for v in values)
+        already = f" (and {before} that were assumed in the machine of --from)" if before else ""
         return (
-            f"{self.dump}: {keys} keys of {self.machine.name} read, {inherited} inherited, {assumed} assumed; "
+            f"{self.dump}: {keys} keys of {self.machine.name} read, {inherited} inherited, {len(self.assumed)} "
+            f"assumed{already}; "
             f"{len(self.missing)} parameters missing, not understood or not used"
         )
 
@@ -148,6 +153,10 @@ class ParameterImport(Result):
             return "punch the parameters out again (CNC-PARA.TXT, all of them), and import that."
         if not any(axis.modes for axis in self.machine.axes.as_tuple()):
             return "find the vibration modes, which no dump holds: shapegcode identify TAP.csv --update MACHINE."
+        open_axes = [letter for letter in "xyz" if _is_open(getattr(self.machine.axes, letter))]
+        if open_axes:
+            names = ", ".join(open_axes).upper()
+            return f"tap {names}, whose modes nobody knows: shapegcode identify TAP.csv --update MACHINE."
         return "look at what is assumed, and measure it: shapegcode characterize."
 
     def to_toml(self) -> str:
@@ -179,6 +188,11 @@ class ParameterImport(Result):
             Table("missing, not understood or not used", missing, self.missing),
         ]
         return [table for table in found if table.rows]
+
+
+def _is_open(axis: Axis) -> bool:
+    """Whether nobody knows of a mode of it, nor that it has none."""
+    return not axis.modes and not axis.rigid
 
 
 def _origins(rows: list[ReadParameter]) -> str:
