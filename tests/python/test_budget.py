@@ -20,7 +20,7 @@ import shapegcode as sg
 from acceptance import Judged, convert, machine_with, read_sample
 from command import run as run_command
 from judge.player import durations
-from shapegcode.conversion.budget import busiest_per_s
+from shapegcode.checking.runs import busiest_per_s
 
 HEAD = "%\nO1\nG21G17G90G94\nG0X0Y0Z0\n"
 TAIL = "G0Z50.\nM30\n%\n"

@@ -382,3 +382,20 @@ def test_bad_input(folder: Path, capsys: pytest.CaptureFixture[str], words: list
     code, _, err = run(capsys, *words)
     assert code == 2
     assert said in err
+
+
+def test_shaped_blocks_ask_for_the_rate_of_their_busiest_stretch(tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(HEAD + "G1X40.F4000.\nY40.\nX0\nY0\nG0Z5.\n" + END)
+    vx500 = machine()
+    conversion = sg.convert(tmp_path / "part.nc", vx500, shape_all=True)
+    said = next(note.text for note in conversion.at_the_control if note.topic.startswith("drip feed"))
+    asked = int(said.partition(" baud")[0])
+    for baud, count in ((9600, 1), (asked - 100, 1), (asked + 100, 0)):
+        check = sg.check_text(conversion.text, machine(dnc_baud=baud), source="out.nc")
+        assert check.dnc is not None
+        assert check.counts_by_code.get("dnc_rate", 0) == check.dnc.region_count == count
+        assert check.dnc.needed_characters_per_s * 11 == pytest.approx(asked, rel=0.002)
+    # Blocks of the program itself may be bridged by the buffer: their average counts, as before.
+    plain = sg.check_text(HEAD + "G1X10.F6000.\nX20.F600.\n" + END, machine(dnc_baud=115_200))
+    assert plain.dnc is not None
+    assert plain.dnc.needed_characters_per_s == pytest.approx(24 / 1.1, rel=0.1)

@@ -116,7 +116,7 @@ def check_text(
         found += _short_findings(program, machine, table.runs)
         if machine.controller.dnc_baud > 0:
             dnc = _serial_line(program, machine, table.runs)
-            found += _dnc_findings(program, dnc.characters_per_s, table.runs)
+            found += _dnc_findings(program, dnc, table.runs)
     severities = Counter(finding.severity for finding in found)
     return Check(
         source,
@@ -250,8 +250,8 @@ def _serial_line(program: Program, machine: Machine, runs: Iterable[CuttingRun])
     controller = machine.controller
     carried = controller.dnc_baud / controller.dnc_bits_per_character
     timed = [run for run in runs if run.time_s > 0.0]
-    needed = max((run.bytes / run.time_s for run in timed), default=0.0)
-    starved = [run for run in timed if run.bytes > run.time_s * carried]
+    needed = max((run.needed_per_s for run in timed), default=0.0)
+    starved = [run for run in timed if run.needed_per_s > carried]
     return SerialLine(
         baud=controller.dnc_baud,
         bits_per_character=controller.dnc_bits_per_character,
@@ -265,22 +265,24 @@ def _serial_line(program: Program, machine: Machine, runs: Iterable[CuttingRun])
                 bytes=run.bytes,
                 programmed_s=run.time_s,
                 blocks_per_s=run.blocks / run.time_s,
-                needed_characters_per_s=run.bytes / run.time_s,
-                factor=run.bytes / run.time_s / carried,
+                needed_characters_per_s=run.needed_per_s,
+                factor=run.needed_per_s / carried,
             )
             for run in starved[:MOST_FINDINGS]
         ),
     )
 
 
-def _dnc_findings(program: Program, carried: float, runs: Iterable[CuttingRun]) -> Iterator[Finding]:
+def _dnc_findings(program: Program, line: SerialLine, runs: Iterable[CuttingRun]) -> Iterator[Finding]:
     for run in runs:
-        if run.bytes > run.time_s * carried > 0.0:
-            needed = run.bytes / run.time_s
+        if run.time_s > 0.0 and run.needed_per_s > line.characters_per_s:
+            factor = run.needed_per_s / line.characters_per_s
+            where = "" if run.bytes > run.time_s * line.characters_per_s else "its busiest stretch "
             message = (
-                f"up to {_end(program, run)} the program asks for {needed:.0f} characters/s "
-                f"({run.blocks / run.time_s:.0f} blocks/s), the serial line carries {carried:.0f}: it takes "
-                f"{needed / carried:.2f} times as long, in jerks"
+                f"up to {_end(program, run)} the program asks for {run.needed_per_s:.0f} characters/s "
+                f"({run.blocks / run.time_s:.0f} blocks/s), the serial line carries {line.characters_per_s:.0f}: "
+                f"{where or 'it '}takes {factor:.2f} times as long, in jerks; "
+                f"{run.needed_per_s * line.bits_per_character:.0f} baud or more would do"
             )
             yield _at(program, "warning", "dnc_rate", run.first_line, message)
 

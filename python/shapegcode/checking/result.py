@@ -124,8 +124,8 @@ class StarvedRun:
         bytes: of these lines, line ends included.
         programmed_s: all of them at their feed, without acceleration.
         blocks_per_s: that the run asks for.
-        needed_characters_per_s: likewise.
-        factor: times as long as programmed that the run takes.
+        needed_characters_per_s: likewise; of shaped blocks in their busiest stretch.
+        factor: times as long as programmed that the run, or that stretch, takes.
     """
 
     lines: tuple[int, int]

@@ -20,7 +20,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.controller import controller_model
 from shapegcode.program import Program
 
-__all__ = ["BlockTable", "Breaker", "ClampedFeed", "CuttingRun", "block_table", "look_ahead_breakers"]
+__all__ = ["BlockTable", "Breaker", "ClampedFeed", "CuttingRun", "block_table", "busiest_per_s", "look_ahead_breakers"]
 
 _CUTTING, _RAPID, _DWELL = (
     kind.value for kind in (_core.BlockKind.cutting, _core.BlockKind.rapid, _core.BlockKind.dwell)
@@ -54,6 +54,8 @@ class CuttingRun:
         first_line: line of the first block.
         last_line: line of the last one.
         bytes: of these lines, line ends included.
+        needed_per_s: characters per second that they ask for: of shaped blocks in their busiest stretch as long as the
+            shaper, of all others on average.
         blocks: blocks that move.
         time_s: at their feed, axis limits included, without acceleration.
         taken_s: the same if no block takes less than the block time.
@@ -65,6 +67,7 @@ class CuttingRun:
     first_line: int
     last_line: int
     bytes: int
+    needed_per_s: float
     blocks: int
     time_s: float
     taken_s: float
@@ -149,7 +152,9 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
     # The control takes a shaped block for whole periods: its F is rounded up so that it ends just before the last one.
     period_s = machine.controller.interpolation_period_s
     whole = np.ceil(limited_s / period_s - _TICK_SLACK) * period_s
-    duration = np.where(_in_shaped_region(program, line), whole, limited_s)
+    shaped = _in_shaped_region(program, line)
+    duration = np.where(shaped, whole, limited_s)
+    stretch_s = np.where(shaped, _shaper_s(program, machine), np.inf)
 
     block_time = machine.controller.block_time_s
     short = duration < block_time * (1.0 - _ROUNDING)
@@ -169,6 +174,7 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
                 first,
                 last,
                 int(line_bytes[last] - line_bytes[first - 1]),
+                _needed_per_s(duration[begin:end], line_bytes, first, line[begin:end], stretch_s[begin]),
                 end - begin,
                 float(duration[begin:end].sum()),
                 float(taken[begin:end].sum()),
@@ -179,6 +185,49 @@ def block_table(program: Program, machine: Machine) -> BlockTable:
         )
     firsts = tuple(line[short_at[:_FIRST_PLACES]].tolist())
     return BlockTable(tuple(runs), lines, lines_of[_RAPID], lines_of[_DWELL], firsts, clamped)
+
+
+def busiest_per_s(durations_s: npt.ArrayLike, amounts: npt.ArrayLike, stretch_s: float) -> float:
+    """Largest amount per second in any stretch of a duration; each block's amount is spread evenly over it.
+
+    Args:
+        durations_s: of the blocks, s, (n,).
+        amounts: what each of them needs: its characters, or 1, (n,).
+        stretch_s: the stretch, s; all blocks together if they last less.
+
+    Returns:
+        Amount per second.
+    """
+    times = np.concatenate([[0.0], np.cumsum(np.asarray(durations_s, dtype=np.float64))])
+    sums = np.concatenate([[0.0], np.cumsum(np.asarray(amounts, dtype=np.float64))])
+    if times[-1] <= 0.0:
+        return 0.0
+    stretch = min(stretch_s, float(times[-1]))
+    # The sum over a stretch is piecewise linear in its place: it is largest where a block begins or ends at its edge.
+    begins = np.clip(np.concatenate([times, times - stretch]), 0.0, times[-1] - stretch)
+    amount = np.interp(begins + stretch, times, sums) - np.interp(begins, times, sums)
+    return float(amount.max()) / stretch
+
+
+def _needed_per_s(
+    duration_s: npt.NDArray[np.float64],
+    offsets: npt.NDArray[np.int64],
+    first: int,
+    lines: npt.NDArray[np.int64],
+    stretch_s: float,
+) -> float:
+    """Characters per second; those between two blocks count with the block that follows."""
+    amounts = np.diff(offsets[lines], prepend=offsets[first - 1])
+    return busiest_per_s(duration_s, amounts, stretch_s)
+
+
+def _shaper_s(program: Program, machine: Machine) -> float:
+    """How long the shaper of a shaped program is, as its header says: no transition is shorter."""
+    least_s = machine.controller.block_time_s
+    try:
+        return max(float(program.stamp.shaper_ms) * 1e-3, least_s) if program.stamp else least_s
+    except ValueError:
+        return least_s
 
 
 def _in_shaped_region(program: Program, lines: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:

@@ -9,11 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.checking.runs import busiest_per_s
 from shapegcode.conversion.write import EmittedRegion
 from shapegcode.results.result import Xyz
 from shapegcode.shaping.grid import Grid
 
-__all__ = ["Budget", "BudgetOutcome", "GivenUp", "TextNeeds", "TransferLoad", "busiest_per_s", "measure_load"]
+__all__ = ["Budget", "BudgetOutcome", "GivenUp", "TextNeeds", "TransferLoad", "measure_load"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -148,28 +149,6 @@ class BudgetOutcome:
     after: TextNeeds
     block_period_s: float
     given_up: tuple[GivenUp, ...]
-
-
-def busiest_per_s(durations_s: npt.ArrayLike, amounts: npt.ArrayLike, stretch_s: float) -> float:
-    """Largest amount per second in any stretch of a duration; each block's amount is spread evenly over it.
-
-    Args:
-        durations_s: of the blocks, s, (n,).
-        amounts: what each of them needs: its characters, or 1, (n,).
-        stretch_s: the stretch, s; all blocks together if they last less.
-
-    Returns:
-        Amount per second.
-    """
-    times = np.concatenate([[0.0], np.cumsum(np.asarray(durations_s, dtype=np.float64))])
-    sums = np.concatenate([[0.0], np.cumsum(np.asarray(amounts, dtype=np.float64))])
-    if times[-1] <= 0.0:
-        return 0.0
-    stretch = min(stretch_s, float(times[-1]))
-    # The sum over a stretch is piecewise linear in its place: it is largest where a block begins or ends at its edge.
-    begins = np.clip(np.concatenate([times, times - stretch]), 0.0, times[-1] - stretch)
-    amount = np.interp(begins + stretch, times, sums) - np.interp(begins, times, sums)
-    return float(amount.max()) / stretch
 
 
 def measure_load(region: _core.Region, shaped: EmittedRegion, grid: Grid, bits_per_character: float) -> TransferLoad:
