@@ -11,6 +11,7 @@ import pytest
 import shapegcode as sg
 from acceptance import PROGRAMS, convert, machine_with
 from command import run
+from shapegcode.conversion.benefit import summary
 from shapegcode.results.json import schema
 
 # A fast contour that shakes the table, and a slow one that does not.
@@ -104,3 +105,47 @@ def test_what_stays_shaped_is_shaped_as_before(name: str) -> None:
         assert region.residual_vibration_um == other.residual_vibration_um
         assert region.contour_error_um == other.contour_error_um
     assert len(chosen.regions) + len(chosen.kept) == len(everything.regions)
+
+
+def test_a_missed_tolerance_is_the_reason_and_the_only_one() -> None:
+    machine = machine_with({"tolerance.residual_ratio": 1e-6, "tolerance.residual_floor_um": 1e-6,
+                            "tolerance.residual_floor_increments": 0.0})  # fmt: skip
+    conversion = convert(part(FAST), machine, shape_all=False).conversion
+    worst = max(conversion.kept, key=lambda region: region.gain_um)
+    assert "residual" in worst.reason and worst.gain_um > conversion.least_gain_um
+    assert (
+        f"a tolerance would be missed (lines {worst.lines[0]} to {worst.lines[1]}: {worst.reason})" in conversion.answer
+    )
+    assert "would gain" not in conversion.answer
+    said = summary([worst], conversion.least_gain_um)
+    assert "a tolerance would be missed, lines" in said and "less than" not in said
+
+
+def test_no_benefit_names_the_moving_axes_of_which_nobody_knows_a_mode() -> None:
+    along_y = part(SLOW)
+    for keys, named in (
+        ({"axes.y.modes": [], "axes.y.rigid": False}, True),
+        ({"axes.y.modes": [], "axes.y.rigid": True}, False),
+    ):
+        conversion = convert(along_y, MACHINE.with_values(keys), shape_all=False).conversion
+        assert conversion.nothing_shaped
+        assert any(warning.startswith("Y moves, and nobody knows") for warning in conversion.warnings) == named
+
+
+def test_no_benefit_asks_for_the_unit_first() -> None:
+    conversion = convert(part(SLOW).replace("G21", ""), MACHINE, shape_all=False).conversion
+    assert conversion.nothing_shaped and conversion.next_step.startswith("make sure of the unit")
+    assert "power_on.units=G20" in conversion.next_step
+
+
+@pytest.mark.parametrize(
+    ("prologue", "off"),
+    [(["G05.1 Q0"], True), (["G08P0"], True), (["G05.1Q1"], False), (["G64"], False), ([], False)],
+)
+def test_no_advice_to_do_what_the_prologue_does(prologue: list[str], off: bool) -> None:
+    machine = machine_with({"emission.prologue": prologue, "controller.corner_speed_difference_mm_per_min": 1.0})
+    conversion = convert(part(FAST), machine).conversion
+    assert conversion.slowed_blocks > 0
+    assert any("run them with the look-ahead mode off" in warning for warning in conversion.warnings) != off
+    (note,) = (each for each in conversion.at_the_control if each.topic == "look-ahead")
+    assert ("switches the look-ahead mode off" in note.text) == off

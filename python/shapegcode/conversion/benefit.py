@@ -80,11 +80,15 @@ def summary(kept: Sequence[KeptRegion], least_um: float) -> str:
         return ""
     count = f"{len(kept)} region{'' if len(kept) == 1 else 's'}"
     missed = [region for region in kept if region.gain_um >= least_um]
-    said = f"{count} ({sum(region.cutting_s for region in kept):.1f} s of cutting) as programmed: shaping would gain "
-    said += f"less than {least_um:g} µm (shaping.least_gain_um)"
+    reasons = []
+    if len(missed) < len(kept):
+        reasons.append(f"shaping would gain less than {least_um:g} µm (shaping.least_gain_um)")
     if missed:
         worst = max(missed, key=lambda region: region.gain_um)
-        said += "; {} of them because a tolerance would be missed, such as lines {} to {}: {}".format(
-            len(missed), *worst.lines, worst.reason
+        many = f"in {len(missed)} of them " if reasons else ""
+        where = (
+            "lines {} to {}".format(*worst.lines) if len(missed) == 1 else "such as lines {} to {}".format(*worst.lines)
         )
-    return said
+        reasons.append(f"{many}a tolerance would be missed, {where}: {worst.reason}")
+    time_s = sum(region.cutting_s for region in kept)
+    return f"{count} ({time_s:.1f} s of cutting) as programmed: {'; '.join(reasons)}"

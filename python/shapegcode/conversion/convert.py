@@ -28,7 +28,7 @@ from shapegcode.conversion.readback import read_back
 from shapegcode.conversion.rests import RestsOn, rests_on
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.spending import Spending, keepable
-from shapegcode.conversion.warnings import played_warnings, text_warnings
+from shapegcode.conversion.warnings import open_axes, played_warnings, text_warnings
 from shapegcode.conversion.whole_text import TextWriter, Written, why_kept
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
@@ -390,6 +390,9 @@ class _Run:
             warnings.append(sentence)
         elif not written.placed and not self.kept:
             warnings.append(f"{program.source}: no cutting moves that can be shaped: the text is unchanged")
+        if not written.placed:
+            # Where something was shaped, what the verdict rests on names them.
+            warnings += open_axes(program, machine)
         warnings += played_warnings(program, figures, machine)
         return warnings + text_warnings(program, written.placed, figures, machine, len(written.text), written.blocks)
 

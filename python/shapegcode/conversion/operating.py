@@ -99,8 +99,12 @@ def _look_ahead(loads: Mapping[int, TransferLoad], machine: Machine, block_perio
     rate = max((load.blocks_per_second for load in loads.values()), default=0.0)
     needs = f"up to {rate:.0f} blocks/s, one every {block_period_s * 1e3:g} ms"
     prologue = " ".join(machine.emission.prologue)
+    if machine.emission.leaves_look_ahead:
+        on = " ".join(machine.emission.epilogue)
+        again = f", {on} behind it on again" if on else ""
+        return f"{needs}; {prologue} before each shaped cut switches the look-ahead mode off{again}"
     if prologue:
-        return f"{needs}; {prologue} before each shaped cut puts the control into the mode for them"
+        return f"{needs}; {prologue} before each shaped cut is meant to put the control into the mode for them"
     return f"{needs}; the program switches no mode: contour control with look-ahead (G05.1Q1, G08P1) must be off"
 
 

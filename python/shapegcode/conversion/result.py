@@ -116,8 +116,11 @@ class Conversion(PlayedFigures, Result):
             if self._gave_up:
                 why = "nothing fits the budget"
             elif self.kept:
-                most = max(region.gain_um for region in self.kept)
-                why = f"shaping would gain {most:.1f} µm at most (least: {self.least_gain_um:g})"
+                best = max(self.kept, key=lambda region: region.gain_um)
+                if best.gain_um >= self.least_gain_um:
+                    why = "a tolerance would be missed (lines {} to {}: {})".format(*best.lines, best.reason)
+                else:
+                    why = f"shaping would gain {best.gain_um:.1f} µm at most (least: {self.least_gain_um:g})"
             else:
                 why = "there is nothing to shape"
             return f"{self.recommendation}: {why}; the text is unchanged"
@@ -147,6 +150,12 @@ class Conversion(PlayedFigures, Result):
     def next_step(self) -> str:
         """The one thing to do next, in one sentence."""
         if self.nothing_shaped:
+            # A program read in the wrong unit was judged at a twenty-fifth of its size, or its speed.
+            if any("(power_on.units)" in warning for warning in self.warnings):
+                return (
+                    "make sure of the unit, as the program has neither G20 nor G21: convert it with "
+                    "--set power_on.units=G20 (inch) or G21 (mm), and write that code into it."
+                )
             return "run the original program: nothing in it was shaped."
         if not self.ok:
             stated = any("; feasible: " in warning for warning in self.warnings)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from shapegcode.conversion.figures import PlayedFigures
 from shapegcode.conversion.readback import Placed
 from shapegcode.machine import Machine
@@ -12,10 +14,32 @@ from shapegcode.machine.controller import Controller
 from shapegcode.machine.output import Tolerance
 from shapegcode.program import Program, least_increment_mm
 
-__all__ = ["played_warnings", "text_warnings"]
+__all__ = ["open_axes", "played_warnings", "text_warnings"]
 
 # How much worse than the original's a figure must be to be worth a warning: ratio, and size in um.
 _WORSE_RATIO, _WORSE_UM = 1.2, 5.0
+
+
+def open_axes(program: Program, machine: Machine) -> list[str]:
+    """Axes that move in the regions of a program, have no mode and are not said to be rigid.
+
+    Args:
+        program: the original.
+        machine: that shall run it.
+
+    Returns:
+        A warning for each: what was judged took it as rigid.
+    """
+    reach = [np.ptp(np.asarray(region.path.polyline()), axis=0) for region in program.regions]
+    stated = {value.key for value in machine.values() if not value.unmeasured}
+    return [
+        f"{letter.upper()} moves, and nobody knows whether it has a vibration mode: taken as rigid; "
+        f"tap it (shapegcode identify), or state axes.{letter}.rigid = true"
+        for rank, (letter, axis) in enumerate(zip("xyz", machine.axes.as_tuple(), strict=True))
+        if not axis.modes
+        and not (axis.rigid and f"axes.{letter}.rigid" in stated)
+        and any(ways[rank] > 0.0 for ways in reach)
+    ]
 
 
 def played_warnings(program: Program, figures: PlayedFigures, machine: Machine) -> list[str]:
@@ -60,7 +84,7 @@ def text_warnings(
         *_mode_left_on(program, placed, machine.emission.prologue),
         *_too_fast(program, placed, fastest),
         *_memory_and_line(machine.controller, size, blocks, figures.region_time_s().emitted),
-        *_slowed(figures.slowed_blocks, blocks),
+        *_slowed(0 if machine.emission.leaves_look_ahead else figures.slowed_blocks, blocks),
     ]
 
 

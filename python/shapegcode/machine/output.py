@@ -11,6 +11,7 @@ from pydantic import Field, Strict, field_validator, model_validator
 from shapegcode.settings.keys import Bool, NonNegative, Positive, Text, TomlTable, key, toml
 
 _BLOCK_CHARACTERS = re.compile(r"[A-Z0-9 .,+\-*/=#\[\]()<>_:;&]*")
+_LOOK_AHEAD = re.compile(r"G(?:0?5\.1 *Q|0?8 *P)(\d)(?!\d)")
 
 
 class Emission(TomlTable):
@@ -104,6 +105,12 @@ class Emission(TomlTable):
                     f"{self.max_line_length}"
                 )
         return self
+
+    @property
+    def leaves_look_ahead(self) -> bool:
+        """Whether the prologue switches a look-ahead mode off: G05.1 Q0 or G08 P0."""
+        last = [found for line in self.prologue for found in _LOOK_AHEAD.findall(line)]
+        return bool(last) and last[-1] == "0"
 
 
 class Shaping(TomlTable):

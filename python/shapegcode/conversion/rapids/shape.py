@@ -253,7 +253,7 @@ def _warnings(outcome: RapidsOutcome, machine: Machine) -> list[str]:
             "shaped rapids are straight lines; the rapids that they replace were not (controller.rapid_path = "
             '"non_linear"): check that the straight way is free'
         )
-    if outcome.slowed_blocks:
+    if outcome.slowed_blocks and not machine.emission.leaves_look_ahead:
         warnings.append(
             f"{outcome.slowed_blocks} blocks of shaped rapids step an axis by more than "
             "controller.corner_speed_difference_mm_per_min: run them with the look-ahead mode off "
