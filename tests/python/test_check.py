@@ -399,3 +399,29 @@ def test_shaped_blocks_ask_for_the_rate_of_their_busiest_stretch(tmp_path: Path)
     plain = sg.check_text(HEAD + "G1X10.F6000.\nX20.F600.\n" + END, machine(dnc_baud=115_200))
     assert plain.dnc is not None
     assert plain.dnc.needed_characters_per_s == pytest.approx(24 / 1.1, rel=0.1)
+
+
+def test_a_feed_that_convert_does_not_write_is_noted() -> None:
+    check = checked("G1X0.01F0.001\nY10.F3000.\nG0Z5.\nG1X5.F1.\n")
+    assert told(check, "reader") == [(5, "note", 0)]
+    (note,) = (each for each in check.findings if each.code == "reader")
+    assert "0.001 mm/min is below controller.minimum_feed_mm_per_min = 1" in note.message
+    assert told(checked("G1X0.01F0.001\n", minimum_feed_mm_per_min=0.001), "reader") == []
+
+
+def test_a_shaped_program_that_is_too_large_is_told_to_convert_smaller(tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(HEAD + "G1X40.F4000.\nY40.\nX0\nG0Z5.\n" + END)
+    small = machine(program_memory_bytes=1000)
+    conversion = sg.convert(tmp_path / "part.nc", small, shape_all=True)
+    check = sg.check_text(conversion.text, small, source="out.nc")
+    said = [
+        next(each.message for each in check.findings if each.code == "program_memory"),
+        next(warning for warning in conversion.warnings if "program_memory_bytes" in warning),
+        next(note.text for note in conversion.at_the_control if note.topic == "memory"),
+    ]
+    for sentence in said:
+        way = sentence.index("--max-bytes 1000")
+        assert all(sentence.find(other) > way for other in ("card", "data server", "drip feed"))
+    assert check.next_step.startswith("convert the original with --max-bytes 1000")
+    plain = checked("G1X10.F1000.\n", program_memory_bytes=10)
+    assert "--max-bytes" not in plain.next_step

@@ -386,3 +386,18 @@ def test_demo_shows_both_sets_beside_the_paper(folder: Path, capsys: pytest.Capt
     # What does not accelerate does not change.
     for part in ("cutting_s", "rapid_s", "in_position_s", "dwell_s"):
         assert first["parts"][part] == pytest.approx(second["parts"][part], abs=1e-6)
+
+
+def test_an_override_that_the_program_switches_off_is_told(tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text("%\nO0001\nG21 G90 G17\nG00 X0 Y0 Z5.\nG01 X40. F4000.\nY40.\nM30\n%\n")
+    for override, expected in (("lock", 1), ("ask", 0)):
+        machine = sg.Machine.load("vx500").with_values({"emission.override": override})
+        text = sg.convert(tmp_path / "part.nc", machine, shape_all=True).text
+        program = sg.Program.from_text(text, machine)
+
+        def said(program: sg.Program, machine: sg.Machine, feed: float) -> int:
+            warnings = sg.cycle_time(program, machine, feed_override=feed).warnings
+            return sum("switches the feed override off in its shaped regions (1)" in each for each in warnings)
+
+        assert said(program, machine, 0.8) == expected
+        assert said(program, machine, 1.0) == 0

@@ -25,7 +25,9 @@ from shapegcode.checking.runs import BlockTable, Breaker, CuttingRun, block_tabl
 from shapegcode.machine import Machine
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program
+from shapegcode.program.operating import no_room
 from shapegcode.program.reading import program_bytes
+from shapegcode.program.stamp import STAMP_BEGIN
 
 __all__ = ["MOST_FINDINGS", "check", "check_text"]
 
@@ -39,6 +41,7 @@ _ALARM_WORDS = re.compile(r" \(alarm \d+\)")
 _MACRO_FROM_DNC = 123
 _NO_ROOM = 70
 _WORK_LIMIT = "controller.max_program_"  # in the message of every limit of a reading
+_ROUNDING = 1e-9
 _LOST_S = 1e-3  # by a run with short blocks: less is no reason to change the program
 # Of one reading (most_alarms in the core's reader).
 _MOST_ALARMS = 200
@@ -112,6 +115,7 @@ def check_text(
         table = block_table(program, machine)
         found += _breaker_findings(program, look_ahead_breakers(program, machine, table))
         found += _feed_findings(program, table)
+        found += _low_feed_findings(program, machine)
         short = _short_blocks(program, machine, table)
         found += _short_findings(program, machine, table.runs)
         if machine.controller.dnc_baud > 0:
@@ -166,7 +170,9 @@ def _whole_file(data: bytes, source: str, machine: Machine) -> Iterator[Finding]
         if fed:
             yield Finding("note", "program_memory", 0, source, 0, 0, f"{over}: it can only be drip fed")
         else:
-            message = f"{over}: the control cannot store it; drip feed it, split it, or shorten it"
+            # Only text that was shaped can be made smaller there.
+            ways = no_room(controller.program_memory_bytes) if STAMP_BEGIN in data else "drip feed it, or split it"
+            message = f"{over}: the control cannot store it; {ways}"
             yield Finding("warning", "program_memory", _NO_ROOM, source, 0, 0, message)
     if not fed:
         return
@@ -211,6 +217,19 @@ def _feed_findings(program: Program, table: BlockTable) -> Iterator[Finding]:
             f"{clamped.least_mm_per_min:.0f} mm/min"
         )
         yield _at(program, "warning", "axis_feed", clamped.first_line, message)
+
+
+def _low_feed_findings(program: Program, machine: Machine) -> Iterator[Finding]:
+    least = machine.controller.minimum_feed_mm_per_min
+    for region in program.regions:
+        slowest = region.path.slowest_feed_mm_per_s * 60.0
+        if region.shaped or not 0.0 < slowest < least * (1.0 - _ROUNDING):
+            continue
+        message = (
+            f"{program.lines(region)}: feed {slowest:g} mm/min is below controller.minimum_feed_mm_per_min = {least:g}"
+            ": convert keeps them untouched"
+        )
+        yield _at(program, "note", "reader", region.first_line, message)
 
 
 def _short_findings(program: Program, machine: Machine, runs: Iterable[CuttingRun]) -> Iterator[Finding]:

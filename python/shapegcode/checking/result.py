@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from shapegcode.program.operating import no_room
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
@@ -227,6 +228,9 @@ class Check(Result):
         if "dnc_rate" in worst:
             return "raise the baud rate or lower the feed where the serial line starves (controller.dnc_baud)."
         if "program_memory" in worst:
+            large = next(finding for finding in self.findings if finding.code == "program_memory")
+            if "--max-bytes" in large.message:
+                return f"{no_room(self.memory_bytes)}."
             return "drip feed the program (controller.dnc_baud), or split it."
         if "short_block" in worst:
             count = self.counts_by_code["short_block"]

@@ -10,7 +10,7 @@ from shapegcode.conversion.budget import TransferLoad
 from shapegcode.conversion.figures import PlayedFigures
 from shapegcode.conversion.readback import Placed
 from shapegcode.machine import Machine
-from shapegcode.program.operating import FEED_HOLD, FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK
+from shapegcode.program.operating import FEED_HOLD, FIRST_RUN, OVERRIDES, RESTART, SINGLE_BLOCK, no_room
 from shapegcode.results.table import Column, Table
 
 __all__ = ["ControlNote", "at_the_control", "control_table"]
@@ -83,7 +83,7 @@ def control_table(notes: Sequence[ControlNote]) -> Table:
 
 def _memory(size: int, machine: Machine) -> str:
     room = machine.controller.program_memory_bytes
-    fits = "fits" if size <= room else "does not fit: memory card, data server or drip feed"
+    fits = "fits" if size <= room else f"does not fit: {no_room(room)}"
     return f"{size} bytes ({size / _TAPE_CHARACTERS_PER_M:.0f} m of tape); {room} bytes on this machine: {fits}"
 
 

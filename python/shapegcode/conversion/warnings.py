@@ -13,6 +13,7 @@ from shapegcode.machine import Machine
 from shapegcode.machine.controller import Controller
 from shapegcode.machine.output import Tolerance
 from shapegcode.program import Program, least_increment_mm
+from shapegcode.program.operating import no_room
 
 __all__ = ["open_axes", "played_warnings", "text_warnings"]
 
@@ -156,7 +157,7 @@ def _memory_and_line(controller: Controller, size: int, blocks: int, cutting_s: 
     if size > controller.program_memory_bytes:
         yield (
             f"the emitted program has {size} bytes, the controller's memory {controller.program_memory_bytes} "
-            "(controller.program_memory_bytes): run it from DNC or a data server"
+            f"(controller.program_memory_bytes): {no_room(controller.program_memory_bytes)}"
         )
     if controller.dnc_baud > 0 and blocks > 0 and cutting_s > 0.0:
         needed = size * controller.dnc_bits_per_character / cutting_s

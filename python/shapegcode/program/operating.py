@@ -7,7 +7,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["FEED_HOLD", "FIRST_RUN", "OVERRIDE", "OVERRIDES", "RESTART", "SINGLE_BLOCK", "Habit"]
+__all__ = [
+    "FEED_HOLD",
+    "FIRST_RUN",
+    "OVERRIDE",
+    "OVERRIDES",
+    "OVERRIDE_LOCKED",
+    "RESTART",
+    "SINGLE_BLOCK",
+    "Habit",
+    "no_room",
+]
 
 
 @dataclass(frozen=True)
@@ -65,3 +75,15 @@ FIRST_RUN = Habit(
     "first run above the part: shift Z of the work offset by more than the deepest cut, no tool, spindle off, rapid "
     "override 25 %, feed override 100 %",
 )
+
+
+def no_room(room_bytes: int) -> str:
+    """What to do with a shaped program that the memory of the control does not hold.
+
+    Args:
+        room_bytes: of the memory.
+
+    Returns:
+        The ways in words, the best one first.
+    """
+    return f"convert the original with --max-bytes {room_bytes}; or memory card, data server or drip feed (DNC)"

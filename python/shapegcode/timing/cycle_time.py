@@ -19,6 +19,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.controller import controller_model
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program, given_program
+from shapegcode.program.operating import OVERRIDE_LOCKED
 from shapegcode.timing.result import PARTS, BlockTime, CycleTime, RegionTime, ToolTime
 
 __all__ = ["cycle_time"]
@@ -79,8 +80,23 @@ def cycle_time(
         regions=tuple(_regions(timed.regions, program, feed_override)),
         blocks=tuple(_blocks(timed.blocks, program)) if per_block else (),
         shaped_regions=program.shaped_regions,
-        warnings=(*program.warnings, *(why for _, why in shaped_warnings(program, machine))),
+        warnings=(
+            *program.warnings,
+            *(why for _, why in shaped_warnings(program, machine)),
+            *_locked(program, feed_override),
+        ),
     )
+
+
+def _locked(program: Program, feed_override: float) -> Iterator[str]:
+    """An override that shaped moves do not obey, but these times do."""
+    locked = program.shaped_regions and f"({OVERRIDE_LOCKED.comment})".encode() in program.own_text
+    if locked and feed_override != 1.0:
+        yield (
+            f"the program switches the feed override off in its shaped regions ({program.shaped_regions}), which the "
+            f"control runs at 100 %; here they are timed at {feed_override * 100:g} %, as all others: their times with "
+            "--override 100% are the true ones"
+        )
 
 
 def _tool_time(timed: _core.ToolTime) -> ToolTime:
