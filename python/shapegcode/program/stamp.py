@@ -45,8 +45,7 @@ _MARK_PENDING = f"(TEXT {_NO_MARK})".encode()
 _COMMENT = re.compile(rb"\(([^()\r\n]*)\)[ \t]*[\r\n]*")
 # What a control or an editor may change without changing the program: comments, blanks, %; then N and O words.
 _UNIMPORTANT = re.compile(rb"\([^()\r\n]*\)|[ \t%]+")
-_LINE_HEAD = re.compile(rb"(?<=\n)(/\d?)?(?:N\d+)?(?:[O:]\d+)?")
-_LINE_ENDS = re.compile(rb"[\r\n]+")
+_LINE_HEAD = re.compile(rb"(?<=\n)(/\d?)?(?:N\d+(?:[O:]\d+)?|[O:]\d+)")
 
 
 @dataclass(frozen=True)
@@ -179,9 +178,17 @@ def text_mark(text: bytes) -> str:
     Returns:
         The CRC-32 of the rest.
     """
-    kept = _LINE_ENDS.sub(b"\n", b"\n" + _UNIMPORTANT.sub(b"", text).upper())
-    kept = _LINE_ENDS.sub(b"\n", _LINE_HEAD.sub(rb"\1", kept)).strip()
+    kept = _one_end(b"\n" + _UNIMPORTANT.sub(b"", text).upper())
+    kept = _one_end(_LINE_HEAD.sub(rb"\1", kept)).strip()
     return f"{zlib.crc32(kept):08X}"
+
+
+def _one_end(text: bytes) -> bytes:
+    """Lines with LF, none of them empty; by plain replacing, as a program may have a million lines."""
+    text = text.replace(b"\r", b"\n")
+    while b"\n\n" in text:
+        text = text.replace(b"\n\n", b"\n")
+    return text
 
 
 def judged(text: bytes, *, good: bool) -> bytes:
