@@ -409,7 +409,7 @@ def test_an_axis_that_moves_elsewhere_is_named_too() -> None:
 
 
 def test_what_it_rests_on_costs_no_more_than_the_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Motion played with its contour for unmeasured values: no more than four times the program, or a minute."""
+    """Motion played with its contour for unmeasured values: no more than twice the program, or a minute."""
     played: list[float] = []
     whole = _Region.play
 

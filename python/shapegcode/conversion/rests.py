@@ -30,7 +30,7 @@ LEAST_SHARE = 0.01
 
 _MOST_SHOWN = 8
 _FREE_S = 60.0  # of motion: so much is always played
-_FULL_RUNS = 4  # a verdict plays every region about so often with its contour
+_FULL_RUNS = 2  # about half as often as a verdict plays every region with its contour
 _FILTER_S = 0.024  # moving average of 1769 or 1622 on a machining centre, where the file says that there is none
 _MODE = {"frequency_hz": 40.0, "damping_ratio": 0.02}  # of an axis of a machining centre, where none is known
 _PERCENT = {"frequency_hz": 5.0, "damping_ratio": 50.0, "participation": 30.0}  # where no uncertainty is stated
