@@ -424,4 +424,4 @@ def test_what_it_rests_on_costs_no_more_than_the_verdict(monkeypatch: pytest.Mon
     conversion = convert(text, machine, shape_all=True).conversion
     assert conversion.cutting_time_s.emitted > 90.0
     assert len(played) >= 8
-    assert 0.0 < sum(played) <= 4.01 * conversion.cutting_time_s.emitted
+    assert 0.0 < sum(played) <= 2.01 * conversion.cutting_time_s.emitted
