@@ -129,16 +129,6 @@ void register_path(py::module_& module) {
           },
           "Smallest programmed feed, mm/s; infinity for an empty path.")
       .def_property_readonly(
-          "fastest_feed_mm_per_s",
-          [](const Path& self) {
-            double fastest = 0.0;
-            for (const Segment& segment : self.segments()) {
-              fastest = std::max(fastest, segment.feed_mm_per_s);
-            }
-            return fastest;
-          },
-          "Largest programmed feed, mm/s; 0 for an empty path.")
-      .def_property_readonly(
           "programmed_time_s",
           [](const Path& self) {
             double time = 0.0;

@@ -44,8 +44,9 @@ _NO_MARK = "0" * 8
 _MARK_PENDING = f"(TEXT {_NO_MARK})".encode()
 _COMMENT = re.compile(rb"\(([^()\r\n]*)\)[ \t]*[\r\n]*")
 # What a control or an editor may change without changing the program: comments, blanks, %; then N and O words.
-_UNIMPORTANT = re.compile(rb"\([^()\r\n]*\)|[ \t%]+")
-_LINE_HEAD = re.compile(rb"(?<=\n)(/\d?)?(?:N\d+(?:[O:]\d+)?|[O:]\d+)")
+_ANY_COMMENT = re.compile(rb"\([^()\r\n]*\)")
+_BLANKS = b" \t%"
+_LINE_HEAD = re.compile(rb"(\n(?:/\d?)?)(?:N\d+(?:[O:]\d+)?|[O:]\d+)")
 
 
 @dataclass(frozen=True)
@@ -178,7 +179,7 @@ def text_mark(text: bytes) -> str:
     Returns:
         The CRC-32 of the rest.
     """
-    kept = _one_end(b"\n" + _UNIMPORTANT.sub(b"", text).upper())
+    kept = _one_end(b"\n" + _ANY_COMMENT.sub(b"", text).translate(None, _BLANKS).upper())
     kept = _one_end(_LINE_HEAD.sub(rb"\1", kept)).strip()
     return f"{zlib.crc32(kept):08X}"
 
