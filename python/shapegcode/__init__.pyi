@@ -106,6 +106,15 @@ from shapegcode.identification.plots import (
 )
 from shapegcode.identification.result import Identification as Identification
 from shapegcode.identification.update import MachineUpdate as MachineUpdate, update_machine as update_machine
+from shapegcode.io.edge_capture import (
+    EdgeAxis as EdgeAxis,
+    EdgeBlock as EdgeBlock,
+    EdgeCall as EdgeCall,
+    EdgeCapture as EdgeCapture,
+    EdgeGap as EdgeGap,
+    EdgeValue as EdgeValue,
+)
+from shapegcode.io.edge_json import read_edge_json as read_edge_json
 from shapegcode.io.read import ReadOptions as ReadOptions
 from shapegcode.io.record import Record as Record
 from shapegcode.machine import Machine as Machine

@@ -1,0 +1,270 @@
+"""What a Sinumerik control recorded of itself: signals of the axes in every position control cycle, and its blocks."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode.errors import RecordError
+
+__all__ = ["EdgeAxis", "EdgeBlock", "EdgeCall", "EdgeCapture", "EdgeGap", "EdgeValue"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+TURN_DEG = 360.0
+
+
+@dataclass(frozen=True)
+class EdgeAxis:
+    """An axis or spindle of the capture.
+
+    Attributes:
+        number: behind the bar of its signals: 3 of "DES_POS|3".
+        name: as the header labels it, such as "X1"; the number where it has no label. A label is what the recorder was
+            told, not what the control calls the axis.
+        signals: what was recorded of it, such as "DES_POS".
+    """
+
+    number: int
+    name: str
+    signals: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class EdgeBlock:
+    """A block that the control began to execute.
+
+    Attributes:
+        counter: position control cycle.
+        time_s: of it, from the first sample on; may lie before it, behind the last one, or in a gap.
+        text: of the block, as the control holds it after its preprocessing.
+        line: number of the line in its program ("SeekOffset").
+        path: of its program, from the last call event; empty before the first one.
+        selected_tool: number of the tool that is programmed.
+        active_tool: number of the tool in the spindle.
+        motion: G code of the first group, such as "G1".
+        buffered: blocks in the look-ahead buffer.
+        channel: of the control.
+    """
+
+    counter: int
+    time_s: float
+    text: str
+    line: int | None
+    path: str
+    selected_tool: int | None
+    active_tool: int | None
+    motion: str
+    buffered: int | None
+    channel: int | None
+
+
+@dataclass(frozen=True)
+class EdgeCall:
+    """A program that was called, or to which the control came back.
+
+    Attributes:
+        counter: position control cycle.
+        time_s: of it, from the first sample on.
+        path: of the program.
+        line: number of the line in it.
+        level: depth of the call.
+        channel: of the control.
+    """
+
+    counter: int
+    time_s: float
+    path: str
+    line: int | None
+    level: int | None
+    channel: int | None
+
+
+@dataclass(frozen=True)
+class EdgeValue:
+    """A slow value ("LFData").
+
+    Attributes:
+        counter: position control cycle.
+        time_s: of it, from the first sample on.
+        address: such as "/Channel/State/actTNumber".
+        value: as text, as the file has it.
+    """
+
+    counter: int
+    time_s: float
+    address: str
+    value: str
+
+
+@dataclass(frozen=True)
+class EdgeGap:
+    """Cycles without a sample.
+
+    Attributes:
+        index: of the first sample behind the gap.
+        counter: of the last sample before it.
+        missing: cycles that were not recorded.
+        start_s: time of the last sample before it.
+        duration_s: until the first sample behind it.
+    """
+
+    index: int
+    counter: int
+    missing: int
+    start_s: float
+    duration_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeCapture:
+    """A capture of a Sinumerik control, as `read_edge_json` reads it.
+
+    Units are those of the control: positions in mm (rotary axes in degrees), speeds per second, torques in Nm (N for a
+    linear motor). DES_POS is the command behind the fine interpolator, ENC_POS the active encoder, CONT_DEV the lag
+    less the lag that the control's own model of the axis expects, VEL_FFW the speed that is fed forward.
+
+    Attributes:
+        source: file.
+        version: of the format, such as "1.0".
+        cycle_s: position control cycle.
+        counter: (n,) cycle of each sample, rising.
+        time_s: (n,) time of each sample from the first one on: counter times cycle, gaps counted.
+        columns: (n,) values by address, such as "DES_POS|1"; NaN where the file has no value.
+        axes: in the order of their numbers.
+        blocks: in the order of their counters.
+        calls: in the order of their counters.
+        values: slow values in the order of their counters.
+        gaps: where samples are missing.
+        notes: what reading had to leave out or to assume.
+    """
+
+    source: str
+    version: str
+    cycle_s: float
+    counter: IntArray
+    time_s: FloatArray
+    columns: Mapping[str, FloatArray]
+    axes: tuple[EdgeAxis, ...]
+    blocks: tuple[EdgeBlock, ...] = ()
+    calls: tuple[EdgeCall, ...] = ()
+    values: tuple[EdgeValue, ...] = ()
+    gaps: tuple[EdgeGap, ...] = ()
+    notes: tuple[str, ...] = field(default=())
+
+    @functools.cached_property
+    def stretches(self) -> tuple[slice, ...]:
+        """Ranges of samples without a gap, in order."""
+        ends = [0, *(gap.index for gap in self.gaps), len(self.counter)]
+        return tuple(slice(start, stop) for start, stop in itertools.pairwise(ends) if stop > start)
+
+    def axis(self, axis: int | str) -> EdgeAxis:
+        """An axis.
+
+        Args:
+            axis: its number, or its label ("X1").
+
+        Returns:
+            The axis.
+
+        Raises:
+            RecordError: there is none, or the label stands for several.
+        """
+        wanted = str(axis).strip().lower()
+        found = [each for each in self.axes if wanted == str(each.number)]
+        found = found or [each for each in self.axes if wanted == each.name.lower()]
+        if len(found) != 1:
+            known = ", ".join(f"{each.number} ({each.name})" for each in self.axes)
+            what = "no axis" if not found else f"{len(found)} axes"
+            raise RecordError(f"{self.source}: {what} {axis!r}; the file has {known or 'no axis'}")
+        return found[0]
+
+    def column(self, signal: str, axis: int | str) -> FloatArray:
+        """The values of one signal of one axis, as they stand in the file.
+
+        Args:
+            signal: such as "DES_POS".
+            axis: number or label.
+
+        Returns:
+            (n,) values.
+
+        Raises:
+            RecordError: the file does not have it; the message says what it has.
+        """
+        found = self.axis(axis)
+        if signal not in found.signals:
+            raise RecordError(
+                f"{self.source}: SignalListHFData has no {signal}|{found.number}; recorded of axis {found.number} "
+                f"({found.name}) are {', '.join(found.signals)}"
+            )
+        return self.columns[f"{signal}|{found.number}"]
+
+    def position(self, axis: int | str, *, actual: bool = False) -> FloatArray:
+        """Position of an axis without the jumps of whole turns with which a control keeps a rotary axis small.
+
+        A step of more than half a turn within one cycle is taken as such a jump: no axis moves that fast (90 m/s,
+        15 000 rpm at 2 ms). Behind a gap nobody knows how many turns were made: there it starts anew with the value of
+        the file. Command and actual position are straightened with the same turns, so that their difference stays.
+
+        Args:
+            axis: number or label.
+            actual: the encoder's (ENC_POS), else the command (DES_POS).
+
+        Returns:
+            (n,) in mm or degrees.
+
+        Raises:
+            RecordError: the file does not have it.
+        """
+        number = self.axis(axis).number
+        values = self.column("ENC_POS" if actual else "DES_POS", number)
+        reference = values if actual and f"DES_POS|{number}" not in self.columns else self.column("DES_POS", number)
+        out = np.array(values)
+        for stretch in self.stretches:
+            steps = np.diff(reference[stretch], prepend=reference[stretch][:1])
+            turns = np.where(np.abs(steps) > TURN_DEG / 2.0, np.round(steps / TURN_DEG), 0.0)
+            out[stretch] -= TURN_DEG * np.cumsum(np.nan_to_num(turns))
+        return out
+
+    def is_rotary(self, axis: int | str) -> bool:
+        """Whether the command of an axis makes jumps of whole turns: only a rotary axis does.
+
+        False says nothing: a rotary axis may have stayed within one turn.
+
+        Args:
+            axis: number or label.
+
+        Returns:
+            Whether such a jump was seen.
+
+        Raises:
+            RecordError: the file does not have its command.
+        """
+        return bool(np.any(np.abs(self.position(axis) - self.column("DES_POS", axis)) > TURN_DEG / 2.0))
+
+    def speed(self, axis: int | str, *, actual: bool = False) -> FloatArray:
+        """Speed of an axis: differences of its position over two cycles, over one at the ends of a stretch.
+
+        Args:
+            axis: number or label.
+            actual: of the encoder, else of the command.
+
+        Returns:
+            (n,) in mm/s or degrees/s; NaN for a sample alone between gaps.
+
+        Raises:
+            RecordError: the file does not have its position.
+        """
+        place = self.position(axis, actual=actual)
+        out = np.full(len(place), np.nan)
+        for stretch in self.stretches:
+            if stretch.stop - stretch.start > 1:
+                out[stretch] = np.gradient(place[stretch], self.cycle_s)
+        return out
