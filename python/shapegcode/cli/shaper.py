@@ -14,7 +14,8 @@ __all__ = ["add_arguments", "run"]
 # The registry's, whose solvers take too long to load for a help text.
 _FAMILIES = (
     "zv", "zvd", "zvdd", "mzv", "ei", "ei2", "ei3", "si", "negative-zv", "simultaneous", "minimal", "polynomial",
-    "non-negative", "robust", "taps",
+    "non-negative", "robust", "mirrored", "smooth-zv", "smooth-mzv", "smooth-ei", "smooth-ei2", "smooth-si",
+    "smooth-zvd-ei", "taps",
 )  # fmt: skip
 
 
@@ -29,7 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add(
         "--mode", metavar="HZ[:DAMPING][±BAND]", action="append", default=[],
-        help="a mode to cancel, such as 46:0.02±5%% or 46:0.02+-2Hz, from 0.1 to 10000 Hz; once for each mode",
+        help="a mode to cancel, such as 46:0.02±5%%, 46:0.02+-2Hz or 46:0.02-5%%+8%%, from 0.1 to 10000 Hz; once for "
+        "each mode",
     )  # fmt: skip
     add_machine_argument(parser, required=False)
     add(

@@ -131,6 +131,13 @@ class Shaping(TomlTable):
         "polynomial",
         "non-negative",
         "robust",
+        "mirrored",
+        "smooth-zv",
+        "smooth-mzv",
+        "smooth-ei",
+        "smooth-ei2",
+        "smooth-si",
+        "smooth-zvd-ei",
     ] = key(
         'family of the shaper (`shapegcode shaper` compares them); "auto": the shortest without negative taps, exact '
         "at the modes, or below vibration_limit over their bands where frequency_uncertainty_percent states them",

@@ -20,7 +20,10 @@ NARROW_PERCENT = 0.2
 _SLOWEST_HZ = 0.1  # the swing of a load on 25 m of rope; no machine tool has a slower mode
 _FASTEST_HZ = 10_000.0  # as in a machine file
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_TEXT = re.compile(rf"({_NUMBER})(?::({_NUMBER}))?(?:(?:±|\+-|\+/-)({_NUMBER})(%|Hz)?)?")
+_SIZE = r"(?:\d+\.?\d*|\.\d+)"
+_TEXT = re.compile(
+    rf"({_NUMBER})(?::({_NUMBER}))?(?:(?:±|\+-|\+/-)({_NUMBER})(%|Hz)?|[-−]({_SIZE})(%|Hz)/?\+({_SIZE})(%|Hz))?"
+)
 
 
 @dataclass(frozen=True)
@@ -81,13 +84,17 @@ class ModeBand:
 def parse_mode_band(text: str) -> ModeBand:
     """A mode such as ``46``, ``46:0.02``, ``46:0.02±5%`` or ``46:0.02+-2.3Hz``: Hz, damping ratio, band.
 
+    A band that reaches further to one side, ``30:0.1-13%+19%``, is that of its middle: ``30.9:0.1±15.534%``.
+
     Raises:
         ArgumentError: not of that form, or a value outside its range; a frequency below 0.1 Hz or above 10 kHz is
             taken for a slip.
     """
     match = _TEXT.fullmatch(text.strip())
     if match is None:
-        raise ArgumentError(f"{text!r} is no mode: FREQUENCY[:DAMPING][±BAND], for example 46:0.02±5%")
+        raise ArgumentError(
+            f"{text!r} is no mode: FREQUENCY[:DAMPING][±BAND], for example 46:0.02±5%, or with both ends 46:0.02-5%+8%"
+        )
     frequency_hz, damping = float(match[1]), float(match[2] or 0.0)
     band = float(match[3] or 0.0)
     mode = Mode(frequency_hz, damping)
@@ -95,7 +102,16 @@ def parse_mode_band(text: str) -> ModeBand:
         raise ArgumentError(
             f"mode frequency {frequency_hz:g} Hz, as typed in {text!r}: must be {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz"
         )
-    return ModeBand(mode, band / frequency_hz if match[4] == "Hz" else band / 100.0)
+    if match[5] is None:
+        return ModeBand(mode, band / frequency_hz if match[4] == "Hz" else band / 100.0)
+    below, above = (
+        float(size) / (frequency_hz if unit == "Hz" else 100.0)
+        for size, unit in ((match[5], match[6]), (match[7], match[8]))
+    )
+    if below >= 1.0:
+        raise ArgumentError(f"the band of {text!r} begins at {frequency_hz * (1.0 - below):g} Hz: it must be above 0")
+    middle = 1.0 + 0.5 * (above - below)
+    return ModeBand(Mode(frequency_hz * middle, damping), 0.5 * (above + below) / middle)
 
 
 def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:

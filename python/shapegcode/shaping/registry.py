@@ -66,6 +66,17 @@ def _robust(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
     return [found.shaper]
 
 
+def _mirrored(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+    found = minimax_robust(
+        bands, options.grid_period_s, vibration_limit=options.vibration_limit, max_duration_s=options.max_duration_s,
+        mirrored=True, hints=False,
+    )  # fmt: skip
+    return [found.shaper]
+
+
+_KALICO = "the printer firmware Kalico; on a grid: this project"
+_SMOOTH = "as smooth-zv; flat towards faster modes, so a grid must tell its highest zero from slower ones"
+
 FAMILIES: tuple[Family, ...] = (
     Family(
         "zv", "zero vibration, one mode after the other",
@@ -132,6 +143,36 @@ FAMILIES: tuple[Family, ...] = (
     Family(
         "robust", "shortest shaper of a grid below a residual over the bands", "this project",
         "modes with a band; one without is cancelled exactly; no tap is negative", False, True, _robust,
+    ),
+    Family(
+        "mirrored", "the same read backwards: a contour comes out alike either way", "this project",
+        "modes with a band or without one, which is cancelled exactly; no tap is negative; longer than robust", False,
+        True, _mirrored,
+    ),
+    Family(
+        "smooth-zv", "polynomial kernel with a zero at the mode (Kalico's smooth_zv)", _KALICO,
+        "any modes, best on a grid of four periods in a swing or more; its samples are the taps, none is negative; "
+        "exact at the nominal frequencies", False, True, solvers.smooth("smooth-zv", (1.0,), 0.8025),
+    ),
+    Family(
+        "smooth-mzv", "polynomial kernel with zeros at 1 and 5/3 times the mode (smooth_mzv)", _KALICO,
+        _SMOOTH, False, True, solvers.smooth("smooth-mzv", (1.0, 5.0 / 3.0), 0.95625),
+    ),
+    Family(
+        "smooth-ei", "polynomial kernel with zeros at 1 and 1.414 times the mode (smooth_ei)", _KALICO,
+        _SMOOTH, False, True, solvers.smooth("smooth-ei", (1.0, 1.41375), 1.06625),
+    ),
+    Family(
+        "smooth-ei2", "polynomial kernel with zeros at 1, 1.525 and 2.159 times the mode (smooth_2hump_ei)", _KALICO,
+        _SMOOTH, False, True, solvers.smooth("smooth-ei2", (1.0, 1.525, 2.159), 1.14875),
+    ),
+    Family(
+        "smooth-si", "polynomial kernel with zeros at 1, 1.55 and 2.33 times the mode (smooth_si)", _KALICO,
+        _SMOOTH, False, True, solvers.smooth("smooth-si", (1.0, 1.5495, 2.32975), 1.245, at_least=True),
+    ),
+    Family(
+        "smooth-zvd-ei", "polynomial kernel with a double zero at the mode and one at 1.69 times it (smooth_zvd_ei)",
+        _KALICO, _SMOOTH, False, True, solvers.smooth("smooth-zvd-ei", (1.0, 1.0, 1.6875), 1.475),
     ),
     Family(
         "taps", "taps as given", "the user",

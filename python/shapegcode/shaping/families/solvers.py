@@ -22,11 +22,12 @@ from shapegcode.shaping.bands import ModeBand
 from shapegcode.shaping.families.conditions import Conditions, ResidualLimit, Zero
 from shapegcode.shaping.families.on_grid import shortest_on_grid
 from shapegcode.shaping.families.simultaneous import simultaneous_zv
+from shapegcode.shaping.families.smooth import smooth_kernel
 from shapegcode.shaping.options import DesignOptions
 from shapegcode.shaping.taps import on_grid
 from shapegcode.shaping.words import mode_names
 
-__all__ = ["Solve", "hump_ei", "modified", "negative", "repeated", "simultaneous", "specified", "user_taps"]
+__all__ = ["Solve", "hump_ei", "modified", "negative", "repeated", "simultaneous", "smooth", "specified", "user_taps"]
 
 Solve = Callable[[Sequence[ModeBand], DesignOptions], Sequence[Shaper]]
 """All shapers of a family for some bands, the preferred one first."""
@@ -34,12 +35,24 @@ Solve = Callable[[Sequence[ModeBand], DesignOptions], Sequence[Shaper]]
 _STEPS_PER_PERIOD = 64  # of the fastest frequency: time grid of the SI shaper at continuous times
 
 
-def _one_after_the_other(
+def _one_after_the_other(of_one: Callable[[Mode, DesignOptions], Shaper]) -> Solve:
+    """The design of one mode, convolved over all."""
+
+    def solve(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
+        shaper = of_one(bands[0].mode, options)
+        for band in bands[1:]:
+            shaper = convolve(shaper, of_one(band.mode, options))
+        return [shaper]
+
+    return solve
+
+
+def _defined(
     name: str,
     continuous: Callable[[Mode, DesignOptions], Shaper],
     conditions: Callable[[Mode, DesignOptions], Conditions],
 ) -> Solve:
-    """The design of one mode, convolved over all."""
+    """A closed form at continuous times; on a grid the shortest taps that meet the conditions that define it."""
 
     def of_one(mode: Mode, options: DesignOptions) -> Shaper:
         if options.period_s is None:
@@ -51,18 +64,12 @@ def _one_after_the_other(
             title=f"{name} for {mode_names([mode])}",
         )
 
-    def solve(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:
-        shaper = of_one(bands[0].mode, options)
-        for band in bands[1:]:
-            shaper = convolve(shaper, of_one(band.mode, options))
-        return [shaper]
-
-    return solve
+    return _one_after_the_other(of_one)
 
 
 def repeated(name: str, zeros: int) -> Solve:
     """ZV, ZVD, ZVDD ...: that many zeros at each mode; on a grid the shortest non-negative taps that have them."""
-    return _one_after_the_other(
+    return _defined(
         name,
         lambda mode, _options: repeated_zv(mode, zeros),
         lambda mode, _options: Conditions(zeros=(Zero(mode, zeros),)),
@@ -79,24 +86,29 @@ def hump_ei(name: str, humps: int) -> Solve:
             limits=(ResidualLimit(mode, zeros_hz[0], zeros_hz[-1], options.vibration_limit),),
         )
 
-    return _one_after_the_other(
+    return _defined(
         name, lambda mode, options: extra_insensitive(mode, options.vibration_limit, humps).shaper, conditions
     )
 
 
-modified = _one_after_the_other(
+modified = _defined(
     "MZV",
     lambda mode, _options: mzv(mode),
     lambda mode, _options: Conditions(zeros=(Zero(mode), Zero(mzv_second_zero(mode)))),
 )
 """MZV; on a grid the shortest non-negative taps with its two zeros."""
 
-negative = _one_after_the_other(
+negative = _defined(
     "negative ZV",
     lambda mode, _options: negative_zv(mode),
     lambda mode, _options: Conditions(zeros=(Zero(mode),), largest_tap=1.0),
 )
 """Unity-magnitude ZV; on a grid the shortest taps between -1 and 1."""
+
+
+def smooth(name: str, ratios: tuple[float, ...], periods: float, *, at_least: bool = False) -> Solve:
+    """A polynomial kernel with zeros at these multiples of each mode, see `smooth_kernel`."""
+    return _one_after_the_other(smooth_kernel(name, ratios, periods, at_least=at_least))
 
 
 def specified(bands: Sequence[ModeBand], options: DesignOptions) -> list[Shaper]:

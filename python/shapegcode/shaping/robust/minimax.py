@@ -95,6 +95,7 @@ def minimax_robust(
     non_negative: bool = True,
     max_abs_sum: float = 10.0,
     zeros_at_nominal: bool = False,
+    mirrored: bool = False,
     hints: bool = True,
 ) -> RobustDesign:
     """Shortest taps on a grid that leave at most a given share of the vibration anywhere in the bands.
@@ -112,6 +113,7 @@ def minimax_robust(
         non_negative: no tap is negative.
         max_abs_sum: largest sum of the taps' magnitudes where taps may be negative, at least 1.
         zeros_at_nominal: every mode is cancelled exactly at its nominal frequency besides.
+        mirrored: the taps are the same read backwards, so that a contour comes out alike either way.
         hints: a refusal looks for what would do, which may take seconds.
 
     Returns:
@@ -124,7 +126,7 @@ def minimax_robust(
 
     Source: this project.
     """
-    task = Task.checked(bands, period_s, non_negative, max_abs_sum, zeros_at_nominal)
+    task = Task.checked(bands, period_s, non_negative, max_abs_sum, zeros_at_nominal, mirrored)
     check_time("max_duration_s", max_duration_s)
     if not 0.0 < vibration_limit < 1.0:
         raise ArgumentError(f"vibration_limit is {vibration_limit}: it must be above 0 and below 1")

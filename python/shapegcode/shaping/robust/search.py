@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,7 @@ class Task:
         max_abs_sum: largest sum of the taps' magnitudes; None: no tap is negative.
         zeros_at_nominal: every mode is cancelled exactly at its nominal frequency.
         pool: planes found so far.
+        mirrored: the taps are the same read backwards.
     """
 
     bands: tuple[ModeBand, ...]
@@ -71,10 +72,17 @@ class Task:
     max_abs_sum: float | None
     zeros_at_nominal: bool
     pool: CutPool
+    mirrored: bool = False
 
     @classmethod
     def checked(
-        cls, bands: Sequence[ModeBand], period_s: float, non_negative: bool, max_abs_sum: float, zeros_at_nominal: bool
+        cls,
+        bands: Sequence[ModeBand],
+        period_s: float,
+        non_negative: bool,
+        max_abs_sum: float,
+        zeros_at_nominal: bool,
+        mirrored: bool = False,
     ) -> Task:
         """The task, its values checked.
 
@@ -88,7 +96,8 @@ class Task:
             raise ArgumentError(f"max_abs_sum is {max_abs_sum}: it must be finite and at least 1, the sum of the taps")
         bands = tuple(bands)
         wide = [band for band in bands if band.uncertainty]
-        return cls(bands, period_s, None if non_negative else max_abs_sum, zeros_at_nominal, CutPool.around(wide))
+        largest = None if non_negative else max_abs_sum
+        return cls(bands, period_s, largest, zeros_at_nominal, CutPool.around(wide), mirrored)
 
     @property
     def wide(self) -> list[ModeBand]:
@@ -104,19 +113,28 @@ class Task:
         """Whole periods within a duration."""
         return whole_periods(duration_s, self.period_s)
 
+    def conditions(self, last: int) -> tuple[FloatArray, FloatArray]:
+        """Matrix and right-hand side of what the taps at 0 ... `last` periods meet exactly."""
+        matrix, right = exact_conditions(self.exact, self.period_s, last)
+        if not self.mirrored:
+            return matrix, right
+        pairs = (np.eye(last + 1) - np.eye(last + 1)[::-1])[: (last + 1) // 2]
+        return np.vstack([matrix, pairs]), np.append(right, np.zeros(len(pairs)))
+
     def problem(self, last: int, last_tap: float = 0.0) -> TapProblem:
         """The taps at 0 ... `last` periods, the last one at least `last_tap`."""
-        conditions = exact_conditions(self.exact, self.period_s, last)
-        return TapProblem(self.wide, self.period_s, last, conditions, self.max_abs_sum, self.pool, last_tap)
+        return TapProblem(self.wide, self.period_s, last, self.conditions(last), self.max_abs_sum, self.pool, last_tap)
 
     def at_period(self, period_s: float) -> Task:
         """The same on another grid."""
-        return Task(self.bands, period_s, self.max_abs_sum, self.zeros_at_nominal, CutPool.around(self.wide))
+        return replace(self, period_s=period_s, pool=CutPool.around(self.wide))
 
     def finished(self, taps: FloatArray, lower: float) -> RobustDesign | None:
         """The taps without dust, their zeros solved again to rounding, judged; None if that breaks them."""
+        if self.mirrored:
+            taps = 0.5 * (taps + taps[::-1])
         support = np.flatnonzero(np.abs(taps) > _NO_TAP)
-        matrix, right = exact_conditions(self.exact, self.period_s, len(taps) - 1)
+        matrix, right = self.conditions(len(taps) - 1)
         amplitudes, columns = taps[support], matrix[:, support]
         for _ in range(3):
             amplitudes = amplitudes + np.linalg.lstsq(columns, right - columns @ amplitudes, rcond=1e-14)[0]
@@ -136,7 +154,7 @@ def shortest_below(task: Task, limit: float, max_duration_s: float, *, least_cos
     Of that duration the one of least contour cost is taken, or, to save the time that takes, any one.
     """
     most = task.periods(max_duration_s)
-    if not task.wide and task.max_abs_sum is None:
+    if not task.wide and task.max_abs_sum is None and not task.mirrored:
         return _exact(task, max_duration_s)
     if unreachable(task):
         return None
@@ -194,8 +212,12 @@ def best_within(task: Task, last: int) -> RobustDesign | None:
 
 def _below(task: Task, last: int, limit: float) -> Bounds | None:
     """Taps within `last` periods whose worst residual is below the limit, or None."""
-    bounds = task.problem(last).least_worst(limit)
-    return bounds if bounds is not None and bounds.upper <= limit else None
+    # mirrored taps stay so with a zero at each end, so a period more helps them or the one before
+    for periods in (last, last - 1) if task.mirrored and last else (last,):
+        bounds = task.problem(periods).least_worst(limit)
+        if bounds is not None and bounds.upper <= limit:
+            return bounds
+    return None
 
 
 def smallest_below(task: Task, limit: float, most: int, *, too_few: int = 0, precision: float = 0.0) -> int | None:
