@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from shapegcode.errors import RecordError
+from shapegcode.identification import problem
 from shapegcode.identification.identify import identify
 from shapegcode.identification.mode import Estimate, IdentifiedMode
 from shapegcode.identification.result import Identification
@@ -69,6 +70,50 @@ def test_forty_decibels_of_noise() -> None:
     assert np.all(np.median(errors, axis=0) <= (0.001, 0.02, 0.02))
     # 25 intervals that hold in 95 % of all cases: fewer than 80 % in one case of a thousand.
     assert np.all(np.mean(covered, axis=0) >= 0.8)
+
+
+FAST = (TrueMode(46.0, 0.03, 120.0), TrueMode(263.0, 0.02, 30.0), TrueMode(1071.0, 0.02, 60.0))
+
+
+def test_a_fast_record_is_thinned_out_and_says_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    record = tap(FAST, np.random.default_rng(5), snr_db=50.0, rate_hz=51200.0, samples=12800, pulse_samples=80)
+    thinned = identify([record])
+    assert len(thinned.fitted_records[0].response) < len(record.response) / 4
+    assert "51200 samples per second are thinned out to" in thinned.notes[-1]
+    monkeypatch.setattr(problem, "thin", lambda *_: None)
+    whole = identify([record])
+    assert len(whole.fitted_records[0].response) == len(record.response)
+    for mode in FAST:
+        fast, full = nearest(thinned, mode)[0], nearest(whole, mode)[0]
+        for one, other, truth in zip(estimates(fast), estimates(full), truth_of(mode), strict=True):
+            assert one.low <= other.high
+            assert other.low <= one.high
+            assert one.value == pytest.approx(truth, rel=0.02)
+
+
+def test_a_thinned_force_may_have_run_straight_between_its_samples() -> None:
+    # Simulated without a filter at the rate of the record. Taken for band-limited only, the mass of the upper mode
+    # would be off by (pi f/rate)^2/3, .5 %.
+    time = np.arange(25600) / 51200.0
+    force = np.where((time > 0.01) & (time < 0.0112), 800.0 * np.sin(np.pi * (time - 0.01) / 0.0012), 0.0)
+    modes = (TrueMode(700.0, 0.02, 8.0), TrueMode(1981.0, 0.015, 4.0))
+    response = acceleration(modes, force, time[1])
+    noise = 1e-4 * np.std(response) * np.random.default_rng(3).standard_normal(len(time))
+    found = identify([Record("straight", time[1], response + noise, force_n=force)])
+    assert found.fitted_records[0].period_s > 2.0 * time[1]
+    for mode in modes:
+        values = [estimate.value for estimate in estimates(nearest(found, mode)[0])]
+        assert values == pytest.approx(truth_of(mode), rel=3e-4)
+
+
+def test_a_strong_mode_above_the_band_asked_for_does_not_spoil_it() -> None:
+    modes = (TrueMode(61.0, 0.03, 80.0), TrueMode(143.0, 0.02, 50.0), TrueMode(1071.0, 0.02, 6.0))
+    record = tap(modes, np.random.default_rng(8), snr_db=50.0, rate_hz=25600.0, samples=25600, pulse_samples=15)
+    found = identify([record], band_hz=(20.0, 400.0))
+    assert [round(mode.frequency_hz.value) for mode in found.modes] == [61, 143]
+    for mode in modes[:2]:
+        values = [estimate.value for estimate in estimates(nearest(found, mode)[0])]
+        assert values == pytest.approx(truth_of(mode), rel=0.02)
 
 
 @pytest.mark.slow

@@ -17,13 +17,8 @@ from shapegcode.identification.model_search import Fit, Search, chart_poles, evi
 from shapegcode.identification.prepared import Prepared
 from shapegcode.identification.problem import HIGHEST_SHARE, Decays, Taps, problem_of
 from shapegcode.identification.result import Identification, MassCheck
-from shapegcode.identification.support import (
-    Doubts,
-    estimates_of,
-    is_background,
-    refusal_of,
-    rivals_of,
-)
+from shapegcode.identification.support import Doubts, estimates_of, is_background, refusal_of, rivals_of
+from shapegcode.io.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -32,6 +27,7 @@ __all__ = ["find_modes"]
 _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which they are not taken for white
 _SPECTRUM = 4096  # points of the force's transform
 _FOLDED = 2.0 / 3.0
+_FILTER_ERROR = 3e-4  # what thinning out may do to a mass: the filters let 80 dB less pass
 _FINER = 16  # steps of the check by Wilson's method in a sampling period
 _POSSIBLY = 15.0  # by so much (twice the logarithm of the odds) another course of the force may be less evident
 
@@ -61,12 +57,12 @@ def find_modes(
     Raises:
         RecordError: a band beyond half the sampling rate, or more modes than the records hold.
     """
-    problem = problem_of(ready, band_hz)
+    problem = problem_of(ready, band_hz, within=modes is not None)
     models = _search(problem, most_modes, modes)
     others: list[Fit] = []
     if isinstance(problem, Taps) and models.fits:
         problem, models, others = _held(problem, models, most_modes, modes)
-    return _result(ready, files, problem, models, modes or models.order, others, accepted_percent)
+    return _result(ready, files, problem, models, modes or models.order, others, accepted_percent, band_hz)
 
 
 def _held(problem: Taps, models: Search, most_modes: int, modes: int | None) -> tuple[Taps, Search, list[Fit]]:
@@ -77,10 +73,9 @@ def _held(problem: Taps, models: Search, most_modes: int, modes: int | None) -> 
     """
     courses = [(problem, models)]
     order = modes or max(models.order, 1)
-    for hold in ("linear", "impulse"):
-        other = replace(problem, hold=hold)
+    for other in problem.other_courses(models.fits[order - 1]):
         fits = tuple(other.fit(starts_of(fit)) for fit in models.fits[:order])
-        evidence = tuple(evidence_of(fit) for fit in fits)
+        evidence = tuple(evidence_of(fit, other.white_share) for fit in fits)
         # The search is worth its time only where it may win: a wrong course asks for modes of its own.
         may_win = min(evidence) < min(models.evidence)
         courses.append((other, _search(other, most_modes, modes) if may_win else Search(fits, evidence)))
@@ -88,7 +83,7 @@ def _held(problem: Taps, models: Search, most_modes: int, modes: int | None) -> 
     least = min(best[1].evidence)
     starts = starts_of(best[1].fits[(modes or max(best[1].order, 1)) - 1])
     # A record that begins within the pulse does not tell half of the momentum from the whole.
-    begun = any(force[0] != 0.0 for force in problem.forces) and best[0].hold != "impulse"
+    begun = problem.begun and best[0].hold != "impulse"
     possible = [other for other, searched in courses if begun or min(searched.evidence) < least + _POSSIBLY]
     others: list[Fit] = [other.fit(starts) for other in possible if other is not best[0]]
     return *best, others
@@ -109,6 +104,7 @@ def _result(
     order: int,
     others: Sequence[Fit],
     accepted_percent: float,
+    band_hz: tuple[float, float] | None,
 ) -> Identification:
     warnings = [*ready.warnings, *(f"{refused.source}: not used: {refused.reason}" for refused in ready.refused)]
     squares = sum(float(np.sum(response**2)) for response in problem.responses)
@@ -119,22 +115,24 @@ def _result(
         noise_rms=float(np.sqrt(squares / sum(len(response) for response in problem.responses))),
         reason="no mode stands out of the noise",
         warnings=tuple(warnings),
-        notes=ready.notes,
+        notes=(*ready.notes, *_thinned_note(ready, problem, band_hz)),
         prepared=ready,
         chart=stabilisation_chart(chart_poles(problem), problem.period_s),
         fitted=tuple(np.zeros(len(response)) for response in problem.responses),
-        used=tuple((0, len(response)) for response in problem.responses),
+        fitted_records=_fitted_records(ready, problem),
     )
     if order == 0:
         return without
     fit = models.fits[order - 1]
-    if abs(fit.residual_autocorrelation) * np.sqrt(fit.samples) > _COLOURED:
+    coloured = abs(fit.residual_autocorrelation - problem.noise_correlation) * np.sqrt(fit.samples) > _COLOURED
+    if coloured:
         fit = problem.fit(starts_of(fit), coloured=True)
         warnings.append(
             f"what the model leaves is no white noise (autocorrelation {fit.residual_autocorrelation:.2f}): the "
             "intervals allow for it; other causes than modes, or a mode that is not linear"
         )
-    found = _judged(problem, fit, models, others, accepted_percent)
+    white_share = 1.0 if coloured else problem.white_share
+    found = _judged(ready, problem, fit, models, others, accepted_percent, white_share, band_hz)
     supported = tuple(mode for mode in found if not mode.refusal)
     refused = tuple(mode for mode in found if mode.refusal)
     left = float(np.sqrt(fit.sum_of_squares / squares)) if squares > 0.0 else 1.0
@@ -152,16 +150,51 @@ def _result(
     )
 
 
+def _fitted_records(ready: Prepared, problem: Taps | Decays) -> tuple[Record, ...]:
+    """The records as they were fitted: thinned out, if they were."""
+    if isinstance(problem, Decays) or problem.thinned is None:
+        return ready.records
+    thinned = problem.thinned
+    parts = zip(ready.records, problem.responses, problem.forces, thinned.first_s, strict=True)
+    return tuple(
+        replace(record, response=response, force_n=force, period_s=thinned.period_s, start_s=record.start_s + first_s)
+        for record, response, force, first_s in parts
+    )
+
+
+def _thinned_note(ready: Prepared, problem: Taps | Decays, band_hz: tuple[float, float] | None) -> list[str]:
+    thinned = problem.thinned if isinstance(problem, Taps) else None
+    if thinned is None:
+        return []
+    rates = f"{1.0 / ready.records[0].period_s:.6g} samples per second are thinned out to {1.0 / thinned.period_s:.6g}"
+    if band_hz is not None:
+        return [
+            f"{rates}, which the band up to {band_hz[1]:g} Hz and what stands out of the response above it need, "
+            "behind one filter for force and response"
+        ]
+    return [
+        f"{rates}, behind one filter for force and response: above {problem.band_hz[1]:.4g} Hz the hit excites little "
+        "and nothing stands out of the response (--frequencies LOW:HIGH states another band)"
+    ]
+
+
 def _judged(
-    problem: Taps | Decays, fit: Fit, models: Search, others: Sequence[Fit], accepted_percent: float
+    ready: Prepared,
+    problem: Taps | Decays,
+    fit: Fit,
+    models: Search,
+    others: Sequence[Fit],
+    accepted_percent: float,
+    white_share: float,
+    band_hz: tuple[float, float] | None,
 ) -> list[IdentifiedMode]:
     """The modes of a fit by ascending frequency, without background, each with its refusal where there is one."""
-    aliased = _aliased(problem) if isinstance(problem, Taps) else _never_aliased
+    aliased = _aliased(ready, problem) if isinstance(problem, Taps) else _never_aliased
     doubts = Doubts(
         limit_percent=accepted_percent,
-        band_hz=problem.band_hz,
+        band_hz=band_hz or problem.band_hz,
         record_s=max(len(response) for response in problem.responses) * problem.period_s,
-        rivals=rivals_of(len(fit.omega_rad_s), models.fits),
+        rivals=rivals_of(len(fit.omega_rad_s), models.fits, problem.white_share),
         aliased=aliased,
     )
     found = [
@@ -173,7 +206,7 @@ def _judged(
             each.stiffness_n_per_m,
             refusal_of(each, doubts),
         )
-        for each in estimates_of(fit, _alone(problem, fit), others, aliased)
+        for each in estimates_of(fit, _alone(problem, fit), others, aliased, white_share)
         if not is_background(each, doubts)
     ]
     return sorted(found, key=lambda mode: mode.frequency_hz.value)
@@ -194,7 +227,7 @@ def _never_aliased(_frequency_hz: float) -> float:
     return 0.0
 
 
-def _aliased(problem: Taps) -> Callable[[float], float]:
+def _aliased(ready: Prepared, problem: Taps) -> Callable[[float], float]:
     """Share of the force's spectrum at a frequency that may have been folded down from above half the sampling rate.
 
     Without an anti-aliasing filter the spectrum does not end before half the rate: what it still has there, beyond
@@ -203,18 +236,20 @@ def _aliased(problem: Taps) -> Callable[[float], float]:
     force without any noise that runs straight from sample to sample is no recording: it holds nothing else.
     """
     is_simulated = problem.force_noise_n == 0.0 and problem.hold != "band_limited"
-    if problem.hold == "impulse" or is_simulated:
-        return _never_aliased
-    pulse = np.trim_zeros(problem.forces[0])
+    record = ready.records[0]
+    least = 0.0 if problem.thinned is None else _FILTER_ERROR
+    if problem.hold == "impulse" or is_simulated or record.force_n is None:
+        return lambda _hz: least
+    pulse = np.trim_zeros(record.force_n)
     spectrum = np.abs(np.fft.rfft(pulse, _SPECTRUM))
     share = np.fft.rfftfreq(_SPECTRUM)
     highest = float(np.sqrt(np.mean(spectrum[share > HIGHEST_SHARE] ** 2)))
-    noise = problem.force_noise_n * np.sqrt(len(pulse))
+    noise = (ready.force_noise_n[0] or 0.0) * np.sqrt(len(pulse))
     folded = _FOLDED * np.sqrt(max(highest**2 - 2.0 * noise**2, 0.0))
 
     def at(frequency_hz: float) -> float:
-        here = float(np.interp(frequency_hz * problem.period_s, share, spectrum))
-        return folded / here if here > 0.0 else np.inf
+        here = float(np.interp(frequency_hz * record.period_s, share, spectrum))
+        return max(folded / here, least) if here > 0.0 else np.inf
 
     return at
 
@@ -238,7 +273,7 @@ def _mass_check(problem: Taps | Decays, fit: _core.ModalFit | _core.DecayFit) ->
     if isinstance(problem, Decays) or len(fit.omega_rad_s) != 1 or problem.hold == "impulse":
         return None
     args = (
-        _finer(problem.forces[0], problem.hold),
+        _finer(problem.forces[0], problem.held),
         _finer(problem.responses[0], "band_limited"),
         problem.period_s / _FINER,
         float(fit.omega_rad_s[0]),

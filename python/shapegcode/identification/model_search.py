@@ -27,6 +27,8 @@ _PEAKS = 2  # of the residual's spectrum that are tried
 _TWINS = 0.25  # of the half width of a resonance
 _APART = np.pi  # rad: two modes must come half a turn apart in the record
 _CHART_ORDERS = 20  # of the stabilisation chart
+_SAME_PLACE = 0.2  # of the half width of a resonance: two poles of the chart are one start
+_SAME_DAMPING = 0.2  # and in the logarithm of their damping
 _MOST_DAMPING = 0.7  # of a pole to begin with
 # Two models in a row that the data do not ask for end the search: one may only have missed its place.
 _PATIENCE = 2
@@ -44,6 +46,8 @@ class FitProblem(Protocol):
     def period_s(self) -> float: ...  # noqa: D102
     @property
     def band_hz(self) -> tuple[float, float]: ...  # noqa: D102
+    @property
+    def white_share(self) -> float: ...  # noqa: D102
 
     def fit(self, starts: Starts) -> Fit: ...  # noqa: D102
 
@@ -89,7 +93,8 @@ def search(problem: FitProblem, most_modes: int) -> Search:
     """
     squares = sum(float(np.sum((response - response.mean()) ** 2)) for response in problem.responses)
     samples = sum(len(response) for response in problem.responses)
-    evidence = [_evidence(squares, samples, len(problem.responses), 0)]
+    share = problem.white_share
+    evidence = [_evidence(squares, share * samples, len(problem.responses), 0)]
     fits: list[Fit] = []
     pool = _pool(problem)
     while len(fits) < most_modes:
@@ -100,25 +105,26 @@ def search(problem: FitProblem, most_modes: int) -> Search:
         if explained < _LEAST_SHARE * squares:
             break
         fits.append(best)
-        evidence.append(evidence_of(best))
+        evidence.append(evidence_of(best, share))
         if len(fits) - int(np.argmin(evidence)) >= _PATIENCE:
             break
     return Search(tuple(fits), tuple(evidence))
 
 
-def evidence_of(fit: Fit) -> float:
+def evidence_of(fit: Fit, white_share: float) -> float:
     """Evidence of a fit, as in `Search.evidence`.
 
     Args:
         fit: a model.
+        white_share: of the samples, how many are independent.
 
     Returns:
         The criterion; lower is better.
     """
-    return _evidence(fit.sum_of_squares, fit.samples, fit.parameters, len(fit.omega_rad_s))
+    return _evidence(fit.sum_of_squares, white_share * fit.samples, fit.parameters, len(fit.omega_rad_s))
 
 
-def _evidence(squares: float, samples: int, parameters: int, modes: int) -> float:
+def _evidence(squares: float, samples: float, parameters: int, modes: int) -> float:
     tiny = np.finfo(float).tiny
     return float(samples * np.log(max(squares / samples, tiny)) + (parameters + modes) * np.log(samples))
 
@@ -143,7 +149,16 @@ def _pool(problem: FitProblem) -> Starts:
     for of_model in chart_poles(problem):
         omega, zeta = _core.poles_to_modes(list(of_model), problem.period_s)
         found += [(w, z) for w, z in zip(map(float, omega), map(float, zeta), strict=True) if z < _MOST_DAMPING]
-    return [(w, z) for w, z in found if low <= w / (2.0 * np.pi) <= high]
+    return _apart([(w, z) for w, z in found if low <= w / (2.0 * np.pi) <= high])
+
+
+def _apart(found: Starts) -> Starts:
+    """Those that are no repetition of another one: of models of higher order, which know the weak modes too."""
+    kept: Starts = []
+    for w, z in reversed(found):
+        if not any(abs(w - v) < _SAME_PLACE * min(z, y) * w and abs(np.log(z / y)) < _SAME_DAMPING for v, y in kept):
+            kept.append((w, z))
+    return kept
 
 
 def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None:

@@ -66,22 +66,22 @@ def plot_traces(found: Identification, ax: Axes | None = None) -> Axes:
     Returns:
         The first panel.
     """
-    shown = list(zip(found.taps, found.used, found.fitted, strict=True))[:_MOST_TRACES]
+    shown = list(zip(found.fitted_records, found.fitted, strict=True))[:_MOST_TRACES]
     rows = 1 if found.decay else 2
     many = f", {len(shown)} of {len(found.taps)} records" if len(found.taps) > len(shown) else ""
     panels = plot.grid(
         ax, rows, len(shown), size_inch=(4.0 + 3.6 * len(shown), 2.6 + 2.2 * rows), sharex="col",
         title=f"Records and model ({found.fit_percent:.1f} % fit{many})",
     )  # fmt: skip
-    for column, (record, (begin, end), fitted) in zip(zip(*panels, strict=True), shown, strict=True):
+    for column, (record, fitted) in zip(zip(*panels, strict=True), shown, strict=True):
         time_s = record.time_s if found.decay else record.time_s - record.start_s
         if record.force_n is not None:
             column[0].plot(time_s, record.force_n, color="black", linewidth=1.0)
             column[0].set_ylabel("force in N")
         panel = column[-1]
         panel.plot(time_s, record.response, color=_MEASURED, linewidth=2.2, label="measured")
-        panel.plot(time_s[begin:end], fitted, "--", color=_FITTED, linewidth=1.1, label="model")
-        panel.set_xlim(time_s[0], time_s[begin + _last_seen(np.asarray(fitted))])
+        panel.plot(time_s, fitted, "--", color=_FITTED, linewidth=1.1, label="model")
+        panel.set_xlim(time_s[0], time_s[_last_seen(np.asarray(fitted))])
         panel.set_ylabel(_quantity(record))
         panel.set_xlabel(_FILE_TIME if found.decay else "time in s")
         column[0].set_title(Path(record.source).name, fontsize=9, loc="right")
@@ -99,7 +99,7 @@ def plot_response(found: Identification, ax: Axes | None = None) -> Axes:
     Returns:
         The panel of the magnitude.
     """
-    measured, model = frf(_fitted_part(found)), frf(_as_fitted(found))
+    measured, model = frf(found.fitted_records), frf(_as_fitted(found))
     seen = _seen(measured.frequency_hz, found)
     rows = 2 if measured.coherence is None else 3
     taps = len(found.taps)
@@ -196,7 +196,7 @@ def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
         The upper panel.
     """
     frequencies = [mode.frequency_hz.value for mode in found.modes][:_MOST_ENVELOPES]
-    record, model = _fitted_part(found)[0], _as_fitted(found)[0]
+    record, model = found.fitted_records[0], _as_fitted(found)[0]
     begin = _after_hit(record)
     record, model = (replace(each, response=each.response[begin:], force_n=None) for each in (record, model))
     name = f": {Path(record.source).name}" if len(found.taps) > 1 else ""
@@ -236,7 +236,7 @@ def plot_spectrum(found: Identification, ax: Axes | None = None) -> Axes:
     Returns:
         The panel.
     """
-    spectrum = decay_spectrum(_fitted_part(found)[0])
+    spectrum = decay_spectrum(found.fitted_records[0])
     seen = _seen(spectrum.frequency_hz, found, [peak.frequency_hz for peak in spectrum.peaks])
     panel = plot.axes(ax, size_inch=(9.0, 4.5), title="Spectrum of the free decay")
     amplitude = spectrum.amplitude[seen]
@@ -258,30 +258,17 @@ def _quantity(record: Record) -> str:
     return f"{record.quantity} in {UNITS[record.quantity]}"
 
 
-def _fitted_part(found: Identification) -> list[Record]:
-    """The records as far as they were fitted."""
-    return [
-        replace(
-            record,
-            response=record.response[begin:end],
-            force_n=None if record.force_n is None else record.force_n[begin:end],
-            start_s=record.start_s + begin * record.period_s,
-        )
-        for record, (begin, end) in zip(found.taps, found.used, strict=True)
-    ]
-
-
 def _as_fitted(found: Identification) -> list[Record]:
     """The same with the model's response."""
     return [
         replace(record, response=np.asarray(fitted))
-        for record, fitted in zip(_fitted_part(found), found.fitted, strict=True)
+        for record, fitted in zip(found.fitted_records, found.fitted, strict=True)
     ]
 
 
 def _spectrum(found: Identification) -> tuple[FloatArray, FloatArray]:
     """Frequencies and root mean square over the records of their amplitude spectra, 2/n |FFT|."""
-    parts = _fitted_part(found)
+    parts = found.fitted_records
     count = 1 << max(len(part.response) for part in parts).bit_length()
     squares = [
         (2.0 / len(part.response) * np.abs(np.fft.rfft(part.response - part.response.mean(), count))) ** 2

@@ -10,9 +10,10 @@ import numpy.typing as npt
 
 from shapegcode import _core
 from shapegcode.errors import RecordError
-from shapegcode.identification.model_search import Starts
+from shapegcode.identification.model_search import Fit, Starts
 from shapegcode.identification.prepared import Prepared
 from shapegcode.identification.support import LEAST_SWINGS
+from shapegcode.identification.thinning import FLAT, Thinned, highest_of_interest_hz, thin
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -36,6 +37,8 @@ class Taps:
         quantity: what the sensor measured.
         force_noise_n: RMS of the force off the pulse.
         hold: course of the force between samples: "band_limited", "linear" or "impulse".
+        thinned: what was thinned out before the fit; None: every sample is fitted.
+        begun: the record begins within the pulse.
     """
 
     forces: list[FloatArray]
@@ -45,6 +48,38 @@ class Taps:
     quantity: str
     force_noise_n: float
     hold: str
+    thinned: Thinned | None = None
+    begun: bool = False
+
+    @property
+    def white_share(self) -> float:
+        """Share of white noise that reaches the samples: so many of them are independent."""
+        return 1.0 if self.thinned is None else self.thinned.white_share
+
+    @property
+    def noise_correlation(self) -> float:
+        """Between two samples on end, of noise that was white."""
+        return 0.0 if self.thinned is None else self.thinned.noise_correlation
+
+    @property
+    def held(self) -> str:
+        """Course of the force that is fitted: what was thinned out is band-limited, whatever it was."""
+        return self.hold if self.thinned is None else "band_limited"
+
+    def other_courses(self, near: Fit) -> list[Taps]:
+        """The same taps with every other course that the force may take between its samples.
+
+        An acceleration holds the force over the mass as it was at the samples, whatever its course between them. Where
+        a straight course was thinned out, what the two differ by is taken away from the response.
+        """
+        if self.thinned is None:
+            return [replace(self, hold="linear"), replace(self, hold="impulse")]
+        straight, responses = self.thinned.straight, self.responses
+        if self.quantity == "acceleration" and isinstance(near, _core.ModalFit):
+            free = float(np.sum(near.inverse_mass))
+            parts = zip(responses, self.forces, straight, strict=True)
+            responses = [response - free * (sampled - course) for response, sampled, course in parts]
+        return [replace(self, forces=straight, responses=responses, hold="linear")]
 
     def fit(self, starts: Starts, coloured: bool = False) -> _core.ModalFit:
         """The best model near some modes, its residual white or coloured."""
@@ -65,7 +100,7 @@ class Taps:
             omega,
             zeta,
             quantity=self.quantity,
-            hold=self.hold,
+            hold=self.held,
             force_noise_n=force_noise_n,
             coloured_residuals=coloured,
             most_iterations=steps,
@@ -96,11 +131,15 @@ class Decays:
         responses: (n,) each.
         period_s: time between two samples.
         band_hz: modes are looked for in it.
+        white_share: every sample is independent.
+        noise_correlation: none.
     """
 
     responses: list[FloatArray]
     period_s: float
     band_hz: tuple[float, float]
+    white_share: float = 1.0
+    noise_correlation: float = 0.0
 
     def fit(self, starts: Starts, coloured: bool = False) -> _core.DecayFit:
         """The best model near some modes, its residual white or coloured."""
@@ -131,12 +170,16 @@ class Decays:
         return replace(self, responses=[self.responses[index]])
 
 
-def problem_of(ready: Prepared, band_hz: tuple[float, float] | None) -> Taps | Decays:
+def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: bool = False) -> Taps | Decays:
     """The records of a fit, and the band to look in.
+
+    A strong mode outside the band asked for is part of what is measured within it: it is looked for too.
 
     Args:
         ready: records that were looked through.
-        band_hz: as asked for; None: from two swings per record to .45 of the sampling rate.
+        band_hz: as asked for; None: from two swings per record to .45 of the sampling rate, or to where nothing is
+            excited any more.
+        within: look for modes in the band asked for only.
 
     Returns:
         Taps or decays.
@@ -147,17 +190,19 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None) -> Taps | D
     first = ready.records[0]
     responses = [record.response for record in ready.records]
     longest_s = max(len(response) for response in responses) * first.period_s
-    band = band_hz or (LEAST_SWINGS / longest_s, HIGHEST_SHARE / first.period_s)
-    if not 0.0 <= band[0] < band[1] <= 0.5 / first.period_s:
+    if band_hz is not None and not 0.0 <= band_hz[0] < band_hz[1] <= 0.5 / first.period_s:
         raise RecordError(
-            f"band of {band[0]:g} to {band[1]:g} Hz: must ascend and end below half the sampling rate, "
+            f"band of {band_hz[0]:g} to {band_hz[1]:g} Hz: must ascend and end below half the sampling rate, "
             f"{0.5 / first.period_s:g} Hz"
         )
+    band = (LEAST_SWINGS / longest_s, HIGHEST_SHARE / first.period_s)
+    if band_hz is not None:
+        band = band_hz if within else (min(band[0], band_hz[0]), max(band[1], band_hz[1]))
     if first.force_n is None:
         return Decays(responses, first.period_s, band)
     forces = [record.force_n for record in ready.records if record.force_n is not None]
     noise = [value for value in ready.force_noise_n if value is not None]
-    return Taps(
+    taps = Taps(
         forces,
         responses,
         first.period_s,
@@ -165,4 +210,17 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None) -> Taps | D
         first.quantity,
         float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0,
         "band_limited",
+        begun=any(force[0] != 0.0 for force in forces),
+    )
+    thinned = thin(ready, highest_of_interest_hz(ready, None if band_hz is None else band_hz[1]))
+    if thinned is None:
+        return taps
+    return replace(
+        taps,
+        forces=thinned.forces,
+        responses=thinned.responses,
+        period_s=thinned.period_s,
+        band_hz=(band[0], min(band[1], FLAT / thinned.period_s)),
+        force_noise_n=taps.force_noise_n * thinned.force_noise,
+        thinned=thinned,
     )

@@ -70,7 +70,8 @@ def is_clipped(values: FloatArray) -> bool:
                 continue
             reach = (len(run) + 1) // 2
             sides = [k for k in (int(run[0]) - reach, int(run[-1]) + reach) if 0 <= k < len(signal)]
-            if sides and top - min(float(signal[k]) for k in sides) > _SMOOTH_FALL * step:
+            # A cut falls on both sides; a peak with a kink, where the force begins or ends, on one.
+            if sides and top - max(float(signal[k]) for k in sides) > _SMOOTH_FALL * step:
                 return True
     return False
 

@@ -112,7 +112,8 @@ class Identification(Result):
         order: number of modes of the chosen model; 0: there is none.
         evidence: information criterion (lower is better) by number of modes.
         fit_percent: 100 * (1 - |measured - fitted| / |measured|), over all records together; null without a model.
-        noise_rms: of the response's measurement noise, in the unit of the records; null without a model.
+        noise_rms: of the response's measurement noise in the band that is fitted, in the unit of the records; null
+            without a model.
         mass_check: where the model has one mode.
         reason: why there is no mode; empty: there is.
         machine_file: where the modes were put; null: nowhere.
@@ -120,8 +121,8 @@ class Identification(Result):
         notes: what was left out of the files and the like.
         prepared: the records that were used, and those that were not; None: the files hold none that can be.
         chart: poles of the stabilisation chart.
-        fitted: response of the model per record, (n,), at the samples that were used.
-        used: first and last + 1 sample per record that was fitted.
+        fitted_records: the records as they were fitted, thinned out to what the band needs.
+        fitted: response of the model per record, (n,), at the samples that were fitted.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {
@@ -145,8 +146,8 @@ class Identification(Result):
     notes: tuple[str, ...] = ()
     prepared: Prepared | None = field(default=None, metadata=hidden())
     chart: tuple[ChartPole, ...] = field(default=(), metadata=hidden())
+    fitted_records: tuple[Record, ...] = field(default=(), metadata=hidden())
     fitted: tuple[FloatArray, ...] = field(default=(), metadata=hidden())
-    used: tuple[tuple[int, int], ...] = field(default=(), metadata=hidden())
 
     @property
     def taps(self) -> tuple[Record, ...]:

@@ -86,7 +86,11 @@ class Doubts:
 
 
 def estimates_of(
-    fit: Fit, alone: Sequence[Fit], others: Sequence[Fit] = (), aliased: Callable[[float], float] = lambda _hz: 0.0
+    fit: Fit,
+    alone: Sequence[Fit],
+    others: Sequence[Fit] = (),
+    aliased: Callable[[float], float] = lambda _hz: 0.0,
+    white_share: float = 1.0,
 ) -> list[Estimates]:
     """Values and 95 % intervals of each mode of a fit.
 
@@ -99,12 +103,13 @@ def estimates_of(
         alone: of each record by itself, its modes in the same order; fewer than two: no scatter.
         others: the same modes under other courses of the force between its samples.
         aliased: share of the force's spectrum at a frequency in Hz that may come from above half the sampling rate.
+        white_share: of the samples, how many are independent.
 
     Returns:
         Estimates per mode, in the order of the fit.
     """
-    freedom = max(fit.samples - fit.parameters, 1)
-    quantile = float(stats.t.ppf(0.975, freedom))
+    freedom = max(white_share * fit.samples - fit.parameters, 1.0)
+    quantile = float(stats.t.ppf(0.975, freedom)) / np.sqrt(white_share)
     rows = [_logarithms(fit, mode) for mode in range(len(fit.omega_rad_s))]
     found = []
     for mode, row in enumerate(rows):
@@ -115,7 +120,7 @@ def estimates_of(
             apart = _logarithms(other, mode)
             spread = np.maximum(spread, np.abs(apart.values - row.values) + _half_widths(apart, quantile))
         if len(alone) > 1:
-            spread = np.maximum(spread, _scatter([_logarithms(one, mode) for one in alone]))
+            spread = np.maximum(spread, _scatter([_logarithms(one, mode) for one in alone], white_share))
         values = [
             Estimate(value, value * float(np.exp(-half)), value * float(np.exp(half)))
             for value, half in zip(np.exp(row.values), np.minimum(spread, _UNKNOWN), strict=True)
@@ -163,10 +168,10 @@ def _half_widths(row: _Logarithms, quantile: float) -> FloatArray:
     return np.where(usable, quantile * np.sqrt(np.where(usable, variance, 0.0)), _UNKNOWN)
 
 
-def _scatter(taps: Sequence[_Logarithms]) -> FloatArray:
+def _scatter(taps: Sequence[_Logarithms], white_share: float) -> FloatArray:
     """Half widths from the scatter of single taps; 0 where noise explains it."""
     values = np.array([tap.values for tap in taps])
-    expected = np.mean([np.diag(tap.covariance) for tap in taps], axis=0)
+    expected = np.mean([np.diag(tap.covariance) for tap in taps], axis=0) / white_share
     seen = np.var(values, axis=0, ddof=1)
     ratio = seen / np.maximum(expected, np.finfo(float).tiny)
     more = ratio > stats.chi2.ppf(1.0 - _SCATTER_PROBABILITY, len(taps) - 1) / (len(taps) - 1)
@@ -174,7 +179,7 @@ def _scatter(taps: Sequence[_Logarithms]) -> FloatArray:
     return np.where(more, half, 0.0)
 
 
-def rivals_of(order: int, fits: Sequence[Fit]) -> list[Rival]:
+def rivals_of(order: int, fits: Sequence[Fit], white_share: float) -> list[Rival]:
     """Models beside the chosen one that the data do not clearly refuse.
 
     That is the one with a mode more, if chance alone would seldom make it fit so much better.
@@ -182,6 +187,7 @@ def rivals_of(order: int, fits: Sequence[Fit]) -> list[Rival]:
     Args:
         order: number of modes of the chosen model.
         fits: models with 1, 2, ... modes.
+        white_share: of the samples, how many are independent.
 
     Returns:
         None, or the one with a mode more.
@@ -190,7 +196,9 @@ def rivals_of(order: int, fits: Sequence[Fit]) -> list[Rival]:
     if len(fits) <= order:
         return []
     larger = fits[order]
-    gain = chosen.samples * np.log(chosen.sum_of_squares / max(larger.sum_of_squares, np.finfo(float).tiny))
+    gain = (
+        white_share * chosen.samples * np.log(chosen.sum_of_squares / max(larger.sum_of_squares, np.finfo(float).tiny))
+    )
     if gain <= stats.chi2.ppf(1.0 - _RIVAL_PROBABILITY, larger.parameters - chosen.parameters):
         return []
     return [Rival(larger, "with one mode more in the model", "more taps or less noise")]
