@@ -41,7 +41,14 @@ void register_motion(py::module_& module) {
       .def_readwrite("corner_speed_difference_mm_per_s", &MotionLimits::corner_speed_difference_mm_per_s,
                      "Speed step per axis at a corner, shape (3,).")
       .def_readwrite("centripetal_acceleration_mm_per_s2", &MotionLimits::centripetal_acceleration_mm_per_s2,
-                     "Across the path on arcs and along polylines.")
+                     "Across the path on arcs.")
+      .def_readwrite("polyline_acceleration_mm_per_s2", &MotionLimits::polyline_acceleration_mm_per_s2,
+                     "Across the path along polylines.")
+      .def_readwrite("corner_stop_angle_rad", &MotionLimits::corner_stop_angle_rad,
+                     "A corner that turns by as much or more is a stop.")
+      .def_readwrite("junction_deviation_mm", &MotionLimits::junction_deviation_mm,
+                     "A corner is passed as an arc that cuts it by so much.")
+      .def_readwrite("block_time_s", &MotionLimits::block_time_s, "No block is run off faster, s.")
       .def_readwrite("contour_acceleration_mm_per_s2", &MotionLimits::contour_acceleration_mm_per_s2,
                      "Of a change of direction, per axis, on arcs and along polylines, shape (3,).")
       .def_readwrite("feed_override", &MotionLimits::feed_override, "Scales the programmed feeds.")

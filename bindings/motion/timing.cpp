@@ -2,6 +2,7 @@
 
 #include <array>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "arrays.hpp"
@@ -15,6 +16,24 @@ namespace py = pybind11;
 
 namespace shapegcode::bindings {
 namespace {
+
+using SpindleRows = std::vector<std::pair<double, double>>;
+
+SpindleRows spindle_rows(const std::vector<SpindleTime>& times) {
+  SpindleRows rows;
+  for (const SpindleTime& time : times) {
+    rows.emplace_back(time.rev_per_min, time.seconds);
+  }
+  return rows;
+}
+
+std::vector<SpindleTime> spindle_times(const SpindleRows& rows) {
+  std::vector<SpindleTime> times;
+  for (const auto& [rev_per_min, seconds] : rows) {
+    times.push_back({rev_per_min, seconds});
+  }
+  return times;
+}
 
 // Read-only structured array over a vector of rows that lives as long as `base`.
 template <class Row>
@@ -111,7 +130,18 @@ void define_model(py::module_& module) {
       .def_readwrite("rapid_override", &ControllerModel::rapid_override,
                      "Scales the rapid rates; the acceleration of a rapid stays.")
       .def_readwrite("tool_change_s", &ControllerModel::tool_change_s, "M06, s.")
-      .def_readwrite("m_function_s", &ControllerModel::m_function_s, "Every other M code, s.");
+      .def_readwrite("m_function_s", &ControllerModel::m_function_s, "Every M code without a time of its own, s.")
+      .def_readwrite("m_code_s", &ControllerModel::m_code_s, "M codes with a time of their own: code -> s.")
+      .def_readwrite("unknown_move_s", &ControllerModel::unknown_move_s,
+                     "Per axis: a rapid of whose way the program does not tell start or end, s, shape (3,).")
+      .def_property(
+          "spindle_start_s", [](const ControllerModel& self) { return spindle_rows(self.spindle_start_s); },
+          [](ControllerModel& self, const SpindleRows& rows) { self.spindle_start_s = spindle_times(rows); },
+          "(speed in 1/min, s) in which the spindle comes from rest to it.")
+      .def_property(
+          "spindle_stop_s", [](const ControllerModel& self) { return spindle_rows(self.spindle_stop_s); },
+          [](ControllerModel& self, const SpindleRows& rows) { self.spindle_stop_s = spindle_times(rows); },
+          "(speed in 1/min, s) in which the spindle comes from it to rest.");
 
   module.def("for_shaped_blocks", &for_shaped_blocks, py::arg("model"),
              "The same controller while shaped blocks run: block by block at their feed, without look-ahead.");

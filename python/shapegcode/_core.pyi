@@ -707,9 +707,17 @@ class MotionLimits:
     def arc_feed_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def block_time_s(self) -> float:
+        """
+        No block is run off faster, s.
+        """
+    @block_time_s.setter
+    def block_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def centripetal_acceleration_mm_per_s2(self) -> float:
         """
-        Across the path on arcs and along polylines.
+        Across the path on arcs.
         """
     @centripetal_acceleration_mm_per_s2.setter
     def centripetal_acceleration_mm_per_s2(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -729,6 +737,14 @@ class MotionLimits:
         """
     @corner_speed_difference_mm_per_s.setter
     def corner_speed_difference_mm_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def corner_stop_angle_rad(self) -> float:
+        """
+        A corner that turns by as much or more is a stop.
+        """
+    @corner_stop_angle_rad.setter
+    def corner_stop_angle_rad(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def feed_excess_ratio(self) -> float:
@@ -763,6 +779,14 @@ class MotionLimits:
     def jerk_time_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def junction_deviation_mm(self) -> float:
+        """
+        A corner is passed as an arc that cuts it by so much.
+        """
+    @junction_deviation_mm.setter
+    def junction_deviation_mm(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def law(self) -> AccelerationLaw:
         """
         Law of a change of speed.
@@ -793,6 +817,14 @@ class MotionLimits:
         """
     @max_jerk_mm_per_s3.setter
     def max_jerk_mm_per_s3(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def polyline_acceleration_mm_per_s2(self) -> float:
+        """
+        Across the path along polylines.
+        """
+    @polyline_acceleration_mm_per_s2.setter
+    def polyline_acceleration_mm_per_s2(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def time_constant_s(self) -> float:
@@ -4109,9 +4141,17 @@ class ControllerModel:
     def look_ahead_filter_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def m_code_s(self) -> dict[int, float]:
+        """
+        M codes with a time of their own: code -> s.
+        """
+    @m_code_s.setter
+    def m_code_s(self, arg0: collections.abc.Mapping[typing.SupportsInt | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        ...
+    @property
     def m_function_s(self) -> float:
         """
-        Every other M code, s.
+        Every M code without a time of its own, s.
         """
     @m_function_s.setter
     def m_function_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
@@ -4221,6 +4261,22 @@ class ControllerModel:
     def shaped_time_constant_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def spindle_start_s(self) -> list[tuple[float, float]]:
+        """
+        (speed in 1/min, s) in which the spindle comes from rest to it.
+        """
+    @spindle_start_s.setter
+    def spindle_start_s(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
+    def spindle_stop_s(self) -> list[tuple[float, float]]:
+        """
+        (speed in 1/min, s) in which the spindle comes from it to rest.
+        """
+    @spindle_stop_s.setter
+    def spindle_stop_s(self, arg1: collections.abc.Sequence[tuple[typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex]]) -> None:
+        ...
+    @property
     def time_constant_s(self) -> float:
         """
         After interpolation, s (1622).
@@ -4235,6 +4291,14 @@ class ControllerModel:
         """
     @tool_change_s.setter
     def tool_change_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def unknown_move_s(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Per axis: a rapid of whose way the program does not tell start or end, s, shape (3,).
+        """
+    @unknown_move_s.setter
+    def unknown_move_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
         ...
 class ServoLag:
     """

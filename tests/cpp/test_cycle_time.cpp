@@ -97,3 +97,33 @@ TEST_CASE("circle: refuses what is no circle") {
   CHECK_THROWS_AS((void)simulate_circle(10.0, -1.0, ControllerModel()), Error);
   CHECK_THROWS_AS((void)simulate_circle(1e6, 1e-6, ControllerModel()), Error);
 }
+
+TEST_CASE("cycle time: M codes, the spindle that starts and stops while the axes move, ways that are not known") {
+  ReaderOptions options;
+  const Program read = read_program(
+      "%\nO1\nG21 G90 G94\nT1 M6\nG0 X0. Y0. S6000 M3\nG4 P500\nZ5. M8\nG1 Z0. F600.\nM5\nG91 G28 Z0. M9\nM30\n%\n",
+      options);
+  ControllerModel model;
+  model.tool_change_s = 6.0;
+  model.m_function_s = 0.1;
+  model.m_code_s = {{8, 0.4}};
+  model.spindle_start_s = {{4000.0, 1.0}, {12000.0, 5.0}};  // 2 s at 6000
+  model.spindle_stop_s = {{12000.0, 6.0}};                  // 3 s from 6000
+  model.unknown_move_s = {0.7, 0.8, 0.9};
+  const CycleTime time = time_program(read, model, true);
+  CHECK(time.parts.tool_change_s == doctest::Approx(6.0));
+  // M03 takes .1 s and the way in X and Y .8, then .5 of dwell: of the start .6 s are left before M08's .4. Z from a
+  // place not known: .9. M05 .1, way of G28 .9, M09 .1: of the stop 3 - .1 - .9 - .1 are left before M30's .1.
+  CHECK(time.parts.function_s == doctest::Approx(0.1 + 0.8 + (2.0 - 0.1 - 0.8 - 0.5) + 0.4 + 0.9 + 0.1 + 0.1 + 0.9 +
+                                                 (3.0 - 0.1 - 0.1 - 0.9) + 0.1));
+  const InterpolatedTime played = interpolate_program(read, model);
+  CHECK(played.function_s == doctest::Approx(time.parts.function_s));
+  CHECK(played.tool_change_s == doctest::Approx(6.0));
+  // A cut right behind M03 waits for the whole start.
+  const Program cut = program("G21 G90 G94 G0 X0. Y0. Z0.\nS12000 M3\nG1 X10. F600.");
+  model.unknown_move_s.setZero();
+  CHECK(time_program(cut, model).parts.function_s == doctest::Approx(5.0 + 0.1));  // M03 passes within it; M30
+  CHECK(interpolate_program(cut, model).function_s == doctest::Approx(5.1));
+  model.spindle_start_s = {{4000.0, 1.0}, {3000.0, 5.0}};
+  CHECK_THROWS_AS((void)time_program(cut, model), Error);
+}

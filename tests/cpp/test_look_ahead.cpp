@@ -205,6 +205,32 @@ TEST_CASE("look-ahead: an arc's feed ratio and centripetal limit") {
   CHECK(segment_speed_limit(arc, MotionLimits{}, contour) == doctest::Approx(20.0));
 }
 
+TEST_CASE("look-ahead: the acceleration of a circle turns with it, jerk v^3 / r^2; no block faster than it is read") {
+  const Segment arc = make_arc({20, 0, 0}, {40, 20, 0}, {20, 20, 0}, pi / 2, 2, 200.0);
+  MotionLimits limits;
+  limits.max_jerk_mm_per_s3 = {2500.0, 2600.0, 1.0};  // cbrt(2500 * 400) = 100; Z does not move
+  CHECK(segment_speed_limit(arc, limits) == doctest::Approx(100.0));
+  CHECK(segment_speed_limit(make_line({0, 0, 0}, {1, 0, 0}, 200.0), limits) == doctest::Approx(200.0));
+  limits = MotionLimits{};
+  limits.block_time_s = 0.01;
+  CHECK(segment_speed_limit(make_line({0, 0, 0}, {1, 0, 0}, 200.0), limits) == doctest::Approx(100.0));
+}
+
+TEST_CASE("look-ahead: corners by junction deviation, and as stops") {
+  const Segment along_x = make_line({0, 0, 0}, {10, 0, 0}, 100.0);
+  const Segment along_y = make_line({10, 0, 0}, {10, 10, 0}, 100.0);
+  MotionLimits limits;
+  limits.max_acceleration_mm_per_s2 = {1000.0, 2000.0, none};
+  limits.junction_deviation_mm = 0.01;
+  // The turn points along (-1, 1) / sqrt(2): X allows 1000 sqrt(2). The arc: r = 0.01 / (sqrt(2) - 1).
+  CHECK(corner_speed_limit(along_x, along_y, limits) ==
+        doctest::Approx(std::sqrt(1000.0 * std::sqrt(2.0) * 0.01 / (std::sqrt(2.0) - 1.0))));
+  limits.corner_stop_angle_rad = 0.51 * pi;
+  CHECK(corner_speed_limit(along_x, along_y, limits) > 1.0);
+  limits.corner_stop_angle_rad = 0.5 * pi - 1e-9;
+  CHECK(corner_speed_limit(along_x, along_y, limits) < 0.01);
+}
+
 TEST_CASE("look-ahead: speed difference at corners of 90, 180 and 0 degrees") {
   MotionLimits limits;
   limits.corner_speed_difference_mm_per_s = {8.0, 5.0, none};
@@ -343,6 +369,12 @@ TEST_CASE("look-ahead: refuses limits that are not positive and segments without
     limits = MotionLimits{};
     limits.centripetal_acceleration_mm_per_s2 = bad;
     CHECK_THROWS_AS((void)plan_speed(path, limits), Error);
+    for (double MotionLimits::*limit : {&MotionLimits::polyline_acceleration_mm_per_s2,
+                                        &MotionLimits::junction_deviation_mm, &MotionLimits::corner_stop_angle_rad}) {
+      limits = MotionLimits{};
+      limits.*limit = bad;
+      CHECK_THROWS_AS((void)plan_speed(path, limits), Error);
+    }
     CHECK_THROWS_AS((void)plan_speed(straight(10.0, bad), MotionLimits{}), Error);
   }
   MotionLimits limits;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -110,12 +111,30 @@ class Judge {
     const double angle = std::acos(std::clamp(before.dot(after), -1.0, 1.0));
     const double bend = angle / (0.5 * (path_[i - 1].length_mm + path_[i].length_mm));
     if (angle > 1e-5) {
-      worst.corner_speed =
-          std::max(worst.corner_speed, speed * speed * bend / limits_.centripetal_acceleration_mm_per_s2);
+      worst.corner_speed = std::max(worst.corner_speed, speed * speed * bend / limits_.polyline_acceleration_mm_per_s2);
+      worst.corner_speed = std::max(worst.corner_speed, speed * speed / deviating_squared(before, after, angle));
+    }
+    if (angle >= limits_.corner_stop_angle_rad) {
+      worst.corner_speed = std::max(worst.corner_speed, speed / 2e-3);
     }
   }
 
  private:
+  // v^2 of the rule of junction deviation, from the radius of the arc that is tangent to both sides and stays within
+  // the deviation of the corner: r = d / (1 / sin(half of the inner angle) - 1).
+  [[nodiscard]] double deviating_squared(const Vector3& before, const Vector3& after, double angle) const {
+    const double inner = std::sin(0.5 * (std::numbers::pi - angle));
+    const double radius = inner < 1.0 ? limits_.junction_deviation_mm / (1.0 / inner - 1.0) : MotionLimits::none;
+    const Vector3 turn = (after - before).normalized();
+    double acceleration = MotionLimits::none;
+    for (int k = 0; k < 3; ++k) {
+      if (turn[k] != 0.0) {
+        acceleration = std::min(acceleration, limits_.max_acceleration_mm_per_s2[k] / std::abs(turn[k]));
+      }
+    }
+    return std::max(acceleration * radius, 1e-6);
+  }
+
   const Path& path_;
   const MotionLimits& limits_;
   std::size_t cursor_ = 0;
@@ -129,6 +148,7 @@ MotionLimits all_limits(AccelerationLaw law) {
   limits.max_acceleration_mm_per_s2 = {3000.0, 2000.0, 900.0};
   limits.corner_speed_difference_mm_per_s = {15.0, 12.0, 6.0};
   limits.centripetal_acceleration_mm_per_s2 = 800.0;
+  limits.polyline_acceleration_mm_per_s2 = 800.0;
   limits.arc_feed_ratio = 0.8;
   return limits;
 }
@@ -139,7 +159,13 @@ TEST_CASE("look-ahead: no limit is passed anywhere on random paths, sampled") {
   std::mt19937_64 generator(101);
   for (int round = 0; round < 120; ++round) {
     const auto law = round % 2 == 0 ? AccelerationLaw::constant_time : AccelerationLaw::jerk_limited;
-    const MotionLimits limits = all_limits(law);
+    MotionLimits limits = all_limits(law);
+    if (round % 5 == 0) {
+      limits.junction_deviation_mm = 0.005;
+    }
+    if (round % 7 == 0) {
+      limits.corner_stop_angle_rad = 1.0;
+    }
     const Path path(random_segments(generator, 40, round % 3 != 0, 20.0));
     const SpeedProfile profile = plan_speed(path, limits);
     CAPTURE(round);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <span>
 #include <vector>
@@ -109,6 +110,12 @@ enum class ShapedRegions : std::uint8_t {
   none,
 };
 
+/// What the spindle needs to reach a speed, or to stop from it.
+struct SpindleTime {
+  double rev_per_min = 0.0;
+  double seconds = 0.0;
+};
+
 /// Everything that decides how long a program takes on a controller, and what its acceleration does to the path.
 /// Plain values; the numbers in the comments are FANUC parameters.
 struct ControllerModel {
@@ -142,10 +149,14 @@ struct ControllerModel {
   double shaped_bell_time_s = 0.0;                        ///< likewise, linear: second moving average; 0: none
   BlockEnd shaped_block_end = BlockEnd::ceil;             ///< between shaped blocks
 
-  double feed_override = 1.0;   ///< scales every programmed feed
-  double rapid_override = 1.0;  ///< scales the rapid rates; the acceleration of a rapid stays what it is
-  double tool_change_s = 0.0;   ///< M06
-  double m_function_s = 0.0;    ///< every other M code
+  double feed_override = 1.0;                ///< scales every programmed feed
+  double rapid_override = 1.0;               ///< scales the rapid rates; the acceleration of a rapid stays what it is
+  double tool_change_s = 0.0;                ///< M06
+  double m_function_s = 0.0;                 ///< every other M code that `m_code_s` does not name
+  std::map<int, double> m_code_s;            ///< M codes with a time of their own
+  std::vector<SpindleTime> spindle_start_s;  ///< from rest, by speed; it passes while the axes move; empty: none
+  std::vector<SpindleTime> spindle_stop_s;   ///< likewise to rest
+  Vector3 unknown_move_s = Vector3::Zero();  ///< of a rapid of whose way the program does not tell start or end
 };
 
 /// The same controller while shaped blocks run: block by block at their feed, without look-ahead.

@@ -30,10 +30,14 @@ struct MotionLimits {
   Vector3 max_acceleration_mm_per_s2 = Vector3::Constant(none);
   Vector3 max_jerk_mm_per_s3 = Vector3::Constant(none);
   Vector3 corner_speed_difference_mm_per_s = Vector3::Constant(none);  ///< per axis at a corner
-  double centripetal_acceleration_mm_per_s2 = none;                    ///< on arcs and along polylines (1735)
-  Vector3 contour_acceleration_mm_per_s2 = Vector3::Constant(none);    ///< per axis, of a change of direction (1737)
-  double feed_override = 1.0;                                          ///< scales the programmed feeds
-  double arc_feed_ratio = 1.0;                                         ///< feed on arcs relative to the programmed feed
+  double corner_stop_angle_rad = none;  ///< a corner that turns by as much or more is a stop
+  double block_time_s = 0.0;            ///< no block is run off faster: what the control needs to read one
+  double junction_deviation_mm = none;  ///< a corner is passed as an arc that cuts it by so much, at its acceleration
+  double centripetal_acceleration_mm_per_s2 = none;                  ///< on arcs (1735)
+  double polyline_acceleration_mm_per_s2 = none;                     ///< the same along polylines
+  Vector3 contour_acceleration_mm_per_s2 = Vector3::Constant(none);  ///< per axis, of a change of direction (1737)
+  double feed_override = 1.0;                                        ///< scales the programmed feeds
+  double arc_feed_ratio = 1.0;                                       ///< feed on arcs relative to the programmed feed
   /// A lower programmed feed is reached so long before its segment, and left so long behind it: what follows the
   /// look-ahead mixes the motion of this time to both sides.
   double feed_spread_s = 0.0;

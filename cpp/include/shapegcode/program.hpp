@@ -160,6 +160,8 @@ struct MachineFunction {
   int m_count = 0;
   std::int64_t tool = -1;             ///< T, -1 if the block has none
   double spindle_rev_per_min = -1.0;  ///< S, -1 if the block has none
+  /// Axes that the block moves in rapid on a way of which start or end is not known (behind M06, G28, G30, G53).
+  std::array<bool, axis_count> unknown_way = {false, false, false};
 };
 
 enum class StepKind : std::uint8_t { region, move, function };

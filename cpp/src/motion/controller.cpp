@@ -30,6 +30,15 @@ void add_average(std::vector<Fir>& filters, double time_s, double period_s) {
   }
 }
 
+void require_ascending(const char* name, const std::vector<SpindleTime>& table) {
+  double below = 0.0;
+  for (const SpindleTime& row : table) {
+    require(row.rev_per_min > below, name, row.rev_per_min, "1/min", "above the row before");
+    require_wait(name, row.seconds);
+    below = row.rev_per_min;
+  }
+}
+
 }  // namespace
 
 ControllerModel for_shaped_blocks(const ControllerModel& model) {
@@ -52,6 +61,11 @@ void check(const ControllerModel& model) {
   require_ramp("rapid bell time", model.rapid_bell_time_s);
   require_wait("tool change", model.tool_change_s);
   require_wait("M function", model.m_function_s);
+  for (const auto& [code, seconds] : model.m_code_s) {
+    require_wait("M code", seconds);
+  }
+  require_ascending("start of the spindle", model.spindle_start_s);
+  require_ascending("stop of the spindle", model.spindle_stop_s);
   require(model.exponential_rest > 0.0 && model.exponential_rest < 1.0, "share left of the exponential",
           model.exponential_rest, "", "between 0 and 1");
   require_above_zero(model.feed_override, "feed override", "");
@@ -62,6 +76,7 @@ void check(const ControllerModel& model) {
     require_above_zero(model.rapid_rate_mm_per_s[i], "rapid rate", "mm/s");
     require_ramp("rapid time constant", model.rapid_time_constant_s[i]);
     require_wait("in-position wait", model.in_position_s[i]);
+    require_wait("way that is not known", model.unknown_move_s[i]);
     require_above_zero(model.position_gain_per_s[i], "position gain", "1/s");
     require_above_zero(model.in_position_width_mm[i], "in-position width", "mm");
     require(model.feed_forward_ratio[i] >= 0.0 && model.feed_forward_ratio[i] <= 1.0, "feed-forward ratio",

@@ -20,6 +20,9 @@ struct Piece {
   double start_speed = 0.0;
 };
 
+// The planner wants a speed at every junction; this one is a stop to every purpose.
+constexpr double standstill_mm_per_s = 1e-3;
+
 // Infinity switches a limit off.
 void require_limit(double value, const char* name, const char* unit) { require(value > 0.0, name, value, unit, "> 0"); }
 
@@ -32,6 +35,10 @@ void check_limits(const MotionLimits& limits, const FilterTolerance& filter) {
   require_not_below_zero(limits.feed_excess_ratio, "excess of feeds", "");
   require_limit(filter.contour_tolerance_mm, "contour tolerance", "mm");
   require_limit(limits.centripetal_acceleration_mm_per_s2, "centripetal acceleration", "mm/s2");
+  require_limit(limits.polyline_acceleration_mm_per_s2, "acceleration along polylines", "mm/s2");
+  require_limit(limits.junction_deviation_mm, "junction deviation", "mm");
+  require_not_below_zero(limits.block_time_s, "block time", "s");
+  require_limit(limits.corner_stop_angle_rad, "angle of corners that are stops", "rad");
   for (int i = 0; i < axis_count; ++i) {
     require_limit(limits.max_feed_mm_per_s[i], "axis feed limit", "mm/s");
     require_limit(limits.max_acceleration_mm_per_s2[i], "axis acceleration limit", "mm/s2");
@@ -75,6 +82,18 @@ double arc_centripetal_limit(const Segment& segment, const MotionLimits& limits)
   return limit;
 }
 
+// The acceleration of a circle turns with it: jerk v^3 / r^2.
+double arc_jerk_speed(const Segment& segment, const MotionLimits& limits) noexcept {
+  double jerk = MotionLimits::none;
+  for (int i = 0; i < axis_count; ++i) {
+    if (i != segment.normal) {
+      jerk = std::min(jerk, limits.max_jerk_mm_per_s3[i]);
+    }
+  }
+  const double bend = curvature(segment);
+  return std::isfinite(jerk) && bend > 0.0 ? std::cbrt(jerk / (bend * bend)) : MotionLimits::none;
+}
+
 double segment_acceleration(const Segment& segment, double speed_limit, const MotionLimits& limits) noexcept {
   double axes = tangential_limit(axis_share(segment), limits.max_acceleration_mm_per_s2);
   if (segment.kind == SegmentKind::arc && std::isfinite(axes)) {
@@ -100,6 +119,13 @@ double polyline_curvature(const Segment& before, const Segment& after, double an
 // no axis more than its contour acceleration: a = |change| v^2 / reach.
 double contour_speed(const Vector3& change, double reach, const MotionLimits& limits) noexcept {
   return std::sqrt(tangential_limit(change.cwiseAbs(), limits.contour_acceleration_mm_per_s2) * reach);
+}
+
+// Speed on the arc that is tangent to both sides of a corner and cuts it by the deviation: a d c / (1 - c), c the
+// cosine of half the turn. (Sonny Jeon's rule of grbl, 2011.)
+double junction_deviation_speed(double angle, double acceleration, double deviation_mm) noexcept {
+  const double cosine = std::cos(0.5 * angle);
+  return std::sqrt(acceleration * deviation_mm * cosine / (1.0 - cosine));
 }
 
 double curvature_speed(double curvature_per_mm, double centripetal, const FilterTolerance& filter,
@@ -387,6 +413,10 @@ double segment_speed_limit(const Segment& segment, const MotionLimits& limits, c
     speed *= limits.arc_feed_ratio;
     speed = std::min(speed, curvature_speed(curvature(segment), arc_centripetal_limit(segment, limits), filter,
                                             filter.contour_tolerance_mm));
+    speed = std::min(speed, arc_jerk_speed(segment, limits));
+  }
+  if (limits.block_time_s > 0.0 && segment.length_mm > 0.0) {
+    speed = std::min(speed, segment.length_mm / limits.block_time_s);
   }
   return std::min(speed, axis_feed_limit(segment, limits));
 }
@@ -403,7 +433,15 @@ double corner_speed_limit(const Segment& before, const Segment& after, const Mot
   const double angle = 2.0 * std::asin(std::min(1.0, 0.5 * size));
   const double tolerance = filter.corner_share * filter.contour_tolerance_mm;
   speed = std::min(speed, curvature_speed(polyline_curvature(before, after, angle),
-                                          limits.centripetal_acceleration_mm_per_s2, filter, tolerance));
+                                          limits.polyline_acceleration_mm_per_s2, filter, tolerance));
+  if (angle >= limits.corner_stop_angle_rad) {
+    speed = std::min(speed, standstill_mm_per_s);
+  }
+  if (limits.junction_deviation_mm < MotionLimits::none) {
+    const double acceleration = tangential_limit(change.cwiseAbs() / size, limits.max_acceleration_mm_per_s2);
+    speed = std::min(speed, std::max(standstill_mm_per_s,
+                                     junction_deviation_speed(angle, acceleration, limits.junction_deviation_mm)));
+  }
   speed = std::min(speed, contour_speed(change, polyline_reach(before, after), limits));
   if (filter.mean_deviation_s > 0.0) {
     // A filter of symmetric spread passes the corner at |change| * (v*E|t| + a*E[t^2]/2) / 2: what the speed at the

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 
+#include "play/function_clock.hpp"
 #include "play/program_runs.hpp"
 #include "shapegcode/control.hpp"
 #include "shapegcode/error.hpp"
@@ -21,6 +22,7 @@ class Clock {
         model_(model),
         per_block_(per_block),
         limits_(detail::overridden_limits(model)),
+        function_clock_(model),
         ordinary_(model),
         shaped_(for_shaped_blocks(model)),
         changes_by_t_(!detail::has_tool_change(program)) {}
@@ -58,6 +60,7 @@ class Clock {
   };
 
   void region(const Region& region) {
+    wait_for_spindle(region.first_line);
     RegionTime row;
     row.first_line = region.first_line;
     row.last_line = region.last_line;
@@ -77,6 +80,7 @@ class Clock {
   std::size_t other_move(std::size_t at) {
     const OtherMove& move = program_.other_moves[program_.steps[at].index];
     if (detail::is_cutting(move)) {
+      wait_for_spindle(move.segment.line);
       std::vector<Segment> run;
       at = detail::gather_run(program_, at, run);
       const bool stop = run.back().stop_at_end;
@@ -111,11 +115,21 @@ class Clock {
     if ((changes > 0 && selected_ >= 0) || (changes_by_t_ && function.tool >= 0)) {
       select_tool(selected_, line);
     }
-    if (!codes.empty()) {
+    const detail::FunctionWait wait = function_clock_.functions(function, now_s());
+    if (!codes.empty() || wait.function_s > 0.0) {
       TimeParts parts;
-      parts.tool_change_s = static_cast<double>(changes) * model_.tool_change_s;
-      parts.function_s = static_cast<double>(function.m_count - changes) * model_.m_function_s;
+      parts.tool_change_s = wait.tool_change_s;
+      parts.function_s = wait.function_s;
       note(line, changes > 0 ? BlockKind::tool_change : BlockKind::function, parts, 0.0);
+      add(parts);
+    }
+  }
+
+  void wait_for_spindle(std::uint32_t line) {
+    TimeParts parts;
+    parts.function_s = function_clock_.before_cut(now_s());
+    if (parts.function_s > 0.0) {
+      note(line, BlockKind::function, parts, 0.0);
       add(parts);
     }
   }
@@ -210,6 +224,7 @@ class Clock {
   const ControllerModel& model_;
   bool per_block_;
   MotionLimits limits_;
+  detail::FunctionClock function_clock_;
   Playing ordinary_;
   Playing shaped_;
   bool changes_by_t_;

@@ -81,6 +81,10 @@ bool is_cutting(const OtherMove& move) noexcept {
   return !(move.dwell_s > 0.0) && move.segment.kind != SegmentKind::rapid;
 }
 
+bool cuts(const Program& program, const ProgramStep& step) noexcept {
+  return step.kind == StepKind::region || (step.kind == StepKind::move && is_cutting(program.other_moves[step.index]));
+}
+
 std::size_t gather_run(const Program& program, std::size_t at, std::vector<Segment>& run) {
   for (; at < program.steps.size(); ++at) {
     const ProgramStep& step = program.steps[at];

@@ -21,6 +21,9 @@ inline constexpr int tool_change_code = 6;
 /// A cutting move outside of the regions: neither a rapid nor a dwell.
 [[nodiscard]] bool is_cutting(const OtherMove& move) noexcept;
 
+/// Whether a step of the program is a cut, in a region or outside.
+[[nodiscard]] bool cuts(const Program& program, const ProgramStep& step) noexcept;
+
 /// Collects the cutting moves from step `at` on that follow each other without a stop; returns the step behind them.
 [[nodiscard]] std::size_t gather_run(const Program& program, std::size_t at, std::vector<Segment>& run);
 

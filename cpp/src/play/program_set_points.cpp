@@ -44,6 +44,7 @@ ProgramSetPoints::ProgramSetPoints(const Program& program, const ControllerModel
       waits_(waits),
       filters_(acceleration_filters(model)),
       shaped_filters_(acceleration_filters(shaped_model_)),
+      function_clock_(model),
       servo_(model.position_gain_per_s, model.feed_forward_ratio, model.period_s) {
   time_.region_s.reserve(program_.regions.size());
   set_point_ = first_position();
@@ -110,6 +111,9 @@ bool ProgramSetPoints::open_step() {
   }
   const ProgramStep& step = program_.steps[at_];
   next_.line = step.line;
+  if (detail::cuts(program_, step) && wait_for_spindle()) {
+    return true;
+  }
   switch (step.kind) {
     case StepKind::region: {
       const Region& region = *program_.regions[step.index];
@@ -141,19 +145,27 @@ void ProgramSetPoints::end_region() {
 }
 
 void ProgramSetPoints::open_functions(const MachineFunction& function) {
-  double tool_change_s = 0.0;
-  double function_s = 0.0;
-  for (int k = 0; k < function.m_count; ++k) {
-    const bool changes = function.m_codes[static_cast<std::size_t>(k)] == tool_change_code;
-    (changes ? tool_change_s : function_s) += changes ? model_.tool_change_s : model_.m_function_s;
-  }
-  time_.tool_change_s += tool_change_s;
-  time_.function_s += function_s;
-  next_.kind = tool_change_s > 0.0 ? BlockKind::tool_change : BlockKind::function;
+  const FunctionWait wait = function_clock_.functions(function, elapsed_s());
+  time_.tool_change_s += wait.tool_change_s;
+  time_.function_s += wait.function_s;
+  next_.kind = wait.tool_change_s > 0.0 ? BlockKind::tool_change : BlockKind::function;
   // A machine function needs no servo loop: the time's full interpolation leaves it out.
   if (waits_ == Waits::played) {
-    open_wait(tool_change_s + function_s);
+    open_wait(wait.tool_change_s + wait.function_s);
   }
+}
+
+bool ProgramSetPoints::wait_for_spindle() {
+  const double wait_s = function_clock_.before_cut(elapsed_s());
+  if (wait_s <= tick_slack * model_.period_s) {
+    return false;
+  }
+  time_.function_s += wait_s;
+  next_.kind = BlockKind::function;
+  if (waits_ == Waits::played) {
+    open_wait(wait_s);
+  }
+  return true;
 }
 
 void ProgramSetPoints::open_other_move(std::uint32_t line) {
@@ -292,6 +304,11 @@ void ProgramSetPoints::give(const Vector3& position) {
   }
   set_point_ = position;
   servo_.step(position);
+}
+
+double ProgramSetPoints::elapsed_s() const noexcept {
+  return (periods_cutting_ + periods_rapid_ + periods_waiting_) * model_.period_s + measured_s_ + time_.dwell_s +
+         time_.tool_change_s + time_.function_s;
 }
 
 InterpolatedTime ProgramSetPoints::time() const {

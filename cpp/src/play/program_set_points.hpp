@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "play/filter_chain.hpp"
+#include "play/function_clock.hpp"
 #include "shapegcode/control.hpp"
 #include "shapegcode/motion.hpp"
 #include "shapegcode/plant/servo_lag.hpp"
@@ -78,6 +79,10 @@ class ProgramSetPoints {
   /// Begins the next step of the program; false if there is none.
   bool open_step();
   void open_functions(const MachineFunction& function);
+  /// Opens what is left of the spindle's time before a cut; false if nothing is.
+  bool wait_for_spindle();
+  /// Since the start of the program.
+  [[nodiscard]] double elapsed_s() const noexcept;
   void open_other_move(std::uint32_t line);
   void open_rapid(const Segment& segment);
   void open_cut(const std::shared_ptr<const Path>& programmed, bool exact_stop, bool is_region, bool shaped);
@@ -96,6 +101,7 @@ class ProgramSetPoints {
   Waits waits_;
   FilterChain filters_;
   FilterChain shaped_filters_;
+  FunctionClock function_clock_;
   ServoLag servo_;
   std::variant<std::monostate, Cut, Rapid, Wait, InPositionWait> active_;
   std::size_t at_ = 0;  // step of the program that comes next

@@ -94,6 +94,27 @@ class Controller(TomlTable):
         default=1000.0,
         assumed=True,
     )
+    polyline_acceleration_mm_s2: Positive | None = key(
+        "the same along polylines, where two lines meet; left out: as in arcs",
+        unit="mm/s²",
+        default=None,
+    )
+    junction_deviation_mm: Annotated[Positive, Field(le=10)] | None = key(
+        "look-ahead that passes a corner as an arc which cuts it by so much, at the acceleration of its axes (GRBL and "
+        "others, not FANUC); left out: no such rule",
+        unit="mm",
+        default=None,
+    )
+    corner_stop_angle_deg: Annotated[Positive, Field(le=180)] | None = key(
+        "look-ahead that stops at corners which turn by as much or more (not FANUC); left out: no such rule",
+        unit="degrees",
+        default=None,
+    )
+    look_ahead_block_time_s: Annotated[NonNegative, Field(le=1)] = key(
+        "look-ahead runs no block off faster than it reads one; 0: not limited",
+        unit="s",
+        default=0.0,
+    )
     contour_acceleration_mm_s2: PositiveAxisValues | None = key(
         "largest acceleration of an axis along a contour, corners and curves alike; left out: not limited. One "
         "number, or x, y, z",
@@ -265,13 +286,6 @@ class Controller(TomlTable):
     def holds_macros(self) -> bool:
         """Whether macro statements may stand in a program: the control has them, and is not drip fed."""
         return self.macros and self.dnc_baud == 0
-
-
-class Times(TomlTable):
-    """What takes time beside the motion."""
-
-    tool_change_s: Annotated[NonNegative, Field(le=3600)] = key("an M06", unit="s", default=0.0, assumed=True)
-    m_function_s: Annotated[NonNegative, Field(le=3600)] = key("any other M code", unit="s", default=0.0, assumed=True)
 
 
 class PowerOn(TomlTable):

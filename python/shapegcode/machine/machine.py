@@ -19,11 +19,12 @@ from pydantic import Field, PrivateAttr, Strict, model_validator
 
 from shapegcode.errors import MachineError, Problem
 from shapegcode.machine.axes import Axes, Axis, AxisMode
-from shapegcode.machine.controller import Controller, PowerOn, Times
+from shapegcode.machine.controller import Controller, PowerOn
 from shapegcode.machine.drive import Drive
 from shapegcode.machine.feed import FeedControl
 from shapegcode.machine.input import Input
 from shapegcode.machine.output import Emission, Shaping, Tolerance, Verdict
+from shapegcode.machine.times import Times
 from shapegcode.settings import change
 from shapegcode.settings.describe import documentation, values_of, write_toml
 from shapegcode.settings.keys import KeyInfo, KeyValue, PerAxis, Text, TomlTable, key, toml

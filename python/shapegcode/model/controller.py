@@ -48,8 +48,13 @@ def controller_model(
     model.shaped_bell_time_s = controller.shaped_bell_time_s
     model.feed_override = feed_override
     model.rapid_override = rapid_override
-    model.tool_change_s = machine.times.tool_change_s
-    model.m_function_s = machine.times.m_function_s
+    times = machine.times
+    model.tool_change_s = times.tool_change_s
+    model.m_function_s = times.m_function_s
+    model.m_code_s = dict(zip(times.m_codes.code, times.m_codes.s, strict=True)) if times.m_codes else {}
+    model.spindle_start_s = times.spindle_start.rows if times.spindle_start else []
+    model.spindle_stop_s = times.spindle_stop.rows if times.spindle_stop else []
+    model.unknown_move_s = times.unknown_move_s.as_tuple()
     return model
 
 
@@ -72,13 +77,22 @@ def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.Mot
     limits.jerk_time_s = controller.bell_time_s
     limits.max_feed_mm_per_s = [axis.max_feed_mm_per_min / 60.0 for axis in axes]
     limits.max_acceleration_mm_per_s2 = [axis.max_acceleration_mm_s2 for axis in axes]
-    limits.max_jerk_mm_per_s3 = [math.inf if axis.max_jerk_mm_s3 is None else axis.max_jerk_mm_s3 for axis in axes]
+    limits.max_jerk_mm_per_s3 = [_limit(axis.max_jerk_mm_s3) for axis in axes]
     # 0 means a stop at every corner; the planner wants a speed, and this one is a stop to every purpose.
     limits.corner_speed_difference_mm_per_s = [
         max(value / 60.0, 1e-3) for value in controller.corner_speed_difference_mm_per_min.as_tuple()
     ]
     limits.centripetal_acceleration_mm_per_s2 = controller.centripetal_acceleration_mm_s2
+    along = controller.polyline_acceleration_mm_s2
+    limits.polyline_acceleration_mm_per_s2 = controller.centripetal_acceleration_mm_s2 if along is None else along
+    limits.junction_deviation_mm = _limit(controller.junction_deviation_mm)
+    limits.corner_stop_angle_rad = math.radians(_limit(controller.corner_stop_angle_deg))
+    limits.block_time_s = controller.look_ahead_block_time_s
     if controller.contour_acceleration_mm_s2 is not None:
         limits.contour_acceleration_mm_per_s2 = controller.contour_acceleration_mm_s2.as_tuple()
     limits.arc_feed_ratio = arc_feed_ratio
     return limits
+
+
+def _limit(value: float | None) -> float:
+    return math.inf if value is None else value

@@ -82,6 +82,19 @@ void Interpreter::forget_axes(std::uint32_t letters) noexcept {
   }
 }
 
+void Interpreter::unknown_way(std::uint32_t letters, bool from_unknown) {
+  MachineFunction function;
+  for (std::size_t axis = 0; axis < axis_count; ++axis) {
+    const bool named = ((letters >> (static_cast<std::size_t>('X' - 'A') + axis)) & 1U) != 0;
+    function.unknown_way[axis] = named && !(from_unknown && state_.known[axis]);
+  }
+  if (std::ranges::find(function.unknown_way, true) != function.unknown_way.end()) {
+    close_region();
+    add_step(StepKind::function, program_.functions.size());
+    program_.functions.push_back(function);
+  }
+}
+
 void Interpreter::note(std::size_t segment) {
   RegionNote entry;
   entry.segment = static_cast<std::uint32_t>(segment);
@@ -202,6 +215,7 @@ void Interpreter::execute(const ParsedBlock& block, std::uint32_t line, const Li
     ++program_.block_count;
   }
   read_header_comments();
+  steps_before_block_ = program_.steps.size();
   const ModalState before = state_;
   const std::uint32_t foreign_before = foreign_;
   LineFlow flow;

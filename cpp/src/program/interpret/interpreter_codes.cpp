@@ -125,6 +125,7 @@ void Interpreter::reference_code(int g_tenths) {
     refuse_in_cycle(g_tenths);
   }
   one_shot_axes_ = true;
+  unknown_way(words().has_any(axis_letters) ? words().present : axis_letters, false);
   if (words().has_any(axis_letters)) {
     forget_axes(words().present);
   } else {
@@ -326,6 +327,12 @@ void Interpreter::change_coordinates(int number, int extra) {
   }
 }
 
+namespace {
+
+bool ends_something(int code) noexcept { return code <= 2 || code == 5 || code == 9 || code == 30; }
+
+}  // namespace
+
 void Interpreter::m_codes(LineFlow& flow) {
   if (words().has_any(letter_mask("MST"))) {
     close_region();
@@ -344,6 +351,13 @@ void Interpreter::m_codes(LineFlow& flow) {
     }
     add_step(StepKind::function, program_.functions.size());
     program_.functions.push_back(function);
+    // The spindle, the coolant and the like start with the block's move, what ends something follows it.
+    if (std::ranges::none_of(codes, ends_something)) {
+      const auto moves =
+          std::find_if(program_.steps.begin() + static_cast<std::ptrdiff_t>(steps_before_block_), program_.steps.end(),
+                       [](const ProgramStep& step) { return step.kind != StepKind::region; });
+      std::rotate(moves, program_.steps.end() - 1, program_.steps.end());
+    }
   }
   for (int k = 0; k < words().m_count; ++k) {
     flow.stop = true;

@@ -120,9 +120,13 @@ class Interpreter {
   [[nodiscard]] bool target(Vector3& end, std::array<bool, 3>& known_after, bool& relative) const noexcept;
   [[nodiscard]] Segment cutting_segment(const Vector3& end) const;
   void forget_axes(std::uint32_t letters) noexcept;
+  /// Notes a rapid of the axes that are named on a way of which start or end is not known, for the clock;
+  /// `from_unknown`: only of those whose position is not known now.
+  void unknown_way(std::uint32_t letters, bool from_unknown);
 
   const ReaderOptions& options_;
   Program& program_;
+  std::size_t steps_before_block_ = 0;
   ModalState state_;
   Offsets offsets_;
   const ParsedBlock* block_ = nullptr;  ///< the one that is executed

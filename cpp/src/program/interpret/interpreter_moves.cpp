@@ -138,6 +138,7 @@ void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t beg
     bool relative = false;
     const bool measurable = target(to, known_after, relative);
     if (foreign_ == 0) {
+      unknown_way(words().present, true);
       OtherMove rapid{make_line(measurable ? state_.position_mm : to, to, 0.0, line_number_), 0.0};
       rapid.segment.kind = SegmentKind::rapid;
       add_move(rapid);
