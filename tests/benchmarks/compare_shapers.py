@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
+import closed_rival
 import numpy as np
 from table import markdown
 
@@ -64,6 +65,7 @@ WAYS = (
     Way("`zvd`", "zvd"),
     Way("`ei`", "ei"),
     Way("`mzv`", "mzv"),
+    Way("`smooth-zv`", "smooth-zv"),
     Way("`minimal`, times rounded ¹", "minimal"),
     Way("`non-negative`: exact on the grid", "non-negative"),
     Way("`robust`, ±10 % ²", "robust", band=max(BANDS)),
@@ -139,7 +141,7 @@ def _with_grid(way: Way, machine: sg.Machine) -> AbstractContextManager[Any]:
         return nullcontext()
     # The conversion has no design that ignores its grid; here it is given one.
     grid = rounded_minimal(machine)
-    return mock.patch.object(converter, "choose_grid", lambda *_: grid)
+    return mock.patch.object(converter, "choose_grid", lambda *_, **__: grid)
 
 
 def convert(program: Path, way: Way, contour_um: float, finer: int = 0) -> Outcome:
@@ -147,7 +149,7 @@ def convert(program: Path, way: Way, contour_um: float, finer: int = 0) -> Outco
     machine = machine_of(way, contour_um, finer)
     try:
         with _with_grid(way, machine):
-            conversion = sg.convert(program, machine)
+            conversion = sg.convert(program, machine, shape_all=True)
     except _core.DesignError as error:
         return Outcome(way.name, refusal=str(error))
     report = conversion.to_dict()
@@ -256,7 +258,7 @@ def _time(each: Outcome, before_s: float) -> str:
 
 def _ideal_note() -> str:
     """What rounding does to the minimal shaper."""
-    machine = machine_of(WAYS[4], WIDE_UM)
+    machine = machine_of(next(way for way in WAYS if way.family == "minimal"), WIDE_UM)
     bands = machine_bands(machine)
     ideal = design("minimal", bands)[0].shaper
     grid = rounded_minimal(machine)
@@ -280,7 +282,11 @@ def main() -> int:
         "--finer", type=int, default=0, metavar="N", help="words with N more decimals than the machine's"
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure to FILE")
+    parser.add_argument("--bands", action="store_true", help="only the bands and durations beside the closed rival")
     arguments = parser.parse_args()
+    if arguments.bands:
+        print(closed_rival.tables())
+        return 0
 
     wide: dict[str, list[Outcome]] = {}
     tight: dict[str, list[Outcome]] = {}
@@ -306,7 +312,8 @@ def main() -> int:
     before_s = [outcomes[0].cutting_s for outcomes in wide.values()]
     print(f"**Contour tolerance {TIGHT_UM:g} µm**: seconds longer than as programmed\n")
     print(tight_table(list(PROGRAMS), list(tight.values()), before_s), end="\n\n")
-    print(_ideal_note())
+    print(_ideal_note(), end="\n\n")
+    print(closed_rival.tables())
     if arguments.json:
         figures = {
             name: {f"{WIDE_UM:g} um": [asdict(each) for each in wide[name]],
