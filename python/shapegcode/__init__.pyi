@@ -46,6 +46,14 @@ from shapegcode.characterization.result import (
     Characterisation as Characterisation,
     CharacterisationTests as CharacterisationTests,
 )
+from shapegcode.characterization.servo.fit import fit_servo as fit_servo
+from shapegcode.characterization.servo.plots import plot_servo as plot_servo
+from shapegcode.characterization.servo.record import (
+    ServoRecord as ServoRecord,
+    ServoTrace as ServoTrace,
+    read_servo_record as read_servo_record,
+)
+from shapegcode.characterization.servo.result import ServoAxis as ServoAxis, ServoFit as ServoFit
 from shapegcode.checking.check import (
     check as check,
     check_text as check_text,

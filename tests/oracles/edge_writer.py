@@ -44,7 +44,7 @@ def edge_document(
 
 def _label(address: str) -> str:
     name, bar, number = address.partition("|")
-    return {"1": "X1", "2": "Y1", "3": "Z1"}.get(number, f"A{number}") if bar else name
+    return {"1": "X1", "2": "Y1", "3": "Z1"}.get(number, f"Q{number}") if bar else name
 
 
 def write_edge(path: Path, document: Any) -> Path:

@@ -12,6 +12,7 @@ from shapegcode.characterization.facts import Facts
 from shapegcode.characterization.hold import held_samples
 from shapegcode.characterization.log import ServoLog
 from shapegcode.characterization.plan import AXES
+from shapegcode.characterization.servo.lag import lag_way
 
 Array = npt.NDArray[np.float64]
 _SERVO_SLACK = 0.02
@@ -64,14 +65,11 @@ def _servo_rows(log: ServoLog, index: int) -> tuple[Array, Array, float] | None:
 def _lag_of(records: list[tuple[Array, Array, float]]) -> tuple[float, float]:
     """Position gain in 1/s and what feed-forward leaves (1 − f), from all records: least squares of the error."""
     from scipy.optimize import minimize_scalar
-    from scipy.signal import lfilter
 
     def solve(gain: float) -> tuple[float, float]:
         cross = square = power = 0.0
         for way, error, step in records:
-            kept = math.exp(-gain * step)
-            part = (1.0 - kept) / (gain * step)  # of a ramp over one step
-            model: Array = np.asarray(lfilter([part, -part], [1.0, -kept], way))
+            model = lag_way(way, gain, step)
             cross += float(model @ error)
             square += float(model @ model)
             power += float(error @ error)

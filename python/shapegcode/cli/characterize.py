@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, load_machine
+from shapegcode.cli.options import add_machine_argument, add_plots_argument, load_machine
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -19,7 +19,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Writes short test programs (air moves inside a stated box) with instructions, then fits the machine file to "
         "stopwatch times or servo logs of them: interpolation period, block time, time constants, in-position times. "
-        "Exit code 1 if results contradict each other."
+        "--servo takes any log of commands and actual positions: dead time, position gain, feed-forward, friction. "
+        "Exit code 1 if results contradict each other, or if no axis tells its loop."
     )
     action = parser.add_mutually_exclusive_group(required=True)
     action.add_argument(
@@ -28,12 +29,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     action.add_argument(
         "--fit", metavar="RESULTS", help="fit a filled-in RESULTS.toml, a folder with it and logs, or one log beside it"
     )
+    action.add_argument(
+        "--servo",
+        metavar="LOG",
+        help="fit the position loops to one half of a log and judge them on the other: a capture of a Sinumerik "
+        "control (JSON, gzip, zip), or a CSV with columns of commands and actual positions",
+    )
     add_machine_argument(parser)
-    parser.add_argument("-o", "--output", metavar="FILE", help="with --fit: machine file to write, with what is known")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help="with --fit, --servo: machine file to write, with what is known"
+    )
+    parser.add_argument(
+        "--axes", metavar="X=1,Y=6,Z=2", help="with --servo: axes of the log that are X, Y, Z (default: by their names)"
+    )
+    parser.add_argument(
+        "--drive",
+        action="store_true",
+        help="with --servo: fit a drive with friction too, some ten seconds for each axis",
+    )
+    add_plots_argument(parser, "with --servo: write a picture of what is left (PNG and SVG) into this folder")
     parser.add_argument(
         "--units",
         metavar="TIME,LENGTH",
-        help="with --fit: of the logs, for example ms,um (default: from their headers)",
+        help="with --fit, --servo: of CSV logs, for example ms,um (default: from their headers)",
     )
     parser.add_argument(
         "--box",
@@ -54,9 +72,33 @@ def run(args: argparse.Namespace) -> int:
     """
     from shapegcode.cli import runner
 
+    _check_options(args)
     machine = load_machine(args)
-    runner.check_files(args)
+    runner.check_files(args, also_read=[args.servo] if args.servo is not None else [])
+    if args.servo is not None:
+        return _servo(args, machine)
     return _write(args, machine) if args.write is not None else _fit(args, machine)
+
+
+def _check_options(args: argparse.Namespace) -> None:
+    """Refuse options that do not go with what is asked for."""
+    from shapegcode.errors import ArgumentError
+
+    for option, value in (("--axes", args.axes), ("--drive", args.drive or None), ("--plots", args.plots)):
+        if value is not None and args.servo is None:
+            raise ArgumentError(f"{option}: goes with --servo alone")
+
+
+def _servo(args: argparse.Namespace, machine: Machine) -> int:
+    from shapegcode.characterization.servo.fit import fit_servo
+    from shapegcode.cli import runner
+
+    with runner.progress(f"fitting {args.servo}", args) as bar:
+        found = fit_servo(
+            args.servo, machine, axes=args.axes, units=args.units, drive=args.drive, on_progress=bar.update
+        )
+    output = (args.output, found.to_toml().encode()) if args.output is not None else None
+    return runner.finish(found, args, output=output)
 
 
 def _write(args: argparse.Namespace, machine: Machine) -> int:

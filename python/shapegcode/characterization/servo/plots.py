@@ -1,0 +1,66 @@
+"""The pictures of a servo log: the control's contour deviation, and what the model leaves."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shapegcode.characterization.servo.result import ServoFit
+from shapegcode.results import plot
+from shapegcode.results.result import Plot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["plot_servo", "plots_of"]
+
+_OWN, _OURS = "control: contour deviation", "left by our model, not fitted there"
+
+
+def plots_of(found: ServoFit) -> dict[str, Plot]:
+    """Its pictures by name.
+
+    Args:
+        found: what the log says.
+
+    Returns:
+        What draws each picture, by the name of its file without ending.
+    """
+    return {"servo": partial(plot_servo, found)} if any(axis.models for axis in found.axes) else {}
+
+
+def plot_servo(found: ServoFit, ax: Axes | None = None) -> Axes:
+    """One panel for each axis: deviation from the control's own model, and what ours leaves where it was not fitted.
+
+    Args:
+        found: what the log says.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The first of the axes drawn into.
+    """
+    shown = [axis for axis in found.axes if axis.models and axis.curves is not None]
+    panels = [
+        row[0]
+        for row in plot.grid(
+            ax, len(shown), 1, size_inch=(9.0, 0.8 + 1.3 * len(shown)), title=Path(found.source).name, sharex=True
+        )
+    ]
+    for panel, axis in zip(panels, shown, strict=True):
+        curves = axis.curves
+        assert curves is not None
+        unit = "µm" if axis.unit == "mm" else "mdeg"
+        for rank, time in enumerate(curves.time_s):
+            first = rank == 0
+            if curves.deviation is not None:
+                panel.plot(
+                    time, 1e3 * curves.deviation[rank], color=plot.GREY, linewidth=0.8, label=_OWN if first else None
+                )
+            panel.plot(
+                time, 1e3 * curves.rest[rank], color=plot.COLOURS[0], linewidth=0.8, label=_OURS if first else None
+            )
+        panel.set_ylabel(f"{axis.name}, {unit}")
+    panels[-1].set_xlabel("time in s")
+    plot.legend_above(panels[0])
+    return plot.aligned(panels)

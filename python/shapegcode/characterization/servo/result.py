@@ -1,0 +1,283 @@
+"""What a log of commands and actual positions says about the position loops: figures, tables, pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode.errors import ArgumentError
+from shapegcode.machine import Machine
+from shapegcode.results.json import hidden
+from shapegcode.results.result import Plot, Result
+from shapegcode.results.table import Column, Table
+
+__all__ = ["ServoAxis", "ServoCurves", "ServoEstimate", "ServoFit", "ServoModel"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ServoEstimate:
+    """A parameter.
+
+    Attributes:
+        name: of it.
+        value: null where the record does not tell it.
+        low: lower end of the interval (95 %; of the drive: the range of the fits to the halves and to all).
+        high: upper end.
+        unit: of the three.
+        note: why it is not known, or what it rests on.
+    """
+
+    name: str
+    value: float | None
+    low: float | None
+    high: float | None
+    unit: str
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class ServoModel:
+    """A model of the loop, held against the record.
+
+    Attributes:
+        name: "servo lag", "dead time and servo lag", "drive".
+        rest: root mean square of what it leaves of the following error in samples that it was not fitted to, in mm or
+            degrees.
+        rest_fitted: the same where it was fitted to all samples.
+        explained_percent: share of the mean square of the control's contour deviation that it explains in samples that
+            it was not fitted to; null where there is none. Negative: the control's own model is better.
+    """
+
+    name: str
+    rest: float
+    rest_fitted: float
+    explained_percent: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class ServoCurves:
+    """What the picture shows of an axis, one array for each stretch without a gap.
+
+    Attributes:
+        time_s: (n,).
+        speed: of the command, (n,).
+        lag: command less actual position, (n,).
+        deviation: the control's contour deviation, (n,); None: not recorded.
+        rest: what the best model leaves of the lag, each sample judged by the fit to the other half, (n,).
+    """
+
+    time_s: tuple[FloatArray, ...]
+    speed: tuple[FloatArray, ...]
+    lag: tuple[FloatArray, ...]
+    deviation: tuple[FloatArray, ...] | None
+    rest: tuple[FloatArray, ...]
+
+
+@dataclass(frozen=True)
+class ServoAxis:
+    """One axis.
+
+    Attributes:
+        name: as the file has it.
+        unit: "mm" or "deg".
+        travel: of the command, mm or degrees.
+        top_speed: of the command, per second.
+        lag_rms: root mean square of command less actual position.
+        deviation_rms: of the control's contour deviation; null where it was not recorded.
+        models: held against it; none where the axis did not change its speed.
+        parameters: of the dead time and servo lag, then of the drive and of the torque.
+        note: what the record cannot tell, or what no model explains.
+        curves: for the picture.
+    """
+
+    name: str
+    unit: str
+    travel: float
+    top_speed: float
+    lag_rms: float
+    deviation_rms: float | None
+    models: tuple[ServoModel, ...]
+    parameters: tuple[ServoEstimate, ...]
+    note: str
+    curves: ServoCurves | None = field(default=None, metadata=hidden())
+
+    @property
+    def best(self) -> ServoModel | None:
+        """The model that leaves least in samples that it was not fitted to."""
+        return min(self.models, key=lambda each: each.rest, default=None)
+
+    def model(self, name: str) -> ServoModel | None:
+        """A model.
+
+        Args:
+            name: "servo lag", "dead time and servo lag" or "drive".
+
+        Returns:
+            The model; None: it was not fitted.
+        """
+        return next((each for each in self.models if each.name == name), None)
+
+    def parameter(self, name: str) -> ServoEstimate | None:
+        """A parameter.
+
+        Args:
+            name: such as "dead time", "position gain", "drive: speed loop".
+
+        Returns:
+            The parameter, whose value may be unknown; None: it was not fitted.
+        """
+        return next((each for each in self.parameters if each.name == name), None)
+
+
+@dataclass(frozen=True, repr=False)
+class ServoFit(Result):
+    """Position loops as a log of commands and actual positions shows them.
+
+    Attributes:
+        source: file.
+        duration_s: of the samples, without gaps.
+        axes: one for each axis with command and actual position.
+        machine: name of the machine whose file gets the values; empty: none.
+        written: keys of the machine file that were set, with their values.
+        warnings: what no model explains, and what reading had to leave out.
+        fitted: the machine with what is known; None without a machine.
+    """
+
+    source: str
+    duration_s: float
+    axes: tuple[ServoAxis, ...]
+    machine: str
+    written: Mapping[str, float]
+    warnings: tuple[str, ...]
+    fitted: Machine | None = field(default=None, metadata=hidden())
+
+    @property
+    def ok(self) -> bool:
+        """At least one axis tells its loop."""
+        return any(axis.models for axis in self.axes)
+
+    @property
+    def answer(self) -> str:
+        """How much of the following error is explained, in the axis that lags most."""
+        fitted = [axis for axis in self.axes if axis.models]
+        if not fitted:
+            return f"{self.source}: no axis changes its speed: nothing follows but the lag at constant speed"
+        said = ", ".join(
+            f"{axis.name} {1e3 * axis.lag_rms:.4g} to {1e3 * best.rest:.3g} {_small(axis)}"
+            for axis in fitted
+            if (best := axis.best) is not None
+        )
+        return f"following error, rms, and what our model leaves of it where it was not fitted: {said}"
+
+    def to_toml(self) -> str:
+        """The machine file with gain and feed-forward that are known; a remark stands behind each.
+
+        Returns:
+            The text of the file.
+
+        Raises:
+            ArgumentError: nothing is known that a machine file has a key for.
+        """
+        if self.fitted is None or not self.written:
+            raise ArgumentError(
+                f"{self.source}: no gain or feed-forward of X, Y or Z follows, so there is no machine file to write; "
+                "name the axes where the labels of the log do not (axes, for example X=1,Y=6,Z=2)"
+            )
+        return self.fitted.to_toml()
+
+    @property
+    def next_step(self) -> str:
+        """To write the machine file, or to look at the pictures."""
+        if self.written:
+            return "-o FILE writes the machine file with " + ", ".join(self.written)
+        return "--plots DIR draws what is left; -m and -o write gain and feed-forward into a machine file"
+
+    def tables(self) -> list[Table]:
+        """What the models explain, and their parameters."""
+        explained = (
+            Column("axis", value="name", left=True),
+            Column("unit", value=_small, left=True),
+            Column("top speed", "/s", "top_speed", digits=1),
+            Column("lag", value=lambda axis: _milli(axis.lag_rms)),
+            *(
+                Column(heading, value=lambda axis, name=name: _rest(axis, name))  # type: ignore[misc]
+                for name, heading in (
+                    ("servo lag", "servo lag"),
+                    ("dead time and servo lag", "and dead time"),
+                    ("drive", "drive"),
+                )
+            ),
+            Column("control's model", value=lambda axis: _milli(axis.deviation_rms)),
+            Column("of that explained", "%", _explained, digits=1),
+        )
+        fitted = [axis for axis in self.axes if axis.parameters]
+        drives = [axis for axis in fitted if axis.model("drive")]
+        notes = [axis for axis in self.axes if axis.note]
+        name = Column("axis", value="name", left=True)
+        said = (name, Column("", value="note", text=True))
+        return [
+            Table("Left of the following error, rms, where the model was not fitted", explained, self.axes),
+            Table("What follows: servo lag behind a dead time, 95 % intervals", (name, *_columns(_LAG)), fitted),
+            *([Table("The drive: range of three fits", (name, *_columns(_DRIVE)), drives)] if drives else []),
+            *([Table("What does not follow", said, notes)] if notes else []),
+        ]
+
+    def plots(self) -> Mapping[str, Plot]:
+        """A picture of the axes."""
+        return self._drawn_beside()
+
+
+def _small(axis: ServoAxis) -> str:
+    return "µm" if axis.unit == "mm" else "mdeg"
+
+
+def _milli(value: float | None) -> str:
+    return "" if value is None else f"{1e3 * value:.4g}"
+
+
+def _rest(axis: ServoAxis, name: str) -> str:
+    found = axis.model(name)
+    return "" if found is None else _milli(found.rest)
+
+
+def _explained(axis: ServoAxis) -> float | None:
+    return None if axis.best is None else axis.best.explained_percent
+
+
+_LAG = (
+    ("lag", "ms", "lag at constant speed"),
+    ("dead time", "ms", "dead time"),
+    ("gain", "1/s", "position gain"),
+    ("feed-forward", "", "feed-forward"),
+    ("friction by torque", "/s²", "friction over mass by torque"),
+)
+_DRIVE = (
+    ("dead time", "ms", "drive: dead time"),
+    ("gain", "1/s", "drive: position gain"),
+    ("feed-forward", "", "drive: feed-forward"),
+    ("speed loop", "Hz", "drive: speed loop"),
+    ("integral", "ms", "drive: integral time"),
+    ("friction", "/s²", "drive: friction over mass"),
+)
+
+
+def _columns(parameters: Sequence[tuple[str, str, str]]) -> tuple[Column, ...]:
+    return tuple(Column(heading, unit, partial(_cell, name), text=True) for heading, unit, name in parameters)
+
+
+def _cell(name: str, axis: ServoAxis) -> str:
+    """Value and interval; a question mark where the record does not tell the value."""
+    found = axis.parameter(name)
+    if found is None:
+        return ""
+    scale = 1e3 if found.unit == "s" else 1.0
+    value = "?" if found.value is None else f"{scale * found.value:.4g}"
+    if found.low is None or found.high is None:
+        return value
+    return f"{value} {scale * found.low:.4g}–{scale * found.high:.4g}"
