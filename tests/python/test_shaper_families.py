@@ -25,7 +25,15 @@ from shapegcode._core import (
     worst_residual,
     zv,
 )
-from shapegcode.shaping import FAMILIES, DesignOptions, ModeBand, design, parse_mode_band, shortest_non_negative
+from shapegcode.shaping import (
+    FAMILIES,
+    DesignOptions,
+    ModeBand,
+    choose_shaper,
+    design,
+    parse_mode_band,
+    shortest_non_negative,
+)
 from shapegcode.shaping.families.conditions import Conditions, ResidualLimit, Zero
 from shapegcode.shaping.families.on_grid import shortest_on_grid
 from shapegcode.shaping.families.simultaneous import simultaneous_zv
@@ -484,6 +492,10 @@ def test_a_band_with_two_ends_is_that_of_its_middle() -> None:
     assert band.damping_ratio == 0.1
     in_hz = parse_mode_band("30:0.1-3Hz+6Hz")
     assert [in_hz.shifted(side).frequency_hz for side in (-1.0, 1.0)] == pytest.approx([27.0, 36.0])
+    (through_the_command,) = choose_shaper(
+        ["30:0.1-13%+19%"], periods_s=[0.001], families=["robust"], uncertainty=0.5
+    ).modes
+    assert through_the_command == band
     assert parse_mode_band("30-5%+5%").uncertainty == pytest.approx(0.05)
     for text in ("30:0.1-13%", "30:0.1+19%-13%", "30:0.1-13+19", "30:0.1--13%+19%"):
         with pytest.raises(ArgumentError, match=re.escape(f"{text!r} is no mode")):

@@ -81,10 +81,17 @@ class ModeBand:
         return f"{text}±{100.0 * self.uncertainty:g}%" if self.uncertainty else text
 
 
-def parse_mode_band(text: str) -> ModeBand:
+def parse_mode_band(text: str, uncertainty: float = 0.0) -> ModeBand:
     """A mode such as ``46``, ``46:0.02``, ``46:0.02±5%`` or ``46:0.02+-2.3Hz``: Hz, damping ratio, band.
 
     A band that reaches further to one side, ``30:0.1-13%+19%``, is that of its middle: ``30.9:0.1±15.534%``.
+
+    Args:
+        text: the mode.
+        uncertainty: half width of the band, relative, where the text states none.
+
+    Returns:
+        The mode with its band.
 
     Raises:
         ArgumentError: not of that form, or a value outside its range; a frequency below 0.1 Hz or above 10 kHz is
@@ -96,14 +103,15 @@ def parse_mode_band(text: str) -> ModeBand:
             f"{text!r} is no mode: FREQUENCY[:DAMPING][±BAND], for example 46:0.02±5%, or with both ends 46:0.02-5%+8%"
         )
     frequency_hz, damping = float(match[1]), float(match[2] or 0.0)
-    band = float(match[3] or 0.0)
     mode = Mode(frequency_hz, damping)
     if not _SLOWEST_HZ <= frequency_hz <= _FASTEST_HZ:
         raise ArgumentError(
             f"mode frequency {frequency_hz:g} Hz, as typed in {text!r}: must be {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz"
         )
+    if match[3] is not None:
+        return ModeBand(mode, float(match[3]) / (frequency_hz if match[4] == "Hz" else 100.0))
     if match[5] is None:
-        return ModeBand(mode, band / frequency_hz if match[4] == "Hz" else band / 100.0)
+        return ModeBand(mode, uncertainty)
     below, above = (
         float(size) / (frequency_hz if unit == "Hz" else 100.0)
         for size, unit in ((match[5], match[6]), (match[7], match[8]))

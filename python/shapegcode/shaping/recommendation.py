@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 __all__ = ["choose_shaper"]
 
 _SLOWEST_PERIODS = 3.0  # longest shaper where none is stated: three-hump EI of the slowest mode and of a faster one
-_BAND = re.compile(r"±|\+-|\+/-")  # a stated band, even one of 0
 
 
 def choose_shaper(
@@ -117,5 +115,4 @@ def _band(given: str | Mode | ModeBand, uncertainty: float) -> ModeBand:
         return ModeBand(given, uncertainty)
     if isinstance(given, ModeBand):
         return given
-    band = parse_mode_band(given)
-    return band if _BAND.search(given) else ModeBand(band.mode, uncertainty)
+    return parse_mode_band(given, uncertainty)

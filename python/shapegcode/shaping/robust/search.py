@@ -280,12 +280,16 @@ def check_time(name: str, value_s: float) -> None:
 def no_exact(task: Task, duration_s: float) -> str:
     """Why the modes without a band have no design of a duration, for a message."""
     taps = "non-negative taps" if task.max_abs_sum is None else f"taps with sum|a| up to {task.max_abs_sum:g}"
+    if task.mirrored:
+        taps = f"mirrored {taps}"
     return f"{taps} up to {ms(duration_s)} on a {ms(task.period_s)} grid do not cancel {mode_names(task.exact)} exactly"
 
 
 def refusal(task: Task, limit: float, max_duration_s: float) -> str:
     """That there is no design below the limit, and the reason if it is known, for a message."""
     reason = unreachable(task)
+    if not task.wide:
+        return no_exact(task, max_duration_s) + (f"; {reason}" if reason else "")
     return (
         f"no design within {ms(max_duration_s)} on a {ms(task.period_s)} grid leaves at most {100.0 * limit:.3g} % of "
         f"{band_names(task.bands)}" + (f"; {reason}" if reason else "")
