@@ -152,6 +152,7 @@ BAD: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
     (_row(lambda row: row.__setitem__(1, "1.5")), r"HFData\[7\]: DES_POS\|1 = '1.5': must be a number"),
     (_row(lambda row: row.__setitem__(1, True)), r"DES_POS\|1 = True: must be a number"),
     (_row(lambda row: row.__setitem__(2, float("inf"))), r"HFData\[7\]: ENC_POS\|1 = inf: must be finite"),
+    (_row(lambda row: row.__setitem__(2, -1e13)), r"ENC_POS\|1 = -1e\+13: must be finite and at most 1e\+12"),
     (_row(lambda row: row.__setitem__(1, 10**400)), r"Payload\[1\].HFData: a number is too large"),
     (_row(lambda row: row.__setitem__(0, 5_000_090)), r"HFData\[7\]: CYCLE = 5000090 behind 5000107: the counter goes"),
     (_row(lambda row: row.__setitem__(0, 5_000_107)), r"HFData\[7\]: CYCLE = 5000107 .* other values under the same"),
@@ -237,6 +238,10 @@ def test_what_is_missing_is_said(document: dict[str, Any], tmp_path: Path) -> No
         "newer",
     ):
         assert part in said
+    document["Footer"] = {"ErrorMessages": 7, "FilePathChain": []}
+    assert any(
+        "reports an error: 7" in note for note in sg.read_edge_json(write_edge(tmp_path / "a.json", document)).notes
+    )
     with pytest.raises(sg.RecordError, match=r"no ENC_POS\|2; recorded of axis 2 \(Y1\) are DES_POS"):
         capture.position(2, actual=True)
     with pytest.raises(sg.RecordError, match=r"no axis 'Q'; the file has 1 \(X1\), 2 \(Y1\)"):

@@ -173,6 +173,11 @@ def test_axes_that_tell_nothing(tmp_path: Path) -> None:
     assert running.note == "never changes its speed"
     assert running.parameters[0].value == pytest.approx(0.1 / 20.0)
     assert resting.note == "did not move"
+    inches = capture(tmp_path / "c.json", {1: (way, way / 25.4), 2: (way, -way)})
+    assert [axis.note.partition(":")[0] for axis in sg.fit_servo(inches).axes] == [
+        "the actual position goes 0.0394 times the way of the command",
+        "the actual position goes -1 times the way of the command",
+    ]
     only = capture(tmp_path / "b.json", {3: (still, still)})
     assert not sg.fit_servo(only).ok
 

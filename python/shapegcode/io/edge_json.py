@@ -219,12 +219,13 @@ class _Part:
         if not isinstance(footer, dict):
             self.notes.append("no Footer: the recorder did not end the file")
             return
-        for text in footer.get("ErrorMessages") or ():
+        errors = footer.get("ErrorMessages") or []
+        for text in errors if isinstance(errors, list) else [errors]:
             self.notes.append(f"the recorder reports an error: {str(text)[:200]}")
         chain = footer.get("FilePathChain")
         for name, words in (("Previous", "began in"), ("Next", "goes on in")):
             if isinstance(chain, dict) and chain.get(name):
-                self.notes.append(f"the recording {words} {chain[name]}")
+                self.notes.append(f"the recording {words} {str(chain[name])[:200]}")
 
 
 def _capture(path: Path, parts: list[_Part], rows: Rows) -> EdgeCapture:

@@ -16,6 +16,7 @@ __all__ = ["Rows", "read_rows"]
 
 FloatArray = npt.NDArray[np.float64]
 _FEWEST = 2
+_LARGEST = 1e12
 _NUMBERS = {int, float, type(None)}
 
 
@@ -98,10 +99,12 @@ def _numbers(where: str, rows: Any, addresses: tuple[str, ...]) -> FloatArray:
         values: FloatArray = np.array(rows, dtype=np.float64).reshape(len(rows), len(addresses))
     except OverflowError as error:
         raise RecordError(f"{where}: a number is too large: {error}") from error
-    infinite = np.argwhere(np.isinf(values))
-    if len(infinite):
-        at, place = infinite[0]
-        raise RecordError(f"{where}[{at}]: {addresses[place]} = {values[at, place]}: must be finite")
+    wild = np.argwhere(np.abs(values) > _LARGEST)
+    if len(wild):
+        at, place = wild[0]
+        raise RecordError(
+            f"{where}[{at}]: {addresses[place]} = {values[at, place]:g}: must be finite and at most {_LARGEST:g}"
+        )
     return values
 
 

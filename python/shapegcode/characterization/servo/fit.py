@@ -25,6 +25,7 @@ Masks = tuple[npt.NDArray[np.bool_], ...]
 _STILL_TRAVEL = 1e-3  # mm or degrees
 _STEADY_CHANGE = 0.02  # of the top speed: less is no change of speed
 _LAG_SPREAD = 0.03
+_SLOPE = (0.5, 2.0)
 _LEAST_SPEED = 0.02
 
 
@@ -98,6 +99,9 @@ def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[
     )  # fmt: skip
     if travel < _STILL_TRAVEL:
         return _with(base, note="did not move")
+    alike = _alike(trace)
+    if alike:
+        return _with(base, note=alike)
     change = sum(float(np.abs(np.diff(each)).sum()) for each in speeds)
     if change < _STEADY_CHANGE * top:
         mean = float(np.mean(lag)) / float(np.mean(np.concatenate(speeds)))
@@ -143,6 +147,17 @@ def _axis(trace: ServoTrace, period_s: float, with_drive: bool, tell: Callable[[
         parameters=parameters,
         curves=curves,
     )
+
+
+def _alike(trace: ServoTrace) -> str:
+    """Says where the actual position goes another way than the command: other units, another axis, another sign."""
+    way = [r - r.mean() for r in trace.command]
+    power = sum(float(r @ r) for r in way)
+    slope = sum(float(r @ (x - x.mean())) for r, x in zip(way, trace.actual, strict=True)) / power
+    low, high = _SLOPE
+    if low <= slope <= high:
+        return ""
+    return f"the actual position goes {slope:.3g} times the way of the command: not the same unit, sign or axis"
 
 
 def _with(axis: ServoAxis, **changes: object) -> ServoAxis:
