@@ -46,6 +46,11 @@ from shapegcode.characterization.result import (
     Characterisation as Characterisation,
     CharacterisationTests as CharacterisationTests,
 )
+from shapegcode.characterization.runs_file import (
+    RunEntry as RunEntry,
+    RunsFile as RunsFile,
+    load_runs as load_runs,
+)
 from shapegcode.characterization.servo.fit import fit_servo as fit_servo
 from shapegcode.characterization.servo.plots import plot_servo as plot_servo
 from shapegcode.characterization.servo.record import (
@@ -86,6 +91,7 @@ from shapegcode.errors import (
     ProgramError as ProgramError,
     RecordError as RecordError,
     RoundTripError as RoundTripError,
+    RunsFileError as RunsFileError,
     ShapegcodeError as ShapegcodeError,
     StockError as StockError,
     ToolError as ToolError,
@@ -125,6 +131,14 @@ from shapegcode.io.edge_capture import (
 from shapegcode.io.edge_json import read_edge_json as read_edge_json
 from shapegcode.io.read import ReadOptions as ReadOptions
 from shapegcode.io.record import Record as Record
+from shapegcode.io.run_log import (
+    iter_run_logs as iter_run_logs,
+    read_run_logs as read_run_logs,
+)
+from shapegcode.io.run_record import (
+    RunLog as RunLog,
+    Signal as Signal,
+)
 from shapegcode.machine import Machine as Machine
 from shapegcode.machine.fanuc_import import import_parameters as import_parameters
 from shapegcode.machine.result import (

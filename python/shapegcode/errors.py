@@ -1,8 +1,8 @@
 """Every error of shapegcode that is the user's to mend, as one family under :class:`ShapegcodeError`.
 
 The core's: :class:`ArgumentError`, :class:`DesignError`, :class:`NumericError`, :class:`ProgramError`. Of files of
-settings: :class:`MachineError`, :class:`ToolError`, :class:`StockError`. Of measured records: :class:`RecordError`.
-Files that cannot be read or written raise what Python raises, :class:`OSError`.
+settings: :class:`MachineError`, :class:`ToolError`, :class:`StockError`, :class:`RunsFileError`. Of measured
+records: :class:`RecordError`. Files that cannot be read or written raise what Python raises, :class:`OSError`.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ __all__ = [
     "ProgramError",
     "RecordError",
     "RoundTripError",
+    "RunsFileError",
     "ShapegcodeError",
     "StockError",
     "ToolError",
@@ -79,6 +80,10 @@ class ToolError(FileError):
 
 class StockError(FileError):
     """A stock file that cannot be used, or that does not suit the program."""
+
+
+class RunsFileError(FileError):
+    """A file of runs (programs and their logs) that cannot be used."""
 
 
 class RecordError(ArgumentError):

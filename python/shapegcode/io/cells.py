@@ -8,7 +8,9 @@ from pathlib import Path
 
 from shapegcode.errors import RecordError
 
-__all__ = ["cells_of", "has_thousands", "is_clock_time", "is_number", "utf8_text", "without_thousands"]
+__all__ = [
+    "cells_of", "has_thousands", "is_clock_time", "is_number", "refuse_binary", "utf8_text", "without_thousands",
+]  # fmt: skip
 
 _TEXT_BYTES = frozenset(range(32, 256)) | {9, 10, 12, 13}
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
@@ -35,15 +37,27 @@ def utf8_text(path: Path) -> bytes:
     if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
         data = data.decode("utf-16", errors="replace").encode("utf-8")
     data = data.removeprefix(b"\xef\xbb\xbf")
-    strange = sorted(set(data[:65536]) - _TEXT_BYTES)
-    if strange:
-        raise RecordError(
-            f"{path}: a binary file (byte 0x{strange[0]:02x} at {data.index(bytes([strange[0]]))}); needed is text "
-            "with columns, UFF (dataset 58) or WAV"
-        )
+    refuse_binary(path, data[:65536], "text with columns, UFF (dataset 58) or WAV")
     if b"\n" not in data[:65536] and b"\r" in data[:65536]:
         data = data.replace(b"\r", b"\n")
     return data
+
+
+def refuse_binary(path: Path, head: bytes, needed: str) -> None:
+    """Refuse a file that is no text.
+
+    Args:
+        path: of the file, for messages.
+        head: its beginning.
+        needed: what it should be, for messages.
+
+    Raises:
+        RecordError: a byte that no text has.
+    """
+    strange = sorted(set(head) - _TEXT_BYTES)
+    if strange:
+        place = head.index(bytes([strange[0]]))
+        raise RecordError(f"{path}: a binary file (byte 0x{strange[0]:02x} at {place}); needed is {needed}")
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:

@@ -22,9 +22,12 @@ _FACTORS: dict[Measured, dict[str, float]] = {
     "force": {"N": 1.0, "kN": 1e3, "kgf": _G_M_S2, "lbf": _LBF_N},
     "torque": {"N·m": 1.0, "N·cm": 1e-2},
     "acceleration": {"m/s²": 1.0, "mm/s²": 1e-3, "g": _G_M_S2},
-    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "mm/min": 1e-3 / 60.0, "µm/s": 1e-6, "um/s": 1e-6},
+    "velocity": {
+        "m/s": 1.0, "mm/s": 1e-3, "mm/min": 1e-3 / 60.0, "µm/s": 1e-6, "um/s": 1e-6, "m/min": 1.0 / 60.0,
+        "inch/min": _INCH_M / 60.0, "inch/s": _INCH_M,
+    },
     "displacement": {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "um": 1e-6, "inch": _INCH_M},
-}
+}  # fmt: skip
 _SPELLINGS = {
     spelling: unit
     for unit, spellings in {
@@ -42,7 +45,9 @@ _SPELLINGS = {
         "m/s²": "ms-2",
         "mm/s²": "mms-2",
         "m/s": "ms-1",
-        "mm/s": "mms-1",
+        "mm/s": "mms-1 millimeter/second",
+        "mm/min": "mm_min mmpm millimeter/minute",
+        "inch/min": "in/min ipm inch_min inch/minute",
     }.items()
     for spelling in spellings.split()
 }

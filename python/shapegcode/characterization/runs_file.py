@@ -1,0 +1,236 @@
+"""The file of runs (RUNS.toml): which program made which log, and what to do with each.
+
+[[runs]]
+program = "programs/COVER.NC"
+logs = ["logs/COVER-run*.txt"]
+"""
+
+from __future__ import annotations
+
+import glob
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, Strict, model_validator
+
+from shapegcode.errors import Problem, RecordError, RunsFileError
+from shapegcode.io.run_items import ItemTable, stated_feed_unit
+from shapegcode.io.run_log import LogFormat, RunLog, read_run_logs
+from shapegcode.settings.keys import Positive, Text, TomlTable, key, toml
+from shapegcode.settings.load import parsed, read_text, validated
+from shapegcode.settings.problems import KeyProblem, line_of
+
+__all__ = ["RunEntry", "RunsFile", "load_runs"]
+
+Use = Literal["fit", "test"]
+_HEAD_BYTES = 4096
+_Path = Annotated[str, Strict(), Field(min_length=1)]
+_Percent = Annotated[Positive, Field(le=200)]
+
+
+@dataclass(frozen=True)
+class RunEntry:
+    """A program and the logs of its runs.
+
+    Attributes:
+        program: file.
+        logs: files, sorted within each pattern.
+        use: "fit", or "test": predicted only, never fitted.
+        feed_unit: of the feed in the logs; None: by the data.
+        items: (what it is, name in the log) of items that are named.
+        format: of the logs; None: by their content.
+        override_percent: what the operator had set for the feed, where a log does not say; None: not known.
+        rapid_override_percent: the same of rapids.
+        leave_out: why it is not used at all; None: it is.
+        logged_as: name of the program in the logs; None: that of its file, or its O number.
+        shared: logs that other programs have too: only runs that name this program are taken from them.
+        line: of the entry in the file; None: not known.
+    """
+
+    program: Path
+    logs: tuple[Path, ...]
+    use: Use = "fit"
+    feed_unit: str | None = None
+    items: tuple[tuple[str, str], ...] = ()
+    format: LogFormat | None = None
+    override_percent: float | None = None
+    rapid_override_percent: float | None = None
+    leave_out: str | None = None
+    logged_as: str | None = None
+    shared: tuple[Path, ...] = ()
+    line: int | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Under which a log may know the program."""
+        if self.logged_as is not None:
+            return (self.logged_as,)
+        head = self.program.read_bytes()[:_HEAD_BYTES].decode("latin-1")
+        number = re.search(r"^\s*:?(O\d{1,8})\b", head, re.MULTILINE)
+        return (self.program.name, number[1]) if number and int(number[1][1:]) else (self.program.name,)
+
+    def read(self) -> tuple[RunLog, ...]:
+        """The runs of all its logs; of a log that names programs only those of this one.
+
+        Returns:
+            The runs, log by log.
+
+        Raises:
+            RecordError: a log cannot be used.
+            OSError: a log cannot be read.
+        """
+        found: list[RunLog] = []
+        for log in self.logs:
+            runs = read_run_logs(
+                log, items=dict(self.items), format=self.format, program_name=self.names, feed_unit=self.feed_unit
+            )
+            if log in self.shared and any(run.program is None for run in runs):
+                raise RecordError(
+                    f"{log}: it is a log of several programs, and a run in it (from line {runs[0].lines[0]}) names "
+                    f"none: whether {self.program.name} made it cannot be told; divide the log"
+                )
+            found += runs
+        return tuple(found)
+
+
+@dataclass(frozen=True)
+class RunsFile:
+    """A file of runs.
+
+    Attributes:
+        path: of the file.
+        entries: in the order of the file, those that are left out as well.
+    """
+
+    path: Path
+    entries: tuple[RunEntry, ...]
+
+    @property
+    def used(self) -> tuple[RunEntry, ...]:
+        """The entries that are not left out."""
+        return tuple(entry for entry in self.entries if entry.leave_out is None)
+
+
+class _RunsRow(TomlTable):
+    """A program and the logs of its runs."""
+
+    program: _Path = key("the program, relative to this file")
+    log: _Path | None = key('one log, or a pattern such as "logs/COVER-*.txt"', default=None)
+    logs: Annotated[tuple[_Path, ...], Field(min_length=1)] | None = key(
+        "several logs, or patterns, in place of log", default=None
+    )
+    use: Use = key('"fit": learned from; "test": predicted only', default="fit")
+    feed_unit: Text | None = key("unit of the feed in the logs; left out: by the data", default=None)
+    items: dict[Text, Text] | None = key("names of the items in the logs by what they are", default=None)
+    format: LogFormat | None = key("of the logs; left out: by their content", default=None)
+    override_percent: _Percent | None = key(
+        "override of the feed that the operator had set, where the log does not say", unit="%", default=None
+    )
+    rapid_override_percent: _Percent | None = key("the same of rapids", unit="%", default=None)
+    logged_as: _Path | None = key(
+        "name of the program in the logs; left out: that of its file, or its O number", default=None
+    )
+    leave_out: _Path | None = key("why it is not used", default=None)
+
+    @model_validator(mode="after")
+    def _fits(self) -> _RunsRow:
+        if (self.log is None) == (self.logs is None):
+            what = "logs" if self.logs is not None else "log"
+            raise KeyProblem(what, self.log or list(self.logs or ()), "one of log and logs must be given")
+        try:
+            if self.feed_unit is not None:
+                stated_feed_unit(self.feed_unit)
+        except RecordError as error:
+            raise KeyProblem("feed_unit", self.feed_unit, str(error).partition(": ")[2]) from error
+        try:
+            ItemTable(self.items)
+        except RecordError as error:
+            raise KeyProblem("items", self.items, str(error).partition(": ")[2]) from error
+        return self
+
+
+class _RunsTable(TomlTable):
+    """The file."""
+
+    runs: Annotated[tuple[_RunsRow, ...], Field(min_length=1)] = key("programs and logs")
+
+
+def load_runs(path: str | Path) -> RunsFile:
+    """Read a file of runs.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        Its entries; the logs are found, not read.
+
+    Raises:
+        RunsFileError: not TOML, wrong keys or values, a program or a log that does not exist, a pattern without a
+            match, a log twice for one program; every problem is listed.
+        OSError: the file cannot be read.
+    """
+    path = Path(path)
+    text = read_text(path, RunsFileError)
+    rows = validated(_RunsTable, parsed(text, str(path), RunsFileError), str(path), text, RunsFileError).runs
+    found = _Found(path, text)
+    entries = tuple(found.entry(number, row) for number, row in enumerate(rows, start=1))
+    if found.problems:
+        raise RunsFileError(str(path), tuple(found.problems))
+    return RunsFile(path, tuple(replace(entry, shared=found.shared(entry)) for entry in entries))
+
+
+class _Found:
+    """The programs and logs of a file of runs, as they are on the disk."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        self.problems: list[Problem] = []
+        self._folder = path.parent
+        self._text = text
+        self._users: dict[Path, list[tuple[int, Path]]] = {}  # of a log: number and program of its entries
+
+    def entry(self, number: int, row: _RunsRow) -> RunEntry:
+        """An entry; what is wrong goes to the problems, unless it is left out."""
+        place = f"runs.{number}"
+        program = self._folder / row.program
+        if row.leave_out is None and not program.is_file():
+            self._problem(f"{place}.program", row.program, "no such file")
+        logs = tuple(
+            log
+            for key, pattern in [("log", row.log)] * (row.log is not None) + [("logs", each) for each in row.logs or ()]
+            for log in self._logs(f"{place}.{key}", pattern or "", number, program, row.leave_out is None)
+        )
+        return RunEntry(
+            program=program,
+            logs=logs,
+            use=row.use,
+            feed_unit=None if row.feed_unit is None else stated_feed_unit(row.feed_unit),
+            items=tuple((row.items or {}).items()),
+            format=row.format,
+            logged_as=row.logged_as,
+            override_percent=row.override_percent,
+            rapid_override_percent=row.rapid_override_percent,
+            leave_out=row.leave_out,
+            line=line_of(place, self._text),
+        )
+
+    def shared(self, entry: RunEntry) -> tuple[Path, ...]:
+        """The logs of an entry that others have too."""
+        return tuple(log for log in entry.logs if len(self._users.get(log.resolve(), ())) > 1)
+
+    def _logs(self, where: str, pattern: str, number: int, program: Path, used: bool) -> list[Path]:
+        found = [Path(each) for each in sorted(glob.glob(str(self._folder / pattern)))]
+        found = found or [self._folder / pattern]
+        if used and not found[0].is_file():
+            self._problem(where, pattern, "matches no file" if glob.has_magic(pattern) else "no such file")
+        for log in found if used else ():
+            users = self._users.setdefault(log.resolve(), [])
+            before = next((one for one, other in users if other.resolve() == program.resolve()), None)
+            if before is not None:
+                self._problem(where, pattern, f"{log.name} is a log of runs.{before} already: each run counts once")
+            users.append((number, program))
+        return found
+
+    def _problem(self, where: str, value: str, limit: str) -> None:
+        self.problems.append(Problem(where, toml(value), limit, line_of(where, self._text)))

@@ -1,0 +1,223 @@
+"""Reads MTConnectStreams documents, one or many in a file: what an agent answers to `sample` and `current`.
+
+Source of the format: MTConnect Institute, MTConnect Standard, Part 1 and Part 3 (streams), versions 1.0 to 2.x.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from xml.parsers import expat
+
+from shapegcode.errors import RecordError
+from shapegcode.io.run_items import Item, ItemTable
+from shapegcode.io.run_notes import Event, FileNotes
+from shapegcode.io.stamps import Stamps
+from shapegcode.io.text_lines import chunks
+
+__all__ = ["mtconnect_events"]
+
+#: An agent sends no more at once: its largest buffers hold a million.
+_MAX_OBSERVATIONS = 4_000_000
+#: Sub-types of which the value is not what the machine does, by kind of item.
+_LEFT_OUT = {"COMMANDED", "PROGRAMMED", "JOG", "TARGET", "PROBE", "INCREMENTAL", "SCHEDULE", "OVERRIDE"}
+_BEGIN = re.compile(rb"<\?xml\s|<(?:\w+:)?MTConnect(?:Streams|Devices|Error|Assets)\b")
+_OVERLAP = 80
+_FEED_UNIT = "mm/s"
+
+_Observation = tuple[int, int, float, bytes, Item, bytes]  # sequence, line, time, time stamp, item, text
+
+
+def mtconnect_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Event]:
+    """The values of the items that are used.
+
+    Args:
+        path: of the file: documents one behind the other, also with the headers of a multipart answer between them.
+        table: what the items are.
+        notes: takes what is left out.
+
+    Returns:
+        Events; within a document in the order of their sequence numbers, since it is sorted by component there.
+
+    Raises:
+        RecordError: no XML, cut off, or no streams.
+        OSError: the file cannot be read.
+    """
+    reader = _Documents(path, table, notes)
+    notes.feed_unit = _FEED_UNIT  # of PathFeedrate by the standard, whatever the control counts in
+    for piece in chunks(path):
+        yield from reader.feed(piece)
+    yield from reader.close()
+
+
+class _Documents:
+    """Divides a file into documents, and gives the observations of each as soon as it ends."""
+
+    def __init__(self, path: Path, table: ItemTable, notes: FileNotes) -> None:
+        self._path = path
+        self._table = table
+        self._notes = notes
+        self._document: _Document | None = None
+        self._rest = b""
+        self._line = 1
+        self._count = 0
+        self._sent: dict[str, int] = {}  # last sequence number by instance of the agent
+
+    def feed(self, piece: bytes) -> Iterator[Event]:
+        """Read on."""
+        data = self._rest + piece
+        self._rest = b""
+        while data:
+            if self._document is None:
+                found = _BEGIN.search(data)
+                if found is None:
+                    keep = max(0, len(data) - _OVERLAP)
+                    self._line += data.count(b"\n", 0, keep)
+                    self._rest = data[keep:]
+                    return
+                self._line += data.count(b"\n", 0, found.start())
+                data = data[found.start() :]
+                self._document = _Document(self._path, self._line, self._table, self._notes)
+                self._count += 1
+            used = self._document.feed(data)
+            self._line += data.count(b"\n", 0, used)
+            data = data[used:]
+            if self._document.ended:
+                yield from self._events(self._document)
+                self._document = None
+
+    def close(self) -> Iterator[Event]:
+        """The end of the file."""
+        if self._document is not None:
+            raise RecordError(
+                f"{self._path}:{self._line}: the document that begins in line {self._document.line} is cut off within "
+                f"<{self._document.open_element}>: its observations are sorted by component, so that some are missing "
+                "from its whole time; save it again"
+            )
+        if not self._count:
+            raise RecordError(f"{self._path}:1: no MTConnectStreams document in the file")
+        yield from ()
+
+    def _events(self, document: _Document) -> Iterator[Event]:
+        sent = self._sent.get(document.instance, -1)
+        self._sent[document.instance] = max([sent, *(each[0] for each in document.observations)])
+        fresh = [each for each in document.observations if each[0] < 0 or each[0] > sent]
+        numbered = all(each[0] >= 0 for each in fresh)
+        fresh.sort(key=lambda each: each[0] if numbered else each[2])
+        for _, line, time, stamp, item, text in fresh:
+            yield line, time, stamp, item, text
+
+
+class _Document:
+    """One document."""
+
+    def __init__(self, path: Path, line: int, table: ItemTable, notes: FileNotes) -> None:
+        self.line = line
+        self.ended = False
+        self.instance = ""
+        self.observations: list[_Observation] = []
+        self._path = path
+        self._table = table
+        self._notes = notes
+        self._stamps = Stamps()
+        self._open: list[str] = []
+        self._known: dict[tuple[str, str, str, str], Item | None] = {}
+        self._axis = ""
+        self._now: tuple[Item, dict[str, str], int] | None = None
+        self._text: list[str] = []
+        self._fed = 0
+        self._parser = expat.ParserCreate(namespace_separator="}")
+        self._parser.buffer_text = True
+        self._parser.StartElementHandler = self._start
+        self._parser.EndElementHandler = self._end
+        self._parser.CharacterDataHandler = self._text.append
+        self._parser.EntityDeclHandler = self._refuse_entity
+
+    @property
+    def open_element(self) -> str:
+        """The innermost element that has not ended."""
+        return self._open[-1] if self._open else "?xml"
+
+    def feed(self, data: bytes) -> int:
+        """Read on; the bytes that belong to this document."""
+        try:
+            self._parser.Parse(data, False)
+        except expat.ExpatError as error:
+            if not self.ended:
+                raise RecordError(
+                    f"{self._path}:{self.line + error.lineno - 1}: no whole XML: {expat.ErrorString(error.code)}, "
+                    f"column {error.offset + 1}, within <{self.open_element}>"
+                ) from error
+            return max(0, self._parser.ErrorByteIndex - self._fed)
+        self._fed += len(data)
+        return len(data)
+
+    def _refuse_entity(self, *_: object) -> None:
+        raise RecordError(f"{self._path}:{self._here}: an entity is declared: no MTConnectStreams document has one")
+
+    @property
+    def _here(self) -> int:
+        return self.line + self._parser.CurrentLineNumber - 1
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        name = tag.rpartition("}")[2]
+        if not self._open and name != "MTConnectStreams":
+            said = {"MTConnectDevices": "the answer to `probe`", "MTConnectError": "an error of the agent"}
+            raise RecordError(
+                f"{self._path}:{self._here}: <{name}>{', ' + said[name] if name in said else ''}: needed is "
+                "MTConnectStreams, the answer to `sample`"
+            )
+        depth = len(self._open)
+        self._open.append(name)
+        self._text.clear()
+        if name == "Header" and depth == 1:
+            self.instance = attributes.get("instanceId", "")
+        elif name == "ComponentStream":
+            self._axis = attributes.get("name", "") if attributes.get("component") == "Linear" else ""
+        elif "timestamp" in attributes and depth >= 2:
+            self._observation(name, attributes)
+
+    def _observation(self, name: str, attributes: dict[str, str]) -> None:
+        kind = attributes.get("subType", ""), attributes.get("name", ""), attributes.get("dataItemId", "")
+        key = (name, *kind)
+        if key not in self._known:
+            self._known[key] = self._item(name, *kind)
+        item = self._known[key]
+        self._now = None if item is None else (item, attributes, self._here)
+
+    def _item(self, name: str, kind: str, given: str, identity: str) -> Item | None:
+        """What a data item is: chosen by its id or name, else by its element, and by its sub-type."""
+        chosen = {one.strip().lower() for one in (self._table.chosen or {}).values()}
+        if {given.lower(), identity.lower()} & chosen:
+            return self._table.find(given or identity, identity)
+        label = f"{name} ({given or identity})" if given or identity else name
+        if name == "PathFeedrateOverride" and kind == "RAPID":
+            return self._table.find(label, "PathFeedrateOverrideRapid")
+        override = name.endswith("Override")
+        if (kind in _LEFT_OUT and not (override and kind == "PROGRAMMED")) or name in ("AxisFeedrate", "Position"):
+            return None
+        return self._table.find(label, name)
+
+    def _end(self, tag: str) -> None:
+        self._open.pop()
+        if self._now is not None:
+            item, attributes, line = self._now
+            self._now = None
+            stamp = attributes["timestamp"].encode()
+            text = "".join(self._text).strip()
+            try:
+                time = self._stamps.seconds(stamp)
+            except ValueError:
+                self._notes.add("stamp", line, f"{attributes['timestamp'][:40]!r} is no time stamp, left out")
+            else:
+                sequence = attributes.get("sequence", "")
+                number = int(sequence) if sequence.isdigit() else -1
+                self.observations.append((number, line, time, stamp, item, text.encode()))
+                if len(self.observations) > _MAX_OBSERVATIONS:
+                    raise RecordError(
+                        f"{self._path}:{line}: more than {_MAX_OBSERVATIONS} observations in one document: ask the "
+                        "agent for fewer at once (count)"
+                    )
+        self._text.clear()
+        self.ended = not self._open

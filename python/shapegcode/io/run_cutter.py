@@ -1,0 +1,292 @@
+"""Cuts the events of a log into runs: from ACTIVE to PROGRAM_COMPLETED, whatever the control calls them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from shapegcode.errors import RecordError
+from shapegcode.io.run_items import STATES, Item, ItemTable, State, plain_name
+from shapegcode.io.run_notes import Event, FileNotes
+from shapegcode.io.run_record import RunLog
+from shapegcode.io.run_tracks import Hold, RunPart, Track, run_of
+
+__all__ = ["RunCutter"]
+
+#: A step back up to this is an adapter whose items overtake each other; more is a clock that was set.
+_DISORDER_S = 1.0
+#: No value for this long within a run is said.
+_QUIET_S = 30.0
+#: What a value of text counts as, in values.
+_TEXT_VALUES = 8
+#: Values kept while no run goes on.
+_IDLE_VALUES = 100_000
+
+
+@dataclass
+class _Open:
+    """The run that goes on."""
+
+    start: float
+    stamp: str
+    line: int
+    cut_start: bool = False
+    holds: list[Hold] = field(default_factory=list)
+    gaps: list[tuple[float, float]] = field(default_factory=list)
+
+    @property
+    def held(self) -> Hold | None:
+        """The hold that has not ended."""
+        return self.holds[-1] if self.holds and self.holds[-1].end is None else None
+
+
+class RunCutter:
+    """Takes events, gives runs; holds the values of one run at a time."""
+
+    def __init__(self, source: str, table: ItemTable, feed_unit: str | None, max_values: int) -> None:
+        """Nothing was read yet.
+
+        Args:
+            source: file, for messages.
+            table: what the items are.
+            feed_unit: of the feed, where the user says it.
+            max_values: that a run may have.
+        """
+        self.notes = FileNotes()
+        self.feed_unit = feed_unit
+        self._source = source
+        self._table = table
+        self._limit = max_values
+        self._tracks: dict[Item, Track] = {}
+        self._status: Item | None = None
+        self._state: State = "unknown"
+        self._open: _Open | None = None
+        self._first: tuple[int, float, str] | None = None
+        self._last_line = 0
+        self._given = False
+
+    def runs(self, events: Iterator[Event]) -> Iterator[RunLog]:
+        """The runs of a log.
+
+        Args:
+            events: of the file, in its order.
+
+        Returns:
+            The runs, in their order.
+
+        Raises:
+            RecordError: no run, no block numbers, two controls in one file, or too many values.
+        """
+        tracks, last, room, line = self._tracks, -math.inf, self._limit, 0
+        for line, time, stamp, item, text in events:
+            if not 0.0 <= time - last <= _QUIET_S:
+                yield from self._odd_step(line, time, last, stamp)
+            last = time
+            track = tracks.get(item)
+            if track is None:
+                track = tracks[item] = Track(item)
+            if track.texts is None:
+                try:
+                    value = float(text)
+                except ValueError:
+                    value = math.nan
+                if value - value != 0.0 or (track.counts and (value < 0.0 or value % 1.0)):
+                    self._leave_out(line, track, text)
+                    continue
+                if track.counts and track.times and track.times[-1] == time:
+                    self.notes.add("twice", line, f"{item.name} twice at one time: the value before is left out")
+                track.times.append(time)
+                track.values.append(value)
+                room -= 1
+            elif item.role == "status":
+                self._last_line = line
+                yield from self._status_event(line, time, stamp, item, text)
+                room = self._limit if self._open is not None or self._state == "unknown" else _IDLE_VALUES
+            else:
+                track.add_text(time, text)
+                room -= _TEXT_VALUES
+            if room <= 0:
+                self._last_line = line
+                yield from self._full(line)
+                room = self._limit if self._open is not None else _IDLE_VALUES
+        self._last_line = line
+        yield from self._end(last)
+
+    # --- steps of the clock, and limits ---
+
+    def _odd_step(self, line: int, time: float, last: float, stamp: bytes) -> Iterator[RunLog]:
+        """A first event, a step back, or a long silence."""
+        if self._first is None:
+            self._first = line, time, stamp.decode("latin-1").strip()
+            return
+        step = time - last
+        run = self._open
+        if step > 0.0:
+            if run is not None and run.held is None:
+                run.gaps.append((last, step))
+                self.notes.add("gap", line, f"nothing for {step:.1f} s before it: a dwell, a long block, or the log "
+                               "or its clock was interrupted")  # fmt: skip
+            return
+        if step >= -_DISORDER_S:
+            self.notes.add("disorder", line, f"its time stamp is {-step:.3f} s before that of the line above; sorted")
+            return
+        self.notes.add(
+            "back", line, f"the clock goes back by {-step:.3f} s"
+            + ("; the run ends there, its rest is left out" if run is not None else ""),
+        )  # fmt: skip
+        if run is not None:
+            self._last_line = line
+            yield from self._finish(last, None)
+        for track in self._tracks.values():
+            track.forget_times()
+
+    def _full(self, line: int) -> Iterator[RunLog]:
+        """Too many values for the memory: an error in a run; while none goes on the old ones are dropped."""
+        if self._open is not None and self._open.held is not None:
+            yield from self._finish(self._open.held.start, self._open.held.word)
+        elif self._open is not None:
+            raise RecordError(
+                f"{self._source}:{line}: the run that began in line {self._open.line} has more than {self._limit} "
+                "values: is its end logged? Log fewer items, cut the log, or allow more (max_values)"
+            )
+        elif self._status is None:
+            raise RecordError(
+                f"{self._source}:{line}: {self._limit} values, and nothing that says when a program runs: looked for "
+                f"{self._table.sought('status')}; the log has {self._names()}; name it (items), or cut the log"
+            )
+        for track in self._tracks.values():
+            track.drop_until(track.last_time)
+
+    def _leave_out(self, line: int, track: Track, text: bytes) -> None:
+        shown = text.decode("utf-8", errors="replace").strip()
+        wrong = "is empty" if not shown else f"is {shown[:40]!r}, no {'line number' if track.counts else 'number'}"
+        self.notes.add(f"value of {track.item.name}", line, f"{track.item.name} {wrong}, left out")
+
+    def _names(self) -> str:
+        names = list(self._table.seen)
+        return (", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "")) or "no items"
+
+    # --- what the program does ---
+
+    def _status_event(self, line: int, time: float, stamp: bytes, item: Item, text: bytes) -> Iterator[RunLog]:
+        if self._status is None:
+            self._status = item
+        elif item is not self._status:
+            self._second_status(line, item)
+            return
+        word = text.decode("utf-8", errors="replace").strip().upper()
+        state = STATES.get(re.sub(r"[_\s-]", "", word), "unknown")
+        if state == "unknown":
+            self.notes.add("state", line, f"{item.name} is {word[:40]!r}, which is not known, left out")
+            return
+        first = self._state == "unknown"
+        self._state = state
+        if first and state in ("hold", "stop", "completed") and self._moved() and self._first is not None:
+            began, at, text_at = self._first
+            self._open = _Open(at, text_at, began, cut_start=True)
+            self.notes.add("middle", began, f"the log begins within a run: no {item.name} ACTIVE before it")
+        run = self._open
+        if run is None:
+            if state == "active":
+                self._open = _Open(time, stamp.decode("latin-1").strip(), line)
+        elif state == "active":
+            if run.held is not None:
+                run.held.end = time
+                run.held.resumed = stamp.decode("latin-1").strip(), line
+        elif state in ("hold", "stop"):
+            if run.held is None:
+                run.holds.append(Hold(time, word, state == "stop"))
+        elif state == "completed":
+            if run.held is not None:
+                run.held.end = time
+            yield from self._finish(time, word)
+        else:
+            yield from self._break_off(line, time, word)
+
+    def _break_off(self, line: int, time: float, word: str) -> Iterator[RunLog]:
+        """Ended without completion: READY and the like, out of a hold or not."""
+        run = self._open
+        assert run is not None
+        name = self._status.name if self._status else ""
+        if word in ("UNAVAILABLE", "OFF"):
+            self.notes.add("gone", line, f"{name} is {word}: the run is cut off")
+            yield from self._finish(time, None)
+        elif run.held is not None:
+            held = run.holds.pop()
+            self.notes.add("broken", line, f"{name} is {word} after {held.word}: the run ended at {held.word}")
+            yield from self._finish(held.start, held.word)
+        else:
+            self.notes.add("ended", line, f"{name} is {word} without PROGRAM_COMPLETED: ended, or broken off")
+            yield from self._finish(time, word)
+
+    def _second_status(self, line: int, item: Item) -> None:
+        assert self._status is not None
+        one, other = self._status.name, item.name
+        if plain_name(one.rpartition(":")[2]) == plain_name(other.rpartition(":")[2]):
+            raise RecordError(
+                f"{self._source}:{line}: {other} besides {one}: the log has more than one control; choose one, for "
+                f'example items = {{ status = "{one}" }} with the other items of that control'
+            )
+        self.notes.add("status", line, f"{other} left out: {one} says when the program runs")
+
+    def _moved(self) -> bool:
+        """Whether block numbers changed so far."""
+        return any(
+            len(set(track.values)) > 1 for track in self._tracks.values() if track.counts
+        )  # fmt: skip
+
+    # --- the ends of runs ---
+
+    def _finish(self, end: float, word: str | None) -> Iterator[RunLog]:
+        """Give the run that goes on; *word*: what ended it, None: it is cut off."""
+        run = self._open
+        assert run is not None
+        self._open = None
+        self._given = True
+        has_status = self._status is not None
+        part = RunPart(
+            self._source, run.start, run.stamp, end, word, (run.line, self._last_line), run.cut_start,
+            word is None and has_status, run.holds, run.gaps, has_status,
+        )  # fmt: skip
+        for each in part.restarted(list(self._tracks.values())):
+            yield self._made(each)
+        for track in self._tracks.values():
+            track.drop_until(end)
+
+    def _made(self, part: RunPart) -> RunLog:
+        found = run_of(part, list(self._tracks.values()), self.feed_unit or self.notes.feed_unit, self.notes)
+        if not len(found.block) and not any(track.counts and track.ever for track in self._tracks.values()):
+            raise RecordError(
+                f"{self._source}:{part.lines[1]}: no line numbers of the program: looked for "
+                f"{self._table.sought('block')}; the log has {self._names()}; name it, for example "
+                'items = { block = "Block_Number" }'
+            )
+        return found
+
+    def _end(self, last: float) -> Iterator[RunLog]:
+        """The end of the file."""
+        if self._first is None:
+            raise RecordError(
+                f"{self._source}: no item that is of use: looked for {self._table.sought('block')}; the log has "
+                f'{self._names()}; name it, for example items = {{ block = "Block_Number" }}'
+            )
+        if self._open is not None:
+            held = self._open.held
+            if held is not None:
+                self._open.holds.pop()
+                self.notes.add("end", self._last_line, f"the log ends in {held.word}, where the run is taken to end")
+                yield from self._finish(held.start, held.word)
+            else:
+                self.notes.add("end", self._last_line, "the log ends within the run")
+                yield from self._finish(last, None)
+        elif self._status is None:
+            line, time, stamp = self._first
+            self.notes.add("status", 0, "nothing says when the program runs: the whole log is one run")
+            self._open = _Open(time, stamp, line)
+            yield from self._finish(last, None)
+        elif not self._given:
+            raise RecordError(
+                f"{self._source}:{self._last_line}: no run: {self._status.name} never says that a program runs (ACTIVE)"
+            )

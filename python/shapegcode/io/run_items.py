@@ -1,0 +1,175 @@
+"""The data items of a log of runs: what they are, and what controls and adapters call them."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from shapegcode.errors import RecordError
+from shapegcode.io.units import find_unit, units_of
+
+__all__ = ["ROLES", "STATES", "Item", "ItemTable", "Role", "State", "plain_name", "stated_feed_unit"]
+
+Role = Literal[
+    "time", "block", "sequence", "block_text", "feed", "tool", "spindle", "feed_override", "rapid_override", "status",
+    "program", "x", "y", "z",
+]  # fmt: skip
+State = Literal["active", "hold", "stop", "completed", "ended", "unknown"]
+
+#: Names by role, the better one first; only letters and digits count, upper or lower case.
+_NAMES: dict[Role, str] = {
+    "time": "time timestamp times datetime date zeit t clock",
+    "block": "block_number line_number line program_line current_line nc_line block_no line_no block_num "
+    "current_block_number active_line satznummer zeile",
+    "sequence": "line_label sequence_number seq_number sequence seq n_number",
+    "block_text": "block block_text current_block active_block program_block satz",
+    "feed": "feed_rate path_feedrate actual_feed_rate actual_feed feed_act feed_actual path_feedrate_actual path_feed "
+    "feed fact frt act_feed vorschub",
+    "tool": "current_tool tool_number tool_id active_tool tool_no tool_num tool_asset_id tool act_tool "
+    "t_number werkzeug",
+    "spindle": "spindle_speed rotary_velocity spindle_speed_actual actual_spindle_speed spindle_rpm s_speed speed_act "
+    "sspeed s1speed srpm rpm spindle",
+    "feed_override": "feed_override path_feedrate_override feedrate_override feed_rate_override fovr feed_ovr fov "
+    "frapid_override_feed override",
+    "rapid_override": "rapid_override path_feedrate_override_rapid rapid_feed_override rovr rapid_ovr rov",
+    "status": "program_status execution execution_state exec execution_status run_status cycle_status program_state "
+    "status",
+    "program": "program_name_running program program_name running_program active_program current_program main_program "
+    "prog programm",
+    "x": "x x_act xact x_actual x_pos xpos x_position actual_x x_abs xabs pos_x x_mm position_x",
+    "y": "y y_act yact y_actual y_pos ypos y_position actual_y y_abs yabs pos_y y_mm position_y",
+    "z": "z z_act zact z_actual z_pos zpos z_position actual_z z_abs zabs pos_z z_mm position_z",
+}
+
+#: Names that are kept for messages.
+_MOST_NAMES = 1000
+
+ROLES: tuple[Role, ...] = get_args(Role)
+"""What an item can be; the keys of `items`."""
+
+_STATES: dict[State, str] = {
+    "active": "ACTIVE RUNNING RUN EXECUTING IN_CYCLE CYCLE AUTO_RUN START STARTED STRT MSTR",
+    "hold": "FEED_HOLD INTERRUPTED HOLD HELD FEEDHOLD PAUSED PAUSE OPTIONAL_STOP PROGRAM_OPTIONAL_STOP WAIT WAITING "
+    "PROGRAM_STOPPED",
+    "stop": "STOPPED STOP",
+    "completed": "PROGRAM_COMPLETED COMPLETED FINISHED DONE PROGRAM_END M30 M02",
+    "ended": "READY IDLE RESET ABORTED CANCELLED CANCELED UNAVAILABLE OFF E_STOP EMERGENCY_STOP",
+}
+STATES: dict[str, State] = {word.replace("_", ""): state for state, words in _STATES.items() for word in words.split()}
+"""What a status means, by its words in capitals without blanks, bars and hyphens."""
+
+
+def plain_name(name: str) -> str:
+    """Letters and digits of a name in lower case: Block_Number and "block number" are the same.
+
+    Args:
+        name: of an item.
+
+    Returns:
+        What names are compared by.
+    """
+    return re.sub(r"[\W_]", "", name.lower())
+
+
+_KNOWN: dict[str, tuple[Role, int]] = {}
+for _role, _words in _NAMES.items():
+    for _rank, _word in enumerate(_words.split()):
+        _KNOWN.setdefault(plain_name(_word), (_role, _rank))
+
+
+def stated_feed_unit(text: str) -> str:
+    """The name of a unit of feed, however it is spelt.
+
+    Args:
+        text: such as "in/min".
+
+    Returns:
+        Its name in `shapegcode.io.units`.
+
+    Raises:
+        RecordError: not known.
+    """
+    unit = find_unit(text)
+    if unit is None or unit.measures != "velocity":
+        raise RecordError(f"unit {text!r} of the feed: must be one of {units_of('velocity')}")
+    return unit.name
+
+
+@dataclass(frozen=True, eq=False)
+class Item:
+    """An item of a file that is used.
+
+    Attributes:
+        name: in the file.
+        role: what it is.
+        rank: of its name among those of its role; the lowest is taken.
+    """
+
+    name: str
+    role: Role
+    rank: int
+
+
+@dataclass
+class ItemTable:
+    """Finds out what the items of a file are.
+
+    Attributes:
+        chosen: names by role, which hold over the known ones.
+        seen: names that were met in the file, and what they are.
+    """
+
+    chosen: Mapping[str, str] | None = None
+    seen: dict[str, Item | None] = field(init=False, default_factory=dict)
+    _chosen: dict[str, tuple[Role, int]] = field(init=False, default_factory=dict)
+    _roles: frozenset[str] = field(init=False, default=frozenset())
+
+    def __post_init__(self) -> None:
+        for role, name in (self.chosen or {}).items():
+            if role not in ROLES:
+                close = difflib.get_close_matches(role, ROLES, n=1, cutoff=0.5)
+                hint = f"; did you mean {close[0]}?" if close else ""
+                raise RecordError(f"items: {role!r} is not known{hint}; must be one of {', '.join(ROLES)}")
+            if not isinstance(name, str) or not name.strip():
+                raise RecordError(f"items: {role} = {name!r}: must be the name of an item in the log")
+            self._chosen[name.strip().lower()] = role, 0
+        self._roles = frozenset(self.chosen or {})
+
+    def find(self, *names: str) -> Item | None:
+        """What an item is.
+
+        Args:
+            names: under which it goes, the one for messages first: of a data item its name, its id, its kind.
+
+        Returns:
+            The item; None: of no use here.
+        """
+        found = self._find(names)
+        if len(self.seen) < _MOST_NAMES:
+            self.seen[names[0]] = found
+        return found
+
+    def _find(self, names: tuple[str, ...]) -> Item | None:
+        for name in names:
+            for text in (name, name.rpartition(":")[2]):
+                if chosen := self._chosen.get(text.strip().lower()):
+                    return Item(names[0], *chosen)
+        for name in names:
+            found = _KNOWN.get(plain_name(name.rpartition(":")[2]))
+            if found is not None and found[0] not in self._roles:
+                return Item(names[0], *found)
+        return None
+
+    def sought(self, role: Role) -> str:
+        """The names that are looked for, for messages.
+
+        Args:
+            role: of the item.
+
+        Returns:
+            Names between commas.
+        """
+        return (self.chosen or {}).get(role) or ", ".join(_NAMES[role].split()[:6])

@@ -1,0 +1,54 @@
+"""What reading a log of runs bridges or leaves out: each kind with its first lines, the rest counted."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from shapegcode.io.run_items import Item
+
+__all__ = ["Event", "FileNotes"]
+
+Event: TypeAlias = tuple[int, float, bytes, Item, bytes]
+"""(line, time in s, time stamp, item, value as text)."""
+
+_SHOWN = 3
+
+
+class FileNotes:
+    """Notes since the last run.
+
+    Attributes:
+        feed_unit: what the file itself says of the unit of the feed.
+    """
+
+    def __init__(self) -> None:
+        """None yet."""
+        self.feed_unit: str | None = None
+        self._kinds: dict[str, tuple[list[str], int, int]] = {}
+
+    def add(self, kind: str, line: int, text: str) -> None:
+        """Note something.
+
+        Args:
+            kind: what is alike is counted from the fourth one on.
+            line: of the file; 0: it has none.
+            text: what it is.
+        """
+        shown, count, _ = self._kinds.get(kind, ([], 0, 0))
+        if len(shown) < _SHOWN:
+            shown.append(f"line {line}: {text}" if line else text)
+        self._kinds[kind] = shown, count + 1, line
+
+    def taken(self) -> tuple[str, ...]:
+        """The notes, which are forgotten then.
+
+        Returns:
+            One text each.
+        """
+        found: list[str] = []
+        for shown, count, line in self._kinds.values():
+            found += shown
+            if count > len(shown):
+                found.append(f"{count - len(shown)} more like it, the last one in line {line}: {shown[-1]}")
+        self._kinds = {}
+        return tuple(found)

@@ -1,0 +1,310 @@
+"""The values of each item while a run goes on, and the run that is made of them."""
+
+from __future__ import annotations
+
+import math
+import re
+from array import array
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode.io.run_items import Item, Role
+from shapegcode.io.run_notes import FileNotes
+from shapegcode.io.run_record import RunLog, Signal
+
+__all__ = ["Hold", "RunPart", "Track", "run_of"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_TEXT_ROLES: frozenset[Role] = frozenset({"status", "program", "block_text"})
+_AXES: tuple[Role, ...] = ("x", "y", "z")
+_SIGNALS: tuple[Role, ...] = (
+    "block", "sequence", "feed", "tool", "spindle", "feed_override", "rapid_override", *_AXES,
+)  # fmt: skip
+_COUNTS: frozenset[Role] = frozenset({"block", "sequence"})
+#: What was set before the start still holds; of feed and block nobody knows after so long.
+_KEPT: frozenset[Role] = frozenset({"tool", "spindle", "feed_override", "rapid_override"})
+#: A status is polled: what came so shortly before it belongs to the run.
+_LEAD_IN_S = 1.0
+#: A program's name may come so long after its start.
+_NAME_S = 5.0
+#: A first block number beyond it is no start of a program.
+_LATE_START = 50
+#: A program that begins anew after a hold goes back by more.
+_RESTART_BLOCKS = 20
+
+
+@dataclass
+class Hold:
+    """A hold, an interruption, a stop."""
+
+    start: float
+    word: str
+    is_stop: bool
+    end: float | None = None
+    resumed: tuple[str, int] = ("", 0)  # time stamp and line
+
+
+class Track:
+    """The values of one item, as they come."""
+
+    def __init__(self, item: Item) -> None:
+        """No value yet.
+
+        Args:
+            item: what it is.
+        """
+        self.item = item
+        self.counts = item.role in _COUNTS
+        self.times = array("d")
+        self.values = array("d")
+        self.texts: list[str] | None = [] if item.role in _TEXT_ROLES else None
+        self.ever = False
+
+    @property
+    def last_time(self) -> float:
+        """Of its last value."""
+        return self.times[-1] if self.times else -math.inf
+
+    def add_text(self, time: float, text: bytes) -> None:
+        """Take a value of text.
+
+        Args:
+            time: of it in s.
+            text: the value.
+        """
+        assert self.texts is not None
+        self.times.append(time)
+        self.texts.append(text.decode("utf-8", errors="replace").strip())
+
+    def drop_until(self, end: float) -> None:
+        """Drop values up to a time; the last of them stays, since it may hold on.
+
+        Args:
+            end: the time in s.
+        """
+        if not self.times:
+            return
+        self.ever = True
+        keep = len(self.times) - 1
+        if self.last_time > end:
+            before = np.flatnonzero(np.array(self.times) <= end)
+            keep = int(before[-1]) if before.size else 0
+        self.times = self.times[keep:]
+        self.values = self.values[keep:]
+        if self.texts is not None:
+            self.texts = self.texts[keep:]
+
+    def forget_times(self) -> None:
+        """The clock was set: only the last value stays, as one of long ago."""
+        self.drop_until(self.last_time)
+        if self.times:
+            self.times[0] = -math.inf
+
+    def signal(self, start: float, end: float) -> Signal:
+        """The values of a run.
+
+        Args:
+            start: of the run in s.
+            end: of it.
+
+        Returns:
+            They and the last one before, where that still holds.
+        """
+        times, values = np.array(self.times), np.array(self.values)
+        inside = (times >= start - _LEAD_IN_S) & (times <= end)
+        before = np.flatnonzero(times < start - _LEAD_IN_S)
+        first_is_late = not inside.any() or times[inside].min() > start
+        times, kept = times[inside] - start, values[inside]
+        if before.size and first_is_late and self.item.role in _KEPT:
+            times, kept = np.append(0.0, times), np.append(values[before[-1]], kept)
+        order = np.argsort(times, kind="stable")
+        times, kept = times[order], kept[order]
+        if self.counts and times.size:  # of two with one time stamp the second one counts
+            last = np.append(np.diff(times) > 0.0, True)
+            times, kept = times[last], kept[last]
+        return Signal(times, kept, self.item.name)
+
+
+@dataclass(frozen=True)
+class RunPart:
+    """From when to when a run goes; times in s of the log's clock."""
+
+    source: str
+    start: float
+    stamp: str
+    end: float
+    word: str | None
+    lines: tuple[int, int]
+    cut_start: bool
+    cut_end: bool
+    holds: list[Hold]
+    gaps: list[tuple[float, float]]
+    has_status: bool = True
+
+    def restarted(self, tracks: Sequence[Track]) -> Iterator[RunPart]:
+        """Divide it where the program began anew after a stop, without a word of its end.
+
+        Args:
+            tracks: of all items.
+
+        Returns:
+            The runs, in their order.
+        """
+        rest = self
+        for hold in self.holds:
+            if hold.end is None or not hold.resumed[0] or not _began_anew(hold, rest, tracks):
+                continue
+            yield replace(rest, end=hold.start, word=hold.word, cut_end=False, lines=(rest.lines[0], hold.resumed[1]),
+                          holds=[each for each in rest.holds if each.start < hold.start],
+                          gaps=[each for each in rest.gaps if each[0] < hold.start])  # fmt: skip
+            rest = replace(rest, start=hold.end, stamp=hold.resumed[0], cut_start=False,
+                           lines=(hold.resumed[1], self.lines[1]),
+                           holds=[each for each in rest.holds if each.start > hold.start],
+                           gaps=[each for each in rest.gaps if each[0] > hold.start])  # fmt: skip
+        yield rest
+
+
+def _began_anew(hold: Hold, part: RunPart, tracks: Sequence[Track]) -> bool:
+    """Whether the block numbers fall back to where the run began."""
+    assert hold.end is not None
+    for track in tracks:
+        if not track.counts or not track.times:
+            continue
+        times, values = np.array(track.times), np.array(track.values)
+        before = values[(times >= part.start - _LEAD_IN_S) & (times <= hold.start)]
+        after = values[(times > hold.end - _LEAD_IN_S) & (times >= hold.start) & (times <= part.end)]
+        if before.size > 1 and after.size:
+            fall = before[-1] - after[0]
+            least = 0 if hold.is_stop else _RESTART_BLOCKS
+            return bool(after[0] <= before[before > 0.0].min(initial=np.inf) + 2.0 and fall > least)
+    return False
+
+
+def run_of(part: RunPart, tracks: Sequence[Track], feed_unit: str | None, notes: FileNotes) -> RunLog:
+    """Make the run.
+
+    Args:
+        part: from when to when.
+        tracks: of all items.
+        feed_unit: as the user or the file says it.
+        notes: to be taken into the run; what is said of its signals comes to them.
+
+    Returns:
+        The run.
+    """
+    signals = {role: _best(part, tracks, role, notes) for role in _SIGNALS}
+    block, counts = signals["block"], "line"
+    texts = _texts(part, tracks, "block_text")
+    if block is None:
+        counts = "sequence"
+        block = signals["sequence"] or _n_words(texts, notes)
+    if block is None:
+        notes.add("no block", part.lines[0], "no block numbers in this run")
+        block, counts = Signal(np.empty(0), np.empty(0)), "line"
+    elif (first := block.value[block.value > 0.0])[:1] > _LATE_START and counts == "line":
+        notes.add(
+            "late", part.lines[0], f"the first {block.name} is {first[0]:g}: the program or the log began in the middle"
+        )
+    return RunLog(
+        source=part.source,
+        start=part.stamp,
+        duration_s=part.end - part.start if part.has_status and not (part.cut_start or part.cut_end) else None,
+        block=block,
+        feed=signals["feed"],
+        feed_unit=feed_unit if signals["feed"] is not None else None,
+        tool=signals["tool"],
+        spindle_rpm=signals["spindle"],
+        feed_override=_override(signals["feed_override"], notes),
+        rapid_override=_override(signals["rapid_override"], notes),
+        position_mm=tuple((axis, found) for axis in _AXES if (found := signals[axis]) is not None),
+        holds=tuple(
+            (hold.start - part.start, (part.end if hold.end is None else hold.end) - hold.start) for hold in part.holds
+        ),
+        program=_program(part, tracks, notes),
+        notes=notes.taken(),
+        block_counts="line" if counts == "line" else "sequence",
+        block_texts=texts,
+        gaps=tuple((start - part.start, duration) for start, duration in part.gaps),
+        lines=part.lines,
+        ended_by=part.word,
+        cut_start=part.cut_start,
+        cut_end=part.cut_end,
+    )
+
+
+def _best(part: RunPart, tracks: Sequence[Track], role: Role, notes: FileNotes) -> Signal | None:
+    """The signal of the item with the best name, then of that with most values; the others are noted."""
+    found = [
+        (track.item.rank, -len(signal), index, signal)
+        for index, track in enumerate(tracks)
+        if track.item.role == role and len(signal := track.signal(part.start, part.end))
+    ]
+    found.sort(key=lambda each: each[:3])
+    for _, _, _, other in found[1:]:
+        notes.add(f"other {role}", part.lines[0], f"{other.name} left out: {found[0][3].name} is taken")
+    return found[0][3] if found else None
+
+
+def _texts(part: RunPart, tracks: Sequence[Track], role: Role) -> tuple[tuple[float, str], ...]:
+    """The values of text of a run, those without anything in them left out."""
+    ranked = sorted((track for track in tracks if track.item.role == role), key=lambda each: each.item.rank)
+    for track in ranked:
+        pairs = zip(track.times, track.texts or (), strict=True)
+        found = tuple(
+            (time - part.start, text)
+            for time, text in pairs
+            if part.start - _LEAD_IN_S <= time <= part.end and text and text != "UNAVAILABLE"
+        )
+        if found:
+            return found
+    return ()
+
+
+def _n_words(texts: tuple[tuple[float, str], ...], notes: FileNotes) -> Signal | None:
+    """Numbers of the N words of blocks of which only the text is logged."""
+    found = [
+        (time, float(word[1])) for time, text in texts if (word := re.match(r"\s*/?\s*N(\d+)", text, re.IGNORECASE))
+    ]
+    if not found:
+        return None
+    notes.add("n words", 0, f"no line numbers: the N words of {len(found)} of {len(texts)} blocks are taken")
+    return Signal(np.array([time for time, _ in found]), np.array([number for _, number in found]), "N")
+
+
+def _override(signal: Signal | None, notes: FileNotes) -> Signal | None:
+    """As a ratio; logs have percent."""
+    if signal is None:
+        return None
+    if signal.time_s[0] > 0.0:
+        notes.add(
+            f"late {signal.name}", 0,
+            f"{signal.name} is first logged at {signal.time_s[0]:.2f} s: what held before is not known",
+        )  # fmt: skip
+    return Signal(signal.time_s, signal.value / 100.0, signal.name)
+
+
+def _program(part: RunPart, tracks: Sequence[Track], notes: FileNotes) -> str | None:
+    """The name that holds at the start or comes shortly after it."""
+    ranked = sorted((track for track in tracks if track.item.role == "program"), key=lambda each: each.item.rank)
+    for track in ranked:
+        pairs = [
+            (time - part.start, text)
+            for time, text in zip(track.times, track.texts or (), strict=True)
+            if time <= part.end and text and text != "UNAVAILABLE"
+        ]
+        early = [text for time, text in pairs if time <= _NAME_S]
+        name = early[-1] if early else pairs[0][1] if pairs else None
+        if name is not None:
+            for time, text in pairs:
+                if time > _NAME_S and text != name:
+                    notes.add(
+                        "program",
+                        0,
+                        f"{track.item.name} is {text} from {time:.2f} s on: a called program, or another one",
+                    )
+            return name
+    return None

@@ -1,0 +1,105 @@
+"""Reads SHDR, the text that adapters of MTConnect send: ``time|item|value``, also several ``|item|value`` in a line.
+
+Source of the format: MTConnect Institute, C++ Agent, "Adapter Agent Protocol Version 2.0".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from shapegcode.errors import RecordError
+from shapegcode.io.run_items import Item, ItemTable
+from shapegcode.io.run_notes import Event, FileNotes
+from shapegcode.io.stamps import Stamps
+from shapegcode.io.text_lines import line_chunks
+
+__all__ = ["shdr_events"]
+
+_CONDITION = {b"normal", b"warning", b"fault", b"unavailable"}
+_CONDITION_FIELDS = 6
+_MARK = b"--multiline--"
+
+
+def shdr_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Event]:
+    """The values of the items that are used.
+
+    Args:
+        path: of the file.
+        table: what the items are.
+        notes: takes what is left out.
+
+    Returns:
+        Events in the order of the lines.
+
+    Raises:
+        RecordError: no line with a time stamp.
+        OSError: the file cannot be read.
+    """
+    known: dict[bytes, Item | None] = {}
+    stamps = Stamps()
+    number, readable, unreadable = 0, False, ""
+    reader = _Odd(table, notes, known)
+    for lines in line_chunks(path):
+        for number, line in enumerate(lines, start=number + 1):  # noqa: B020  (goes on over the chunks)
+            fields = line.split(b"|")
+            if len(fields) == 3 and not reader.until:
+                name = fields[1]
+                item = known[name] if name in known else reader.find(name)
+                pairs: tuple[tuple[Item, bytes], ...] = ((item, fields[2]),) if item is not None else ()
+            else:
+                pairs = reader.pairs(number, line, fields)
+            if not pairs:
+                continue
+            try:
+                time = stamps.seconds(fields[0])
+            except ValueError:
+                unreadable = unreadable or f"{path}:{number}: {fields[0][:40].decode('latin-1')!r} is no time stamp"
+                notes.add(
+                    "stamp", number, f"{fields[0][:40].decode('latin-1')!r} is no time stamp, the line is left out"
+                )
+                continue
+            readable = True
+            for item, text in pairs:
+                yield number, time, fields[0], item, text
+    if unreadable and not readable:
+        raise RecordError(f"{unreadable}; needed is for example 2017-02-10T18:33:01.138Z")
+
+
+class _Odd:
+    """Lines that are not one item and its value."""
+
+    def __init__(self, table: ItemTable, notes: FileNotes, known: dict[bytes, Item | None]) -> None:
+        self._table = table
+        self._notes = notes
+        self._known = known
+        self.until = b""  # ends what goes over several lines
+
+    def find(self, name: bytes) -> Item | None:
+        """What an item is; kept for the next time, with a limit for what is no log."""
+        item = self._table.find(name.decode("utf-8", errors="replace").strip())
+        if len(self._known) < 10_000:
+            self._known[name] = item
+        return item
+
+    def pairs(self, number: int, line: bytes, fields: list[bytes]) -> tuple[tuple[Item, bytes], ...]:
+        """(item, value) of a line with several of them; none of everything else, which is noted."""
+        if self.until:
+            if line.strip() == self.until:
+                self.until = b""
+            return ()
+        if not line.strip() or line.startswith((b"*", b"#")):
+            return ()
+        rest = fields[1:]
+        if rest and rest[0].strip().startswith(b"@"):  # @ASSET@, @REMOVE_ASSET@
+            if _MARK in line:
+                self.until = line[line.index(_MARK) :].strip()
+            self._notes.add("asset", number, "an asset, left out")
+        elif len(rest) == _CONDITION_FIELDS and rest[1].strip().lower() in _CONDITION and self.find(rest[2]) is None:
+            self._notes.add("condition", number, f"the condition {rest[0].decode('latin-1')}, left out")
+        elif len(rest) < 2 or len(rest) % 2:
+            self._notes.add("odd", number, f"{line[:60].decode('latin-1')!r} is not time|item|value, left out")
+        else:
+            found = ((self.find(name), text) for name, text in zip(rest[::2], rest[1::2], strict=True))
+            return tuple((item, text) for item, text in found if item is not None)
+        return ()

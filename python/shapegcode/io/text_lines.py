@@ -1,0 +1,105 @@
+"""Lines of a text file of any length in bounded memory: plain or packed by gzip, UTF-8 or UTF-16."""
+
+from __future__ import annotations
+
+import codecs
+import gzip
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO, cast
+
+from shapegcode.errors import RecordError
+from shapegcode.io.cells import refuse_binary
+
+__all__ = ["chunks", "head_of", "line_chunks"]
+
+_CHUNK_BYTES = 1 << 20
+_HEAD_BYTES = 65_536
+_GZIP = b"\x1f\x8b"
+
+
+def _opened(path: Path) -> BinaryIO:
+    if path.exists() and not path.is_file():
+        raise RecordError(f"{path}: not a regular file")
+    with path.open("rb") as file:
+        packed = file.read(2) == _GZIP
+    return cast(BinaryIO, gzip.open(path)) if packed else path.open("rb")
+
+
+def chunks(path: Path) -> Iterator[bytes]:
+    """Pieces of a file as UTF-8, without a byte order mark.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        The pieces, in order.
+
+    Raises:
+        RecordError: a packed file is cut off or damaged.
+        OSError: the file cannot be read.
+    """
+    decoder: codecs.IncrementalDecoder | None = None
+    first = True
+    with _opened(path) as file:
+        while True:
+            try:
+                piece = file.read(_CHUNK_BYTES)
+            except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+                raise RecordError(f"{path}: the packed file is cut off or damaged: {error}") from error
+            if not piece:
+                return
+            if first and piece[:2] in {codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE}:
+                decoder = codecs.getincrementaldecoder("utf-16")(errors="replace")
+            if decoder is not None:
+                piece = decoder.decode(piece).encode("utf-8")
+            if first:
+                piece = piece.removeprefix(codecs.BOM_UTF8)
+            first = False
+            yield piece
+
+
+def line_chunks(path: Path) -> Iterator[list[bytes]]:
+    """The lines of a file, many at a time, without their ends.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        Lists of lines, in order; the last line too where it has no end.
+
+    Raises:
+        RecordError: a packed file is cut off or damaged.
+        OSError: the file cannot be read.
+    """
+    rest = b""
+    for piece in chunks(path):
+        lines = (rest + piece).split(b"\n")
+        rest = lines.pop()
+        if len(rest) > _CHUNK_BYTES:
+            raise RecordError(f"{path}: a line of more than {_CHUNK_BYTES} bytes: no text with lines")
+        yield lines
+    if rest:
+        yield [rest]
+
+
+def head_of(path: Path) -> bytes:
+    """The beginning of a file.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        Its first 64 kB, unpacked.
+
+    Raises:
+        RecordError: the file is empty or binary.
+        OSError: the file cannot be read.
+    """
+    head = next(chunks(path), b"")[:_HEAD_BYTES]
+    if not head.strip():
+        raise RecordError(f"{path}: the file is empty; needed is the log of a run")
+    if head[:4] != b"PK\x03\x04":
+        refuse_binary(path, head, "a log of a run: SHDR text, MTConnect streams, Sinumerik Edge JSON or a table")
+    return head
