@@ -66,6 +66,13 @@ def test_exact_shapers_leave_next_to_nothing_of_the_vibration_of_the_path(contou
     assert (judged(run).residual[:2] < share * before[:2]).all()
 
 
+@pytest.mark.parametrize("family", ["smooth-zv", "mirrored"])
+def test_so_do_kernels_and_mirrored_taps(family: str) -> None:
+    run = converted(family)
+    before = residual_um(unshaped(), run.modes, 1e-3)
+    assert (judged(run).residual[:2] < 0.05 * before[:2]).all()
+
+
 def test_keeping_the_contour_makes_the_table_follow_the_path() -> None:
     plain, kept = judged(converted("non-negative")), judged(converted("non-negative", "response"))
     cells = row("`non-negative`: exact on the grid"), row("`non-negative`, contour kept ³")
