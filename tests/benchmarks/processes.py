@@ -45,7 +45,7 @@ class Rs274:
 
     def read(self, program: Path) -> Run:
         """Interpret a program."""
-        return _launch(self._command(program), self._environment)
+        return launched(self._command(program), self._environment)
 
     def count_feed_moves(self, program: Path) -> int:
         """How many straight feed moves it finds: proof that it reads what we time."""
@@ -68,10 +68,10 @@ def convert(program: Path, output: Path) -> Run:
     """`shapegcode convert` for the built-in VX500, with round trip and plant."""
     command = [Path(sys.executable).with_name("shapegcode"), "convert", program, "-m", "vx500", "-o", output]
     command += [word for key, value in ROOM.items() for word in ("--set", f"{key}={value}")]
-    return _launch(command, os.environ, accepted=(0, 1))  # 1: written, but out of tolerance
+    return launched(command, os.environ, accepted=(0, 1))  # 1: written, but out of tolerance
 
 
-def _launch(command: Sequence[str | Path], environment: Mapping[str, str], accepted: Sequence[int] = (0,)) -> Run:
+def launched(command: Sequence[str | Path], environment: Mapping[str, str], accepted: Sequence[int] = (0,)) -> Run:
     launcher = [sys.executable, "-I", "-S", _LAUNCHER, *command]
     text = subprocess.run(launcher, env=dict(environment), stdout=subprocess.PIPE, text=True, check=True).stdout
     run = Run(**json.loads(text))

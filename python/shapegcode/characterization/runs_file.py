@@ -136,9 +136,10 @@ class _RunsRow(TomlTable):
 
     @model_validator(mode="after")
     def _fits(self) -> _RunsRow:
-        if (self.log is None) == (self.logs is None):
-            what = "logs" if self.logs is not None else "log"
-            raise KeyProblem(what, self.log or list(self.logs or ()), "one of log and logs must be given")
+        if self.log is None and self.logs is None:
+            raise ValueError("one of log and logs must be given")
+        if self.log is not None and self.logs is not None:
+            raise KeyProblem("logs", self.logs, "only one of log and logs must be given")
         try:
             if self.feed_unit is not None:
                 stated_feed_unit(self.feed_unit)

@@ -192,9 +192,8 @@ class RunCutter:
             if state == "active":
                 self._open = _Open(time, stamp.decode("latin-1").strip(), line)
         elif state == "active":
-            if run.held is not None:
-                run.held.end = time
-                run.held.resumed = stamp.decode("latin-1").strip(), line
+            if (held := run.held) is not None:
+                held.end, held.resumed = time, (stamp.decode("latin-1").strip(), line)
         elif state in ("hold", "stop"):
             if run.held is None:
                 run.holds.append(Hold(time, word, state == "stop"))

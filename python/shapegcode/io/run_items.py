@@ -125,6 +125,7 @@ class ItemTable:
     chosen: Mapping[str, str] | None = None
     seen: dict[str, Item | None] = field(init=False, default_factory=dict)
     _chosen: dict[str, tuple[Role, int]] = field(init=False, default_factory=dict)
+    _items: dict[tuple[str, Role], Item] = field(init=False, default_factory=dict)
     _roles: frozenset[str] = field(init=False, default=frozenset())
 
     def __post_init__(self) -> None:
@@ -148,6 +149,9 @@ class ItemTable:
             The item; None: of no use here.
         """
         found = self._find(names)
+        if found is not None:
+            # The same item again, in another document, is one object: values are kept by it.
+            found = self._items.setdefault((found.name, found.role), found)
         if len(self.seen) < _MOST_NAMES:
             self.seen[names[0]] = found
         return found

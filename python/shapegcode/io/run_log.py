@@ -28,6 +28,7 @@ LogFormat = Literal["shdr", "mtconnect", "edge", "csv"]
 MAX_VALUES = 4_000_000
 #: NIST_PLATE-12 is PLATE-12; whether OP2 is BOX_OP2 nobody knows.
 _SHORTEST_NAME = 4
+_TABLE_LINES = 100
 _SHDR_LINE = re.compile(rb"[^|\r\n]*\d[^|\r\n]*\|[^|\r\n]+\|")
 
 
@@ -146,7 +147,7 @@ def _format(path: Path, stated: LogFormat | None) -> LogFormat:
     lines = [line for line in begin.splitlines() if line.strip() and not line.lstrip().startswith((b"#", b"*"))]
     if any(_SHDR_LINE.match(line) for line in lines[:20]):
         return "shdr"
-    if lines and any(mark in lines[0] for mark in (b",", b";", b"\t", b"|")):
+    if any(mark in line for line in lines[:_TABLE_LINES] for mark in (b",", b";", b"\t", b"|")):
         return "csv"
     raise RecordError(
         f"{path}:1: no log of runs: the file begins with {begin[:60]!r}; needed is SHDR text (time|item|value), an "
@@ -158,6 +159,7 @@ def _same_program(logged: str, asked: str) -> bool:
     """Whether a log's name means a program: names go with folders, suffixes and prefixes of the shop or without."""
     one, other = (re.split(r"[\\/]", name.strip())[-1].lower() for name in (logged, asked))
     stems = [re.sub(r"\.(nc|cnc|tap|mpf|spf|txt|ngc|gcode|hnc|min|eia)$", "", name) for name in (one, other)]
+    stems = [re.sub(r"^o?0*(\d+)$", r"o\1", stem) for stem in stems]  # O0012 is O12, and 12 in some logs
     short, long = sorted(stems, key=len)
     if short == long:
         return bool(short)

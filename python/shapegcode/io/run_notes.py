@@ -49,6 +49,6 @@ class FileNotes:
         for shown, count, line in self._kinds.values():
             found += shown
             if count > len(shown):
-                found.append(f"{count - len(shown)} more like it, the last one in line {line}: {shown[-1]}")
+                found.append(f"{count - len(shown)} more like the last one" + (f", up to line {line}" if line else ""))
         self._kinds = {}
         return tuple(found)

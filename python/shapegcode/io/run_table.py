@@ -62,8 +62,6 @@ def table_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Eve
     """
     header = _header(path, table)
     notes.feed_unit = header.feed_unit
-    if header.time_unit is None:
-        notes.add("time unit", header.line, f"{header.time.item.name} has no unit: numbers in it are taken as s")
     stamps = Stamps()
     number, readable = 0, False
     for lines in line_chunks(path):
@@ -82,6 +80,8 @@ def table_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Eve
                     ) from None
                 notes.add("stamp", number, f"{header.time.item.name} is {shown[:40]!r}, no time; the row is left out")
                 continue
+            if not readable and header.time_unit is None and is_number(cells[header.time.index], True):
+                notes.add("time unit", header.line, f"{header.time.item.name} has no unit: its numbers are taken as s")
             readable = True
             if len(cells) < header.cells:
                 notes.add("short", number, f"{len(cells)} cells of {header.cells}")

@@ -98,7 +98,7 @@ class _Odd:
         elif len(rest) == _CONDITION_FIELDS and rest[1].strip().lower() in _CONDITION and self.find(rest[2]) is None:
             self._notes.add("condition", number, f"the condition {rest[0].decode('latin-1')}, left out")
         elif len(rest) < 2 or len(rest) % 2:
-            self._notes.add("odd", number, f"{line[:60].decode('latin-1')!r} is not time|item|value, left out")
+            self._notes.add("odd", number, f"{line[:60].strip().decode('latin-1')!r} is not time|item|value, left out")
         else:
             found = ((self.find(name), text) for name, text in zip(rest[::2], rest[1::2], strict=True))
             return tuple((item, text) for item, text in found if item is not None)
