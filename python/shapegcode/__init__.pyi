@@ -129,6 +129,7 @@ from shapegcode.io.edge_capture import (
     EdgeValue as EdgeValue,
 )
 from shapegcode.io.edge_json import read_edge_json as read_edge_json
+from shapegcode.io.frequency_response import FrequencyResponse as FrequencyResponse
 from shapegcode.io.read import ReadOptions as ReadOptions
 from shapegcode.io.record import Record as Record
 from shapegcode.io.run_log import (

@@ -48,13 +48,16 @@ _OF_FILES: tuple[tuple[str, str, dict[str, Any], str], ...] = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
-        "Finds vibration modes in hammer taps (frequency, damping, equivalent mass, damping and stiffness) or in the "
-        "decay after a rapid stop (frequency and damping), each with its 95 % interval, and refuses what the data do "
-        "not support. Exit code 0: all that stands out is supported; 1: some of it is not; 2: nothing is, or bad input."
+        "Finds vibration modes in hammer taps or frequency responses (frequency, damping, equivalent mass, damping and "
+        "stiffness), or in the decay after a rapid stop (frequency and damping), each with its 95 % interval, and "
+        "refuses what the data do not support. Exit code 0: all that stands out is supported; 1: some of it is not; "
+        "2: nothing is, or bad input."
     )
     parser.epilog = "example: shapegcode identify tap1.csv tap2.csv tap3.csv --axis x --update mine.toml --plots plots"
     add = parser.add_argument
-    add("files", metavar="FILE", nargs="*", help="CSV, UFF (dataset 58) or WAV; several taps of one point together")
+    add(
+        "files", metavar="FILE", nargs="*", help="CSV, UFF (dataset 58), WAV, .frf, .mat; several of one point together"
+    )
     along = "use the response along this axis; where the file names none, it is this one"
     add("--axis", choices=("x", "y", "z"), default=None, help=along)
     add("--update", metavar="MACHINE.toml", default=None, help="put the supported modes into this machine file")

@@ -16,7 +16,7 @@ from shapegcode.identification.mode import IdentifiedMode
 from shapegcode.identification.model_search import Fit, Search, chart_poles, evidence_of, search, starts_of
 from shapegcode.identification.prepared import Prepared
 from shapegcode.identification.problem import HIGHEST_SHARE, Decays, Taps, problem_of
-from shapegcode.identification.result import Identification, MassCheck
+from shapegcode.identification.result import Identification, MassCheck, reason_for
 from shapegcode.identification.support import Doubts, estimates_of, is_background, refusal_of, rivals_of
 from shapegcode.io.record import Record
 
@@ -144,9 +144,9 @@ def _result(
         fit_percent=100.0 * (1.0 - left),
         noise_rms=float(np.sqrt(fit.sum_of_squares / (fit.samples - fit.parameters))),
         mass_check=_mass_check(problem, fit),
-        reason=_reason(supported, refused),
+        reason=reason_for(supported, refused),
         warnings=tuple(warnings),
-        fitted=tuple(fit.fitted),
+        fitted=tuple(np.real(part) for part in fit.fitted),
     )
 
 
@@ -212,17 +212,6 @@ def _judged(
     return sorted(found, key=lambda mode: mode.frequency_hz.value)
 
 
-def _reason(supported: Sequence[IdentifiedMode], refused: Sequence[IdentifiedMode]) -> str:
-    """Why there is no mode; empty: there is."""
-    if supported:
-        return ""
-    if not refused:
-        return "no mode stands out of the noise"
-    return "what stands out is not supported by the data: " + "; ".join(
-        f"{mode.frequency_hz.value:.4g} Hz: {mode.refusal}" for mode in refused
-    )
-
-
 def _never_aliased(_frequency_hz: float) -> float:
     return 0.0
 
@@ -265,7 +254,7 @@ def _alone(problem: Taps | Decays, fit: Fit) -> list[Fit]:
     return fits
 
 
-def _mass_check(problem: Taps | Decays, fit: _core.ModalFit | _core.DecayFit) -> MassCheck | None:
+def _mass_check(problem: Taps | Decays, fit: Fit) -> MassCheck | None:
     """The equivalent mass by paper 003's way, from the first tap, where the model has one mode.
 
     Wilson's method shortens the frequency unless its steps are short: force and response are resampled.

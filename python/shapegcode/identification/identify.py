@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from shapegcode.errors import ArgumentError, NumericError
+from shapegcode.errors import ArgumentError, NumericError, RecordError
 from shapegcode.identification.checks import prepare
 from shapegcode.identification.fit import find_modes
+from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.prepared import Prepared
 from shapegcode.identification.result import Identification
 from shapegcode.identification.support import ACCEPTED_PERCENT
-from shapegcode.io.read import ReadOptions, read_records
+from shapegcode.io.frequency_response import FrequencyResponse
+from shapegcode.io.read import ReadOptions, read_measurement
 from shapegcode.io.record import Record
 
 __all__ = ["MOST_MODES", "identify"]
@@ -22,7 +24,7 @@ _LARGEST_MODEL = 99
 
 
 def identify(
-    source: str | Path | Sequence[str | Path] | Sequence[Record],
+    source: str | Path | Sequence[str | Path] | Sequence[Record] | Sequence[FrequencyResponse],
     options: ReadOptions | None = None,
     *,
     most_modes: int = MOST_MODES,
@@ -32,10 +34,10 @@ def identify(
     accepted_percent: float = ACCEPTED_PERCENT,
     strict: bool = True,
 ) -> Identification:
-    """Modes in one or several taps of a point (with force), or in free decays (without).
+    """Modes in one or several taps of a point (with force), in free decays (without), or in frequency responses.
 
     Args:
-        source: a file (CSV, UFF, WAV), several files, or records, all of one point and axis.
+        source: a file (CSV, UFF, WAV, MATLAB), several files, records or frequency responses; of one point and axis.
         options: what the files do not say.
         most_modes: largest number of modes that is tried.
         modes: number of modes; None: chosen by evidence.
@@ -43,9 +45,6 @@ def identify(
         start_s: time at which a decay begins; None: it is looked for.
         accepted_percent: a mode is refused whose damping ratio or stiffness is less certain than this (95 %).
         strict: raise where no record can be used; False: the result says it, in `reason`.
-
-    Returns:
-        The modes that the data support, and those that they do not, each with the reason.
 
     Returns:
         The modes with their uncertainties, those that were refused and why, and how well they fit.
@@ -62,12 +61,26 @@ def identify(
         if number is not None and not 1 <= number <= _LARGEST_MODEL:
             raise ArgumentError(f"{name} = {number}: must be from 1 to {_LARGEST_MODEL}")
     sources = [source] if isinstance(source, str | Path) else source
-    names = tuple(each.source if isinstance(each, Record) else str(each) for each in sources)
+    names = tuple(str(each) if isinstance(each, str | Path) else each.source for each in sources)
     ready: Prepared | None = None
     try:
         records: list[Record] = []
+        responses: list[FrequencyResponse] = []
         for each in sources:
-            records += [each] if isinstance(each, Record) else read_records(each, options)
+            for one in [each] if isinstance(each, Record | FrequencyResponse) else read_measurement(each, options):
+                if isinstance(one, Record):
+                    records.append(one)
+                else:
+                    responses.append(one)
+        if responses and records:
+            raise RecordError(
+                f"{responses[0].source} is a frequency response, {records[0].source} a record over time: identify them "
+                "apart"
+            )
+        if responses:
+            return find_frf_modes(
+                responses, names, band_hz=band_hz, most_modes=most_modes, modes=modes, accepted_percent=accepted_percent
+            )
         ready = prepare(records, band_hz=None if band_hz is None else band_hz[1], start_s=start_s)
         return find_modes(
             ready, names, band_hz=band_hz, most_modes=most_modes, modes=modes, accepted_percent=accepted_percent

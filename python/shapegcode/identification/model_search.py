@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.identification.frf_model import FrfFit
 
 FloatArray = npt.NDArray[np.float64]
 Starts = list[tuple[float, float]]  # (omega_rad_s, damping ratio) of each mode
@@ -34,24 +35,36 @@ _MOST_DAMPING = 0.7  # of a pole to begin with
 _PATIENCE = 2
 
 
-Fit = _core.ModalFit | _core.DecayFit
+Fit = _core.ModalFit | _core.DecayFit | FrfFit
 
 
 class FitProblem(Protocol):
-    """Records of one point."""
+    """Records of one point, over time or over frequency."""
 
     @property
-    def responses(self) -> Sequence[FloatArray]: ...  # noqa: D102
+    def squares(self) -> float: ...  # noqa: D102
+    @property
+    def samples(self) -> int: ...  # noqa: D102
+    @property
+    def constants(self) -> int: ...  # noqa: D102
+    @property
+    def duration_s(self) -> float: ...  # noqa: D102
     @property
     def period_s(self) -> float: ...  # noqa: D102
     @property
     def band_hz(self) -> tuple[float, float]: ...  # noqa: D102
     @property
     def white_share(self) -> float: ...  # noqa: D102
+    @property
+    def chart_orders(self) -> int: ...  # noqa: D102
 
     def fit(self, starts: Starts) -> Fit: ...  # noqa: D102
 
-    def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> Fit: ...  # noqa: D102
+    def fit_quickly(self, starts: Starts) -> Fit: ...  # noqa: D102
+
+    def fit_left(self, starts: Starts, last: Fit | None) -> Fit: ...  # noqa: D102
+
+    def peaks_left(self, last: Fit | None, most: int) -> Sequence[float]: ...  # noqa: D102
 
     def poles(self, most: int) -> Sequence[npt.NDArray[np.complex128]]: ...  # noqa: D102
 
@@ -91,10 +104,8 @@ def search(problem: FitProblem, most_modes: int) -> Search:
     Raises:
         ArgumentError: the records have too few samples for a mode.
     """
-    squares = sum(float(np.sum((response - response.mean()) ** 2)) for response in problem.responses)
-    samples = sum(len(response) for response in problem.responses)
-    share = problem.white_share
-    evidence = [_evidence(squares, share * samples, len(problem.responses), 0)]
+    squares, share = problem.squares, problem.white_share
+    evidence = [evidence_of_none(problem)]
     fits: list[Fit] = []
     pool = _pool(problem)
     while len(fits) < most_modes:
@@ -109,6 +120,18 @@ def search(problem: FitProblem, most_modes: int) -> Search:
         if len(fits) - int(np.argmin(evidence)) >= _PATIENCE:
             break
     return Search(tuple(fits), tuple(evidence))
+
+
+def evidence_of_none(problem: FitProblem) -> float:
+    """Evidence of a model without modes.
+
+    Args:
+        problem: what is fitted.
+
+    Returns:
+        The criterion; lower is better.
+    """
+    return _evidence(problem.squares, problem.white_share * problem.samples, problem.constants, 0)
 
 
 def evidence_of(fit: Fit, white_share: float) -> float:
@@ -138,8 +161,7 @@ def chart_poles(problem: FitProblem) -> Sequence[npt.NDArray[np.complex128]]:
     Returns:
         Discrete poles by number of modes.
     """
-    shortest = min(len(response) for response in problem.responses)
-    return problem.poles(max(1, min(_CHART_ORDERS, (shortest - 8) // 8)))
+    return problem.poles(max(1, min(_CHART_ORDERS, problem.chart_orders)))
 
 
 def _pool(problem: FitProblem) -> Starts:
@@ -167,11 +189,9 @@ def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None
     The further mode is begun at the peaks of what `last` leaves, and at the pole of the pool that explains most of it.
     """
     so_far = [] if last is None else starts_of(last)
-    fitted = [np.zeros(1)] * len(problem.responses) if last is None else last.fitted
-    residuals = [response - model for response, model in zip(problem.responses, fitted, strict=True)]
     candidates: list[Starts] = []
-    for omega in _peaks(residuals, problem):
-        alone = [_attempt(partial(problem.fit_quickly, [(omega, zeta)], residuals)) for zeta in _START_DAMPING]
+    for omega in problem.peaks_left(last, _PEAKS):
+        alone = [_attempt(partial(problem.fit_left, [(omega, zeta)], last)) for zeta in _START_DAMPING]
         usable = [fit for fit in alone if fit is not None]
         if usable:
             candidates.append([*so_far, *starts_of(min(usable, key=lambda fit: fit.sum_of_squares))])
@@ -180,12 +200,11 @@ def _next_fit(problem: FitProblem, last: Fit | None, pool: Starts) -> Fit | None
         if len(chosen) > len(so_far):
             candidates.append([*so_far, pool[chosen[len(so_far)] - len(so_far)]])
     fits = [fit for starts in candidates if (fit := _attempt(partial(problem.fit_quickly, starts))) is not None]
-    longest_s = max(len(response) for response in problem.responses) * problem.period_s
     # The full fit may still run into twins: then the next best start has its turn.
     for quick in sorted(fits, key=lambda fit: fit.sum_of_squares):
-        if not _has_twins(quick, longest_s):
+        if not _has_twins(quick, problem.duration_s):
             fit = _attempt(partial(problem.fit, starts_of(quick)))
-            if fit is not None and not _has_twins(fit, longest_s):
+            if fit is not None and not _has_twins(fit, problem.duration_s):
                 return fit
     return None
 
@@ -218,17 +237,3 @@ def _attempt(task: Callable[[], Fit]) -> Fit | None:
     except (_core.ArgumentError, _core.NumericError):
         return None
     return fit if np.isfinite(fit.sum_of_squares) else None
-
-
-def _peaks(residuals: Sequence[FloatArray], problem: FitProblem) -> list[float]:
-    """Frequencies (rad/s) of the highest peaks of the residuals' spectrum within the band, the highest first."""
-    length = 2 * max(len(residual) for residual in residuals)
-    power = np.zeros(length // 2 + 1)
-    for residual in residuals:
-        power += np.abs(np.fft.rfft(residual - residual.mean(), length)) ** 2
-    frequency = np.fft.rfftfreq(length, problem.period_s)
-    low, high = problem.band_hz
-    power[(frequency < low) | (frequency > high)] = 0.0
-    inner = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:])) + 1
-    highest = inner[np.argsort(power[inner])[::-1][:_PEAKS]]
-    return [float(2.0 * np.pi * frequency[index]) for index in highest]

@@ -12,6 +12,7 @@ import numpy as np
 
 from shapegcode.identification.result import Identification
 from shapegcode.identification.spectra import decay_spectrum, frf, mode_envelopes
+from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.record import UNITS, FloatArray, Record
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
@@ -43,6 +44,11 @@ def plots_of(found: Identification) -> dict[str, Plot]:
     Returns:
         What draws each picture, by the name of its file without ending.
     """
+    if found.responses:
+        return {
+            "identify-response": partial(plot_response, found),
+            "identify-stabilisation": partial(plot_stabilisation, found),
+        }
     pictures: dict[str, Plot] = {
         "identify-traces": partial(plot_traces, found),
         "identify-stabilisation": partial(plot_stabilisation, found),
@@ -93,20 +99,16 @@ def plot_response(found: Identification, ax: Axes | None = None) -> Axes:
     """Frequency response, measured and of the model: magnitude, phase, coherence.
 
     Args:
-        found: what was identified, from taps.
+        found: what was identified, from taps or from frequency responses.
         ax: where to draw; None: a new figure.
 
     Returns:
         The panel of the magnitude.
     """
-    measured, model = frf(found.fitted_records), frf(_as_fitted(found))
+    measured, model, title = _responses(found)
     seen = _seen(measured.frequency_hz, found)
     rows = 2 if measured.coherence is None else 3
-    taps = len(found.taps)
-    panels = plot.grid(
-        ax, rows, 1, size_inch=(9.0, 2.1 + 1.8 * rows), sharex="col",
-        title=f"Frequency response, {taps} {'tap' if taps == 1 else 'taps averaged'}",
-    )  # fmt: skip
+    panels = plot.grid(ax, rows, 1, size_inch=(9.0, 2.1 + 1.8 * rows), sharex="col", title=title)
     column = [row[0] for row in panels]
     magnitude, phase = column[:2]
     for each, style, colour, width, label in (
@@ -121,7 +123,7 @@ def plot_response(found: Identification, ax: Axes | None = None) -> Axes:
         column[2].plot(measured.frequency_hz[seen], measured.coherence[seen], color=plot.COLOURS[1], linewidth=1.0)
         column[2].set_ylabel("coherence")
         column[2].set_ylim(0.0, 1.05)
-    magnitude.set_ylabel(f"({UNITS[found.taps[0].quantity]})/N")
+    magnitude.set_ylabel(f"({UNITS[measured.quantity]})/N")
     phase.set_ylabel("phase in degrees")
     phase.set_yticks([-90, 0, 90, 180, 270])
     column[-1].set_xlabel("frequency in Hz")
@@ -266,8 +268,28 @@ def _as_fitted(found: Identification) -> list[Record]:
     ]
 
 
+def _responses(found: Identification) -> tuple[FrequencyResponse, FrequencyResponse, str]:
+    """Measured lines and those of the model, and what they are."""
+    if found.responses:
+        measured = found.responses[0]
+        model = replace(measured, response=found.fitted_lines[0], coherence=None)
+        return measured, model, f"Frequency response: {Path(measured.source).name}"
+    taps, quantity = len(found.taps), found.taps[0].quantity
+    both = [frf(records) for records in (found.fitted_records, _as_fitted(found))]
+    measured, model = (
+        FrequencyResponse(
+            found.taps[0].source, each.frequency_hz[1:], each.response[1:], quantity,
+            None if each.coherence is None else each.coherence[1:],
+        )
+        for each in both
+    )  # fmt: skip
+    return measured, model, f"Frequency response, {taps} {'tap' if taps == 1 else 'taps averaged'}"
+
+
 def _spectrum(found: Identification) -> tuple[FloatArray, FloatArray]:
     """Frequencies and root mean square over the records of their amplitude spectra, 2/n |FFT|."""
+    if found.responses:
+        return found.responses[0].frequency_hz, np.abs(found.responses[0].response)
     parts = found.fitted_records
     count = 1 << max(len(part.response) for part in parts).bit_length()
     squares = [

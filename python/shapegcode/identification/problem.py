@@ -25,8 +25,60 @@ _STEPS = 60  # of a fit
 _QUICK_STEPS = 15  # of one that only shows where a mode may be
 
 
+class _OverTime:
+    """What records over time have in common, taps or decays."""
+
+    responses: list[FloatArray]
+    period_s: float
+    band_hz: tuple[float, float]
+
+    @property
+    def samples(self) -> int:
+        """Of all records together."""
+        return sum(len(response) for response in self.responses)
+
+    @property
+    def constants(self) -> int:
+        """Parameters of a model without modes: an offset per record."""
+        return len(self.responses)
+
+    @property
+    def squares(self) -> float:
+        """Sum over the responses, offsets taken out."""
+        return sum(float(np.sum((response - response.mean()) ** 2)) for response in self.responses)
+
+    @property
+    def duration_s(self) -> float:
+        """Of the longest record."""
+        return max(len(response) for response in self.responses) * self.period_s
+
+    @property
+    def chart_orders(self) -> int:
+        """Number of modes that the shortest record has samples for."""
+        return (min(len(response) for response in self.responses) - 8) // 8
+
+    def left(self, last: Fit | None) -> list[FloatArray]:
+        """What a model leaves of the responses."""
+        if last is None:
+            return self.responses
+        return [response - np.real(model) for response, model in zip(self.responses, last.fitted, strict=True)]
+
+    def peaks_left(self, last: Fit | None, most: int) -> list[float]:
+        """Frequencies (rad/s) of the highest peaks within the band of what a model leaves, the highest first."""
+        residuals = self.left(last)
+        length = 2 * max(len(residual) for residual in residuals)
+        power = np.zeros(length // 2 + 1)
+        for residual in residuals:
+            power += np.abs(np.fft.rfft(residual - residual.mean(), length)) ** 2
+        frequency = np.fft.rfftfreq(length, self.period_s)
+        power[(frequency < self.band_hz[0]) | (frequency > self.band_hz[1])] = 0.0
+        inner = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:])) + 1
+        highest = inner[np.argsort(power[inner])[::-1][:most]]
+        return [float(2.0 * np.pi * frequency[index]) for index in highest]
+
+
 @dataclass(frozen=True, eq=False)
-class Taps:
+class Taps(_OverTime):
     """Records with force.
 
     Attributes:
@@ -85,9 +137,16 @@ class Taps:
         """The best model near some modes, its residual white or coloured."""
         return self._fit(self.responses, starts, coloured, self.force_noise_n, _STEPS)
 
-    def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> _core.ModalFit:
-        """A model in a few steps, of other responses where they are given."""
-        return self._fit(self.responses if responses is None else responses, starts, False, 0.0, _QUICK_STEPS)
+    def fit_quickly(self, starts: Starts) -> _core.ModalFit:
+        """A model in a few steps."""
+        return self._quick(starts, self.responses)
+
+    def fit_left(self, starts: Starts, last: Fit | None) -> _core.ModalFit:
+        """A model in a few steps of what another one leaves."""
+        return self._quick(starts, self.left(last))
+
+    def _quick(self, starts: Starts, responses: Sequence[FloatArray]) -> _core.ModalFit:
+        return self._fit(responses, starts, False, 0.0, _QUICK_STEPS)
 
     def _fit(
         self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, force_noise_n: float, steps: int
@@ -124,7 +183,7 @@ class Taps:
 
 
 @dataclass(frozen=True, eq=False)
-class Decays:
+class Decays(_OverTime):
     """Records without force.
 
     Attributes:
@@ -145,9 +204,16 @@ class Decays:
         """The best model near some modes, its residual white or coloured."""
         return self._fit(self.responses, starts, coloured, _STEPS)
 
-    def fit_quickly(self, starts: Starts, responses: Sequence[FloatArray] | None = None) -> _core.DecayFit:
-        """A model in a few steps, of other responses where they are given."""
-        return self._fit(self.responses if responses is None else responses, starts, False, _QUICK_STEPS)
+    def fit_quickly(self, starts: Starts) -> _core.DecayFit:
+        """A model in a few steps."""
+        return self._quick(starts, self.responses)
+
+    def fit_left(self, starts: Starts, last: Fit | None) -> _core.DecayFit:
+        """A model in a few steps of what another one leaves."""
+        return self._quick(starts, self.left(last))
+
+    def _quick(self, starts: Starts, responses: Sequence[FloatArray]) -> _core.DecayFit:
+        return self._fit(responses, starts, False, _QUICK_STEPS)
 
     def _fit(self, responses: Sequence[FloatArray], starts: Starts, coloured: bool, steps: int) -> _core.DecayFit:
         omega, zeta = np.array(starts).T

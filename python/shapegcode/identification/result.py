@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from shapegcode.identification.mode import IdentifiedMode, estimate_cell, mode_line
 from shapegcode.identification.prepared import Prepared
+from shapegcode.io.frequency_response import ComplexArray, FrequencyResponse
 from shapegcode.io.record import Quantity, Record
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result
@@ -69,6 +70,7 @@ class RecordUse:
         start_s: time of the first sample in the file.
         quantity: what the sensor measured.
         excited_hz: up to where the hit excites (-20 dB); null for a decay.
+        resolution_hz: distance of two lines of a frequency response without time record, whose lines are its samples.
     """
 
     source: str
@@ -79,6 +81,7 @@ class RecordUse:
     start_s: float | None = None
     quantity: Quantity | None = None
     excited_hz: float | None = None
+    resolution_hz: float | None = None
 
     @property
     def duration_s(self) -> float | None:
@@ -121,6 +124,8 @@ class Identification(Result):
         notes: what was left out of the files and the like.
         prepared: the records that were used, and those that were not; None: the files hold none that can be.
         chart: poles of the stabilisation chart.
+        responses: frequency responses without time record, as far as they were fitted.
+        fitted_lines: the model's lines of each, (n,) complex.
         fitted_records: the records as they were fitted, thinned out to what the band needs.
         fitted: response of the model per record, (n,), at the samples that were fitted.
     """
@@ -146,6 +151,8 @@ class Identification(Result):
     notes: tuple[str, ...] = ()
     prepared: Prepared | None = field(default=None, metadata=hidden())
     chart: tuple[ChartPole, ...] = field(default=(), metadata=hidden())
+    responses: tuple[FrequencyResponse, ...] = field(default=(), metadata=hidden())
+    fitted_lines: tuple[ComplexArray, ...] = field(default=(), metadata=hidden())
     fitted_records: tuple[Record, ...] = field(default=(), metadata=hidden())
     fitted: tuple[FloatArray, ...] = field(default=(), metadata=hidden())
 
@@ -157,6 +164,8 @@ class Identification(Result):
     @property
     def axis(self) -> str | None:
         """Axis along which it was measured, "x", "y" or "z"; null: the files do not say."""
+        if self.responses:
+            return self.responses[0].axis
         return self.taps[0].axis if self.taps else None
 
     @property
@@ -168,17 +177,25 @@ class Identification(Result):
     def source(self) -> str:
         """Where the modes come from, for the machine file."""
         names = ", ".join(Path(file).name for file in self.files)
+        if self.responses:
+            return f"frequency response {names}"
         return f"free decay {names}" if self.decay else f"tap test {names}, {self._counted()}"
 
     def _counted(self) -> str:
-        kind = "decay" if self.decay else "tap"
-        return f"{len(self.taps)} {kind}{'' if len(self.taps) == 1 else 's'}"
+        count = len(self.taps) + len(self.responses)
+        kind = "frequency response" if self.responses else "decay" if self.decay else "tap"
+        return f"{count} {kind}{'' if count == 1 else 's'}"
 
     @property
     def records(self) -> tuple[RecordUse, ...]:
         """Each tap or decay: those that were used, then those that were not."""
         if self.prepared is None:
-            return ()
+            return tuple(
+                RecordUse(
+                    each.source, True, "", len(each.response), quantity=each.quantity, resolution_hz=each.resolution_hz
+                )
+                for each in self.responses
+            )
         used = [
             RecordUse(
                 record.source, True, "", len(record.response), record.period_s, record.start_s, record.quantity, excited
@@ -250,12 +267,34 @@ class Identification(Result):
         )
 
     def plots(self) -> Mapping[str, Plot]:
-        """`identify-traces`, `-stabilisation`, `-decay`, and `-response` or `-spectrum`; none without a model."""
-        return self._drawn_beside() if self.fitted else {}
+        """`identify-traces`, `-stabilisation`, `-decay`, and `-response` or `-spectrum`; none without a model.
+
+        Of a frequency response without time record `-response` and `-stabilisation`.
+        """
+        return self._drawn_beside() if self.fitted or self.fitted_lines else {}
 
 
 def _estimate(name: str, factor: float = 1.0) -> Any:
     return lambda mode: estimate_cell(getattr(mode, name), factor)
+
+
+def reason_for(supported: Sequence[IdentifiedMode], refused: Sequence[IdentifiedMode]) -> str:
+    """Why there is no mode; empty: there is.
+
+    Args:
+        supported: modes that the data support.
+        refused: those that stand out and are not supported.
+
+    Returns:
+        The reason, with that of each mode.
+    """
+    if supported:
+        return ""
+    if not refused:
+        return "no mode stands out of the noise"
+    return "what stands out is not supported by the data: " + "; ".join(
+        f"{mode.frequency_hz.value:.4g} Hz: {mode.refusal}" for mode in refused
+    )
 
 
 _MODE_COLUMNS = (
@@ -273,6 +312,7 @@ _RECORD_COLUMNS = (
     Column("record", value="source", text=True),
     Column("samples"),
     Column("lasts", "s", "duration_s", digits=3),
+    Column("resolution", "Hz", "resolution_hz", digits=3),
     Column("excited up to", "Hz", "excited_hz", digits=0),
     Column("not used", value="reason", text=True),
 )

@@ -144,7 +144,7 @@ class _Logarithms:
 def _logarithms(fit: Fit, mode: int) -> _Logarithms:
     omega, zeta = float(fit.omega_rad_s[mode]), float(fit.damping_ratio[mode])
     values = [np.log(omega / (2.0 * np.pi)), np.log(zeta)]
-    if isinstance(fit, _core.ModalFit):
+    if not isinstance(fit, _core.DecayFit):
         residue = float(fit.inverse_mass[mode])
         scale = np.array([1.0 / omega, 1.0 / zeta, 1.0 / residue])
         # ln of f, zeta, m, c = 2 zeta omega m, k = omega^2 m from ln omega, ln zeta, ln 1/m.

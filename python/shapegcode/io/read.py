@@ -5,12 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from shapegcode.errors import RecordError
+from shapegcode.io.frequency_response import FrequencyResponse
 from shapegcode.io.options import ReadOptions
 from shapegcode.io.record import Record
 
-__all__ = ["ReadOptions", "read_records"]
+__all__ = ["ReadOptions", "read_measurement", "read_records"]
 
 _BYTES_TO_KNOW = 4096
+_WAV = (b"RIFF", b"RIFX", b"RF64")
+_NO_TEXT = (".uff", ".unv", ".uf", ".uf58", ".wav", ".wave")
 
 
 def read_records(path: str | Path, options: ReadOptions | None = None) -> list[Record]:
@@ -29,17 +32,12 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
     """
     path = Path(path)
     options = options or ReadOptions()
-    if path.exists() and not path.is_file():
-        raise RecordError(f"{path}: not a regular file")
-    with path.open("rb") as file:
-        head = file.read(_BYTES_TO_KNOW)
-    if not head.strip():
-        raise RecordError(f"{path}: the file is empty; a record of time, force and acceleration is needed")
-    if head[:4] in {b"RIFF", b"RIFX", b"RF64"}:
+    head = _head(path)
+    if head[:4] in _WAV:
         from shapegcode.io.wav import read_wav
 
         return read_wav(path, options)
-    if head.lstrip(b"\r\n")[:6] == b"    -1" and (head.lstrip(b"\r\n")[6:7] in {b"\r", b"\n", b" "}):
+    if _is_uff(head):
         from shapegcode.io.uff import read_uff
 
         return read_uff(path, options)
@@ -53,3 +51,52 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
     from shapegcode.io.taps import read_csv
 
     return read_csv(path, options)
+
+
+def read_measurement(path: str | Path, options: ReadOptions | None = None) -> list[Record] | list[FrequencyResponse]:
+    """Read a file, whether it holds records over time or a frequency response without them.
+
+    Args:
+        path: of the file: CSV or other text columns, UFF, WAV, MATLAB.
+        options: what the file does not say.
+
+    Returns:
+        Records, or frequency responses (UFF of function type 4, .frf, .mat, text with frequency, Re and Im).
+
+    Raises:
+        RecordError: what was found and what is needed.
+        OSError: the file cannot be read.
+    """
+    path = Path(path)
+    options = options or ReadOptions()
+    head = _head(path)
+    from shapegcode.io.frf_mat import is_mat, read_frf_mat
+
+    if is_mat(path, head):
+        return read_frf_mat(path, options)
+    if _is_uff(head):
+        from shapegcode.io.frf_uff import is_frf_uff, read_frf_uff
+
+        return read_frf_uff(path, options) if is_frf_uff(path, options) else read_records(path, options)
+    if head[:4] not in _WAV and path.suffix.lower() not in _NO_TEXT:
+        from shapegcode.io.frf_text import is_frf_text, read_frf_text
+
+        if is_frf_text(path, options):
+            return read_frf_text(path, options)
+    return read_records(path, options)
+
+
+def _head(path: Path) -> bytes:
+    """The first bytes of a file that is one."""
+    if path.exists() and not path.is_file():
+        raise RecordError(f"{path}: not a regular file")
+    with path.open("rb") as file:
+        head = file.read(_BYTES_TO_KNOW)
+    if not head.strip():
+        raise RecordError(f"{path}: the file is empty; a record of time, force and acceleration is needed")
+    return head
+
+
+def _is_uff(head: bytes) -> bool:
+    plain = head.lstrip(b"\r\n")
+    return plain[:6] == b"    -1" and plain[6:7] in {b"\r", b"\n", b" "}

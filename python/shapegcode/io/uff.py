@@ -15,7 +15,7 @@ from shapegcode.io.record import FloatArray, Quantity, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.units import find_unit, units_of
 
-__all__ = ["read_uff"]
+__all__ = ["UffFile", "read_uff"]
 
 _TIME_RESPONSE = 1
 _FUNCTIONS = {
@@ -57,10 +57,24 @@ class _Channel:
         return int(self.header["rsp_node"]), abs(int(self.header["rsp_dir"]))
 
 
-class _File:
-    """The datasets of one file."""
+class UffFile:
+    """The datasets of one file.
+
+    Attributes:
+        types: number of the kind of each dataset.
+        warnings: what reading had to assume.
+    """
 
     def __init__(self, path: Path, options: ReadOptions) -> None:
+        """Read which datasets there are.
+
+        Args:
+            path: of the file.
+            options: what the file does not say.
+
+        Raises:
+            RecordError: the file cannot be read.
+        """
         import pyuff
 
         self.path, self.options = path, options
@@ -72,7 +86,18 @@ class _File:
         except Exception as error:  # pyuff raises nothing narrower
             raise RecordError(f"{path}: the universal file cannot be read: {error}") from error
 
-    def _set(self, index: int) -> dict[str, Any]:
+    def dataset(self, index: int) -> dict[str, Any]:
+        """One dataset as pyuff gives it.
+
+        Args:
+            index: of the dataset, from 0.
+
+        Returns:
+            Its fields.
+
+        Raises:
+            RecordError: it cannot be read.
+        """
         try:
             found: dict[str, Any] = self.uff.read_sets(index)
         except Exception as error:  # pyuff raises nothing narrower
@@ -92,10 +117,10 @@ class _File:
         found: list[_Channel] = []
         for index, kind in enumerate(self.types):
             if kind == 164:
-                units = self._set(index)
+                units = self.dataset(index)
             if kind != 58:
                 continue
-            data = self._set(index)
+            data = self.dataset(index)
             function = int(data["func_type"])
             timed = function == 0 and int(data["abscissa_spec_data_type"]) == _TIME_TYPE
             if function != _TIME_RESPONSE and not timed:
@@ -273,7 +298,7 @@ def read_uff(path: Path, options: ReadOptions) -> list[Record]:
         RecordError: what was found and what is needed.
         OSError: the file cannot be read.
     """
-    file = _File(path, options)
+    file = UffFile(path, options)
     channels = file.channels()
     forces = [each for each in channels if each.measures == "force"]
     responses = [each for each in channels if each.measures != "force"]
