@@ -228,6 +228,30 @@ def test_a_csv_log(tmp_path: Path) -> None:
         sg.fit_servo(file)
 
 
+def test_a_command_that_jumps_is_divided_there(tmp_path: Path) -> None:
+    """Other coordinates in mid-motion, by more than half a turn: neither a turn nor a motion."""
+    way = moves(6, 200.0, 1500.0)
+    loop = simulated(way, 0.006, 40.0, 0.5)
+    jump = np.where(np.arange(len(way)) >= len(way) // 2 + 13, 321.0, 0.0)
+    found = sg.fit_servo(capture(tmp_path / "a.json", {1: (way + jump, loop + jump)}))
+    (axis,) = found.axes
+    assert axis.unit == "mm"
+    assert axis.top_speed == pytest.approx(200.0, rel=0.01)
+    gain = axis.parameter("position gain")
+    assert gain is not None
+    assert gain.value == pytest.approx(40.0, rel=0.02)
+    assert any("its command jumps, first at" in warning for warning in found.warnings)
+
+
+def test_of_a_long_log_the_liveliest_windows_are_taken(tmp_path: Path) -> None:
+    way = np.concatenate([np.zeros(400_000), moves(6, 200.0, 1500.0), np.full(500_000, moves(6, 200.0, 1500.0)[-1])])
+    found = sg.fit_servo(capture(tmp_path / "a.json", {1: (way, simulated(way, 0.006, 40.0, 0.5))}, noise=2e-4))
+    assert found.warnings == ("of 47751 samples those 40000 were taken where an axis changes its speed most",)
+    gain = found.axes[0].parameter("position gain")
+    assert gain is not None
+    assert gain.value == pytest.approx(40.0, rel=0.02)
+
+
 def test_captures_that_cannot_be_fitted(tmp_path: Path) -> None:
     way = np.linspace(0.0, 1.0, 300)
     only = edge_document({"DES_POS|1": way, "TORQUE|1": way})

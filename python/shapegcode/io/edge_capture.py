@@ -18,6 +18,7 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 TURN_DEG = 360.0
+_EVEN_DEG = 10.0
 
 
 @dataclass(frozen=True)
@@ -209,9 +210,10 @@ class EdgeCapture:
     def position(self, axis: int | str, *, actual: bool = False) -> FloatArray:
         """Position of an axis without the jumps of whole turns with which a control keeps a rotary axis small.
 
-        A step of more than half a turn within one cycle is taken as such a jump: no axis moves that fast (90 m/s,
-        15 000 rpm at 2 ms). Behind a gap nobody knows how many turns were made: there it starts anew with the value of
-        the file. Command and actual position are straightened with the same turns, so that their difference stays.
+        A step of more than half a turn within one cycle is taken as such a jump where whole turns less it goes on as
+        the steps before: no axis moves that fast (90 m/s, 15 000 rpm at 2 ms). Behind a gap nobody knows how many turns
+        were made: there it starts anew with the value of the file. Command and actual position are straightened with
+        the same turns, so that their difference stays.
 
         Args:
             axis: number or label.
@@ -230,6 +232,10 @@ class EdgeCapture:
         for stretch in self.stretches:
             steps = np.diff(reference[stretch], prepend=reference[stretch][:1])
             turns = np.where(np.abs(steps) > TURN_DEG / 2.0, np.round(steps / TURN_DEG), 0.0)
+            # Without the turns the axis goes on as before: else the coordinates were changed.
+            rest = steps - TURN_DEG * turns
+            before = np.concatenate([rest[:1], rest[:-1]])
+            turns[~(np.abs(rest - before) < _EVEN_DEG)] = 0.0
             out[stretch] -= TURN_DEG * np.cumsum(np.nan_to_num(turns))
         return out
 

@@ -26,6 +26,7 @@ _STILL_TRAVEL = 1e-3  # mm or degrees
 _STEADY_CHANGE = 0.02  # of the top speed: less is no change of speed
 _LAG_SPREAD = 0.03
 _SLOPE = (0.5, 2.0)
+_MOST_SAMPLES = 40_000
 _LEAST_SPEED = 0.02
 
 
@@ -69,9 +70,12 @@ def fit_servo(
             if on_progress is not None:
                 on_progress((rank + share) / len(record.axes))
 
-        found.append(_axis(trace, record.period_s, drive, tell))
+        found.append(_axis(trace.liveliest(_MOST_SAMPLES), record.period_s, drive, tell))
     written: dict[str, float] = {}
     warnings = list(record.notes)
+    samples = record.axes[0].samples
+    if samples > _MOST_SAMPLES:
+        warnings.append(f"of {samples} samples those {_MOST_SAMPLES} were taken where an axis changes its speed most")
     fitted = machine
     if machine is not None:
         fitted, written, unknown = learned(machine, found, places)

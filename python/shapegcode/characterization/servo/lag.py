@@ -143,7 +143,7 @@ def fit_lag(
     Returns:
         The best of several starts, with the error that it has in every sample.
     """
-    from scipy.optimize import minimize
+    from scipy.optimize import minimize, minimize_scalar
 
     problem = _LagProblem(commands, [r - x for r, x in zip(commands, actuals, strict=True)], use, period_s)
     scale = max(rms(problem.used(problem.measured)) ** 2, 1e-18)
@@ -156,15 +156,21 @@ def fit_lag(
         found = problem.solve(dead, math.exp(min(max(gain, low), high)))[0]
         return math.log(found / scale + 1e-18) + 1e3 * float(out)
 
-    lag = _steady_lag(problem)
-    starts = [(1e3 * share * lag, math.log(gain)) for share in (0.6, 0.9, 0.99) for gain in (20.0, 60.0)]
-    if not dead_time:
-        starts = [(math.log(gain),) for gain in (20.0, 100.0, 300.0)]  # type: ignore[misc]
-    tried = [
-        minimize(square, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-9, "maxiter": 400})
-        for start in starts
-    ]
-    best = min(tried, key=lambda each: float(each.fun)).x
+    if dead_time:
+        lag = _steady_lag(problem)
+        starts = [(1e3 * share * lag, math.log(gain)) for share in (0.6, 0.9, 0.99) for gain in (20.0, 60.0)]
+        # Two valleys are followed to their ends: from the other starts others only come later to the same place.
+        tried = [
+            minimize(square, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-9, "maxiter": 300})
+            for start in sorted(starts, key=lambda each: square(np.array(each)))[:2]
+        ]
+        best = min(tried, key=lambda each: float(each.fun)).x
+    else:
+        gains = np.linspace(low, high, 13)
+        rank = int(np.argmin([square(gains[at : at + 1]) for at in range(len(gains))]))
+        around = gains[max(rank - 1, 0)], gains[min(rank + 1, len(gains) - 1)]
+        found = minimize_scalar(lambda gain: square(np.array([gain])), bounds=around, method="bounded")
+        best = np.array([float(found.x)])
     dead = min(max(float(best[0]) * 1e-3, 0.0), LONGEST_DEAD_S) if dead_time else 0.0
     return problem.solve(dead, math.exp(min(max(float(best[-1]), low), high)))[1]
 

@@ -19,6 +19,8 @@ __all__ = ["ServoRecord", "ServoTrace", "read_servo_record"]
 FloatArray = npt.NDArray[np.float64]
 _GAP = 1.5  # of the usual step
 _FEWEST = 100
+_WINDOW = 2500
+_LARGEST_ACCELERATION = 5e5  # mm/s² or degrees/s²; a command beyond it is no motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,50 @@ class ServoTrace:
     actual: tuple[FloatArray, ...]
     deviation: tuple[FloatArray, ...] | None = None
     torque: tuple[FloatArray, ...] | None = None
+
+    @property
+    def samples(self) -> int:
+        """Of all stretches."""
+        return sum(map(len, self.command))
+
+    def liveliest(self, most: int) -> ServoTrace:
+        """The windows with most changes of speed, where there are more samples than can be fitted in a short time.
+
+        Args:
+            most: samples to keep.
+
+        Returns:
+            The trace itself where it has no more; else some of its windows, those that touch each other joined.
+        """
+        if self.samples <= most:
+            return self
+        windows: list[tuple[float, int, int]] = []  # change of speed, stretch, start
+        for rank, way in enumerate(self.command):
+            changes = np.abs(np.diff(way, 2, prepend=way[:1], append=way[-1:]))
+            windows += [(float(changes[at : at + _WINDOW].sum()), rank, at) for at in range(0, len(way), _WINDOW)]
+        kept: list[tuple[int, int, int]] = []  # stretch, start, end
+        for _, rank, at in sorted(sorted(windows, reverse=True)[: max(1, most // _WINDOW)], key=lambda each: each[1:]):
+            end = min(at + _WINDOW, len(self.command[rank]))
+            if kept and kept[-1][0] == rank and kept[-1][2] == at:
+                kept[-1] = (rank, kept[-1][1], end)
+            elif end - at >= _FEWEST:
+                kept.append((rank, at, end))
+
+        def cut(values: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
+            return tuple(values[rank][start:end] for rank, start, end in kept)
+
+        def cut_if(values: tuple[FloatArray, ...] | None) -> tuple[FloatArray, ...] | None:
+            return None if values is None else cut(values)
+
+        return ServoTrace(
+            self.name,
+            self.unit,
+            cut(self.time_s),
+            cut(self.command),
+            cut(self.actual),
+            cut_if(self.deviation),
+            cut_if(self.torque),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,8 +147,17 @@ def _of_capture(capture: EdgeCapture) -> ServoRecord:
             notes.append(f"axis {axis.number} ({axis.name}): left out: values are missing from {bad[0]} on")
             continue
 
-        def cut(values: FloatArray) -> tuple[FloatArray, ...]:
-            return tuple(values[each] for each in capture.stretches if each.stop - each.start >= _FEWEST)
+        ranges = _ranges(command, capture.stretches, capture.cycle_s)
+        if len(ranges) > len(capture.stretches):
+            where = f"{capture.time_s[ranges[1].start]:.3f} s"
+            notes.append(f"axis {axis.number} ({axis.name}): its command jumps, first at {where}: divided there")
+        ranges = tuple(each for each in ranges if each.stop - each.start >= _FEWEST)
+        if not ranges:
+            notes.append(f"axis {axis.number} ({axis.name}): left out: no {_FEWEST} samples without gap or jump")
+            continue
+
+        def cut(values: FloatArray, ranges: tuple[slice, ...] = ranges) -> tuple[FloatArray, ...]:
+            return tuple(values[each] for each in ranges)
 
         def other(signal: str, number: int = axis.number) -> tuple[FloatArray, ...] | None:
             found = capture.columns.get(f"{signal}|{number}")
@@ -123,6 +178,18 @@ def _of_capture(capture: EdgeCapture) -> ServoRecord:
             )
         )
     return _checked(ServoRecord(capture.source, capture.cycle_s, tuple(axes), tuple(notes)))
+
+
+def _ranges(command: FloatArray, stretches: tuple[slice, ...], period_s: float) -> tuple[slice, ...]:
+    """The stretches, divided where the command jumps in one sample: other coordinates, no motion."""
+    out = []
+    for each in stretches:
+        steps = np.diff(command[each])
+        kinks = np.abs(np.diff(steps)) > _LARGEST_ACCELERATION * period_s**2
+        jumps = np.flatnonzero(kinks[:-1] & kinks[1:]) + 2  # between the sample before and this one
+        ends = [each.start, *(each.start + jumps).tolist(), each.stop]
+        out += [slice(a, b) for a, b in itertools.pairwise(ends) if b > a]
+    return tuple(out)
 
 
 def _of_log(path: Path, units: tuple[float, float] | None) -> ServoRecord:
