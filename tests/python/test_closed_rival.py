@@ -40,6 +40,8 @@ def test_the_published_bands_lie_within_those_of_the_derived_kernels(mode: guard
         low, high = guard.five_percent_band(times, amplitudes)
         assert low > mode.band_of_setting[0]
         assert low > mode.band[0]
+    if mode.symmetric:
+        assert guard.residual(times[:2], np.array([0.5, 0.5]), np.array([1.0]))[0] > guard.LIMIT
 
 
 @pytest.mark.parametrize("reading", ["band", "band_of_setting"])

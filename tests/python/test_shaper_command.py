@@ -213,6 +213,12 @@ def test_the_same_picture_gives_the_same_bytes(tmp_path: Path) -> None:
         assert (tmp_path / f"one{suffix}").read_bytes() == (tmp_path / f"two{suffix}").read_bytes()
 
 
+def test_families_that_were_asked_for_are_drawn_where_there_is_room() -> None:
+    names = ["zv", "smooth-zv", "smooth-ei", "mirrored"]
+    result = choose_shaper(["30:0.1"], periods_s=[0.001], families=names)
+    assert {each.family for each in selected(result)} == set(names)  # of these only zv is on the front
+
+
 def test_selected_curves_begin_with_the_recommended_one() -> None:
     result = choose_shaper(["46:0.02±5%", "131:0.02"], families=FEW[1:])
     curves = selected(result)

@@ -45,23 +45,24 @@ def plots_of(result: Recommendation) -> dict[str, Plot]:
 def selected(result: Recommendation, count: int = _CURVES) -> list[Design]:
     """The designs worth a curve: what is recommended, then one of each family on the Pareto front, from short to long.
 
-    Designs with negative taps are left out where they may not be recommended and there are others.
+    Where there is room, one of each other family. Designs with negative taps are left out where they may not be
+    recommended and there are others.
     """
     places = list(dict.fromkeys(each for each in (result.recommended, result.recommended_on_grid) if each is not None))
     negative = result.allow_negative or result.design.negative
-    front = [place for place in result.shown() if result.designs[place].pareto]
-    front = [place for place in front if negative or not result.designs[place].negative]
+    shown = [place for place in result.shown() if negative or not result.designs[place].negative]
     families = {result.designs[place].family for place in places}
     drawn = {_taps(result.designs[place]) for place in places}
-    others = []
-    for place in front:
-        each = result.designs[place]
-        if each.family not in families and _taps(each) not in drawn:
-            families.add(each.family)
-            drawn.add(_taps(each))
-            others.append(place)
-    room = min(count - len(places), len(others))
-    places += [others[round(step)] for step in np.linspace(0, len(others) - 1, room)] if room > 0 else []
+    for pareto in (True, False):
+        others = []
+        for place in shown:
+            each = result.designs[place]
+            if each.pareto == pareto and each.family not in families and _taps(each) not in drawn:
+                families.add(each.family)
+                drawn.add(_taps(each))
+                others.append(place)
+        room = min(count - len(places), len(others))
+        places += [others[round(step)] for step in np.linspace(0, len(others) - 1, room)] if room > 0 else []
     return [result.designs[place] for place in places]
 
 
