@@ -277,7 +277,8 @@ def _cell(name: str, axis: ServoAxis) -> str:
     if found is None:
         return ""
     scale = 1e3 if found.unit == "s" else 1.0
-    value = "?" if found.value is None else f"{scale * found.value:.4g}"
+    digits = 3 if name.startswith("drive") else 4
+    value = "?" if found.value is None else f"{scale * found.value:.{digits}g}"
     if found.low is None or found.high is None:
         return value
-    return f"{value} {scale * found.low:.4g}–{scale * found.high:.4g}"
+    return f"{value} {scale * found.low:.{digits}g}–{scale * found.high:.{digits}g}"
