@@ -256,6 +256,14 @@ def test_a_clock_that_goes_back_ends_the_run_there(tmp_path: Path) -> None:
     assert run.notes == ("line 12: the clock goes back by 3599.000 s; the run ends there, its rest is left out",)
 
 
+def test_a_clock_that_goes_back_in_a_log_without_states_makes_two_runs(tmp_path: Path) -> None:
+    text = "".join(line for line in LOG.splitlines(keepends=True) if "Program_Status" not in line)
+    first, second = read(tmp_path, text + text)
+    assert first.cut_start and first.duration_s is None and second.duration_s is None
+    assert first.block.value.tolist() == second.block.value.tolist() == [1, 7, 8, 12, 0]
+    assert first.notes[0] == "line 13: the clock goes back by 607.000 s; the run ends there, and another one begins"
+
+
 def test_values_that_overtake_each_other_are_sorted(tmp_path: Path) -> None:
     run = only(tmp_path, LOG.replace("08:10:02.0000000Z|Block_Number|8", "08:10:00.4900000Z|Block_Number|8"))
     assert values(run.block) == [(-0.1, 1), (0.49, 8), (0.5, 7), (5.0, 12)]
@@ -486,6 +494,7 @@ def test_units_of_tables_are_converted_said_or_refused(tmp_path: Path) -> None:
 
 def test_tables_that_are_refused(tmp_path: Path) -> None:
     refused(tmp_path, "t,force\n0,1\n1,2\n", r"run.csv:1: no header with a time .* has t, force; name them", "run.csv")
+    refused(tmp_path, "t_s,line\n0,5,7\n", r"run.csv:2: 3 cells, the header has 2; decimal commas need", "run.csv")
     refused(tmp_path, "t,line\nmonday,1\n", r"run.csv:2: t is 'monday': must be a number or a time", "run.csv")
 
 

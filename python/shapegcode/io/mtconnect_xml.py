@@ -23,6 +23,7 @@ _MAX_OBSERVATIONS = 4_000_000
 #: Sub-types of which the value is not what the machine does, by kind of item.
 _LEFT_OUT = {"COMMANDED", "PROGRAMMED", "JOG", "TARGET", "PROBE", "INCREMENTAL", "SCHEDULE", "OVERRIDE"}
 _BEGIN = re.compile(rb"<\?xml\s|<(?:\w+:)?MTConnect(?:Streams|Devices|Error|Assets)\b")
+#: Bytes that the declaration of a document, or the beginning of its root, may need.
 _OVERLAP = 80
 _FEED_UNIT = "mm/s"
 
@@ -78,7 +79,8 @@ class _Documents:
                     return
                 self._line += data.count(b"\n", 0, found.start())
                 data = data[found.start() :]
-                self._document = _Document(self._path, self._line, self._table, self._notes)
+                utf_16 = b"utf-16" in data[:_OVERLAP].lower()
+                self._document = _Document(self._path, self._line, self._table, self._notes, utf_16)
                 self._count += 1
             used = self._document.feed(data)
             self._line += data.count(b"\n", 0, used)
@@ -112,7 +114,7 @@ class _Documents:
 class _Document:
     """One document."""
 
-    def __init__(self, path: Path, line: int, table: ItemTable, notes: FileNotes) -> None:
+    def __init__(self, path: Path, line: int, table: ItemTable, notes: FileNotes, transcoded: bool) -> None:
         self.line = line
         self.ended = False
         self.instance = ""
@@ -127,7 +129,8 @@ class _Document:
         self._now: tuple[Item, dict[str, str], int] | None = None
         self._text: list[str] = []
         self._fed = 0
-        self._parser = expat.ParserCreate(namespace_separator="}")
+        # A file in UTF-16 was turned into UTF-8 before it comes here, its declaration was not.
+        self._parser = expat.ParserCreate("UTF-8" if transcoded else None, namespace_separator="}")
         self._parser.buffer_text = True
         self._parser.StartElementHandler = self._start
         self._parser.EndElementHandler = self._end
@@ -143,6 +146,8 @@ class _Document:
         """Read on; the bytes that belong to this document."""
         try:
             self._parser.Parse(data, False)
+        except LookupError as error:
+            raise RecordError(f"{self._path}:{self.line}: {error}") from error
         except expat.ExpatError as error:
             if not self.ended:
                 raise RecordError(

@@ -83,7 +83,9 @@ class RunCutter:
         for line, time, stamp, item, text in events:
             if not 0.0 <= time - last <= _QUIET_S:
                 yield from self._odd_step(line, time, last, stamp)
-            last = time
+                last = time if time > last or time < last - _DISORDER_S else last
+            else:
+                last = time
             track = tracks.get(item)
             if track is None:
                 track = tracks[item] = Track(item)
@@ -132,15 +134,18 @@ class RunCutter:
         if step >= -_DISORDER_S:
             self.notes.add("disorder", line, f"its time stamp is {-step:.3f} s before that of the line above; sorted")
             return
-        self.notes.add(
-            "back", line, f"the clock goes back by {-step:.3f} s"
-            + ("; the run ends there, its rest is left out" if run is not None else ""),
-        )  # fmt: skip
+        then = "" if run is None else "; the run ends there, its rest is left out"
+        if run is None and self._state == "unknown" and self._moved():
+            first, at, began = self._first
+            run = self._open = _Open(at, began, first, cut_start=True)
+            then = "; the run ends there, and another one begins"
+        self.notes.add("back", line, f"the clock goes back by {-step:.3f} s{then}")
         if run is not None:
             self._last_line = line
             yield from self._finish(last, None)
         for track in self._tracks.values():
             track.forget_times()
+        self._first = line, time, stamp.decode("latin-1").strip()
 
     def _full(self, line: int) -> Iterator[RunLog]:
         """Too many values for the memory: an error in a run; while none goes on the old ones are dropped."""
@@ -245,6 +250,7 @@ class RunCutter:
         self._open = None
         self._given = True
         has_status = self._status is not None
+        end = max(end, run.start)  # items may overtake each other
         part = RunPart(
             self._source, run.start, run.stamp, end, word, (run.line, self._last_line), run.cut_start,
             word is None and has_status, run.holds, run.gaps, has_status,

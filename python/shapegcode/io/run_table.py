@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ __all__ = ["table_events"]
 
 _DELIMITERS = ("\t", ";", ",", "|")
 _HEAD_LINES = 400
+_LATEST_S = 1e12
 _MEASURES: dict[str, Measured] = {
     "time": "time", "feed": "velocity", "x": "displacement", "y": "displacement", "z": "displacement",
 }  # fmt: skip
@@ -68,7 +70,12 @@ def table_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Eve
         for number, line in enumerate(lines, start=number + 1):  # noqa: B020  (goes on over the chunks)
             if number <= header.line or not line.strip() or line.startswith(b"#"):
                 continue
-            cells = cells_of(line.decode("utf-8", errors="replace"), header.delimiter)
+            text = line.decode("utf-8", errors="replace").replace("\r", " ")
+            try:
+                cells = cells_of(text, header.delimiter)
+            except csv.Error as error:
+                notes.add("row", number, f"{error}; the row is left out")
+                continue
             try:
                 stamp, time = _time(cells, header, stamps)
             except (ValueError, IndexError):
@@ -83,6 +90,9 @@ def table_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Eve
             if not readable and header.time_unit is None and is_number(cells[header.time.index], True):
                 notes.add("time unit", header.line, f"{header.time.item.name} has no unit: its numbers are taken as s")
             readable = True
+            if any(cells[header.cells :]):
+                hint = "; decimal commas need another sign between the columns" if header.delimiter == "," else ""
+                raise RecordError(f"{path}:{number}: {len(cells)} cells, the header has {header.cells}{hint}")
             if len(cells) < header.cells:
                 notes.add("short", number, f"{len(cells)} cells of {header.cells}")
             for column in header.columns:
@@ -93,7 +103,12 @@ def table_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Eve
 def _time(cells: list[str], header: _Header, stamps: Stamps) -> tuple[bytes, float]:
     cell = cells[header.time.index]
     if is_number(cell, True) or is_number(cell, False):
-        return cell.encode(), float(_point(cell)) * header.time.factor
+        time = float(_point(cell)) * header.time.factor
+        if header.time_unit is None:
+            return cell.encode(), stamps.seconds(_point(cell).encode())
+        if not abs(time) < _LATEST_S:
+            raise ValueError(f"{time:g} s")
+        return cell.encode(), time
     return cell.encode(), stamps.seconds(cell.encode())
 
 
@@ -117,7 +132,10 @@ def _header(path: Path, table: ItemTable) -> _Header:
     for number, line in enumerate(lines, start=1):
         text = line.decode("utf-8", errors="replace").strip().lstrip("#").strip()
         for delimiter in _DELIMITERS:
-            cells = cells_of(text, delimiter)
+            try:
+                cells = cells_of(text, delimiter)
+            except csv.Error:
+                continue
             items = [_label(cell, table) for cell in cells]
             roles = [item.role for item, _ in items if item is not None]
             if "time" in roles and {"block", "sequence", "block_text"} & set(roles):
@@ -172,4 +190,5 @@ def _columns(path: Path, number: int, delimiter: str, items: list[tuple[Item | N
         length = measures == "displacement" and label.unit is not None
         columns.append(_UsedColumn(index, item, factor_between(label.unit, "mm") if length and label.unit else 1.0))
     assert time is not None
+    columns.sort(key=lambda column: column.item.role == "status")  # a row's values belong to the run that ends in it
     return _Header(number, delimiter, len(items), time, columns, feed_unit, time_unit)

@@ -205,7 +205,7 @@ def run_of(part: RunPart, tracks: Sequence[Track], feed_unit: str | None, notes:
     if block is None:
         notes.add("no block", part.lines[0], "no block numbers in this run")
         block, counts = Signal(np.empty(0), np.empty(0)), "line"
-    elif (first := block.value[block.value > 0.0])[:1] > _LATE_START and counts == "line":
+    elif (first := block.value[block.value > 0.0][:1]).size and first[0] > _LATE_START and counts == "line":
         notes.add(
             "late", part.lines[0], f"the first {block.name} is {first[0]:g}: the program or the log began in the middle"
         )

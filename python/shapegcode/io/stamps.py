@@ -18,6 +18,7 @@ _CLOCK = re.compile(r"(\d\d?):(\d\d):(\d\d)([.,]\d+)?")
 _NUMBER = re.compile(r"\d+(\.\d*)?(e[+-]?\d+)?", re.IGNORECASE)
 #: A plain number above it counts milliseconds since 1970: as seconds it would be the year 5138.
 _MILLISECONDS_FROM = 1e11
+_LATEST = 1e15
 
 
 class Stamps:
@@ -42,9 +43,9 @@ class Stamps:
             ValueError: it is none of these.
         """
         if stamp[:_MINUTE] == self._minute and stamp[-1:] == b"Z":
-            second = stamp[_MINUTE:-1]
-            if second[:2].isdigit() and (len(second) == 2 or second[3:].isdigit()):
-                return self._base + float(second)
+            seconds = stamp[_MINUTE:-1]
+            if seconds.replace(b".", b"", 1).isdigit():
+                return self._base + float(seconds)
         text = stamp.decode("latin-1").partition("@")[0].strip()
         found = _ISO.fullmatch(text)
         if found is None:
@@ -79,7 +80,6 @@ def _other(text: str) -> float:
         return (moment - _EPOCH).total_seconds() + _second(found[6], found[7])
     if found := _CLOCK.fullmatch(text):
         return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + _second(found[3], found[4])
-    if _NUMBER.fullmatch(text):
-        value = float(text)
+    if _NUMBER.fullmatch(text) and (value := float(text)) < _LATEST:
         return value / 1000.0 if value > _MILLISECONDS_FROM else value
     raise ValueError(f"{text!r} is no time")
