@@ -18,12 +18,14 @@ from scipy.io import wavfile
 
 from shapegcode.characterization.log import read_log
 from shapegcode.errors import RecordError
+from shapegcode.identification.identify import identify
 from shapegcode.io.columns import tap_label
 from shapegcode.io.read import ReadOptions, read_records
 from shapegcode.io.record import FloatArray, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.units import find_unit
 from shapegcode.testcut.record import read_forces
+from tap_truth import TrueMode, acceleration
 
 COUNT = 24
 PERIOD_S = 0.0005
@@ -754,3 +756,74 @@ def test_bad_wav_files(tmp_path: Path) -> None:
     path.write_text(HEADER + rows(), encoding="utf-8")
     with pytest.raises(RecordError, match="not a WAV file: it begins with"):
         read_records(path)
+
+
+def test_uneven_clock_is_resampled_within_its_band(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    mode = TrueMode(83.0, 0.02, 60.0)
+    fine = np.arange(int(2.2 * 65536)) / 65536.0
+    force = np.where((fine > 0.05) & (fine < 0.056), 500.0 * np.sin(np.pi * (fine - 0.05) / 0.006) ** 2, 0.0)
+    response = acceleration([mode], force, fine[1])
+    times = (np.arange(4096) + 0.5 + rng.uniform(-0.3, 0.3, 4096)) / 2048.0
+    columns = [np.interp(times, fine, each) for each in (force, response)]
+    columns = [each + 0.003 * np.std(each) * rng.standard_normal(4096) for each in columns]
+    path = tmp_path / "logger.csv"
+    save(path, times, columns)
+    (record,) = read_records(path)
+    assert record.widened >= 3.0
+    assert any("resampled to" in warning and "widened" in warning for warning in record.warnings)
+    (found,) = identify(path).modes
+    for estimate, truth in (
+        (found.frequency_hz, mode.frequency_hz), (found.damping_ratio, mode.damping_ratio),
+        (found.stiffness_n_per_m, mode.stiffness_n_per_m),
+    ):  # fmt: skip
+        assert estimate is not None
+        assert estimate.low <= truth <= estimate.high
+    times[2000] = times[1999]
+    save(path, times, columns)
+    with pytest.raises(RecordError, match=r"logger.csv:2002: time .* is repeated: must ascend"):
+        read_records(path)
+    times[2000] = times[1999] - 1e-4
+    save(path, times, columns)
+    with pytest.raises(RecordError, match=r"logger.csv:2002: time .* comes after .*: must ascend"):
+        read_records(path)
+    times[2000:] += 0.01
+    save(path, times, columns)
+    with pytest.raises(RecordError, match=r"must ascend|leaves too little to resample"):
+        read_records(path)
+
+
+def test_clock_of_coarse_digits_is_taken_as_even(tmp_path: Path) -> None:
+    times = np.round(np.arange(2000) / 1024.0, 4)  # rounded to a tenth of the period
+    path = tmp_path / "rounded.csv"
+    save(path, times, [np.sin(300.0 * times), np.cos(300.0 * times)])
+    (record,) = read_records(path)
+    assert record.widened == 1.0
+    assert record.period_s == pytest.approx(1.0 / 1024.0, rel=1e-4)
+
+
+def save(path: Path, times: FloatArray, columns: list[FloatArray]) -> None:
+    np.savetxt(path, np.column_stack((times, *columns)), delimiter=",", header="time_s,force_N,acc_m/s^2", comments="",
+               fmt="%.7f")  # fmt: skip
+
+
+def test_volts_by_the_sensitivity_of_the_sensors(tmp_path: Path) -> None:
+    path = tmp_path / "volts.csv"
+    volts = np.column_stack((np.arange(COUNT) * PERIOD_S, FORCE * 2.25, RESPONSE / 9.80665 * 0.1))
+    header = "time_s,force [mV],ax [V]"
+    np.savetxt(path, volts, delimiter=",", header=header, comments="")
+    with pytest.raises(RecordError, match=r"the unit 'mV' is not known.*--force-sensitivity 2.25mV/N"):
+        read_records(path)
+    (record,) = read_records(path, ReadOptions(force_sensitivity="2.25mV/N", response_sensitivity="100 mV/g"))
+    assert record.force_n == pytest.approx(FORCE)
+    assert record.response == pytest.approx(RESPONSE)
+    assert record.axis == "x"
+    with pytest.raises(RecordError, match=r"force_sensitivity '2.25 N/mV': must be V, mV or µV over one of N, kN"):
+        ReadOptions(force_sensitivity="2.25 N/mV")
+    with pytest.raises(RecordError, match=r"response_sensitivity '100 mV/N': must be"):
+        ReadOptions(response_sensitivity="100 mV/N")
+    with pytest.raises(RecordError, match="state one of both"):
+        ReadOptions(force_sensitivity="1mV/N", force_scale=2.0)
+    np.savetxt(path, volts, delimiter=",", header="time_s,force_N,ax [V]", comments="")
+    with pytest.raises(RecordError, match=r"'force_N' is in N, not in volts"):
+        read_records(path, ReadOptions(force_sensitivity="2.25mV/N", response_sensitivity="100 mV/g"))

@@ -39,6 +39,14 @@ _OF_FILES: tuple[tuple[str, str, dict[str, Any], str], ...] = (
         "m/s^2, m/s or m for 1 in the file (integer WAV: full scale)",
     ),
     (
+        "--force-sensitivity", "force_sensitivity", {"metavar": "mV/N"},
+        "of the hammer, where the force is in volts: 2.25mV/N",
+    ),
+    (
+        "--response-sensitivity", "response_sensitivity", {"metavar": "mV/g"},
+        "of the sensor, where the response is in volts: 100mV/g",
+    ),
+    (
         "--response-first", "response_first", {"action": "store_true", "default": False},
         "in a WAV file the response is the first channel, not the force",
     ),

@@ -131,7 +131,7 @@ def _result(
             f"what the model leaves is no white noise (autocorrelation {fit.residual_autocorrelation:.2f}): the "
             "intervals allow for it; other causes than modes, or a mode that is not linear"
         )
-    white_share = 1.0 if coloured else problem.white_share
+    white_share = 1.0 / max(record.widened for record in ready.records) ** 2 if coloured else problem.white_share
     found = _judged(ready, problem, fit, models, others, accepted_percent, white_share, band_hz)
     supported = tuple(mode for mode in found if not mode.refusal)
     refused = tuple(mode for mode in found if mode.refusal)

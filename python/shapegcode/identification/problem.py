@@ -91,6 +91,7 @@ class Taps(_OverTime):
         hold: course of the force between samples: "band_limited", "linear" or "impulse".
         thinned: what was thinned out before the fit; None: every sample is fitted.
         begun: the record begins within the pulse.
+        widened: what intervals are multiplied with; see `Record`.
     """
 
     forces: list[FloatArray]
@@ -102,11 +103,12 @@ class Taps(_OverTime):
     hold: str
     thinned: Thinned | None = None
     begun: bool = False
+    widened: float = 1.0
 
     @property
     def white_share(self) -> float:
         """Share of white noise that reaches the samples: so many of them are independent."""
-        return 1.0 if self.thinned is None else self.thinned.white_share
+        return (1.0 if self.thinned is None else self.thinned.white_share) / self.widened**2
 
     @property
     def noise_correlation(self) -> float:
@@ -190,7 +192,7 @@ class Decays(_OverTime):
         responses: (n,) each.
         period_s: time between two samples.
         band_hz: modes are looked for in it.
-        white_share: every sample is independent.
+        white_share: of the samples, how many are independent.
         noise_correlation: none.
     """
 
@@ -264,8 +266,9 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: 
     band = (LEAST_SWINGS / longest_s, HIGHEST_SHARE / first.period_s)
     if band_hz is not None:
         band = band_hz if within else (min(band[0], band_hz[0]), max(band[1], band_hz[1]))
+    widest = max(record.widened for record in ready.records)
     if first.force_n is None:
-        return Decays(responses, first.period_s, band)
+        return Decays(responses, first.period_s, band, 1.0 / widest**2)
     forces = [record.force_n for record in ready.records if record.force_n is not None]
     noise = [value for value in ready.force_noise_n if value is not None]
     taps = Taps(
@@ -277,6 +280,7 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: 
         float(np.sqrt(np.mean(np.square(noise)))) if noise else 0.0,
         "band_limited",
         begun=any(force[0] != 0.0 for force in forces),
+        widened=widest,
     )
     thinned = thin(ready, highest_of_interest_hz(ready, None if band_hz is None else band_hz[1]))
     if thinned is None:

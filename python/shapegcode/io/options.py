@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from shapegcode.errors import RecordError
 from shapegcode.io.record import Quantity
 from shapegcode.io.units import Measured, Unit, find_unit, units_of
 
-__all__ = ["ReadOptions", "stated_unit"]
+__all__ = ["ReadOptions", "per_volt", "stated_unit", "volts_of"]
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class ReadOptions:
         force_scale: N for 1 in the file; of an integer WAV, N at full scale.
         response_scale: m/s², m/s or m (see *quantity*) for 1 in the file; of an integer WAV, at full scale.
         response_first: in a WAV file, the response is the first channel and the force the second.
+        force_sensitivity: of the hammer, such as "2.25 mV/N", where the force is in volts.
+        response_sensitivity: of the sensor, such as "100 mV/g", where the response is in volts.
         ignore_force: read the response only, as a free decay.
     """
 
@@ -43,6 +46,8 @@ class ReadOptions:
     force_scale: float | None = None
     response_scale: float | None = None
     response_first: bool = False
+    force_sensitivity: str | None = None
+    response_sensitivity: str | None = None
     ignore_force: bool = False
 
     def __post_init__(self) -> None:
@@ -62,6 +67,55 @@ class ReadOptions:
         for option, text, allowed in stated:
             if text is not None and stated_unit(text, allowed) is None:
                 raise RecordError(f"{option} {text!r} is not known: must be one of {units_of(*allowed)}")
+        for option, text, allowed in (
+            ("force_sensitivity", self.force_sensitivity, ("force",)),
+            ("response_sensitivity", self.response_sensitivity, ("acceleration", "velocity", "displacement")),
+        ):
+            if text is not None:
+                per_volt(option, text, allowed)
+            if text is not None and getattr(self, option.replace("sensitivity", "scale")) is not None:
+                raise RecordError(f"{option} {text!r} and {option.replace('sensitivity', 'scale')}: state one of both")
+
+
+_VOLTS = {"v": 1.0, "mv": 1e-3, "µv": 1e-6, "uv": 1e-6}
+
+
+def volts_of(unit_text: str) -> float | None:
+    """What a value in V, mV or µV is multiplied with to give volts.
+
+    Args:
+        unit_text: of a label; empty: volts.
+
+    Returns:
+        The factor; None: no unit of voltage.
+    """
+    plain = unit_text.strip().lower().replace("μ", "µ")
+    return 1.0 if plain in {"", "volt", "volts"} else _VOLTS.get(plain)
+
+
+def per_volt(option: str, text: str, allowed: tuple[Measured, ...]) -> tuple[Unit, float]:
+    """What one volt means by a sensitivity.
+
+    Args:
+        option: its name, for messages.
+        text: such as "2.25 mV/N" or "100mV/g".
+        allowed: kinds of quantity.
+
+    Returns:
+        The unit of the quantity, and its SI value per volt.
+
+    Raises:
+        RecordError: it is not a number of V, mV or µV over a known unit.
+    """
+    match = re.fullmatch(r"\s*([0-9.]+(?:[eE][+-]?\d+)?)\s*([mµuμ]?V)\s*/\s*\(?(.+?)\)?\s*", text)
+    unit = find_unit(match[3]) if match else None
+    volts = volts_of(match[2]) if match else None
+    if match is None or unit is None or volts is None or unit.measures not in allowed or not float(match[1]) > 0.0:
+        example = "2.25 mV/N" if allowed == ("force",) else "100 mV/g"
+        raise RecordError(
+            f"{option} {text!r}: must be V, mV or µV over one of {units_of(*allowed)}, such as {example!r}"
+        )
+    return unit, unit.factor / (float(match[1]) * volts)
 
 
 def stated_unit(text: str | None, allowed: tuple[Measured, ...]) -> Unit | None:

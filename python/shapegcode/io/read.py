@@ -36,6 +36,12 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
     if head[:4] in _WAV:
         from shapegcode.io.wav import read_wav
 
+        if options.force_sensitivity or options.response_sensitivity:
+            raise RecordError(
+                f"{path}: a WAV file does not say what its full scale is in volts: state N and m/s² at full scale "
+                "(--force-scale, --response-scale)"
+            )
+
         return read_wav(path, options)
     if _is_uff(head):
         from shapegcode.io.uff import read_uff

@@ -30,6 +30,7 @@ class Record:
         start_s: time of the first sample in the file.
         warnings: what reading the file had to assume.
         notes: what reading the file left out.
+        widened: what intervals are multiplied with: samples that were not evenly spaced tell less.
     """
 
     source: str
@@ -41,6 +42,7 @@ class Record:
     start_s: float = 0.0
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    widened: float = 1.0
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.period_s) and self.period_s > 0.0):

@@ -17,6 +17,11 @@ _OFF_STEP = 0.9
 _TELL = 0.1
 #: A stated rate and the instants may differ by this share: clocks are better by far, wrong units are worse by far.
 STATED_RATE_TOLERANCE = 0.01
+#: Rounding moves an instant by half a digit at most; where digits are finer than this share of what it is off, the
+#: clock of the logger itself is uneven.
+_ROUNDED = 0.5
+#: Half of the steps differ from the usual one by more than this share: the clock is uneven.
+_UNEVEN = 0.05
 _GRID_ONLY = "samples must be evenly spaced"
 
 
@@ -25,20 +30,24 @@ class UnevenTimeError(ValueError):
 
     Attributes:
         row: index of the sample at which it shows.
+        ascending: they ascend, so that they can be resampled.
     """
 
-    def __init__(self, row: int, text: str) -> None:
+    def __init__(self, row: int, text: str, *, ascending: bool = False) -> None:
         super().__init__(text)
-        self.row = row
+        self.row, self.ascending = row, ascending
 
 
-def even_period(times_s: FloatArray, stated_s: float | None = None) -> tuple[float, list[str]]:
+def even_period(
+    times_s: FloatArray, stated_s: float | None = None, *, even_clock: bool = True
+) -> tuple[float, list[str]]:
     """Mean period of evenly spaced instants, and warnings.
 
     Args:
         times_s: (n,) instants, n at least 3.
         stated_s: a period stated elsewhere, which the instants must agree with; rounding of the instants to whole
             digits longer than a period is then accepted.
+        even_clock: the clock itself is even, whatever digits it was written with; False: it need not be.
 
     Returns:
         The period in s, and warnings.
@@ -79,6 +88,8 @@ def even_period(times_s: FloatArray, stated_s: float | None = None) -> tuple[flo
                 row + 1,
                 f"{steps[row]:.6g} s between {times_s[row]:.9g} s and {times_s[row + 1]:.9g} s, usually {usual:.6g} s: "
                 f"{_GRID_ONLY}; samples are missing",
+                # An even clock whose samples got lost is no uneven one: nothing tells what was in the gap.
+                ascending=bool(np.median(np.abs(steps - usual)) > _UNEVEN * usual),
             )
     grid = times_s[0] + period * np.arange(count)
     off = times_s - grid
@@ -92,6 +103,14 @@ def even_period(times_s: FloatArray, stated_s: float | None = None) -> tuple[flo
             row,
             f"time {times_s[row]:.9g} s is {share:.2g} periods of {period:.6g} s off even spacing (limit {limit:.2g}): "
             f"{_GRID_ONLY} and none may be missing",
+            ascending=True,
+        )
+    if not even_clock and share > _TELL and not coarse and _digit_of(times_s) < _ROUNDED * share * period:
+        raise UnevenTimeError(
+            row,
+            f"time {times_s[row]:.9g} s is {share:.2g} periods of {period:.6g} s off even spacing, more than "
+            f"the digits of the file explain: {_GRID_ONLY}",
+            ascending=True,
         )
     if share > _TELL and not coarse:
         return period, [
@@ -99,3 +118,12 @@ def even_period(times_s: FloatArray, stated_s: float | None = None) -> tuple[flo
             f"period of {period:.6g} s"
         ]
     return period, []
+
+
+def _digit_of(times_s: FloatArray) -> float:
+    """The last digit of instants, s; 0: none down to a picosecond."""
+    for power in range(13):
+        scaled = times_s * 10.0**power
+        if np.max(np.abs(scaled - np.round(scaled))) < 1e-3:
+            return float(10.0**-power)
+    return 0.0

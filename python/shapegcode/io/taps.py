@@ -11,8 +11,9 @@ import numpy as np
 from shapegcode.errors import RecordError
 from shapegcode.io.cells import is_clock_time
 from shapegcode.io.columns import Label, tap_label, unit_of
-from shapegcode.io.options import ReadOptions, stated_unit
+from shapegcode.io.options import ReadOptions, per_volt, stated_unit, volts_of
 from shapegcode.io.record import UNITS, Quantity, Record
+from shapegcode.io.resampling import even_grid, resample
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.table import TextTable
 from shapegcode.io.units import Measured, Unit
@@ -21,7 +22,10 @@ __all__ = ["read_csv"]
 
 _EXAMPLE = "time_s,force_N,acc_m/s^2"
 _RESPONSES: tuple[Quantity, ...] = ("acceleration", "velocity", "displacement")
-_REMEDY = "state the unit, or the scale of a signal in volts (--force-scale, --response-scale)"
+_REMEDY = (
+    "state the unit, or of a signal in volts the sensor's sensitivity (--force-sensitivity 2.25mV/N, "
+    "--response-sensitivity 100mV/g) or the scale (--force-scale, --response-scale)"
+)
 #: Fewer samples are no record of a vibration.
 _FEWEST_ROWS = 16
 
@@ -86,6 +90,10 @@ class _Chooser:
         options, label = self.options, self.labels[index]
         said = next((each for each in _RESPONSES if each == label.measures), None)
         quantity = options.quantity or said
+        if options.response_sensitivity is not None:
+            of_volt, factor = per_volt("response_sensitivity", options.response_sensitivity, _RESPONSES)
+            measured = next(each for each in _RESPONSES if each == of_volt.measures)
+            return _Column(index, label, self._volts(index) * factor, measured)
         if options.response_scale is not None:
             return _Column(index, label, options.response_scale, quantity or "acceleration")
         bound = options.quantity or (None if options.response_unit else said)
@@ -95,6 +103,20 @@ class _Chooser:
             self.warnings.append(f"{self._name(index)} has no unit: {UNITS[quantity]} is taken")
             return _Column(index, label, 1.0, quantity)
         return _Column(index, label, unit.factor, next(each for each in _RESPONSES if each == unit.measures))
+
+    def _volts(self, index: int) -> float:
+        """Volts of 1 in a column of a sensor whose sensitivity is stated."""
+        label = self.labels[index]
+        factor = None if label.unit is not None else volts_of(label.unknown_unit)
+        if factor is None:
+            said = label.unit.name if label.unit is not None else label.unknown_unit
+            raise RecordError(
+                f"{self.where}: {self._name(index)} is in {said}, not in volts: leave its sensitivity out, or state "
+                "the scale (--force-scale, --response-scale)"
+            )
+        if not label.unknown_unit:
+            self.warnings.append(f"{self._name(index)} has no unit: V is taken, as its sensitivity is stated")
+        return factor
 
     def time(self) -> _Column | None:
         """The column of the time; None: there is none, and a period is stated."""
@@ -133,6 +155,8 @@ class _Chooser:
                 raise RecordError(f"{self.where}: {len(found)} columns of force, {names}: choose with --force-column")
             index = found[0]
         scale = options.force_scale
+        if options.force_sensitivity is not None:
+            scale = self._volts(index) * per_volt("force_sensitivity", options.force_sensitivity, ("force",))[1]
         return _Column(
             index, self.labels[index], self._factor(index, "force", options.force_unit) if scale is None else scale
         )
@@ -213,7 +237,7 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
     columns = [column for column in (time, force, *responses) if column is not None]
     values = table.numbers([column.index for column in columns], _FEWEST_ROWS)
     stated = options.period_s if options.period_s is not None else layout.period_s
-    start_s = 0.0
+    start_s, widened = 0.0, 1.0
     if time is None:
         assert stated is not None
         period = stated
@@ -222,7 +246,16 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
     else:
         times = values[:, 0] * time.factor
         try:
-            period, notes = even_period(times, stated)
+            try:
+                period, notes = even_period(times, stated, even_clock=False)
+            except UnevenTimeError as error:
+                if not error.ascending or stated is not None:
+                    raise
+                grid = even_grid(times)
+                period, notes = grid.period_s, [f"{path}: {note}" for note in grid.notes]
+                columns_of = [resample(column, times, grid) for column in values.T[1:]]
+                values = np.column_stack((grid.times_s / time.factor, *columns_of))
+                widened = grid.widened
         except UnevenTimeError as error:
             raise RecordError(f"{path}:{table.line_of(error.row)}: {error}") from error
         reader.warnings += notes
@@ -246,6 +279,7 @@ def read_csv(path: Path, options: ReadOptions) -> list[Record]:
             start_s=start_s,
             warnings=tuple(reader.warnings),
             notes=tuple(reader.notes),
+            widened=widened,
         )
         for k, column in enumerate(responses)
     ]

@@ -10,7 +10,7 @@ import numpy as np
 
 from shapegcode.errors import RecordError
 from shapegcode.io.columns import tap_label
-from shapegcode.io.options import ReadOptions, stated_unit
+from shapegcode.io.options import ReadOptions, per_volt, stated_unit, volts_of
 from shapegcode.io.record import FloatArray, Quantity, Record
 from shapegcode.io.sampling import UnevenTimeError, even_period
 from shapegcode.io.units import find_unit, units_of
@@ -205,6 +205,12 @@ class UffFile:
         options = self.options
         force = measures == "force"
         scale = options.force_scale if force else options.response_scale
+        sensitivity = options.force_sensitivity if force else options.response_sensitivity
+        if sensitivity is not None:
+            volts = volts_of(str(data.get("ordinate_axis_units_lab", "")).replace("NONE", ""))
+            if volts is None:
+                raise RecordError(f"{where}: it is not in volts: leave the sensitivity out, or state the scale")
+            return volts * per_volt("sensitivity", sensitivity, (measures,))[1]
         if scale is not None:
             return scale
         stated = stated_unit(options.force_unit if force else options.response_unit, (measures,))
