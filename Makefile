@@ -106,6 +106,7 @@ bench: package dev
 	$(BIN)/python tests/benchmarks/simulate_program.py
 	$(BIN)/python tests/benchmarks/feed_schedule.py
 	$(BIN)/python tests/benchmarks/milling_force.py
+	$(BIN)/python tests/benchmarks/run_logs.py
 
 coverage: test-packages dev
 	tests/tools/fetch_rs274.sh

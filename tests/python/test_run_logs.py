@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gzip
 import re
+import tracemalloc
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
@@ -197,6 +198,23 @@ def test_a_day_holds_several_runs_in_bounded_memory(tmp_path: Path) -> None:
         sg.read_run_logs(path, program_name="P7.NC")
     with pytest.raises(sg.RecordError, match=r"day.txt:\d+: the run that began in line 4 has more than 5 values"):
         sg.read_run_logs(path, max_values=5)
+
+
+def test_the_memory_is_that_of_a_run_however_long_the_log(tmp_path: Path) -> None:
+    def peak(runs: int) -> int:
+        lines = "".join(f"2026-03-02T08:10:04.{k:03}Z|Feed_Rate|{k}\n" for k in range(1000))
+        run = LOG.replace("2026-03-02T08:10:05", lines + "2026-03-02T08:10:05")
+        days = [f"{2 + k // 20:02}T{k % 20:02}:" for k in range(runs)]
+        path = written(tmp_path, "".join(run.replace("02T08:", day) for day in days), "day.txt")
+        tracemalloc.start()
+        try:
+            assert sum(len(each.block) for each in sg.iter_run_logs(path)) == 4 * runs
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    peak(2)  # modules are loaded
+    assert peak(200) < 1.2 * peak(60) < 20e6
 
 
 def test_holds_are_those_of_the_log(tmp_path: Path) -> None:
