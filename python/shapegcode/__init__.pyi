@@ -116,6 +116,7 @@ from shapegcode.identification.plots import (
     plot_response as plot_response,
     plot_spectrum as plot_spectrum,
     plot_stabilisation as plot_stabilisation,
+    plot_sweep as plot_sweep,
     plot_traces as plot_traces,
 )
 from shapegcode.identification.result import Identification as Identification

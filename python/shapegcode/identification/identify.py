@@ -12,7 +12,9 @@ from shapegcode.identification.frf_fit import find_frf_modes
 from shapegcode.identification.prepared import Prepared
 from shapegcode.identification.result import Identification
 from shapegcode.identification.support import ACCEPTED_PERCENT
+from shapegcode.identification.sweep import find_swept_modes
 from shapegcode.io.frequency_response import FrequencyResponse
+from shapegcode.io.klipper import is_klipper, read_sweep
 from shapegcode.io.read import ReadOptions, read_measurement
 from shapegcode.io.record import Record
 
@@ -64,6 +66,9 @@ def identify(
     names = tuple(str(each) if isinstance(each, str | Path) else each.source for each in sources)
     ready: Prepared | None = None
     try:
+        swept = _swept(sources, options or ReadOptions())
+        if swept is not None:
+            return find_swept_modes(swept, names, band_hz=band_hz, most_modes=most_modes, modes=modes)
         records: list[Record] = []
         responses: list[FrequencyResponse] = []
         for each in sources:
@@ -93,3 +98,23 @@ def identify(
         return Identification(
             files=names, prepared=ready, reason=str(error), warnings=ready.warnings, notes=ready.notes
         )
+
+
+def _swept(sources: Sequence[object], options: ReadOptions) -> Record | None:
+    """The record of a resonance sweep, if that is what the file holds; None: it is anything else.
+
+    Raises:
+        RecordError: several of them, or a fault in the file.
+    """
+    paths = [Path(each) for each in sources if isinstance(each, str | Path)]
+    found = [path for path in paths if path.is_file() and is_klipper(_beginning(path))]
+    if not found or options.ignore_force:
+        return None
+    if len(sources) > 1:
+        raise RecordError(f"{found[0]}: a sweep is identified alone: one file at a time")
+    return read_sweep(found[0], options)
+
+
+def _beginning(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(400)

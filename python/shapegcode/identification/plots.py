@@ -20,7 +20,15 @@ from shapegcode.results.result import Plot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_decay", "plot_response", "plot_spectrum", "plot_stabilisation", "plot_traces", "plots_of"]
+__all__ = [
+    "plot_decay",
+    "plot_response",
+    "plot_spectrum",
+    "plot_stabilisation",
+    "plot_sweep",
+    "plot_traces",
+    "plots_of",
+]
 
 _MOST_TRACES = 3
 _SEEN = 0.02
@@ -44,6 +52,8 @@ def plots_of(found: Identification) -> dict[str, Plot]:
     Returns:
         What draws each picture, by the name of its file without ending.
     """
+    if found.sweep is not None:
+        return {"identify-sweep": partial(plot_sweep, found)}
     if found.responses:
         return {
             "identify-response": partial(plot_response, found),
@@ -253,6 +263,28 @@ def plot_spectrum(found: Identification, ax: Axes | None = None) -> Axes:
             panel.annotate(
                 peak.label, (peak.frequency_hz, peak.amplitude), (0, 6), textcoords="offset points", ha="center"
             )
+    return panel
+
+
+def plot_sweep(found: Identification, ax: Axes | None = None) -> Axes:
+    """Amplitude of a sweep over the course of its command, measured and of the model.
+
+    Args:
+        found: what was identified, from a sweep.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The panel.
+    """
+    sweep = found.sweep
+    assert sweep is not None
+    panel = plot.axes(ax, size_inch=(9.0, 4.5), title="Sweep: acceleration over that of the command")
+    panel.semilogy(sweep.frequency_hz, sweep.amplitude, color=_MEASURED, linewidth=2.2, label="measured")
+    panel.semilogy(sweep.frequency_hz, sweep.fitted, "--", color=_FITTED, linewidth=1.1, label="model")
+    panel.set_xlabel("frequency in Hz")
+    panel.set_ylabel("any unit")
+    _mark_modes([panel], found)
+    plot.legend_above(panel)
     return panel
 
 

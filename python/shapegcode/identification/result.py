@@ -20,7 +20,7 @@ from shapegcode.results.table import Column, Table
 
 FloatArray = npt.NDArray[np.float64]
 
-__all__ = ["ChartPole", "Identification", "MachineFile", "MassCheck", "RecordUse"]
+__all__ = ["ChartPole", "Identification", "MachineFile", "MassCheck", "RecordUse", "Sweep", "reason_for"]
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,29 @@ class RecordUse:
         return None if self.samples is None or self.period_s is None else self.samples * self.period_s
 
 
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """What a sweep without force showed.
+
+    Attributes:
+        source: of the record.
+        axis: "x", "y" or "z"; None: not known.
+        samples: that were recorded.
+        period_s: time between two samples.
+        frequency_hz: (n,) middles of the bins.
+        amplitude: (n,) of the response over the command's course, any unit.
+        fitted: (n,) of the model.
+    """
+
+    source: str
+    axis: str | None
+    samples: int
+    period_s: float
+    frequency_hz: FloatArray
+    amplitude: FloatArray
+    fitted: FloatArray
+
+
 @dataclass(frozen=True)
 class MachineFile:
     """A machine file that took the modes.
@@ -124,6 +147,7 @@ class Identification(Result):
         notes: what was left out of the files and the like.
         prepared: the records that were used, and those that were not; None: the files hold none that can be.
         chart: poles of the stabilisation chart.
+        sweep: spectrum of a sweep without force; None: there is none.
         responses: frequency responses without time record, as far as they were fitted.
         fitted_lines: the model's lines of each, (n,) complex.
         fitted_records: the records as they were fitted, thinned out to what the band needs.
@@ -151,6 +175,7 @@ class Identification(Result):
     notes: tuple[str, ...] = ()
     prepared: Prepared | None = field(default=None, metadata=hidden())
     chart: tuple[ChartPole, ...] = field(default=(), metadata=hidden())
+    sweep: Sweep | None = field(default=None, metadata=hidden())
     responses: tuple[FrequencyResponse, ...] = field(default=(), metadata=hidden())
     fitted_lines: tuple[ComplexArray, ...] = field(default=(), metadata=hidden())
     fitted_records: tuple[Record, ...] = field(default=(), metadata=hidden())
@@ -164,6 +189,8 @@ class Identification(Result):
     @property
     def axis(self) -> str | None:
         """Axis along which it was measured, "x", "y" or "z"; null: the files do not say."""
+        if self.sweep is not None:
+            return self.sweep.axis
         if self.responses:
             return self.responses[0].axis
         return self.taps[0].axis if self.taps else None
@@ -177,11 +204,13 @@ class Identification(Result):
     def source(self) -> str:
         """Where the modes come from, for the machine file."""
         names = ", ".join(Path(file).name for file in self.files)
-        if self.responses:
-            return f"frequency response {names}"
+        if self.responses or self.sweep is not None:
+            return f"{'frequency response' if self.responses else 'sweep without force'} {names}"
         return f"free decay {names}" if self.decay else f"tap test {names}, {self._counted()}"
 
     def _counted(self) -> str:
+        if self.sweep is not None:
+            return "a sweep without force"
         count = len(self.taps) + len(self.responses)
         kind = "frequency response" if self.responses else "decay" if self.decay else "tap"
         return f"{count} {kind}{'' if count == 1 else 's'}"
@@ -189,6 +218,9 @@ class Identification(Result):
     @property
     def records(self) -> tuple[RecordUse, ...]:
         """Each tap or decay: those that were used, then those that were not."""
+        if self.sweep is not None:
+            sweep = self.sweep
+            return (RecordUse(sweep.source, True, "", sweep.samples, sweep.period_s, quantity="acceleration"),)
         if self.prepared is None:
             return tuple(
                 RecordUse(
@@ -269,9 +301,9 @@ class Identification(Result):
     def plots(self) -> Mapping[str, Plot]:
         """`identify-traces`, `-stabilisation`, `-decay`, and `-response` or `-spectrum`; none without a model.
 
-        Of a frequency response without time record `-response` and `-stabilisation`.
+        Of a frequency response without time record `-response` and `-stabilisation`, of a sweep `-sweep`.
         """
-        return self._drawn_beside() if self.fitted or self.fitted_lines else {}
+        return self._drawn_beside() if self.fitted or self.fitted_lines or self.sweep is not None else {}
 
 
 def _estimate(name: str, factor: float = 1.0) -> Any:

@@ -54,9 +54,10 @@ def read_records(path: str | Path, options: ReadOptions | None = None) -> list[R
                 f"{path}: not a {kind} file: it begins with {head[:16]!r} instead of {begins}; rename it if it is text "
                 "with columns"
             )
+    from shapegcode.io.klipper import is_klipper, klipper_options
     from shapegcode.io.taps import read_csv
 
-    return read_csv(path, options)
+    return read_csv(path, klipper_options(options) if is_klipper(head) else options)
 
 
 def read_measurement(path: str | Path, options: ReadOptions | None = None) -> list[Record] | list[FrequencyResponse]:

@@ -1,0 +1,224 @@
+"""Frequency and damping from a resonance sweep without force, as the firmware Klipper drives and records it.
+
+The machine shakes its own axis: pulses of acceleration whose amplitude grows with their frequency, which rises slowly.
+So the command's spectrum grows as f between the ends of the sweep, harmonics included, and what the sensor on the axis
+shows beyond that is the transmissibility 1 - sum of G s²/(s² + 2 zeta omega s + omega²). Only its magnitude is known:
+when the sweep began is not in the file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from shapegcode.errors import RecordError
+from shapegcode.identification.mode import Estimate, IdentifiedMode
+from shapegcode.identification.result import Identification, Sweep, reason_for
+from shapegcode.io.record import Record
+
+__all__ = ["SWEPT_HZ", "find_swept_modes"]
+
+FloatArray = npt.NDArray[np.float64]
+
+#: What Klipper sweeps unless told otherwise is 5 to 133 Hz; its ends are no steady sweep.
+SWEPT_HZ = (10.0, 130.0)
+_BIN_HZ = 0.5  # over which the spectrum is averaged: interference of the harmonics ripples faster
+_BIN_NOISE = 0.05  # of the logarithm of a bin's power
+_LEAST_S = 10.0
+_APART_HZ = 8.0  # two peaks that are tried
+_MOST_MODES = 4
+#: The covariance is widened: the command's course, friction and play are no noise.
+_WIDENED = 2.0
+_LEAST_FREQUENCY, _LEAST_DAMPING = 0.005, 0.1  # shares: no interval is narrower
+_FREQUENCY_LIMIT, _DAMPING_LIMIT = 2.0, 30.0  # percent
+_NO_VIBRATION = 0.5
+_LEAST_SHARE = 0.02  # of the motion: less is no mode that counts
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """Logarithm of the power: level, slope beyond that of the command, and share, omega, zeta of each mode."""
+
+    parameters: FloatArray
+    covariance: FloatArray
+    squares: float
+
+
+def find_swept_modes(
+    record: Record,
+    files: tuple[str, ...],
+    *,
+    band_hz: tuple[float, float] | None,
+    most_modes: int,
+    modes: int | None,
+) -> Identification:
+    """Find the modes that a sweep shows; see `identify.identify`.
+
+    Args:
+        record: acceleration along the axis that was shaken.
+        files: where it comes from.
+        band_hz: part of the sweep that is looked at; None: 10 to 130 Hz.
+        most_modes: largest number of modes of a model.
+        modes: number of modes; None: chosen by evidence.
+
+    Returns:
+        Frequencies and damping ratios, with wide intervals; masses cannot be had without force.
+
+    Raises:
+        RecordError: too short, too slow, or a band that does not ascend.
+
+    Source: this project; the sweep is that of Klipper's resonance tester.
+    """
+    band = band_hz or SWEPT_HZ
+    frequency, power = _spectrum(record, band)
+    fits = [_fit(frequency, power, [], free=False)]
+    evidence = [_evidence(fits[0], len(power))]
+    while len(fits) - 1 < (modes or min(most_modes, _MOST_MODES)):
+        fits.append(_next(frequency, power, fits[-1]))
+        evidence.append(_evidence(fits[-1], len(power)))
+        if modes is None and len(fits) - 1 - int(np.argmin(evidence)) >= 1:
+            break
+    order = modes if modes is not None else int(np.argmin(evidence))
+    best = fits[order]
+    # What a free slope of the command's spectrum changes is not known.
+    other = _fit(frequency, power, [tuple(row) for row in np.exp(best.parameters[2:].reshape(-1, 3))], free=True)
+    found = [_judged(best, other, index, len(power)) for index in range(order)]
+    found = [mode for mode in found if band[0] <= mode.frequency_hz.value <= band[1]]
+    found.sort(key=lambda mode: mode.frequency_hz.value)
+    supported = tuple(mode for mode in found if not mode.refusal)
+    refused = tuple(mode for mode in found if mode.refusal)
+    fitted = np.exp(0.5 * _log_power(best.parameters, frequency))
+    amplitude = np.sqrt(power)
+    return Identification(
+        files=files,
+        modes=supported,
+        refused=refused,
+        order=order,
+        evidence=dict(enumerate(float(each) for each in evidence)),
+        fit_percent=100.0 * (1.0 - float(np.linalg.norm(fitted - amplitude) / np.linalg.norm(amplitude))),
+        reason=reason_for(supported, refused),
+        warnings=(
+            *record.warnings,
+            "a sweep without force gives no mass and no stiffness, and its command is taken to grow evenly with the "
+            "frequency: intervals are wide; a mode near the ends of the band, or of another axis, may be missed",
+        ),
+        notes=(*record.notes, f"looked at from {band[0]:g} to {band[1]:g} Hz (--frequencies LOW:HIGH)"),
+        sweep=Sweep(record.source, record.axis, len(record.response), record.period_s, frequency, amplitude, fitted),
+    )
+
+
+def _evidence(fit: _Model, bins: int) -> float:
+    """Bayes' criterion; bins are known to some percent at best, since the harmonics of the command interfere."""
+    return float(bins * np.log(fit.squares / bins + _BIN_NOISE**2) + len(fit.parameters) * np.log(bins))
+
+
+def _spectrum(record: Record, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Middles of the bins, and their mean power divided by that of the command's course, f²."""
+    duration = len(record.response) * record.period_s
+    half = 0.5 / record.period_s
+    if not 0.0 < band[0] < band[1] - 10.0 * _BIN_HZ:
+        raise RecordError(f"band of {band[0]:g} to {band[1]:g} Hz: must ascend, by {10.0 * _BIN_HZ:g} Hz or more")
+    if band[1] > 0.8 * half:
+        raise RecordError(
+            f"{record.source}: {1.0 / record.period_s:g} samples per second are too slow for {band[1]:g} Hz: needed "
+            f"are {2.5 * band[1]:.4g} or more, or another band (--frequencies)"
+        )
+    if duration < _LEAST_S:
+        raise RecordError(
+            f"{record.source}: {duration:.3g} s: too short for a sweep ({_LEAST_S:g} s or more); a decay after a "
+            "stop is read with --decay"
+        )
+    if not np.ptp(record.response) > 0.0:
+        raise RecordError(f"{record.source}: every sample is {record.response[0]:g}: is the sensor connected?")
+    spectrum = np.abs(np.fft.rfft(record.response - record.response.mean())) ** 2 * record.period_s
+    places = np.fft.rfftfreq(len(record.response), record.period_s)
+    edges = np.arange(band[0], band[1] + 1e-9, _BIN_HZ)
+    sums = np.histogram(places, edges, weights=spectrum / np.maximum(places, 1e-3) ** 2)[0]
+    counts = np.histogram(places, edges)[0]
+    return 0.5 * (edges[1:] + edges[:-1]), np.maximum(sums / np.maximum(counts, 1), 1e-300)
+
+
+def _log_power(parameters: FloatArray, frequency: FloatArray) -> FloatArray:
+    s = 2j * np.pi * frequency
+    passed = np.ones(len(frequency), dtype=np.complex128)
+    for share, omega, zeta in np.exp(parameters[2:].reshape(-1, 3)):
+        passed -= share * s**2 / (s**2 + 2.0 * zeta * omega * s + omega**2)
+    course = parameters[0] + parameters[1] * np.log(frequency)
+    return np.asarray(course + np.log(np.maximum(np.abs(passed) ** 2, 1e-30)), dtype=np.float64)
+
+
+def _fit(frequency: FloatArray, power: FloatArray, starts: list[tuple[float, ...]], *, free: bool) -> _Model:
+    """Fit the logarithm; a few bins that are far off do not count for more."""
+    goal = np.log(power)
+    first = np.concatenate(([float(np.median(goal)), 0.0], np.log(np.array(starts, dtype=np.float64)).ravel()))
+    slope = 1.0 if free else 1e-9
+    low = np.concatenate(([-np.inf, -slope], np.tile(np.log([1e-4, np.pi * frequency[0], 1e-3]), len(starts))))
+    high = np.concatenate(([np.inf, slope], np.tile(np.log([3.0, 3.0 * np.pi * frequency[-1], 0.9]), len(starts))))
+
+    def left(theta: FloatArray) -> FloatArray:
+        return _log_power(theta, frequency) - goal
+
+    found = least_squares(
+        left,
+        np.clip(first, low + 1e-12, high - 1e-12),
+        bounds=(low, high),
+        loss="soft_l1",
+        f_scale=0.5,
+    )
+    residual = _log_power(found.x, frequency) - goal
+    squares = float(2.0 * found.cost)
+    jacobian = np.asarray(found.jac, dtype=np.float64)
+    freedom = max(len(goal) - len(first), 1)
+    # Neighbouring bins share what the model lacks.
+    rho = float(np.clip(residual[1:] @ residual[:-1] / max(float(residual @ residual), 1e-300), 0.0, 0.95))
+    covariance = np.linalg.pinv(jacobian.T @ jacobian) * squares / freedom * (1.0 + rho) / (1.0 - rho)
+    return _Model(found.x, covariance, max(squares, 1e-300))
+
+
+def _next(frequency: FloatArray, power: FloatArray, last: _Model) -> _Model:
+    """The best model with a mode more, begun where the last one leaves most."""
+    rows = [tuple(row) for row in np.exp(last.parameters[2:].reshape(-1, 3))]
+    left = np.log(power) - _log_power(last.parameters, frequency)
+    smooth = np.convolve(left, np.ones(5) / 5.0, "same")
+    first = int(np.argmax(smooth))
+    peaks = [first, int(np.argmax(smooth * (np.abs(frequency - frequency[first]) > _APART_HZ)))]
+    tried = [
+        _fit(frequency, power, [*rows, (share, 2.0 * np.pi * frequency[peak], zeta)], free=False)
+        for peak in peaks
+        for share in (0.1, 0.7)
+        for zeta in (0.03, 0.1)
+    ]
+    return min(tried, key=lambda fit: fit.squares)
+
+
+def _judged(best: _Model, other: _Model, index: int, bins: int) -> IdentifiedMode:
+    """One mode with its intervals, and why it is refused if it is."""
+    place = 2 + 3 * index
+    quantile = _WIDENED * float(student.ppf(0.975, max(bins - len(best.parameters), 1)))
+    halves = []
+    for at, least in ((place + 1, _LEAST_FREQUENCY), (place + 2, _LEAST_DAMPING)):
+        apart = abs(float(other.parameters[at] - best.parameters[at]))
+        halves.append(max(least, quantile * float(np.sqrt(max(best.covariance[at, at], 0.0))), apart))
+    share, omega, zeta = np.exp(best.parameters[place : place + 3])
+    frequency, damping = (
+        Estimate(value, value * np.exp(-min(half, 7.0)), value * np.exp(min(half, 7.0)))
+        for value, half in zip((omega / (2.0 * np.pi), zeta), halves, strict=True)
+    )
+    refusal = ""
+    if share < _LEAST_SHARE:
+        refusal = f"{100.0 * share:.2g} % of the axis' motion only (limit {100.0 * _LEAST_SHARE:g} %)"
+    elif zeta > _NO_VIBRATION:
+        refusal = f"damping ratio {zeta:.2g}: no vibration that stands out (limit {_NO_VIBRATION:g})"
+    for name, estimate, limit in (
+        ("frequency", frequency, _FREQUENCY_LIMIT), ("damping ratio", damping, _DAMPING_LIMIT),
+    ):  # fmt: skip
+        if not refusal and not estimate.uncertainty_percent <= limit:
+            refusal = (
+                f"{name} is known to {estimate.uncertainty_percent:.2g} % only (limit {limit:g} % of a sweep): a "
+                "slower sweep, more acceleration, or a tap"
+            )
+    return IdentifiedMode(frequency, damping, refusal=refusal)
