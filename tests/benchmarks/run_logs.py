@@ -3,7 +3,7 @@
 python tests/benchmarks/run_logs.py [--lines 10000000]
 
 The day is written anew into a temporary folder: runs of 100 s with the items of NIST's logs (line number, feed,
-spindle, runtime, tool, name of the program), a minute between them; all but the runtime are used.
+spindle, runtime, tool, name of the program), a minute between them.
 """
 
 from __future__ import annotations

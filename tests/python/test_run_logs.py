@@ -26,7 +26,7 @@ LOG = """\
 2026-03-02T08:10:00.5000000Z|Block_Number|7
 2026-03-02T08:10:00.6000000Z|Feed_Rate|16.9333
 2026-03-02T08:10:02.0000000Z|Block_Number|8
-2026-03-02T08:10:02.5000000Z|Program_Runtime_Seconds|2
+2026-03-02T08:10:02.5000000Z|Program_Runtime_Seconds|5
 2026-03-02T08:10:03.0000000Z|Current_Tool|0
 2026-03-02T08:10:04.0000000Z|Current_Tool|5
 2026-03-02T08:10:05.0000000Z|Block_Number|12
@@ -181,7 +181,7 @@ def test_names_of_items_are_known_or_given(tmp_path: Path) -> None:
 
 
 def test_the_better_known_of_two_items_is_taken_and_the_other_said(tmp_path: Path) -> None:
-    run = only(tmp_path, LOG.replace("Program_Runtime_Seconds|2", "Line|999"))
+    run = only(tmp_path, LOG.replace("Program_Runtime_Seconds|5", "Line|999"))
     assert 999 not in run.block.value
     assert run.notes == ("line 4: Line left out: Block_Number is taken",)
 
@@ -296,6 +296,17 @@ def test_a_silence_within_a_run_is_a_gap(tmp_path: Path) -> None:
     assert any(note.startswith("line 12: nothing for 3601.0 s before it") for note in run.notes)
 
 
+def test_a_clock_that_was_set_is_told_by_the_control_s_own_seconds(tmp_path: Path) -> None:
+    """Ten seconds within the run are no gap, but the control did not count them."""
+    late = LOG.replace("08:10:05", "08:10:15").replace("08:10:06.25", "08:10:16.25")
+    run = only(tmp_path, late.replace("08:10:15", "08:10:15.0Z|Program_Runtime_Seconds|5\n2026-03-02T08:10:15"))
+    assert run.notes == (
+        "line 14: Program_Runtime_Seconds is 5 at the end, by the time stamps the run took 16.2 s: it was held, or a "
+        "clock was set",
+    )
+    assert run.gaps == ()
+
+
 def test_two_block_numbers_at_one_time(tmp_path: Path) -> None:
     run = only(tmp_path, LOG.replace("08:10:02.0000000Z|Block_Number|8", "08:10:00.5000000Z|Block_Number|8"))
     assert values(run.block) == [(-0.1, 1), (0.5, 8), (5.0, 12)]
@@ -345,6 +356,10 @@ def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
         tmp_path, LOG + "2026-03-02T08:20:00Z|M2:Program_Status|ACTIVE\n",
         r"run.txt:15: M2:Program_Status besides Program_Status: the log has more than one control",
     )  # fmt: skip
+    endless = "2026-03-02T08:10:02Z|@ASSET@|T1|CuttingTool|--multiline--AB12\n"
+    refused(
+        tmp_path, endless + LOG, r"run.txt:1: the asset that begins here does not end: no line is '--multiline--AB12'"
+    )
     refused(tmp_path, gzip.compress(LOG.encode())[:-40], "the packed file is cut off or damaged", "run.txt.gz")
     with pytest.raises(FileNotFoundError):
         sg.read_run_logs(tmp_path / "none.txt")
@@ -367,7 +382,7 @@ def test_encodings_of_windows(tmp_path: Path, encoding: str) -> None:
     [
         ("2026-03-02T08:10:02Z", 2.0), ("2026-03-02 08:10:02.5", 2.5), ("2026-03-02T10:10:02,25+02:00", 2.25),
         ("2026/03/02 08:10:02.125", 2.125), ("02.03.2026 08:10:02,5", 2.5), ("1772439002.5", 2.5),
-        ("1772439002500", 2.5),
+        ("1772439002500", 2.5), ("2026-03-02T08:10:02,25Z", 2.25),
     ],
 )  # fmt: skip
 def test_spellings_of_time(tmp_path: Path, stamp: str, seconds: float) -> None:
@@ -437,6 +452,16 @@ def test_streams_are_put_in_the_order_of_their_sequence(tmp_path: Path, names: t
     assert values(run.feed_override) == [(0.0, 0.9)]
     assert values(run.rapid_override) == [(0.0, 0.5)]
     assert (run.program, run.block_texts) == ("PLATE", ((5.0, "N120 G1 X3 & more"),))
+
+
+def test_positions_of_linear_axes(tmp_path: Path) -> None:
+    axis = '<ComponentStream component="Linear" name="{}"><Samples>\n{}</Samples></ComponentStream>'
+    x = axis.format("X", observed("Position", 13, "08:10:01", "12.5", "ACTUAL", "x1"))
+    x += axis.format("Z", observed("Position", 13, "08:10:01", "7", "COMMANDED", "z1"))
+    x += axis.format("W", observed("Position", 13, "08:10:01", "9", "ACTUAL", "w1"))
+    run = only(tmp_path, streams().replace("<ComponentStream", x + "<ComponentStream", 1), "streams.xml")
+    ((name, signal),) = run.position_mm
+    assert (name, values(signal)) == ("x", [(1.0, 12.5)])
 
 
 def test_many_documents_in_a_file_with_what_they_share(tmp_path: Path) -> None:

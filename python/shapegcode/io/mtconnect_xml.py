@@ -22,6 +22,7 @@ __all__ = ["mtconnect_events"]
 _MAX_OBSERVATIONS = 4_000_000
 #: Sub-types of which the value is not what the machine does, by kind of item.
 _LEFT_OUT = {"COMMANDED", "PROGRAMMED", "JOG", "TARGET", "PROBE", "INCREMENTAL", "SCHEDULE", "OVERRIDE"}
+_AXES = ("X", "Y", "Z")
 _BEGIN = re.compile(rb"<\?xml\s|<(?:\w+:)?MTConnect(?:Streams|Devices|Error|Assets)\b")
 #: Bytes that the declaration of a document, or the beginning of its root, may need.
 _OVERLAP = 80
@@ -124,7 +125,7 @@ class _Document:
         self._notes = notes
         self._stamps = Stamps()
         self._open: list[str] = []
-        self._known: dict[tuple[str, str, str, str], Item | None] = {}
+        self._known: dict[tuple[str, ...], Item | None] = {}
         self._axis = ""
         self._now: tuple[Item, dict[str, str], int] | None = None
         self._text: list[str] = []
@@ -185,7 +186,7 @@ class _Document:
 
     def _observation(self, name: str, attributes: dict[str, str]) -> None:
         kind = attributes.get("subType", ""), attributes.get("name", ""), attributes.get("dataItemId", "")
-        key = (name, *kind)
+        key = (name + self._axis, *kind)
         if key not in self._known:
             self._known[key] = self._item(name, *kind)
         item = self._known[key]
@@ -200,8 +201,10 @@ class _Document:
         if name == "PathFeedrateOverride" and kind == "RAPID":
             return self._table.find(label, "PathFeedrateOverrideRapid")
         override = name.endswith("Override")
-        if (kind in _LEFT_OUT and not (override and kind == "PROGRAMMED")) or name in ("AxisFeedrate", "Position"):
+        if (kind in _LEFT_OUT and not (override and kind == "PROGRAMMED")) or name == "AxisFeedrate":
             return None
+        if name == "Position":
+            return self._table.find(label, self._axis) if self._axis in _AXES else None
         return self._table.find(label, name)
 
     def _end(self, tag: str) -> None:

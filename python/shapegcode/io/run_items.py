@@ -15,7 +15,7 @@ __all__ = ["ROLES", "STATES", "Item", "ItemTable", "Role", "State", "plain_name"
 
 Role = Literal[
     "time", "block", "sequence", "block_text", "feed", "tool", "spindle", "feed_override", "rapid_override", "status",
-    "program", "x", "y", "z",
+    "program", "runtime", "x", "y", "z",
 ]  # fmt: skip
 State = Literal["active", "hold", "stop", "completed", "ended", "unknown"]
 
@@ -39,6 +39,7 @@ _NAMES: dict[Role, str] = {
     "status",
     "program": "program_name_running program program_name running_program active_program current_program main_program "
     "prog programm",
+    "runtime": "program_runtime_seconds cycle_time_seconds run_time_seconds",
     "x": "x x_act xact x_actual x_pos xpos x_position actual_x x_abs xabs pos_x x_mm position_x",
     "y": "y y_act yact y_actual y_pos ypos y_position actual_y y_abs yabs pos_y y_mm position_y",
     "z": "z z_act zact z_actual z_pos zpos z_position actual_z z_abs zabs pos_z z_mm position_z",

@@ -39,7 +39,7 @@ class RunLog:
     Attributes:
         source: file.
         start: time stamp of the start, as the file has it; empty where the file has none.
-        duration_s: from start to completion; None: the log does not hold both.
+        duration_s: from start to completion, holds included; None: the log does not hold both.
         block: numbers as the control gave them, see `block_counts`; empty where this run has none.
         feed: along the path; None: not logged.
         feed_unit: of the feed, such as "mm/s", a unit of `shapegcode.io.units`; None: the log

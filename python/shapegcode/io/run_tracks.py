@@ -22,7 +22,7 @@ FloatArray = npt.NDArray[np.float64]
 _TEXT_ROLES: frozenset[Role] = frozenset({"status", "program", "block_text"})
 _AXES: tuple[Role, ...] = ("x", "y", "z")
 _SIGNALS: tuple[Role, ...] = (
-    "block", "sequence", "feed", "tool", "spindle", "feed_override", "rapid_override", *_AXES,
+    "block", "sequence", "feed", "tool", "spindle", "feed_override", "rapid_override", "runtime", *_AXES,
 )  # fmt: skip
 _COUNTS: frozenset[Role] = frozenset({"block", "sequence"})
 #: What was set before the start still holds; of feed and block nobody knows after so long.
@@ -35,6 +35,9 @@ _NAME_S = 5.0
 _LATE_START = 50
 #: A program that begins anew after a hold goes back by more.
 _RESTART_BLOCKS = 20
+#: Whole seconds of a control, shown late.
+_CLOCKS_APART_S = 3.0
+_CLOCKS_APART = 0.01
 
 
 @dataclass
@@ -209,6 +212,7 @@ def run_of(part: RunPart, tracks: Sequence[Track], feed_unit: str | None, notes:
         notes.add(
             "late", part.lines[0], f"the first {block.name} is {first[0]:g}: the program or the log began in the middle"
         )
+    _compare_clocks(part, signals["runtime"], notes)
     return RunLog(
         source=part.source,
         start=part.stamp,
@@ -234,6 +238,18 @@ def run_of(part: RunPart, tracks: Sequence[Track], feed_unit: str | None, notes:
         cut_start=part.cut_start,
         cut_end=part.cut_end,
     )
+
+
+def _compare_clocks(part: RunPart, runtime: Signal | None, notes: FileNotes) -> None:
+    """The control's own count of seconds against the clock of the log."""
+    if runtime is None or part.cut_start or part.cut_end or not part.has_status:
+        return
+    counted, clock = float(runtime.value[-1]), part.end - part.start
+    if abs(counted - clock) > max(_CLOCKS_APART_S, _CLOCKS_APART * clock):
+        notes.add(
+            "clocks", part.lines[1], f"{runtime.name} is {counted:g} at the end, by the time stamps the run took "
+            f"{clock:.1f} s: it was held, or a clock was set",
+        )  # fmt: skip
 
 
 def _best(part: RunPart, tracks: Sequence[Track], role: Role, notes: FileNotes) -> Signal | None:

@@ -37,45 +37,72 @@ def shdr_events(path: Path, table: ItemTable, notes: FileNotes) -> Iterator[Even
         OSError: the file cannot be read.
     """
     known: dict[bytes, Item | None] = {}
-    stamps = Stamps()
-    number, readable, unreadable = 0, False, ""
-    reader = _Odd(table, notes, known)
+    seconds = Stamps().seconds
+    number, readable = 0, False
+    odd = _Odd(path, table, notes, known)
     for lines in line_chunks(path):
         for number, line in enumerate(lines, start=number + 1):  # noqa: B020  (goes on over the chunks)
             fields = line.split(b"|")
-            if len(fields) == 3 and not reader.until:
-                name = fields[1]
-                item = known[name] if name in known else reader.find(name)
-                pairs: tuple[tuple[Item, bytes], ...] = ((item, fields[2]),) if item is not None else ()
+            if len(fields) != 3 or odd.until:
+                pairs = odd.pairs(number, line, fields)
+            elif fields[1] in known:
+                item = known[fields[1]]
+                if item is not None:  # nearly every line: kept short
+                    try:
+                        time = seconds(fields[0])
+                    except ValueError:
+                        odd.leave_out(number, fields[0])
+                        continue
+                    readable = True
+                    yield number, time, fields[0], item, fields[2]
+                continue
             else:
-                pairs = reader.pairs(number, line, fields)
-            if not pairs:
-                continue
-            try:
-                time = stamps.seconds(fields[0])
-            except ValueError:
-                unreadable = unreadable or f"{path}:{number}: {fields[0][:40].decode('latin-1')!r} is no time stamp"
-                notes.add(
-                    "stamp", number, f"{fields[0][:40].decode('latin-1')!r} is no time stamp, the line is left out"
-                )
-                continue
-            readable = True
+                pairs = odd.one(fields)
             for item, text in pairs:
+                try:
+                    time = seconds(fields[0])
+                except ValueError:
+                    odd.leave_out(number, fields[0])
+                    break
+                readable = True
                 yield number, time, fields[0], item, text
-    if unreadable and not readable:
-        raise RecordError(f"{unreadable}; needed is for example 2017-02-10T18:33:01.138Z")
+    odd.end(readable)
 
 
 class _Odd:
     """Lines that are not one item and its value."""
 
-    def __init__(self, table: ItemTable, notes: FileNotes, known: dict[bytes, Item | None]) -> None:
+    def __init__(self, path: Path, table: ItemTable, notes: FileNotes, known: dict[bytes, Item | None]) -> None:
+        self._path = path
         self._table = table
         self._notes = notes
         self._known = known
         self.until = b""  # ends what goes over several lines
+        self._began = 0
+        self._unreadable = ""
 
-    def find(self, name: bytes) -> Item | None:
+    def one(self, fields: list[bytes]) -> tuple[tuple[Item, bytes], ...]:
+        """(item, value) of a line with an item that was not met so far; none of one of no use."""
+        item = self._find(fields[1])
+        return () if item is None else ((item, fields[2]),)
+
+    def leave_out(self, number: int, stamp: bytes) -> None:
+        """A line of which the time stamp cannot be read."""
+        shown = stamp[:40].decode("latin-1")
+        self._unreadable = self._unreadable or f"{self._path}:{number}: {shown!r} is no time stamp"
+        self._notes.add("stamp", number, f"{shown!r} is no time stamp, the line is left out")
+
+    def end(self, readable: bool) -> None:
+        """The end of the file; *readable*: some time stamp could be read."""
+        if self._unreadable and not readable:
+            raise RecordError(f"{self._unreadable}; needed is for example 2017-02-10T18:33:01.138Z")
+        if self.until:
+            raise RecordError(
+                f"{self._path}:{self._began}: the asset that begins here does not end: no line is "
+                f"{self.until[:40].decode('latin-1')!r}, so that nothing behind it can be read; take it out"
+            )
+
+    def _find(self, name: bytes) -> Item | None:
         """What an item is; kept for the next time, with a limit for what is no log."""
         item = self._table.find(name.decode("utf-8", errors="replace").strip())
         if len(self._known) < 10_000:
@@ -93,13 +120,13 @@ class _Odd:
         rest = fields[1:]
         if rest and rest[0].strip().startswith(b"@"):  # @ASSET@, @REMOVE_ASSET@
             if _MARK in line:
-                self.until = line[line.index(_MARK) :].strip()
+                self.until, self._began = line[line.index(_MARK) :].strip(), number
             self._notes.add("asset", number, "an asset, left out")
-        elif len(rest) == _CONDITION_FIELDS and rest[1].strip().lower() in _CONDITION and self.find(rest[2]) is None:
+        elif len(rest) == _CONDITION_FIELDS and rest[1].strip().lower() in _CONDITION and self._find(rest[2]) is None:
             self._notes.add("condition", number, f"the condition {rest[0].decode('latin-1')}, left out")
         elif len(rest) < 2 or len(rest) % 2:
             self._notes.add("odd", number, f"{line[:60].strip().decode('latin-1')!r} is not time|item|value, left out")
         else:
-            found = ((self.find(name), text) for name, text in zip(rest[::2], rest[1::2], strict=True))
+            found = ((self._find(name), text) for name, text in zip(rest[::2], rest[1::2], strict=True))
             return tuple((item, text) for item, text in found if item is not None)
         return ()

@@ -43,9 +43,12 @@ class Stamps:
             ValueError: it is none of these.
         """
         if stamp[:_MINUTE] == self._minute and stamp[-1:] == b"Z":
-            seconds = stamp[_MINUTE:-1]
-            if seconds.replace(b".", b"", 1).isdigit():
-                return self._base + float(seconds)
+            try:
+                second = float(stamp[_MINUTE:-1])
+            except ValueError:  # 02,25 or worse: looked at below
+                second = -1.0
+            if 0.0 <= second < 61.0:
+                return self._base + second
         text = stamp.decode("latin-1").partition("@")[0].strip()
         found = _ISO.fullmatch(text)
         if found is None:
