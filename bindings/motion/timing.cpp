@@ -129,6 +129,9 @@ void define_model(py::module_& module) {
       .def_readwrite("feed_override", &ControllerModel::feed_override, "Scales every programmed feed.")
       .def_readwrite("rapid_override", &ControllerModel::rapid_override,
                      "Scales the rapid rates; the acceleration of a rapid stays.")
+      .def_readwrite("program_start_s", &ControllerModel::program_start_s, "From the start key to the first block, s.")
+      .def_readwrite("last_tool_in_spindle", &ControllerModel::last_tool_in_spindle,
+                     "At the start, from the run before: an M06 that calls it changes nothing.")
       .def_readwrite("tool_change_s", &ControllerModel::tool_change_s, "M06, s.")
       .def_readwrite("m_function_s", &ControllerModel::m_function_s, "Every M code without a time of its own, s.")
       .def_readwrite("m_code_s", &ControllerModel::m_code_s, "M codes with a time of their own: code -> s.")

@@ -149,11 +149,13 @@ struct ControllerModel {
   double shaped_bell_time_s = 0.0;                        ///< likewise, linear: second moving average; 0: none
   BlockEnd shaped_block_end = BlockEnd::ceil;             ///< between shaped blocks
 
-  double feed_override = 1.0;                ///< scales every programmed feed
-  double rapid_override = 1.0;               ///< scales the rapid rates; the acceleration of a rapid stays what it is
-  double tool_change_s = 0.0;                ///< M06
-  double m_function_s = 0.0;                 ///< every other M code that `m_code_s` does not name
-  std::map<int, double> m_code_s;            ///< M codes with a time of their own
+  double feed_override = 1.0;         ///< scales every programmed feed
+  double rapid_override = 1.0;        ///< scales the rapid rates; the acceleration of a rapid stays what it is
+  double program_start_s = 0.0;       ///< from the start key to the first block
+  bool last_tool_in_spindle = false;  ///< at the start, from the run before: an M06 that calls it changes nothing
+  double tool_change_s = 0.0;         ///< M06
+  double m_function_s = 0.0;          ///< every other M code that `m_code_s` does not name
+  std::map<int, double> m_code_s;     ///< M codes with a time of their own
   std::vector<SpindleTime> spindle_start_s;  ///< from rest, by speed; it passes while the axes move; empty: none
   std::vector<SpindleTime> spindle_stop_s;   ///< likewise to rest
   Vector3 unknown_move_s = Vector3::Zero();  ///< of a rapid of whose way the program does not tell start or end

@@ -59,6 +59,7 @@ void check(const ControllerModel& model) {
   require_ramp("bell time behind shaped blocks", model.shaped_bell_time_s);
   require_ramp("look-ahead filter time constant", model.look_ahead_filter_time_constant_s);
   require_ramp("rapid bell time", model.rapid_bell_time_s);
+  require_wait("start of the program", model.program_start_s);
   require_wait("tool change", model.tool_change_s);
   require_wait("M function", model.m_function_s);
   for (const auto& [code, seconds] : model.m_code_s) {

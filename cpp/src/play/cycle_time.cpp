@@ -22,7 +22,7 @@ class Clock {
         model_(model),
         per_block_(per_block),
         limits_(detail::overridden_limits(model)),
-        function_clock_(model),
+        function_clock_(program, model),
         ordinary_(model),
         shaped_(for_shaped_blocks(model)),
         changes_by_t_(!detail::has_tool_change(program)) {}

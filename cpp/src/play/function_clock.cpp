@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include "play/program_runs.hpp"
 
@@ -22,6 +23,11 @@ double spindle_time_s(const std::vector<SpindleTime>& table, double rev_per_min)
   return below.seconds;
 }
 
+bool changes_tool(const MachineFunction& function) noexcept {
+  const auto codes = std::span(function.m_codes).first(static_cast<std::size_t>(function.m_count));
+  return std::ranges::find(codes, detail::tool_change_code) != codes.end();
+}
+
 bool starts(int code) noexcept { return code == 3 || code == 4; }
 
 // Whoever stops the program, changes the tool or turns the spindle the other way waits for it to rest.
@@ -31,7 +37,18 @@ bool waits_for_rest(int code) noexcept { return code <= 4 || code == detail::too
 
 namespace detail {
 
+FunctionClock::FunctionClock(const Program& program, const ControllerModel& model) : model_(model) {
+  if (model.last_tool_in_spindle) {
+    std::int64_t selected = -1;
+    for (const MachineFunction& function : program.functions) {
+      selected = function.tool >= 0 ? function.tool : selected;
+      tool_ = changes_tool(function) ? selected : tool_;
+    }
+  }
+}
+
 FunctionWait FunctionClock::functions(const MachineFunction& function, double now_s) {
+  selected_ = function.tool >= 0 ? function.tool : selected_;
   if (function.spindle_rev_per_min >= 0.0) {
     spindle_ = function.spindle_rev_per_min;
     if (running_ > 0.0 && function.m_count == 0) {
@@ -39,6 +56,7 @@ FunctionWait FunctionClock::functions(const MachineFunction& function, double no
     }
   }
   FunctionWait sum;
+  sum.function_s = start_of_program();
   const auto elapsed = [&] { return now_s + sum.tool_change_s + sum.function_s; };
   for (const int code : std::span(function.m_codes).first(static_cast<std::size_t>(function.m_count))) {
     if (waits_for_rest(code)) {
@@ -54,7 +72,8 @@ FunctionWait FunctionClock::functions(const MachineFunction& function, double no
       sum.function_s += wait(elapsed(), false);
     }
     if (code == tool_change_code) {
-      sum.tool_change_s += model_.tool_change_s;
+      sum.tool_change_s += tool_ >= 0 && tool_ == selected_ ? 0.0 : model_.tool_change_s;
+      tool_ = model_.last_tool_in_spindle ? selected_ : -1;
     } else {
       const auto own = model_.m_code_s.find(code);
       sum.function_s += own != model_.m_code_s.end() ? own->second : model_.m_function_s;
@@ -70,7 +89,11 @@ FunctionWait FunctionClock::functions(const MachineFunction& function, double no
   return sum;
 }
 
-double FunctionClock::before_cut(double now_s) { return wait(now_s, false); }
+double FunctionClock::before_cut(double now_s) { return start_of_program() + wait(now_s, false); }
+
+double FunctionClock::start_of_program() noexcept {
+  return std::exchange(started_, true) ? 0.0 : model_.program_start_s;
+}
 
 double FunctionClock::wait(double now_s, bool for_stop) {
   return std::max(0.0, (for_stop ? stopped_s_ : ready_s_) - now_s);

@@ -44,7 +44,7 @@ ProgramSetPoints::ProgramSetPoints(const Program& program, const ControllerModel
       waits_(waits),
       filters_(acceleration_filters(model)),
       shaped_filters_(acceleration_filters(shaped_model_)),
-      function_clock_(model),
+      function_clock_(program, model),
       servo_(model.position_gain_per_s, model.feed_forward_ratio, model.period_s) {
   time_.region_s.reserve(program_.regions.size());
   set_point_ = first_position();

@@ -7,7 +7,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, Strict, model_validator
 
-from shapegcode.settings.keys import AxisTimes, InlineTable, NonNegative, Positive, TomlTable, key
+from shapegcode.settings.keys import AxisTimes, Bool, InlineTable, NonNegative, Positive, TomlTable, key
 
 Seconds = Annotated[NonNegative, Field(le=3600)]
 
@@ -48,6 +48,22 @@ class SpindleTimes(InlineTable):
 class Times(TomlTable):
     """What takes time beside the motion."""
 
+    program_start_s: Seconds = key("from the start key to the first block", unit="s", default=0.0, assumed=True)
+    last_tool_in_spindle: Bool = key(
+        "parts are made in series: the last tool of a program is in the spindle when it starts anew, and an M06 that "
+        "calls it changes nothing; false: every M06 changes",
+        default=False,
+        assumed=True,
+    )
+    feed_override_percent: Annotated[Positive, Field(le=200)] = key(
+        "override of the feed at which this shop usually runs; `time` counts with it unless it is told another",
+        unit="%",
+        default=100.0,
+        assumed=True,
+    )
+    rapid_override_percent: Annotated[Positive, Field(le=200)] = key(
+        "the same of rapids", unit="%", default=100.0, assumed=True
+    )
     tool_change_s: Seconds = key("an M06", unit="s", default=0.0, assumed=True)
     m_function_s: Seconds = key("any other M code that m_codes does not name", unit="s", default=0.0, assumed=True)
     m_codes: MCodeTimes | None = key(

@@ -49,6 +49,8 @@ def controller_model(
     model.feed_override = feed_override
     model.rapid_override = rapid_override
     times = machine.times
+    model.program_start_s = times.program_start_s
+    model.last_tool_in_spindle = times.last_tool_in_spindle
     model.tool_change_s = times.tool_change_s
     model.m_function_s = times.m_function_s
     model.m_code_s = dict(zip(times.m_codes.code, times.m_codes.s, strict=True)) if times.m_codes else {}
