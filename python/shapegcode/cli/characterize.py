@@ -20,7 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Writes short test programs (air moves inside a stated box) with instructions, then fits the machine file to "
         "stopwatch times or servo logs of them: interpolation period, block time, time constants, in-position times. "
         "--servo takes any log of commands and actual positions: dead time, position gain, feed-forward, friction. "
-        "Exit code 1 if results contradict each other, or if no axis tells its loop."
+        "--runs learns the clock (look-ahead, tool changes, M codes, spindle) from programs and the logs of their runs. "
+        "Exit code 1 if results contradict each other, no axis tells its loop, or a run is not told within 2 %%."
     )
     action = parser.add_mutually_exclusive_group(required=True)
     action.add_argument(
@@ -35,9 +36,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="fit the position loops to one half of a log and judge them on the other: a capture of a Sinumerik "
         "control (JSON, gzip, zip), or a CSV with columns of commands and actual positions",
     )
+    action.add_argument(
+        "--runs",
+        metavar="RUNS.toml",
+        help="learn what the clock depends on from programs and the logs of their runs (SHDR text, MTConnect streams, "
+        "Sinumerik Edge, CSV), which this file pairs",
+    )
     add_machine_argument(parser)
     parser.add_argument(
-        "-o", "--output", metavar="FILE", help="with --fit, --servo: machine file to write, with what is known"
+        "--look-ahead",
+        metavar="KIND",
+        action="append",
+        help='with --runs: kind of look-ahead that is tried, for example "speed difference"; several times for several '
+        "(default: all; the one that tells left-out runs best is taken)",
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help="with --fit, --servo, --runs: machine file to write, with what is known"
     )
     parser.add_argument(
         "--axes", metavar="X=1,Y=6,Z=2", help="with --servo: axes of the log that are X, Y, Z (default: by their names)"
@@ -47,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with --servo: fit a drive with friction too, some ten seconds for each axis",
     )
-    add_plots_argument(parser, "with --servo: write a picture of what is left (PNG and SVG) into this folder")
+    add_plots_argument(parser, "with --servo, --runs: write the pictures (PNG and SVG) into this folder")
     parser.add_argument(
         "--units",
         metavar="TIME,LENGTH",
@@ -74,9 +88,11 @@ def run(args: argparse.Namespace) -> int:
 
     _check_options(args)
     machine = load_machine(args)
-    runner.check_files(args, also_read=[args.servo] if args.servo is not None else [])
+    runner.check_files(args, also_read=[each for each in (args.servo, args.runs) if each is not None])
     if args.servo is not None:
         return _servo(args, machine)
+    if args.runs is not None:
+        return _runs(args, machine)
     return _write(args, machine) if args.write is not None else _fit(args, machine)
 
 
@@ -84,9 +100,29 @@ def _check_options(args: argparse.Namespace) -> None:
     """Refuse options that do not go with what is asked for."""
     from shapegcode.errors import ArgumentError
 
-    for option, value in (("--axes", args.axes), ("--drive", args.drive or None), ("--plots", args.plots)):
+    for option, value in (("--axes", args.axes), ("--drive", args.drive or None)):
         if value is not None and args.servo is None:
             raise ArgumentError(f"{option}: goes with --servo alone")
+    if args.plots is not None and args.servo is None and args.runs is None:
+        raise ArgumentError("--plots: goes with --servo and --runs")
+    if args.look_ahead is not None and args.runs is None:
+        raise ArgumentError("--look-ahead: goes with --runs alone")
+    if args.runs is not None and args.units is not None:
+        raise ArgumentError("--units: goes with --fit and --servo; of runs the file of runs states feed_unit")
+
+
+def _runs(args: argparse.Namespace, machine: Machine) -> int:
+    from shapegcode.characterization.clock.learn import learn_clock
+    from shapegcode.characterization.runs_file import load_runs
+    from shapegcode.cli import runner
+
+    file = load_runs(args.runs)
+    read = [str(path) for entry in file.entries for path in (entry.program, *entry.logs)]
+    runner.check_files(args, also_read=read)
+    with runner.progress(f"learning from {args.runs}", args) as bar:
+        found = learn_clock(file, machine, families=args.look_ahead, on_progress=bar.update)
+    output = (args.output, found.to_toml().encode()) if args.output is not None else None
+    return runner.finish(found, args, output=output, notes=[f"not told: {each}" for each in found.not_told])
 
 
 def _servo(args: argparse.Namespace, machine: Machine) -> int:

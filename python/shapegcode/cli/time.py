@@ -25,16 +25,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--override",
         type=override,
-        default=1.0,
+        default=None,
         metavar="RATIO",
-        help="feed override, for example 80%% (at most 254%%)",
+        help="feed override, for example 80%% (at most 254%%; default: times.feed_override_percent)",
     )
     parser.add_argument(
         "--rapid-override",
         type=ratio,
-        default=1.0,
+        default=None,
         metavar="RATIO",
-        help="rapid override, for example 25%% (at most 100%%); the acceleration of rapids stays what it is",
+        help="rapid override, for example 25%% (at most 100%%; default: times.rapid_override_percent); the acceleration of "
+        "rapids stays what it is",
     )
     parser.add_argument("--no-full", action="store_true", help="closed form only, no full interpolation")
     parser.add_argument("--blocks", action="store_true", help="put every block into the JSON")
@@ -73,5 +74,13 @@ def run(args: argparse.Namespace) -> int:
         write_lines(args.csv, time.csv_lines())
     free = sum(block.kind in ("tool_change", "function") and block.duration_s <= 0.0 for block in time.blocks)
     note = f"tool changes and M codes count 0 s on this machine ({free} in the program)"
-    notes = [*([said] if (said := shaped_note(program)) else []), *([note] if free else [])]
+    usual = [
+        f"{what} at {percent:g} %, as this shop usually runs (times.{key})"
+        for what, key, percent, given in (
+            ("feeds", "feed_override_percent", machine.times.feed_override_percent, args.override),
+            ("rapids", "rapid_override_percent", machine.times.rapid_override_percent, args.rapid_override),
+        )
+        if given is None and percent != 100.0
+    ]
+    notes = [*usual, *([said] if (said := shaped_note(program)) else []), *([note] if free else [])]
     return runner.finish(time if args.blocks else time.without_blocks(), args, tables=time.tables(), notes=notes)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, Strict
+from pydantic import Field, Strict, model_validator
 
 from shapegcode.settings.keys import (
     AxisRatios,
@@ -80,6 +80,14 @@ class Controller(TomlTable):
         default=0.0,
         assumed=True,
     )
+    corner_rule: Literal["speed_difference", "junction_deviation", "stops"] = key(
+        'what look-ahead does at corners. "speed_difference": no axis changes its speed by more than '
+        'corner_speed_difference_mm_per_min (FANUC); "junction_deviation": it passes as an arc within '
+        'junction_deviation_mm (GRBL and others); "stops": it stops where the direction turns by corner_stop_angle_deg. '
+        "Programs are written for a FANUC control, whatever it says",
+        fanuc="1783",
+        default="speed_difference",
+    )
     corner_speed_difference_mm_per_min: AxisValues = key(
         "largest speed step of an axis where two blocks meet; 0: stop at every corner. One number, or x, y, z",
         unit="mm/min",
@@ -95,18 +103,18 @@ class Controller(TomlTable):
         assumed=True,
     )
     polyline_acceleration_mm_s2: Positive | None = key(
-        "the same along polylines, where two lines meet; left out: as in arcs",
+        "the same along polylines, where two lines meet; left out: as in arcs, under another corner_rule than "
+        '"speed_difference" not limited',
         unit="mm/s²",
         default=None,
     )
     junction_deviation_mm: Annotated[Positive, Field(le=10)] | None = key(
-        "look-ahead that passes a corner as an arc which cuts it by so much, at the acceleration of its axes (GRBL and "
-        "others, not FANUC); left out: no such rule",
+        'deviation at a corner, run at the acceleration of the axes; corner_rule = "junction_deviation" needs it',
         unit="mm",
         default=None,
     )
     corner_stop_angle_deg: Annotated[Positive, Field(le=180)] | None = key(
-        "look-ahead that stops at corners which turn by as much or more (not FANUC); left out: no such rule",
+        'least turn of a corner that is a stop; corner_rule = "stops" needs it',
         unit="degrees",
         default=None,
     )
@@ -281,6 +289,13 @@ class Controller(TomlTable):
         unit="s",
         default=100_000.0,
     )
+
+    @model_validator(mode="after")
+    def _has_its_rule(self) -> Self:
+        needed = {"junction_deviation": "junction_deviation_mm", "stops": "corner_stop_angle_deg"}.get(self.corner_rule)
+        if needed is not None and getattr(self, needed) is None:
+            raise ValueError(f'corner_rule = "{self.corner_rule}" needs {needed}')
+        return self
 
     @property
     def holds_macros(self) -> bool:

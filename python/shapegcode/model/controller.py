@@ -81,14 +81,17 @@ def motion_limits(machine: Machine, *, arc_feed_ratio: float = 1.0) -> _core.Mot
     limits.max_acceleration_mm_per_s2 = [axis.max_acceleration_mm_s2 for axis in axes]
     limits.max_jerk_mm_per_s3 = [_limit(axis.max_jerk_mm_s3) for axis in axes]
     # 0 means a stop at every corner; the planner wants a speed, and this one is a stop to every purpose.
-    limits.corner_speed_difference_mm_per_s = [
-        max(value / 60.0, 1e-3) for value in controller.corner_speed_difference_mm_per_min.as_tuple()
-    ]
+    rule, along = controller.corner_rule, controller.polyline_acceleration_mm_s2
+    if rule == "speed_difference":
+        steps = controller.corner_speed_difference_mm_per_min.as_tuple()
+        limits.corner_speed_difference_mm_per_s = [max(value / 60.0, 1e-3) for value in steps]
+        along = controller.centripetal_acceleration_mm_s2 if along is None else along
+    elif rule == "junction_deviation":
+        limits.junction_deviation_mm = _limit(controller.junction_deviation_mm)
+    else:
+        limits.corner_stop_angle_rad = math.radians(_limit(controller.corner_stop_angle_deg))
+    limits.polyline_acceleration_mm_per_s2 = _limit(along)
     limits.centripetal_acceleration_mm_per_s2 = controller.centripetal_acceleration_mm_s2
-    along = controller.polyline_acceleration_mm_s2
-    limits.polyline_acceleration_mm_per_s2 = controller.centripetal_acceleration_mm_s2 if along is None else along
-    limits.junction_deviation_mm = _limit(controller.junction_deviation_mm)
-    limits.corner_stop_angle_rad = math.radians(_limit(controller.corner_stop_angle_deg))
     limits.block_time_s = controller.look_ahead_block_time_s
     if controller.contour_acceleration_mm_s2 is not None:
         limits.contour_acceleration_mm_per_s2 = controller.contour_acceleration_mm_s2.as_tuple()

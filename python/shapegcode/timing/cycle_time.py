@@ -34,8 +34,8 @@ def cycle_time(
     *,
     per_block: bool = False,
     full: bool = True,
-    feed_override: float = 1.0,
-    rapid_override: float = 1.0,
+    feed_override: float | None = None,
+    rapid_override: float | None = None,
 ) -> CycleTime:
     """Time of a program on a machine as it is: nothing is shaped.
 
@@ -50,8 +50,9 @@ def cycle_time(
         machine: whose controller plays it.
         per_block: give `CycleTime.blocks` too.
         full: check the closed form by full interpolation.
-        feed_override: scales every programmed feed.
-        rapid_override: scales the rapid rates.
+        feed_override: scales every programmed feed; None: at which the shop usually runs
+            (`times.feed_override_percent`).
+        rapid_override: scales the rapid rates; None: likewise.
 
     Returns:
         The whole time in s and where it goes: by part, tool, region and, if asked for, block.
@@ -61,6 +62,10 @@ def cycle_time(
             program beyond `controller.max_program_s`.
     """
     program = given_program(program, machine)
+    if feed_override is None:
+        feed_override = machine.times.feed_override_percent / 100.0
+    if rapid_override is None:
+        rapid_override = machine.times.rapid_override_percent / 100.0
     model = controller_model(machine, feed_override=feed_override, rapid_override=rapid_override)
     timed = _core.time_program(program.core, model, per_block)
     slowest, limit_s = min(feed_override, rapid_override, 1.0), machine.controller.max_program_s

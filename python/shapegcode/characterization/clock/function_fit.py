@@ -1,0 +1,216 @@
+"""Fits what takes time beside the motion: tool changes, M codes, the spindle, ways that the program does not tell.
+
+What lies between two cuts is a sum of such times, and of the motion that is known already. The logs tell the sums; how
+they divide among codes that always come together is a choice, and the one with the smallest numbers is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.characterization.clock.families import fitted_model
+from shapegcode.characterization.clock.motion_fit import MotionFit
+from shapegcode.characterization.clock.observed import ObservedRun
+from shapegcode.characterization.clock.windows import line_starts
+from shapegcode.machine import Machine
+
+__all__ = ["FunctionFit", "fit_functions", "whole_model"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_READING_S = 0.1  # scatter of the time between two readings
+_OUTLIER = 3.0  # of it: what is further off counts less
+_RIDGE = 0.02  # pull of every number to 0, against its scatter of a reading
+_MOST_S = 60.0
+_TOOL_CHANGE = 6
+_SPEEDS_KRPM = (0.0, 60.0)
+_TABLE_KRPM = 30.0  # a spindle's table is written up to so far above where its time begins
+
+
+@dataclass(frozen=True)
+class FunctionFit:
+    """Times beside the motion.
+
+    Attributes:
+        values: by name: "start", "tool change", "M8", "way xy", "way z" in s; "spindle start from" and "spindle stop
+            from" in 1000/min, "spindle start" and "spindle stop" in s per 1000/min above.
+        low: least values of the 95 % intervals by name.
+        high: largest ones.
+        last_tool_in_spindle: whether the tool that a program ends with is in the spindle when it starts anew.
+        scatter_s: root mean square of what a stretch between two cuts took otherwise.
+        groups: how many such stretches there were.
+    """
+
+    values: dict[str, float]
+    low: dict[str, float]
+    high: dict[str, float]
+    last_tool_in_spindle: bool
+    scatter_s: float
+    groups: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Span:
+    """A stretch of a run from one reading to another, with functions between; end None: the end of the run."""
+
+    run: ObservedRun
+    begin: int  # line; 0: the start key
+    end: int
+    seconds: float
+
+
+def whole_model(
+    machine: Machine, motion: MotionFit, values: dict[str, float], last_tool_in_spindle: bool
+) -> _core.ControllerModel:
+    """The controller with motion and functions.
+
+    Args:
+        machine: for everything else.
+        motion: fitted.
+        values: of functions by name.
+        last_tool_in_spindle: see `FunctionFit`.
+
+    Returns:
+        The core's model.
+    """
+    model = fitted_model(machine, motion.family, motion.values, motion.rapid_mm_per_s)
+    model.program_start_s = values.get("start", 0.0)
+    model.tool_change_s = values.get("tool change", 0.0)
+    model.last_tool_in_spindle = last_tool_in_spindle
+    model.m_function_s = 0.0
+    model.m_code_s = {int(name[1:]): value for name, value in values.items() if name[0] == "M" and name[1:].isdigit()}
+    xy = values.get("way xy", 0.0)
+    model.unknown_move_s = [xy, xy, values.get("way z", 0.0)]
+    model.spindle_start_s = spindle_rows(values, "spindle start")
+    model.spindle_stop_s = spindle_rows(values, "spindle stop")
+    return model
+
+
+def spindle_rows(values: dict[str, float], name: str) -> list[tuple[float, float]]:
+    """The table of a spindle's time: none up to a speed, in proportion above.
+
+    Args:
+        values: of functions by name.
+        name: "spindle start" or "spindle stop".
+
+    Returns:
+        (speed in 1/min, s), empty where it takes no time.
+    """
+    slope, begin = values.get(name, 0.0), values.get(f"{name} from", 0.0)
+    if slope <= 1e-6:
+        return []
+    rows = [(begin * 1000.0, 0.0)] if begin > 1e-3 else []
+    return [*rows, ((begin + _TABLE_KRPM) * 1000.0, slope * _TABLE_KRPM)]
+
+
+def fit_functions(runs: Sequence[ObservedRun], motion: MotionFit, machine: Machine) -> FunctionFit:
+    """Least squares over the stretches between cuts, robust against what an operator does there.
+
+    Args:
+        runs: of the machine.
+        motion: fitted to their sections.
+        machine: for everything else.
+
+    Returns:
+        Times of functions, none below 0.
+    """
+    spans = [span for run in runs for span in _spans(run)]
+    names = _names(runs)
+    fits = [_fit(spans, names, motion, machine, kept) for kept in ((False, True) if _returns(runs) else (False,))]
+    return min(fits, key=lambda fit: fit.scatter_s * (0.98 if not fit.last_tool_in_spindle else 1.0))
+
+
+def _returns(runs: Sequence[ObservedRun]) -> bool:
+    """Whether a program ends with the tool that it begins with: only then it matters what is in the spindle."""
+    for run in runs:
+        used = [tool for tool in run.played.tools.tolist() if tool >= 0]
+        if used and used[0] == used[-1]:
+            return True
+    return False
+
+
+def _names(runs: Sequence[ObservedRun]) -> list[str]:
+    codes: set[int] = set()
+    spins = False
+    for played in {id(run.played): run.played for run in runs}.values():
+        for m_codes, _, speed in played.program.core.functions:
+            codes.update(m_codes)
+            spins = spins or speed > 0.0
+    names = ["start", "way xy", "way z"]
+    names += ["tool change"] if _TOOL_CHANGE in codes else []
+    names += [f"M{code}" for code in sorted(codes - {_TOOL_CHANGE})]
+    if spins and codes & {3, 4}:
+        names += ["spindle start", "spindle start from"]
+    if spins and 5 in codes:
+        names += ["spindle stop", "spindle stop from"]
+    return names
+
+
+def _spans(run: ObservedRun) -> list[_Span]:
+    """Readings next to each other with a function between, and whole ways from cut to cut; start and end of the run."""
+    line, time_s, function = run.line, run.time_s, run.played.function
+    spans = []
+
+    def add(first: int, last: int) -> None:
+        begin = int(line[first]) if first >= 0 else 0
+        end = int(line[last]) if last < len(line) else run.played.line_count + 1
+        since = float(time_s[first]) if first >= 0 else 0.0
+        until = float(time_s[last]) if last < len(line) else run.duration_s
+        if until is not None and until > since and function[max(begin, 1) : end].any():
+            spans.append(_Span(run, begin, end, until - since))
+
+    cuts = np.flatnonzero(np.isfinite(run.played.feed_mm_per_s[line]))
+    # How the way to the first cut divides differs from run to run: a control reports its first lines late.
+    for index in range(int(cuts[0]) if len(cuts) else -1, len(line)):
+        add(index, index + 1)
+    if len(cuts):
+        add(-1, int(cuts[0]))
+        for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+            if last > first + 1:
+                add(int(first), int(last))
+        add(int(cuts[-1]), len(line))
+    return spans
+
+
+def _fit(
+    spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: Machine, kept: bool
+) -> FunctionFit:
+    from scipy.optimize import least_squares
+
+    seconds = np.array([span.seconds for span in spans])
+    scale = np.array([_MOST_S if not name.endswith("from") else _SPEEDS_KRPM[1] for name in names])
+    pull = np.array([0.0 if name.endswith("from") else _RIDGE for name in names]) / _READING_S
+
+    def errors(place: FloatArray) -> FloatArray:
+        model = whole_model(machine, motion, dict(zip(names, place.tolist(), strict=True)), kept)
+        starts: dict[tuple[int, float], FloatArray] = {}
+        taken = np.empty(len(spans))
+        for index, span in enumerate(spans):
+            key = id(span.run.played), span.run.rapid_override
+            if key not in starts:
+                model.rapid_override = span.run.rapid_override
+                starts[key] = line_starts(span.run.played, model)
+            begin = starts[key][span.begin] if span.begin > 0 else 0.0
+            taken[index] = starts[key][span.end] - begin
+        return np.concatenate([(taken - seconds) / _READING_S, pull * place])
+
+    begin = np.array([4.0 if name.endswith("from") else 0.3 for name in names])
+    found = least_squares(
+        errors, begin, bounds=(np.zeros(len(names)), scale), loss="soft_l1", f_scale=_OUTLIER, x_scale=1.0,
+        diff_step=1e-3, max_nfev=60,
+    )  # fmt: skip
+    values = dict(zip(names, found.x.tolist(), strict=True))
+    error = errors(found.x)[: len(spans)] * _READING_S
+    middle = float(np.sqrt(np.mean(np.minimum(error**2, 1.0)))) if len(error) else 0.0
+    # Each stretch is counted about twice: as a whole, and in its readings.
+    spread = np.linalg.pinv(found.jac.T @ found.jac) * 2.0 * max(1.0, (middle / _READING_S) ** 2)
+    reach = 2.0 * np.sqrt(np.maximum(np.diag(spread), 0.0))
+    low = {name: max(0.0, values[name] - float(each)) for name, each in zip(names, reach, strict=True)}
+    high = {name: min(_MOST_S, values[name] + float(each)) for name, each in zip(names, reach, strict=True)}
+    return FunctionFit(values, low, high, kept, middle if math.isfinite(middle) else 0.0, len(spans))

@@ -1,0 +1,385 @@
+"""Learns the clock of a machine from programs and the logs of their runs."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from shapegcode.characterization.clock.families import FAMILIES, Family, fitted_model, machine_values
+from shapegcode.characterization.clock.function_fit import FunctionFit, fit_functions, spindle_rows, whole_model
+from shapegcode.characterization.clock.motion_fit import MotionFit, fit_motion, parameter_intervals
+from shapegcode.characterization.clock.observed import (
+    ObservedRun,
+    PlayedProgram,
+    observe,
+    played_program,
+    rapid_rate,
+    seen_arc_acceleration,
+)
+from shapegcode.characterization.clock.predict import holds_of, predicted_starts, shares_of
+from shapegcode.characterization.clock.result import (
+    TOLERANCE_PERCENT,
+    FamilyScore,
+    LearnedClock,
+    LearnedNumber,
+    LearnedRun,
+)
+from shapegcode.characterization.clock.windows import clocks_of, misfit, section_residuals
+from shapegcode.characterization.runs_file import RunsFile, load_runs
+from shapegcode.errors import ArgumentError
+from shapegcode.machine import Machine
+from shapegcode.program import Program
+
+__all__ = ["learn_clock"]
+
+_MOST_FOLDS = 4
+_BETTER = 0.97  # a family further down the list must be better by so much to be taken
+_KNOWN = 4.0  # an interval that reaches so far from its value to both sides tells nothing
+_LEAST_SPREAD = 0.005  # of what a machine takes for its cuts: no model is truer
+_CALLS = 2500  # of the misfit that one fit takes, about; for the bar
+
+
+@dataclass(frozen=True, eq=False)
+class _Learned:
+    """Motion and functions, from some of the runs."""
+
+    motion: MotionFit
+    functions: FunctionFit
+    machine: Machine
+
+    def starts(self, run: ObservedRun) -> np.ndarray:
+        values = self.functions.values
+        model = whole_model(self.machine, self.motion, values, self.functions.last_tool_in_spindle)
+        return predicted_starts(run, model)
+
+
+def learn_clock(
+    runs: RunsFile | str | Path,
+    machine: Machine,
+    *,
+    families: Sequence[str] | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> LearnedClock:
+    """Learn what the clock of a machine depends on from what it did.
+
+    Logs are laid beside their programs by line; overrides and holds are found. Several kinds of look-ahead are fitted to
+    what stretches between functions took, and the one is taken that says best what programs (or runs, where there is one
+    program) took that it was not fitted to. Tool changes, M codes, spindle and unknown ways follow by least squares.
+
+    Args:
+        runs: pairs of program and log, or the file that lists them (RUNS.toml).
+        machine: whose file gets the numbers, and that says how programs are read.
+        families: names of the kinds of look-ahead that are tried; None: all.
+        on_progress: told the share of the work done, 0 to 1.
+
+    Returns:
+        The numbers with 95 % intervals, the machine with them, and each run beside what was predicted.
+
+    Raises:
+        ArgumentError: no run is to be fitted, or a family that does not exist.
+        RecordError: a log and its program do not belong together, or a log cannot be used; with the line.
+        ProgramError, RunsFileError: bad input.
+        OSError: a file cannot be read.
+    """
+    file = runs if isinstance(runs, RunsFile) else load_runs(runs)
+    tried = _families(families)
+    observed = _observed(file, machine)
+    rate, observed, _ = rapid_rate(observed, machine)
+    fitted = [run for run in observed if run.entry.use == "fit"]
+    if not fitted:
+        raise ArgumentError(f'{file.path}: no run has use = "fit": there is nothing to learn from')
+    folds = _folds(fitted)
+    meter = _Meter(on_progress, len(tried) * (1 + (len(folds) if len(folds) > 1 else 0)))
+    fits, scores = _tried(tried, fitted, folds, machine, rate, meter)
+    order = [score.left_out_s if score.left_out_s is not None else score.fitted_s for score in scores]
+    best = 0
+    for index in range(1, len(order)):
+        if order[index] < _BETTER * order[best]:
+            best = index
+    motion = fits[best]
+    learned = _Learned(motion, fit_functions(fitted, motion, machine), machine)
+    others = _left_out(fitted, folds, motion, machine, rate) if len(folds) > 1 else {}
+    rows, warnings = _rows(observed, learned, others)
+    return _result(machine, learned, scores, fitted, rows, warnings)
+
+
+class _Meter:
+    """How far the work is: by fits begun, and by steps within one."""
+
+    def __init__(self, on_progress: Callable[[float], None] | None, fits: int) -> None:
+        self._on_progress, self._fits, self._done, self._steps = on_progress, fits, 0, 0
+
+    def step(self) -> None:
+        self._steps += 20
+        if self._on_progress is not None:
+            within = min(0.99, self._steps / _CALLS)
+            self._on_progress(0.97 * (self._done + within) / self._fits)
+
+    def next(self) -> None:
+        self._done, self._steps = min(self._done + 1, self._fits - 1), 0
+
+
+def _families(names: Sequence[str] | None) -> list[Family]:
+    if names is None:
+        return list(FAMILIES)
+    known = {family.name: family for family in FAMILIES}
+    unknown = [name for name in names if name not in known]
+    if unknown or not names:
+        raise ArgumentError(f"kind of look-ahead {unknown[0] if unknown else ''!r}: must be one of {', '.join(known)}")
+    return [known[name] for name in names]
+
+
+def _observed(file: RunsFile, machine: Machine) -> list[ObservedRun]:
+    played: dict[Path, PlayedProgram] = {}
+    found = []
+    for entry in file.used:
+        path = entry.program.resolve()
+        if path not in played:
+            played[path] = played_program(Program.read(entry.program, machine))
+        found += [observe(entry, log, played[path], machine) for log in entry.read()]
+    return found
+
+
+def _folds(runs: Sequence[ObservedRun]) -> list[list[ObservedRun]]:
+    """Runs that are left out together: those of a program; with one program each run, with few of them grouped."""
+    by_program: dict[int, list[ObservedRun]] = defaultdict(list)
+    for run in runs:
+        by_program[id(run.played)].append(run)
+    groups = list(by_program.values()) if len(by_program) > 1 else [[run] for run in runs]
+    folds: list[list[ObservedRun]] = [[] for _ in range(min(_MOST_FOLDS, len(groups)))]
+    for index, group in enumerate(groups):
+        folds[index % len(folds)] += group
+    return folds
+
+
+def _seen(runs: Sequence[ObservedRun]) -> dict[str, float]:
+    across = seen_arc_acceleration(runs)
+    return {"arc_acceleration": across} if math.isfinite(across) else {}
+
+
+def _tried(
+    tried: Sequence[Family],
+    runs: Sequence[ObservedRun],
+    folds: Sequence[Sequence[ObservedRun]],
+    machine: Machine,
+    rate: float,
+    meter: _Meter,
+) -> tuple[list[MotionFit], list[FamilyScore]]:
+    clocks = clocks_of(runs)
+    if not clocks:
+        raise ArgumentError(
+            "no log reports lines of a stretch of cuts often enough (10 readings): there is nothing to learn from"
+        )
+    fits, scores = [], []
+    for family in tried:
+        fit = fit_motion(clocks, family, machine, rate, seen=_seen(runs), on_step=meter.step)
+        meter.next()
+        left_out = []
+        for fold in folds if len(folds) > 1 else ():
+            rest = [run for run in runs if run not in fold]
+            part = fit_motion(clocks_of(rest), family, machine, rate, seen=_seen(rest), on_step=meter.step, thorough=False)
+            left_out.append(misfit(clocks_of(fold), fitted_model(machine, family, part.values, rate)))
+            meter.next()
+        fits.append(fit)
+        score = misfit(clocks, fitted_model(machine, family, fit.values, rate))
+        scores.append(FamilyScore(family.name, family.meaning, score, float(np.mean(left_out)) if left_out else None))
+    return fits, scores
+
+
+def _left_out(
+    runs: Sequence[ObservedRun], folds: Sequence[Sequence[ObservedRun]], motion: MotionFit, machine: Machine, rate: float
+) -> dict[int, _Learned]:
+    """For each run what the others teach."""
+    found = {}
+    for fold in folds:
+        rest = [run for run in runs if run not in fold]
+        part = fit_motion(clocks_of(rest), motion.family, machine, rate, seen=_seen(rest))
+        other = _Learned(part, fit_functions(rest, part, machine), machine)
+        found.update({id(run): other for run in fold})
+    return found
+
+
+def _rows(
+    observed: Sequence[ObservedRun], learned: _Learned, others: dict[int, _Learned]
+) -> tuple[list[LearnedRun], list[str]]:
+    spread = _spread(observed, learned, others)
+    rows, warnings = [], []
+    for run in observed:
+        starts = learned.starts(run)
+        holds = holds_of(run, starts)
+        tools, kinds = shares_of(run, starts, holds)
+        held = sum(length for _, length, _ in holds)
+        other = others.get(id(run))
+        left_out = float(other.starts(run)[-1]) if other is not None else None
+        reach = _reach(run, starts, spread, learned.functions)
+        row = LearnedRun(
+            program=str(run.entry.program),
+            log=run.log.source,
+            use=run.entry.use,
+            measured_s=run.duration_s,
+            held_s=held,
+            predicted_s=float(starts[-1]),
+            low_s=float(starts[-1]) - reach,
+            high_s=float(starts[-1]) + reach,
+            left_out_s=left_out,
+            feed_override=_usual([run], lambda each: [(s.feed_override, s.lines[1] - s.lines[0]) for s in each.stretches]),
+            rapid_override=run.rapid_override,
+            tools=tools,
+            kinds=kinds,
+            holds=tuple(f"{begin:.1f} s: {length:.1f} s, {why}" for begin, length, why in holds),
+            notes=run.notes,
+        )
+        rows.append(row)
+        judged = row.judged_percent
+        if judged is not None and abs(judged) > TOLERANCE_PERCENT:
+            warnings.append(f"{row.name}: {judged:+.1f} % from what it took, more than {TOLERANCE_PERCENT:g} %")
+        warnings += [f"{row.name}: held at {hold}" for hold in row.holds]
+    return rows, warnings
+
+
+def _spread(observed: Sequence[ObservedRun], learned: _Learned, others: dict[int, _Learned]) -> float:
+    """Root mean square of the relative error of whole sections, of runs left out where there are any."""
+    square = weight = 0.0
+    for run in observed:
+        if run.entry.use != "fit":
+            continue
+        who = others.get(id(run), learned)
+        model = fitted_model(who.machine, who.motion.family, who.motion.values, who.motion.rapid_mm_per_s)
+        clocks = clocks_of([run])
+        for clock, residual in zip(clocks, section_residuals(clocks, model), strict=True):
+            took = float(clock.time_s[-1] - clock.time_s[0])
+            error = float(np.median(residual[-4:]) - np.median(residual[:4]))
+            square += min(error / took, 0.2) ** 2 * took if took > 0.0 else 0.0
+            weight += took
+    return max(math.sqrt(square / weight) if weight > 0.0 else 0.0, _LEAST_SPREAD)
+
+
+def _reach(run: ObservedRun, starts: np.ndarray, spread: float, functions: FunctionFit) -> float:
+    """Half of the 95 % interval of a run's time: cuts err together, what lies between them by itself."""
+    cut = sum(float(starts[stretch.lines[1] + 1] - starts[stretch.lines[0]]) for stretch in run.stretches)
+    between = len(run.stretches)
+    return 2.0 * math.sqrt((spread * cut) ** 2 + between * functions.scatter_s**2)
+
+
+def _usual(
+    runs: Sequence[ObservedRun], values: Callable[[ObservedRun], Sequence[tuple[float, float]]]
+) -> float:
+    """The value that held for the longest part."""
+    held: dict[float, float] = defaultdict(float)
+    for run in runs:
+        for value, weight in values(run):
+            held[value] += weight
+    return max(held, key=lambda value: held[value]) if held else 1.0
+
+
+def _result(
+    machine: Machine,
+    learned: _Learned,
+    scores: Sequence[FamilyScore],
+    runs: Sequence[ObservedRun],
+    rows: Sequence[LearnedRun],
+    warnings: Sequence[str],
+) -> LearnedClock:
+    motion, functions = learned.motion, learned.functions
+    intervals = parameter_intervals(motion, clocks_of(runs), machine)
+    source = f"logs of {len(runs)} runs"
+    values = machine_values(motion.family, motion.values, motion.rapid_mm_per_s)
+    numbers, not_told = [], []
+    remarks: dict[str, str] = {}
+    for parameter in motion.family.parameters:
+        value = motion.values[parameter.name] * parameter.scale
+        low, high = (bound * parameter.scale for bound in intervals[parameter.name])
+        told = low > value / _KNOWN or high < value * _KNOWN
+        key = parameter.key.format(axis="|".join(parameter.axes))
+        numbers.append(
+            LearnedNumber(
+                key, parameter.meaning, float(f"{value:.5g}"), float(f"{low:.5g}"), float(f"{high:.5g}"), parameter.unit,
+                _had(machine, parameter.key.format(axis=parameter.axes[:1])),
+            )
+        )  # fmt: skip
+        if not told:
+            not_told.append(f"{parameter.meaning} ({key}): the runs bear {low:.3g} to {high:.3g} {parameter.unit}")
+        for axis in parameter.axes or " ":
+            place = parameter.key.format(axis=axis)
+            place = place.rpartition(".")[0] if place.startswith("controller.corner_speed") else place
+            remarks[place] = f"measured ({source}): {low:.4g} ... {high:.4g} {parameter.unit}"
+    values.update(_function_values(functions, runs))
+    for name, key, meaning, unit in _function_rows(functions):
+        numbers.append(
+            LearnedNumber(
+                key, meaning, float(f"{functions.values[name]:.4g}"), float(f"{functions.low[name]:.4g}"),
+                float(f"{functions.high[name]:.4g}"), unit,
+            )
+        )  # fmt: skip
+    for key in values:
+        remarks.setdefault(key, f"measured ({source})" if key.startswith(("times.", "axes.")) else f"as {source} show it")
+    if not math.isfinite(motion.rapid_mm_per_s):
+        not_told.append("rapid rate: no log shows a rapid that runs steadily; the file keeps what it had")
+    fitted = machine.with_values(values, source=f"{machine.name} with what was learned")
+    return LearnedClock(
+        machine=machine.name,
+        family=motion.family.name,
+        families=tuple(scores),
+        numbers=tuple(numbers),
+        runs=tuple(rows),
+        fitted=fitted.with_remarks(machine.all_remarks() | remarks),
+        remarks=remarks,
+        not_told=tuple(not_told),
+        warnings=tuple(dict.fromkeys(warnings)),
+    )
+
+
+def _had(machine: Machine, key: str) -> float | None:
+    place: object = machine
+    for name in key.split("."):
+        place = getattr(place, name, None)
+    if isinstance(place, int | float):
+        return float(place)
+    return float(place.x) if place is not None and hasattr(place, "x") else None
+
+
+def _function_rows(functions: FunctionFit) -> list[tuple[str, str, str, str]]:
+    """Name in the fit, key, meaning and unit of what takes time beside the motion."""
+    known = {
+        "start": ("times.program_start_s", "from the start key to the first block", "s"),
+        "tool change": ("times.tool_change_s", "tool change", "s"),
+        "way xy": ("times.unknown_move_s.x|y", "rapid of X and Y on a way that is not known", "s"),
+        "way z": ("times.unknown_move_s.z", "rapid of Z on a way that is not known", "s"),
+        "spindle start": ("times.spindle_start", "start of the spindle, per 1000/min", "s"),
+        "spindle start from": ("times.spindle_start", "start of the spindle takes time from", "1000/min"),
+        "spindle stop": ("times.spindle_stop", "stop of the spindle, per 1000/min", "s"),
+        "spindle stop from": ("times.spindle_stop", "stop of the spindle takes time from", "1000/min"),
+    }
+    return [
+        (name, *known[name]) if name in known else (name, "times.m_codes", f"M{int(name[1:]):02d}", "s")
+        for name in functions.values
+    ]
+
+
+def _function_values(functions: FunctionFit, runs: Sequence[ObservedRun]) -> dict[str, object]:
+    values = functions.values
+    codes = {int(name[1:]): round(value, 3) for name, value in values.items() if name[0] == "M" and name[1:].isdigit()}
+    codes = {code: value for code, value in codes.items() if value >= 0.005}
+    way_xy, way_z = (round(values.get(name, 0.0), 3) for name in ("way xy", "way z"))
+    feed = _usual(runs, lambda run: [(s.feed_override, s.lines[1] - s.lines[0]) for s in run.stretches])
+    rapid = _usual(runs, lambda run: [(run.rapid_override, run.duration_s or 0.0)])
+    found: dict[str, object] = {
+        "times.program_start_s": round(values.get("start", 0.0), 3),
+        "times.tool_change_s": round(values.get("tool change", 0.0), 3),
+        "times.last_tool_in_spindle": functions.last_tool_in_spindle,
+        "times.m_function_s": 0.0,
+        "times.unknown_move_s": {"x": way_xy, "y": way_xy, "z": way_z},
+        "times.feed_override_percent": round(100.0 * feed, 2),
+        "times.rapid_override_percent": round(100.0 * rapid, 2),
+        "times.m_codes": {"code": list(codes), "s": list(codes.values())} if codes else None,
+    }
+    for name in ("spindle start", "spindle stop"):
+        rows = spindle_rows(values, name)
+        table = {"rpm": [round(row[0], 1) for row in rows], "s": [round(row[1], 3) for row in rows]} if rows else None
+        found[f"times.{name.replace(' ', '_')}"] = table
+    return found

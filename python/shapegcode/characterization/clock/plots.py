@@ -1,0 +1,80 @@
+"""The picture of a learned clock: predicted against measured, by run and by tool."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from shapegcode.characterization.clock.result import TOLERANCE_PERCENT, LearnedClock
+from shapegcode.results import plot
+from shapegcode.results.result import Plot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["plot_clock", "plots_of"]
+
+_TOOL_PERCENT = 5.0
+_MOST_RUNS = 20
+
+
+def plots_of(found: LearnedClock) -> dict[str, Plot]:
+    """Its pictures by name.
+
+    Args:
+        found: what was learned.
+
+    Returns:
+        What draws each picture, by the name of its file without ending; none without a whole run.
+    """
+    return {"clock": partial(plot_clock, found)} if any(run.measured_s for run in found.runs) else {}
+
+
+def plot_clock(found: LearnedClock, ax: Axes | None = None) -> Axes:
+    """How far is the learned machine off? One row for each run: whole run, tools, kinds of motion.
+
+    How to read this: 0 is what the machine took; the bands are 2 % for a run and 5 % for a tool's share; a bar is the
+    95 % interval.
+
+    Args:
+        found: what was learned.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The axes drawn into.
+    """
+    runs = [run for run in found.runs if run.measured_s is not None and run.measured_s > run.held_s][:_MOST_RUNS]
+    panel = plot.axes(
+        ax, size_inch=(9.0, 1.6 + 0.42 * len(runs)), title=f"Predicted against measured: {found.machine}, {found.family}"
+    )
+    panel.axvspan(-_TOOL_PERCENT, _TOOL_PERCENT, color=plot.GREY, alpha=0.12, label="5 %, of a tool's share")
+    panel.axvspan(-TOLERANCE_PERCENT, TOLERANCE_PERCENT, color=plot.GREY, alpha=0.25, label="2 %, of a run")
+    labelled: set[str] = set()
+
+    def once(label: str) -> str | None:
+        return None if label in labelled else (labelled.add(label) or label)
+
+    for row, run in enumerate(runs):
+        took = (run.measured_s or 0.0) - run.held_s
+        error = 100.0 * (run.predicted_s / took - 1.0)
+        reach = 100.0 * (run.high_s - run.predicted_s) / took
+        panel.errorbar(
+            error, row, xerr=reach, fmt="o", color=plot.COLOURS[1], capsize=3, label=once("whole run, with its interval")
+        )
+        if run.left_out_percent is not None:
+            panel.plot(
+                run.left_out_percent, row, "D", color=plot.COLOURS[0], markersize=5,
+                label=once("whole run, learned from the others"),
+            )  # fmt: skip
+        for share in run.tools:
+            if share.measured_s > 0.02 * took:
+                panel.plot(share.error_percent, row + 0.22, "|", color=plot.COLOURS[2], label=once("tools"))
+    panel.set_yticks(
+        range(len(runs)),
+        [f"{run.name}{' (not fitted)' if run.use == 'test' else ''}\n{run.measured_s:.1f} s" for run in runs],
+        fontsize=8,
+    )
+    panel.set_ylim(len(runs) - 0.5, -0.5)
+    panel.set_xlabel("predicted over measured, %")
+    plot.legend_below(panel)
+    return panel

@@ -1,0 +1,257 @@
+"""What was learned of a machine's clock, and how well it says what the machine did: figures, tables, next step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from shapegcode.machine import Machine
+from shapegcode.results.json import hidden
+from shapegcode.results.result import Plot, Result
+from shapegcode.results.table import Column, Table
+
+__all__ = ["FamilyScore", "LearnedClock", "LearnedNumber", "LearnedRun", "LearnedShare"]
+
+TOLERANCE_PERCENT = 2.0
+
+
+@dataclass(frozen=True)
+class FamilyScore:
+    """One kind of look-ahead that was tried.
+
+    Attributes:
+        name: of it.
+        meaning: in words.
+        fitted_s: how far its clock runs apart from the logs that it was fitted to, s (weighted root mean square over
+            stretches of seconds to minutes).
+        left_out_s: the same on runs that it was not fitted to; null: too few runs to leave any out.
+    """
+
+    name: str
+    meaning: str
+    fitted_s: float
+    left_out_s: float | None
+
+
+@dataclass(frozen=True)
+class LearnedNumber:
+    """One number of the machine file.
+
+    Attributes:
+        key: of it.
+        meaning: in words.
+        value: that was learned; null: the logs do not tell it, and the file keeps what it had.
+        low: least value of the 95 % interval.
+        high: largest one.
+        unit: of all three.
+        had: what the machine file had before.
+    """
+
+    key: str
+    meaning: str
+    value: float | None
+    low: float | None
+    high: float | None
+    unit: str
+    had: float | None = None
+
+
+@dataclass(frozen=True)
+class LearnedShare:
+    """A part of a run: a tool, or a kind of motion.
+
+    Attributes:
+        name: "T3", "cuts", "between cuts".
+        measured_s: what it took in the log.
+        predicted_s: what the learned machine says.
+    """
+
+    name: str
+    measured_s: float
+    predicted_s: float
+
+    @property
+    def error_percent(self) -> float:
+        """Predicted over measured."""
+        return 100.0 * (self.predicted_s / self.measured_s - 1.0) if self.measured_s > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class LearnedRun:
+    """One run.
+
+    Attributes:
+        program: file.
+        log: file.
+        use: "fit" or "test".
+        measured_s: from start to completion, by the log; null: it does not hold both.
+        held_s: of it, holds: the machine waited where no program asks for it.
+        predicted_s: by the learned machine, at the overrides of this run.
+        low_s: least time of the 95 % interval.
+        high_s: largest one.
+        left_out_s: what a machine says that was learned from the other programs (or runs) alone; null: no others.
+        feed_override: ratio at which most of it was cut.
+        rapid_override: ratio of its rapids.
+        tools: by tool.
+        kinds: cuts, and what lies between them.
+        holds: where it was held, in words.
+        notes: what was bridged in the log.
+    """
+
+    program: str
+    log: str
+    use: str
+    measured_s: float | None
+    held_s: float
+    predicted_s: float
+    low_s: float
+    high_s: float
+    left_out_s: float | None
+    feed_override: float
+    rapid_override: float
+    tools: tuple[LearnedShare, ...]
+    kinds: tuple[LearnedShare, ...]
+    holds: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Program and log, without folders."""
+        program, log = (each.replace("\\", "/").rsplit("/", 1)[-1] for each in (self.program, self.log))
+        return f"{program.rsplit('.', 1)[0]}, {log}"
+
+    @property
+    def error_percent(self) -> float | None:
+        """Predicted over what was measured without holds."""
+        return _error(self.predicted_s, self.measured_s, self.held_s)
+
+    @property
+    def left_out_percent(self) -> float | None:
+        """The same of the machine learned from the others."""
+        return _error(self.left_out_s, self.measured_s, self.held_s)
+
+    @property
+    def judged_percent(self) -> float | None:
+        """Error as a run left out, where there is one; else of the fit."""
+        return self.left_out_percent if self.left_out_s is not None else self.error_percent
+
+
+def _error(predicted_s: float | None, measured_s: float | None, held_s: float) -> float | None:
+    if predicted_s is None or measured_s is None or measured_s <= held_s:
+        return None
+    return 100.0 * (predicted_s / (measured_s - held_s) - 1.0)
+
+
+@dataclass(frozen=True, repr=False)
+class LearnedClock(Result):
+    """A machine learned from what it did.
+
+    Attributes:
+        machine: name.
+        family: kind of look-ahead that says best what runs took that it was not fitted to.
+        families: all that were tried.
+        numbers: what was learned, one row for each key of the machine file.
+        runs: one row for each run.
+        fitted: the machine with it.
+        remarks: for each key that was set, by its dotted name: interval and source.
+        not_told: what the logs cannot tell, in words.
+        warnings: runs that differ by more than 2 %, overrides of which the logs say nothing.
+    """
+
+    machine: str
+    family: str
+    families: tuple[FamilyScore, ...]
+    numbers: tuple[LearnedNumber, ...]
+    runs: tuple[LearnedRun, ...]
+    fitted: Machine = field(metadata=hidden())
+    remarks: Mapping[str, str] = field(metadata=hidden())
+    not_told: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    json_extra = {"largest_error_percent": "float | None"}  # noqa: RUF012  (as every result declares it)
+
+    @property
+    def largest_error_percent(self) -> float | None:
+        """Largest error of a run: as one left out where others are, without holds."""
+        judged = [abs(run.judged_percent) for run in self.runs if run.judged_percent is not None]
+        return max(judged) if judged else None
+
+    @property
+    def ok(self) -> bool:
+        """Every run is within 2 %."""
+        largest = self.largest_error_percent
+        return largest is not None and largest <= TOLERANCE_PERCENT
+
+    @property
+    def answer(self) -> str:
+        """How well it says what the machine did."""
+        largest = self.largest_error_percent
+        learned = sum(number.value is not None for number in self.numbers)
+        head = f"{self.machine}: {learned} numbers learned from {sum(run.use == 'fit' for run in self.runs)} runs"
+        if largest is None:
+            return f"{head}; no log holds a whole run to judge them by"
+        kind = "left out" if any(run.left_out_s is not None or run.use == "test" for run in self.runs) else "fitted"
+        within = "within" if self.ok else "NOT within"
+        return f"{head}; runs {kind} are {within} {TOLERANCE_PERCENT:g} % (at most {largest:.1f} %)"
+
+    @property
+    def next_step(self) -> str:
+        """To use the machine file, or to give it more runs."""
+        if self.ok:
+            return "write it with -o FILE; shapegcode time part.nc -m FILE tells what other programs take"
+        return "add runs of other programs, or state what the operator had set (override_percent in RUNS.toml)"
+
+    def to_toml(self) -> str:
+        """The machine file with what was learned; a remark stands behind each key."""
+        return self.fitted.to_toml(self.remarks)
+
+    def tables(self) -> list[Table]:
+        """Runs, tools, kinds of look-ahead, numbers."""
+        tools = [(run, share) for run in self.runs for share in (*run.tools, *run.kinds)]
+        return [
+            Table("runs", _RUNS, self.runs),
+            Table("by tool, and by kind of motion", _SHARES, tools),
+            Table("kinds of look-ahead", _FAMILIES, self.families),
+            Table("learned", _NUMBERS, self.numbers),
+        ]
+
+    def plots(self) -> dict[str, Plot]:
+        """Its pictures."""
+        from shapegcode.characterization.clock.plots import plots_of
+
+        return plots_of(self)
+
+
+def _interval(number: LearnedNumber) -> str:
+    return "" if number.low is None or number.high is None else f"{number.low:.4g} ... {number.high:.4g}"
+
+
+_RUNS = (
+    Column("run", value="name", text=True),
+    Column("use", value="use", left=True),
+    Column("measured", "s", "measured_s", digits=1),
+    Column("held", "s", lambda run: run.held_s or None, digits=1),
+    Column("predicted", "s", "predicted_s", digits=1),
+    Column("error", "%", "error_percent", digits=2),
+    Column("left out", "%", "left_out_percent", digits=2),
+)
+_SHARES = (
+    Column("run", value=lambda row: row[0].name, text=True),
+    Column("part", value=lambda row: row[1].name, left=True),
+    Column("measured", "s", lambda row: row[1].measured_s, digits=1),
+    Column("predicted", "s", lambda row: row[1].predicted_s, digits=1),
+    Column("error", "%", lambda row: row[1].error_percent, digits=1),
+)
+_FAMILIES = (
+    Column("kind", value="name", text=True),
+    Column("fitted", "s", "fitted_s", digits=3),
+    Column("left out", "s", "left_out_s", digits=3),
+    Column("what it is", value="meaning", text=True),
+)
+_NUMBERS = (
+    Column("number", value="meaning", text=True),
+    Column("value", value=lambda number: "not told" if number.value is None else f"{number.value:.4g} {number.unit}"),
+    Column("95 % interval", value=_interval),
+    Column("file had", value=lambda number: None if number.had is None else f"{number.had:.4g}"),
+    Column("key", value="key", text=True),
+)
