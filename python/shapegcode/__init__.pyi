@@ -41,6 +41,15 @@ from shapegcode._core import (
     zv as zv,
 )
 from shapegcode.characterization.characterize import characterize as characterize
+from shapegcode.characterization.clock.learn import learn_clock as learn_clock
+from shapegcode.characterization.clock.plots import plot_clock as plot_clock
+from shapegcode.characterization.clock.result import (
+    FamilyScore as FamilyScore,
+    LearnedClock as LearnedClock,
+    LearnedNumber as LearnedNumber,
+    LearnedRun as LearnedRun,
+    LearnedShare as LearnedShare,
+)
 from shapegcode.characterization.programs import write_characterization_tests as write_characterization_tests
 from shapegcode.characterization.result import (
     Characterisation as Characterisation,

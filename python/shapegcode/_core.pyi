@@ -4125,6 +4125,14 @@ class ControllerModel:
     def in_position_width_mm(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
         ...
     @property
+    def last_tool_in_spindle(self) -> bool:
+        """
+        At the start, from the run before: an M06 that calls it changes nothing.
+        """
+    @last_tool_in_spindle.setter
+    def last_tool_in_spindle(self, arg0: bool) -> None:
+        ...
+    @property
     def limits(self) -> MotionLimits:
         """
         Look-ahead; the axes' feed limits hold always.
@@ -4179,6 +4187,14 @@ class ControllerModel:
         """
     @position_gain_per_s.setter
     def position_gain_per_s(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def program_start_s(self) -> float:
+        """
+        From the start key to the first block, s.
+        """
+    @program_start_s.setter
+    def program_start_s(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def rapid_bell_time_s(self) -> float:

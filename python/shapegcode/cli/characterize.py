@@ -20,8 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Writes short test programs (air moves inside a stated box) with instructions, then fits the machine file to "
         "stopwatch times or servo logs of them: interpolation period, block time, time constants, in-position times. "
         "--servo takes any log of commands and actual positions: dead time, position gain, feed-forward, friction. "
-        "--runs learns the clock (look-ahead, tool changes, M codes, spindle) from programs and the logs of their runs. "
-        "Exit code 1 if results contradict each other, no axis tells its loop, or a run is not told within 2 %%."
+        "--runs learns the clock (look-ahead, tool changes, M codes, spindle) from programs and the logs of their "
+        "runs. Exit code 1 if results contradict each other, no axis tells its loop, or a run is not told within 2 %%."
     )
     action = parser.add_mutually_exclusive_group(required=True)
     action.add_argument(

@@ -34,8 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=ratio,
         default=None,
         metavar="RATIO",
-        help="rapid override, for example 25%% (at most 100%%; default: times.rapid_override_percent); the acceleration of "
-        "rapids stays what it is",
+        help="rapid override, for example 25%% (at most 100%%; default: times.rapid_override_percent); the "
+        "acceleration of rapids stays what it is",
     )
     parser.add_argument("--no-full", action="store_true", help="closed form only, no full interpolation")
     parser.add_argument("--blocks", action="store_true", help="put every block into the JSON")

@@ -83,8 +83,8 @@ class Controller(TomlTable):
     corner_rule: Literal["speed_difference", "junction_deviation", "stops"] = key(
         'what look-ahead does at corners. "speed_difference": no axis changes its speed by more than '
         'corner_speed_difference_mm_per_min (FANUC); "junction_deviation": it passes as an arc within '
-        'junction_deviation_mm (GRBL and others); "stops": it stops where the direction turns by corner_stop_angle_deg. '
-        "Programs are written for a FANUC control, whatever it says",
+        'junction_deviation_mm (GRBL and others); "stops": it stops where the direction turns by '
+        "corner_stop_angle_deg. Programs are written for a FANUC control, whatever it says",
         fanuc="1783",
         default="speed_difference",
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -171,16 +172,14 @@ def _spans(run: ObservedRun) -> list[_Span]:
         add(index, index + 1)
     if len(cuts):
         add(-1, int(cuts[0]))
-        for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+        for first, last in pairwise(cuts.tolist()):
             if last > first + 1:
-                add(int(first), int(last))
+                add(first, last)
         add(int(cuts[-1]), len(line))
     return spans
 
 
-def _fit(
-    spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: Machine, kept: bool
-) -> FunctionFit:
+def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: Machine, kept: bool) -> FunctionFit:
     from scipy.optimize import least_squares
 
     seconds = np.array([span.seconds for span in spans])
@@ -203,13 +202,14 @@ def _fit(
     begin = np.array([4.0 if name.endswith("from") else 0.3 for name in names])
     found = least_squares(
         errors, begin, bounds=(np.zeros(len(names)), scale), loss="soft_l1", f_scale=_OUTLIER, x_scale=1.0,
-        diff_step=1e-3, max_nfev=60,
+        diff_step=np.full(len(names), 1e-3), max_nfev=60,
     )  # fmt: skip
     values = dict(zip(names, found.x.tolist(), strict=True))
     error = errors(found.x)[: len(spans)] * _READING_S
     middle = float(np.sqrt(np.mean(np.minimum(error**2, 1.0)))) if len(error) else 0.0
     # Each stretch is counted about twice: as a whole, and in its readings.
-    spread = np.linalg.pinv(found.jac.T @ found.jac) * 2.0 * max(1.0, (middle / _READING_S) ** 2)
+    slope = np.asarray(found.jac)
+    spread = np.linalg.pinv(slope.T @ slope) * 2.0 * max(1.0, (middle / _READING_S) ** 2)
     reach = 2.0 * np.sqrt(np.maximum(np.diag(spread), 0.0))
     low = {name: max(0.0, values[name] - float(each)) for name, each in zip(names, reach, strict=True)}
     high = {name: min(_MOST_S, values[name] + float(each)) for name, each in zip(names, reach, strict=True)}

@@ -67,9 +67,10 @@ def learn_clock(
 ) -> LearnedClock:
     """Learn what the clock of a machine depends on from what it did.
 
-    Logs are laid beside their programs by line; overrides and holds are found. Several kinds of look-ahead are fitted to
-    what stretches between functions took, and the one is taken that says best what programs (or runs, where there is one
-    program) took that it was not fitted to. Tool changes, M codes, spindle and unknown ways follow by least squares.
+    Logs are laid beside their programs by line; overrides and holds are found. Several kinds of look-ahead are fitted
+    to what stretches between functions took, and the one is taken that says best what programs (or runs, where there
+    is one program) took that it was not fitted to. Tool changes, M codes, spindle and unknown ways follow by least
+    squares.
 
     Args:
         runs: pairs of program and log, or the file that lists them (RUNS.toml).
@@ -182,7 +183,9 @@ def _tried(
         left_out = []
         for fold in folds if len(folds) > 1 else ():
             rest = [run for run in runs if run not in fold]
-            part = fit_motion(clocks_of(rest), family, machine, rate, seen=_seen(rest), on_step=meter.step, thorough=False)
+            part = fit_motion(
+                clocks_of(rest), family, machine, rate, seen=_seen(rest), on_step=meter.step, thorough=False
+            )
             left_out.append(misfit(clocks_of(fold), fitted_model(machine, family, part.values, rate)))
             meter.next()
         fits.append(fit)
@@ -192,7 +195,11 @@ def _tried(
 
 
 def _left_out(
-    runs: Sequence[ObservedRun], folds: Sequence[Sequence[ObservedRun]], motion: MotionFit, machine: Machine, rate: float
+    runs: Sequence[ObservedRun],
+    folds: Sequence[Sequence[ObservedRun]],
+    motion: MotionFit,
+    machine: Machine,
+    rate: float,
 ) -> dict[int, _Learned]:
     """For each run what the others teach."""
     found = {}
@@ -227,7 +234,7 @@ def _rows(
             low_s=float(starts[-1]) - reach,
             high_s=float(starts[-1]) + reach,
             left_out_s=left_out,
-            feed_override=_usual([run], lambda each: [(s.feed_override, s.lines[1] - s.lines[0]) for s in each.stretches]),
+            feed_override=_usual([run], _feeds),
             rapid_override=run.rapid_override,
             tools=tools,
             kinds=kinds,
@@ -266,9 +273,12 @@ def _reach(run: ObservedRun, starts: np.ndarray, spread: float, functions: Funct
     return 2.0 * math.sqrt((spread * cut) ** 2 + between * functions.scatter_s**2)
 
 
-def _usual(
-    runs: Sequence[ObservedRun], values: Callable[[ObservedRun], Sequence[tuple[float, float]]]
-) -> float:
+def _feeds(run: ObservedRun) -> list[tuple[float, float]]:
+    """Feed overrides, and the lines that were cut at each."""
+    return [(each.feed_override, each.lines[1] - each.lines[0]) for each in run.stretches]
+
+
+def _usual(runs: Sequence[ObservedRun], values: Callable[[ObservedRun], Sequence[tuple[float, float]]]) -> float:
     """The value that held for the longest part."""
     held: dict[float, float] = defaultdict(float)
     for run in runs:
@@ -298,7 +308,7 @@ def _result(
         key = parameter.key.format(axis="|".join(parameter.axes))
         numbers.append(
             LearnedNumber(
-                key, parameter.meaning, float(f"{value:.5g}"), float(f"{low:.5g}"), float(f"{high:.5g}"), parameter.unit,
+                key, parameter.meaning, _digits(value), _digits(low), _digits(high), parameter.unit,
                 _had(machine, parameter.key.format(axis=parameter.axes[:1])),
             )
         )  # fmt: skip
@@ -312,12 +322,14 @@ def _result(
     for name, key, meaning, unit in _function_rows(functions):
         numbers.append(
             LearnedNumber(
-                key, meaning, float(f"{functions.values[name]:.4g}"), float(f"{functions.low[name]:.4g}"),
-                float(f"{functions.high[name]:.4g}"), unit,
+                key, meaning, _digits(functions.values[name]), _digits(functions.low[name]),
+                _digits(functions.high[name]), unit,
             )
         )  # fmt: skip
     for key in values:
-        remarks.setdefault(key, f"measured ({source})" if key.startswith(("times.", "axes.")) else f"as {source} show it")
+        remarks.setdefault(
+            key, f"measured ({source})" if key.startswith(("times.", "axes.")) else f"as {source} show it"
+        )
     if not math.isfinite(motion.rapid_mm_per_s):
         not_told.append("rapid rate: no log shows a rapid that runs steadily; the file keeps what it had")
     fitted = machine.with_values(values, source=f"{machine.name} with what was learned")
@@ -332,6 +344,11 @@ def _result(
         not_told=tuple(not_told),
         warnings=tuple(dict.fromkeys(warnings)),
     )
+
+
+def _digits(value: float) -> float:
+    """A number to what a person reads."""
+    return float(f"{value:.4g}")
 
 
 def _had(machine: Machine, key: str) -> float | None:
@@ -366,7 +383,7 @@ def _function_values(functions: FunctionFit, runs: Sequence[ObservedRun]) -> dic
     codes = {int(name[1:]): round(value, 3) for name, value in values.items() if name[0] == "M" and name[1:].isdigit()}
     codes = {code: value for code, value in codes.items() if value >= 0.005}
     way_xy, way_z = (round(values.get(name, 0.0), 3) for name in ("way xy", "way z"))
-    feed = _usual(runs, lambda run: [(s.feed_override, s.lines[1] - s.lines[0]) for s in run.stretches])
+    feed = _usual(runs, _feeds)
     rapid = _usual(runs, lambda run: [(run.rapid_override, run.duration_s or 0.0)])
     found: dict[str, object] = {
         "times.program_start_s": round(values.get("start", 0.0), 3),

@@ -19,7 +19,15 @@ from shapegcode.io.units import find_unit
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 
-__all__ = ["ObservedRun", "PlayedProgram", "Stretch", "observe", "played_program", "rapid_rate", "seen_arc_acceleration"]
+__all__ = [
+    "ObservedRun",
+    "PlayedProgram",
+    "Stretch",
+    "observe",
+    "played_program",
+    "rapid_rate",
+    "seen_arc_acceleration",
+]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -317,8 +325,8 @@ def _feed_unit(entry: RunEntry, log: RunLog, played: PlayedProgram) -> float:
     best = min(FEED_UNITS.values(), key=lambda unit: abs(steady + math.log(unit)))
     if abs(steady + math.log(best)) > math.log(2.0):
         raise RecordError(
-            f"{log.source}: steady feeds of {entry.program.name} are {math.exp(steady):.4g} times the programmed ones in "
-            f"mm/s: no unit of {', '.join(FEED_UNITS)} makes that an override of 50 to 200 %; the log is of another "
+            f"{log.source}: steady feeds of {entry.program.name} are {math.exp(steady):.4g} times the programmed ones "
+            f"in mm/s: no unit of {', '.join(FEED_UNITS)} makes that an override of 50 to 200 %; the log is of another "
             "program, or feed_unit must be stated"
         )
     return best
@@ -336,9 +344,7 @@ def _mode(values: FloatArray) -> float | None:
     return float(np.median(ordered[at : at + most]))
 
 
-def _stretches(
-    entry: RunEntry, log: RunLog, played: PlayedProgram, unit: float, notes: list[str]
-) -> list[Stretch]:
+def _stretches(entry: RunEntry, log: RunLog, played: PlayedProgram, unit: float, notes: list[str]) -> list[Stretch]:
     """Feed override of each section: what steady cuts show, else what is stated, else that of the run, else 1."""
     ratio = np.empty(0)
     line = np.empty(0, dtype=np.int64)
@@ -387,7 +393,9 @@ def seen_arc_acceleration(runs: Sequence[ObservedRun]) -> float:
         radius = played.arc_radius_mm[line]
         feed = played.feed_mm_per_s[line]
         inside = np.isfinite(radius) & np.isfinite(feed) & (speed > 0.0)
-        for each, programmed in {(round(float(r), 1), float(f)) for r, f in zip(radius[inside], feed[inside], strict=True)}:
+        for each, programmed in {
+            (round(float(r), 1), float(f)) for r, f in zip(radius[inside], feed[inside], strict=True)
+        }:
             group = inside & (np.round(radius, 1) == each) & (feed == programmed)
             # A reading may fall upon a corner or a ramp: the steady speed is the one that is hardly passed.
             top = float(np.percentile(speed[group], 90))
@@ -436,7 +444,7 @@ def rapid_rate(runs: list[ObservedRun], machine: Machine) -> tuple[float, list[O
         rate = next((top / dial for dial in _DIALS if top / dial >= 0.98 * fastest), fastest)
     found, said = [], []
     for run in runs:
-        plateau, single = shown[id(run)]
+        plateau = shown[id(run)][0]
         if math.isfinite(run.rapid_override):
             found.append(run)
             continue
@@ -508,6 +516,7 @@ def _require_same(run: ObservedRun, machine: Machine) -> None:
     agreement = float(np.corrcoef(one, other)[0, 1])
     if agreement < 0.3:
         raise RecordError(
-            f"{run.log.source}: its lines do not take the time that those of {run.entry.program.name} need (correlation "
-            f"{agreement:.2f} over {groups} stretches, at least 0.3 is expected): log and program do not belong together"
+            f"{run.log.source}: its lines do not take the time that those of {run.entry.program.name} need "
+            f"(correlation {agreement:.2f} over {groups} stretches, at least 0.3 is expected): log and program do not "
+            "belong together"
         )

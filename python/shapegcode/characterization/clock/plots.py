@@ -45,21 +45,32 @@ def plot_clock(found: LearnedClock, ax: Axes | None = None) -> Axes:
     """
     runs = [run for run in found.runs if run.measured_s is not None and run.measured_s > run.held_s][:_MOST_RUNS]
     panel = plot.axes(
-        ax, size_inch=(9.0, 1.6 + 0.42 * len(runs)), title=f"Predicted against measured: {found.machine}, {found.family}"
+        ax,
+        size_inch=(9.0, 1.6 + 0.42 * len(runs)),
+        title=f"Predicted against measured: {found.machine}, {found.family}",
     )
     panel.axvspan(-_TOOL_PERCENT, _TOOL_PERCENT, color=plot.GREY, alpha=0.12, label="5 %, of a tool's share")
     panel.axvspan(-TOLERANCE_PERCENT, TOLERANCE_PERCENT, color=plot.GREY, alpha=0.25, label="2 %, of a run")
     labelled: set[str] = set()
 
     def once(label: str) -> str | None:
-        return None if label in labelled else (labelled.add(label) or label)
+        """A label the first time, so that the legend has it once."""
+        first = label not in labelled
+        labelled.add(label)
+        return label if first else None
 
     for row, run in enumerate(runs):
         took = (run.measured_s or 0.0) - run.held_s
         error = 100.0 * (run.predicted_s / took - 1.0)
         reach = 100.0 * (run.high_s - run.predicted_s) / took
         panel.errorbar(
-            error, row, xerr=reach, fmt="o", color=plot.COLOURS[1], capsize=3, label=once("whole run, with its interval")
+            error,
+            row,
+            xerr=reach,
+            fmt="o",
+            color=plot.COLOURS[1],
+            capsize=3,
+            label=once("whole run, with its interval"),
         )
         if run.left_out_percent is not None:
             panel.plot(

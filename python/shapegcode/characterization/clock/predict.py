@@ -1,4 +1,4 @@
-"""What a model says of a run that was observed: when each line begins, at the overrides of the run; where it was held."""
+"""What a model says of a run that was observed: when each line begins, at its overrides; where it was held."""
 
 from __future__ import annotations
 
@@ -81,7 +81,11 @@ def _held_rapids(run: ObservedRun) -> list[tuple[float, float, str]]:
         if not is_low:
             continue
         at = int(np.searchsorted(run.time_s, end, side="right")) - 1
-        if at >= 0 and cutting[run.line[at]] and not run.played.rapid[run.line[at] : run.line[min(at + 1, len(run.line) - 1)] + 1].any():
+        if (
+            at >= 0
+            and cutting[run.line[at]]
+            and not run.played.rapid[run.line[at] : run.line[min(at + 1, len(run.line) - 1)] + 1].any()
+        ):
             continue
         if found and begin - (found[-1][0] + found[-1][1]) < 0.5:
             found[-1] = (found[-1][0], float(end) - found[-1][0], found[-1][2])

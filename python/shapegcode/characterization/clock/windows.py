@@ -63,7 +63,9 @@ def clocks_of(runs: Sequence[ObservedRun], least: int = _LEAST_READINGS) -> list
         for stretch in run.stretches:
             inside = (run.line >= stretch.lines[0]) & (run.line <= stretch.lines[1])
             if int(inside.sum()) >= least:
-                found.append(SectionClock(run, stretch.lines, stretch.feed_override, run.time_s[inside], run.line[inside]))
+                found.append(
+                    SectionClock(run, stretch.lines, stretch.feed_override, run.time_s[inside], run.line[inside])
+                )
     return found
 
 
