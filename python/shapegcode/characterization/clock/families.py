@@ -13,7 +13,7 @@ from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.controller import controller_model
 
-__all__ = ["FAMILIES", "Family", "Parameter", "family_of", "fitted_model", "machine_values"]
+__all__ = ["FAMILIES", "LookAhead", "Parameter", "family_of", "fitted_model", "machine_values"]
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Family:
+class LookAhead:
     """A rule for corners with its limits.
 
     Attributes:
@@ -107,32 +107,32 @@ _BLOCK_TIME = Parameter(
 _BOTH = (_RAPID_TIME, _ARRIVAL)
 
 FAMILIES = (
-    Family(
+    LookAhead(
         "speed difference", "look_ahead", "jerk_limited", "speed_difference",
         (_ACROSS, _ALONG_Z, _JERK_TIME, _CORNER, _CORNER_Z, _ARCS, *_BOTH),
         "look-ahead with a largest speed step of each axis at corners (FANUC 1783)",
     ),
-    Family(
+    LookAhead(
         "speed difference, block time", "look_ahead", "jerk_limited", "speed_difference",
         (_ACROSS, _ALONG_Z, _JERK_TIME, _CORNER, _CORNER_Z, _ARCS, _BLOCK_TIME, *_BOTH),
         "the same, and blocks are read no faster than so",
     ),
-    Family(
+    LookAhead(
         "speed difference, constant time", "look_ahead", "constant_time", "speed_difference",
         (_ACROSS, _ALONG_Z, _TIME_CONSTANT, _JERK_TIME, _CORNER, _CORNER_Z, _ARCS, *_BOTH),
         "the same, with ramps of a constant time",
     ),
-    Family(
+    LookAhead(
         "junction deviation", "look_ahead", "jerk_limited", "junction_deviation",
         (_ACROSS, _ALONG_Z, _JERK_TIME, _DEVIATION, _ARCS, *_BOTH),
         "look-ahead that passes a corner as an arc within a deviation",
     ),
-    Family(
+    LookAhead(
         "stops at corners", "look_ahead", "jerk_limited", "stops",
         (_ACROSS, _ALONG_Z, _JERK_TIME, _STOP_ANGLE, _ARCS, *_BOTH),
         "look-ahead that stops at sharp corners",
     ),
-    Family(
+    LookAhead(
         "after interpolation", "after_interpolation", "constant_time", "speed_difference", (_TIME_CONSTANT, *_BOTH),
         "no look-ahead: blocks overlap within the time constant (FANUC 1622)",
     ),
@@ -143,13 +143,13 @@ _OFF = 1e9
 _NO_LIMIT = 1e6  # mm/s²
 
 
-def family_of(name: str) -> Family:
+def family_of(name: str) -> LookAhead:
     """The family of a name."""
     return next(family for family in FAMILIES if family.name == name)
 
 
 def fitted_model(
-    machine: Machine, family: Family, values: Mapping[str, float], rapid_mm_per_s: float
+    machine: Machine, family: LookAhead, values: Mapping[str, float], rapid_mm_per_s: float
 ) -> _core.ControllerModel:
     """The controller that a family and its numbers describe.
 
@@ -191,7 +191,7 @@ def fitted_model(
     return model
 
 
-def machine_values(family: Family, values: Mapping[str, float], rapid_mm_per_s: float) -> dict[str, object]:
+def machine_values(family: LookAhead, values: Mapping[str, float], rapid_mm_per_s: float) -> dict[str, object]:
     """The same as values of the machine file, by dotted key.
 
     Args:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapegcode.characterization.clock.families import FAMILIES, Family, fitted_model, machine_values
+from shapegcode.characterization.clock.families import FAMILIES, LookAhead, fitted_model, machine_values
 from shapegcode.characterization.clock.function_fit import FunctionFit, fit_functions, spindle_rows, whole_model
 from shapegcode.characterization.clock.motion_fit import MotionFit, fit_motion, parameter_intervals
 from shapegcode.characterization.clock.observed import (
@@ -125,7 +125,7 @@ class _Meter:
         self._done, self._steps = min(self._done + 1, self._fits - 1), 0
 
 
-def _families(names: Sequence[str] | None) -> list[Family]:
+def _families(names: Sequence[str] | None) -> list[LookAhead]:
     if names is None:
         return list(FAMILIES)
     known = {family.name: family for family in FAMILIES}
@@ -164,7 +164,7 @@ def _seen(runs: Sequence[ObservedRun]) -> dict[str, float]:
 
 
 def _tried(
-    tried: Sequence[Family],
+    tried: Sequence[LookAhead],
     runs: Sequence[ObservedRun],
     folds: Sequence[Sequence[ObservedRun]],
     machine: Machine,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode.characterization.clock.families import Family, fitted_model
+from shapegcode.characterization.clock.families import LookAhead, fitted_model
 from shapegcode.characterization.clock.windows import SectionClock, misfit, section_residuals
 from shapegcode.machine import Machine
 
@@ -38,7 +38,7 @@ class MotionFit:
         misfit_s: how badly it keeps the time of what it was fitted to.
     """
 
-    family: Family
+    family: LookAhead
     values: dict[str, float]
     rapid_mm_per_s: float
     misfit_s: float
@@ -46,7 +46,7 @@ class MotionFit:
 
 def fit_motion(
     clocks: Sequence[SectionClock],
-    family: Family,
+    family: LookAhead,
     machine: Machine,
     rapid_mm_per_s: float,
     *,

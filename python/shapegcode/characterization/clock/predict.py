@@ -24,6 +24,9 @@ def predicted_starts(run: ObservedRun, model: _core.ControllerModel) -> FloatArr
     Args:
         run: whose overrides hold.
         model: of the controller; its overrides are set.
+
+    Returns:
+        Times since the start key.
     """
     model.rapid_override = run.rapid_override
     model.feed_override = 1.0

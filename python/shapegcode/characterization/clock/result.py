@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Plot, Result
+from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
 __all__ = ["FamilyScore", "LearnedClock", "LearnedNumber", "LearnedRun", "LearnedShare"]
@@ -155,7 +156,8 @@ class LearnedClock(Result):
         fitted: the machine with it.
         remarks: for each key that was set, by its dotted name: interval and source.
         not_told: what the logs cannot tell, in words.
-        warnings: runs that differ by more than 2 %, overrides of which the logs say nothing.
+        warnings: runs that differ by more than 2 %, and where one was held.
+        largest_error_percent: of a run: as one left out where others are, without holds; null: no whole run.
     """
 
     machine: str
@@ -168,7 +170,7 @@ class LearnedClock(Result):
     not_told: tuple[str, ...]
     warnings: tuple[str, ...]
 
-    json_extra = {"largest_error_percent": "float | None"}  # noqa: RUF012  (as every result declares it)
+    json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "largest_error_percent": float | None}
 
     @property
     def largest_error_percent(self) -> float | None:
@@ -214,12 +216,6 @@ class LearnedClock(Result):
             Table("kinds of look-ahead", _FAMILIES, self.families),
             Table("learned", _NUMBERS, self.numbers),
         ]
-
-    def plots(self) -> dict[str, Plot]:
-        """Its pictures."""
-        from shapegcode.characterization.clock.plots import plots_of
-
-        return plots_of(self)
 
 
 def _interval(number: LearnedNumber) -> str:
