@@ -91,6 +91,22 @@ def test_a_fast_record_is_thinned_out_and_says_the_same(monkeypatch: pytest.Monk
             assert one.value == pytest.approx(truth, rel=0.02)
 
 
+@pytest.mark.parametrize("band_hz", [None, (500.0, 3500.0)])
+def test_a_steel_holder_at_51_kilohertz(band_hz: tuple[float, float] | None) -> None:
+    # The frequencies of a steel holder; its damping and masses are made up here, the record is SciPy's.
+    holder = (TrueMode(1071.0, 0.02, 1.2), TrueMode(1981.0, 0.015, 0.8), TrueMode(2608.0, 0.02, 0.5))
+    record = tap(
+        holder, np.random.default_rng(1), snr_db=40.0, rate_hz=51200.0, samples=51200, pulse_samples=16
+    )  # fmt: skip
+    found = identify([record], band_hz=band_hz)
+    assert len(found.fitted_records[0].response) <= len(record.response) / 2
+    assert len(found.modes) == len(holder)
+    for mode, truth in zip(found.modes, holder, strict=True):
+        assert abs(mode.frequency_hz.value - truth.frequency_hz) < 0.01 * truth.damping_ratio * truth.frequency_hz
+        for estimate, true in zip(estimates(mode), truth_of(truth), strict=True):
+            assert estimate.value == pytest.approx(true, rel=2e-3)
+
+
 def test_a_thinned_force_may_have_run_straight_between_its_samples() -> None:
     # Simulated without a filter at the rate of the record. Taken for band-limited only, the mass of the upper mode
     # would be off by (pi f/rate)^2/3, .5 %.
