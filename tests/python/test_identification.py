@@ -107,6 +107,24 @@ def test_a_steel_holder_at_51_kilohertz(band_hz: tuple[float, float] | None) -> 
             assert estimate.value == pytest.approx(true, rel=2e-3)
 
 
+def test_a_thinned_blow_of_one_sample() -> None:
+    time, begin = np.arange(25600) / 51200.0, 400
+    force = np.zeros(len(time))
+    force[begin] = 500.0
+    response = np.zeros(len(time))
+    modes = (TrueMode(700.0, 0.02, 8.0), TrueMode(1981.0, 0.015, 4.0))
+    for mode in modes:  # closed form: second derivative of the response to a unit of momentum, the blow itself left out
+        pole = mode.omega * complex(-mode.damping_ratio, np.sqrt(1.0 - mode.damping_ratio**2))
+        rings = np.imag(pole**2 * np.exp(pole * time[: len(time) - begin])) / pole.imag
+        response[begin:] += 500.0 * time[1] / mode.mass_kg * rings
+    response += 1e-3 * np.std(response) * np.random.default_rng(3).standard_normal(len(time))
+    found = identify([Record("blow", time[1], response, force_n=force)])
+    assert found.fitted_records[0].period_s > 2.0 * time[1]
+    for mode in modes:
+        values = [estimate.value for estimate in estimates(nearest(found, mode)[0])]
+        assert values == pytest.approx(truth_of(mode), rel=2e-3)
+
+
 def test_a_thinned_force_may_have_run_straight_between_its_samples() -> None:
     # Simulated without a filter at the rate of the record. Taken for band-limited only, the mass of the upper mode
     # would be off by (pi f/rate)^2/3, .5 %.

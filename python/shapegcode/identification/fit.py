@@ -28,6 +28,7 @@ _COLOURED = 4.0  # standard errors of the residuals' autocorrelation above which
 _SPECTRUM = 4096  # points of the force's transform
 _FOLDED = 2.0 / 3.0
 _FILTER_ERROR = 3e-4  # what thinning out may do to a mass: the filters let 80 dB less pass
+_FILTER_MOVES = (1e-6, 1e-4)  # ... and to a frequency and a damping ratio
 _FINER = 16  # steps of the check by Wilson's method in a sampling period
 _POSSIBLY = 15.0  # by so much (twice the logarithm of the odds) another course of the force may be less evident
 
@@ -190,6 +191,8 @@ def _judged(
 ) -> list[IdentifiedMode]:
     """The modes of a fit by ascending frequency, without background, each with its refusal where there is one."""
     aliased = _aliased(ready, problem) if isinstance(problem, Taps) else _never_aliased
+    is_whole = isinstance(problem, Decays) or problem.thinned is None
+    least = (0.0, 0.0) if is_whole else _FILTER_MOVES
     doubts = Doubts(
         limit_percent=accepted_percent,
         band_hz=band_hz or problem.band_hz,
@@ -206,7 +209,7 @@ def _judged(
             each.stiffness_n_per_m,
             refusal_of(each, doubts),
         )
-        for each in estimates_of(fit, _alone(problem, fit), others, aliased, white_share)
+        for each in estimates_of(fit, _alone(problem, fit), others, aliased, white_share, least)
         if not is_background(each, doubts)
     ]
     return sorted(found, key=lambda mode: mode.frequency_hz.value)

@@ -13,7 +13,7 @@ from shapegcode.errors import RecordError
 from shapegcode.identification.model_search import Fit, Starts
 from shapegcode.identification.prepared import Prepared
 from shapegcode.identification.support import LEAST_SWINGS
-from shapegcode.identification.thinning import FLAT, Thinned, highest_of_interest_hz, thin
+from shapegcode.identification.thinning import FLAT, Thinned, are_blows, highest_of_interest_hz, thin
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -128,6 +128,8 @@ class Taps(_OverTime):
         """
         if self.thinned is None:
             return [replace(self, hold="linear"), replace(self, hold="impulse")]
+        if self.hold == "impulse":
+            return []
         straight, responses = self.thinned.straight, self.responses
         if self.quantity == "acceleration" and isinstance(near, _core.ModalFit):
             free = float(np.sum(near.inverse_mass))
@@ -162,6 +164,8 @@ class Taps(_OverTime):
             zeta,
             quantity=self.quantity,
             hold=self.held,
+            # What is read after a blow lacks the force over the mass: so much of the force is fitted along.
+            with_mass_line=self.hold == "impulse" and self.held != "impulse" and self.quantity == "acceleration",
             force_noise_n=force_noise_n,
             coloured_residuals=coloured,
             most_iterations=steps,
@@ -293,4 +297,5 @@ def problem_of(ready: Prepared, band_hz: tuple[float, float] | None, *, within: 
         band_hz=(band[0], min(band[1], FLAT / thinned.period_s)),
         force_noise_n=taps.force_noise_n * thinned.force_noise,
         thinned=thinned,
+        hold="impulse" if are_blows(ready) else taps.hold,
     )

@@ -91,6 +91,7 @@ def estimates_of(
     others: Sequence[Fit] = (),
     aliased: Callable[[float], float] = lambda _hz: 0.0,
     white_share: float = 1.0,
+    least: tuple[float, float] = (0.0, 0.0),
 ) -> list[Estimates]:
     """Values and 95 % intervals of each mode of a fit.
 
@@ -104,6 +105,7 @@ def estimates_of(
         others: the same modes under other courses of the force between its samples.
         aliased: share of the force's spectrum at a frequency in Hz that may come from above half the sampling rate.
         white_share: of the samples, how many are independent.
+        least: shares to which frequency and damping ratio are known at best.
 
     Returns:
         Estimates per mode, in the order of the fit.
@@ -114,6 +116,7 @@ def estimates_of(
     found = []
     for mode, row in enumerate(rows):
         spread = _half_widths(row, quantile)
+        spread[:2] = np.hypot(spread[:2], least)
         if len(row.values) > 2:
             spread[2:] = np.hypot(spread[2:], aliased(float(np.exp(row.values[0]))))
         for other in others:

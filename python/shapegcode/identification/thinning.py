@@ -12,7 +12,7 @@ from shapegcode.identification.prepared import Prepared
 from shapegcode.identification.spectra import decay_spectrum
 from shapegcode.io.record import FloatArray, Record
 
-__all__ = ["FLAT", "Thinned", "highest_of_interest_hz", "thin"]
+__all__ = ["FLAT", "Thinned", "are_blows", "highest_of_interest_hz", "thin"]
 
 #: Of the new sampling rate: the filter is flat up to here ...
 FLAT = 0.35
@@ -24,6 +24,7 @@ _BAND = 0.34
 _FEW = 4096
 #: What stands out of the response above the band that the hit excites is looked at with this margin.
 _MARGIN = 1.25
+_MARGIN_OF_BLOWS = 2.0
 _GRID = 8  # points of the filter's transform per tap
 
 
@@ -68,12 +69,15 @@ def highest_of_interest_hz(ready: Prepared, asked_hz: float | None) -> float:
         The frequency in Hz.
     """
     excited = max((value for value in ready.excited_hz if value is not None), default=0.0)
+    margin = _MARGIN
+    if are_blows(ready):  # they excite all that the rate holds
+        excited, margin = 0.0, _MARGIN_OF_BLOWS
     peaks = [
         peak.frequency_hz
         for record, hit in zip(ready.records, ready.hits, strict=True)
         for peak in decay_spectrum(_after(record, 0 if hit is None else hit.first)).peaks
     ]
-    return max(excited if asked_hz is None else asked_hz, _MARGIN * max(peaks, default=0.0))
+    return max(excited if asked_hz is None else asked_hz, margin * max(peaks, default=0.0))
 
 
 def _after(record: Record, first: int) -> Record:
@@ -92,13 +96,13 @@ def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
         highest_hz: end of the band.
 
     Returns:
-        The thinned taps; None: they are thin enough, or of blows too short for it.
+        The thinned taps; None: they are thin enough, or velocities after single blows, which jump.
     """
     period = ready.records[0].period_s
     factor = int(_BAND / (highest_hz * period)) if highest_hz > 0.0 else 1
     longest = max(len(record.response) for record in ready.records)
     factor = min(factor, longest // (_FEW // 2))
-    if factor < 2 or longest <= _FEW or _are_blows(ready):
+    if factor < 2 or longest <= _FEW or (are_blows(ready) and ready.records[0].quantity == "velocity"):
         return None
     plain, straight = _filters(factor)
     reach = len(plain) // 2
@@ -134,8 +138,15 @@ def thin(ready: Prepared, highest_hz: float) -> Thinned | None:
     )
 
 
-def _are_blows(ready: Prepared) -> bool:
-    """Whether the pulses are single blows: they excite all that the rate holds."""
+def are_blows(ready: Prepared) -> bool:
+    """Whether the pulses are single blows of one or two samples.
+
+    Args:
+        ready: taps with force.
+
+    Returns:
+        True for blows.
+    """
     forces = (record.force_n for record in ready.records)
     return any(np.count_nonzero(force) < LEAST_PULSE for force in forces if force is not None)
 
