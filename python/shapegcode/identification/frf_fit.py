@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -57,6 +58,15 @@ def find_frf_modes(
     """
     problem, used = frf_problem_of(responses, band_hz)
     problem, models = _searched(problem, modes or most_modes)
+    turned: list[str] = []
+    chosen = models.fits[(modes or models.order) - 1] if 0 < (modes or models.order) <= len(models.fits) else None
+    if isinstance(chosen, FrfFit) and bool(np.all(chosen.inverse_mass < 0.0)):
+        turned.append(
+            f"{responses[0].source}: every mode goes against the push of the hammer: the sign is turned, as for a "
+            "sensor at the same point that points the other way"
+        )
+        problem, used = frf_problem_of([replace(each, response=-each.response) for each in responses], band_hz)
+        problem, models = _searched(problem, modes or most_modes)
     if modes is not None and len(models.fits) < modes:
         raise RecordError(f"{modes} modes are asked for, and the lines hold no more than {len(models.fits)}")
     order = modes or models.order
@@ -79,7 +89,7 @@ def find_frf_modes(
         fit_percent=0.0 if fit is None else 100.0 * (1.0 - float(np.sqrt(fit.sum_of_squares / problem.squares))),
         noise_rms=float(np.sqrt(np.mean(np.abs(left) ** 2))),
         reason=reason_for(supported, refused),
-        warnings=tuple(dict.fromkeys(warning for each in responses for warning in each.warnings)),
+        warnings=(*dict.fromkeys(warning for each in responses for warning in each.warnings), *turned),
         notes=tuple(notes),
         responses=tuple(used),
         chart=stabilisation_chart(chart_poles(problem), problem.period_s),
