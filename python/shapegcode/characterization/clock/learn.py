@@ -10,25 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from shapegcode.characterization.clock.families import FAMILIES, LookAhead, fitted_model, machine_values
-from shapegcode.characterization.clock.function_fit import FunctionFit, fit_functions, spindle_rows, whole_model
-from shapegcode.characterization.clock.motion_fit import MotionFit, fit_motion, parameter_intervals
-from shapegcode.characterization.clock.observed import (
-    ObservedRun,
-    PlayedProgram,
-    observe,
-    played_program,
-    rapid_rate,
-    seen_arc_acceleration,
-)
+from shapegcode.characterization.clock.families import FAMILIES, LookAhead, fitted_model
+from shapegcode.characterization.clock.file_values import feeds_of, learned_machine, usual_value
+from shapegcode.characterization.clock.function_fit import FunctionFit, fit_functions, whole_model
+from shapegcode.characterization.clock.motion_fit import MotionFit, fit_motion
+from shapegcode.characterization.clock.observed import ObservedRun, observe
+from shapegcode.characterization.clock.played import PlayedProgram, played_program
 from shapegcode.characterization.clock.predict import holds_of, predicted_starts, shares_of
-from shapegcode.characterization.clock.result import (
-    TOLERANCE_PERCENT,
-    FamilyScore,
-    LearnedClock,
-    LearnedNumber,
-    LearnedRun,
-)
+from shapegcode.characterization.clock.result import TOLERANCE_PERCENT, FamilyScore, LearnedClock, LearnedRun
+from shapegcode.characterization.clock.shown import rapid_rate, seen_arc_acceleration
 from shapegcode.characterization.clock.windows import clocks_of, misfit, section_residuals
 from shapegcode.characterization.runs_file import RunsFile, load_runs
 from shapegcode.errors import ArgumentError
@@ -39,7 +29,6 @@ __all__ = ["learn_clock"]
 
 _MOST_FOLDS = 4
 _BETTER = 0.97  # a family further down the list must be better by so much to be taken
-_KNOWN = 4.0  # an interval that reaches so far from its value to both sides tells nothing
 _LEAST_SPREAD = 0.005  # of what a machine takes for its cuts: no model is truer
 _CALLS = 2500  # of the misfit that one fit takes, about; for the bar
 
@@ -90,7 +79,7 @@ def learn_clock(
     file = runs if isinstance(runs, RunsFile) else load_runs(runs)
     tried = _families(families)
     observed = _observed(file, machine)
-    rate, observed, _ = rapid_rate(observed, machine)
+    rate, observed = rapid_rate(observed)
     fitted = [run for run in observed if run.entry.use == "fit"]
     if not fitted:
         raise ArgumentError(f'{file.path}: no run has use = "fit": there is nothing to learn from')
@@ -106,7 +95,18 @@ def learn_clock(
     learned = _Learned(motion, fit_functions(fitted, motion, machine), machine)
     others = _left_out(fitted, folds, motion, machine, rate) if len(folds) > 1 else {}
     rows, warnings = _rows(observed, learned, others)
-    return _result(machine, learned, scores, fitted, rows, warnings)
+    with_it, remarks, numbers, not_told = learned_machine(machine, motion, learned.functions, fitted)
+    return LearnedClock(
+        machine=machine.name,
+        family=motion.family.name,
+        families=tuple(scores),
+        numbers=tuple(numbers),
+        runs=tuple(rows),
+        fitted=with_it,
+        remarks=remarks,
+        not_told=tuple(not_told),
+        warnings=tuple(dict.fromkeys(warnings)),
+    )
 
 
 class _Meter:
@@ -147,12 +147,13 @@ def _observed(file: RunsFile, machine: Machine) -> list[ObservedRun]:
 
 
 def _folds(runs: Sequence[ObservedRun]) -> list[list[ObservedRun]]:
-    """Runs that are left out together: those of a program; with one program each run, with few of them grouped."""
+    """Runs that are left out together: those of a program; with one program, which tells less, every other run."""
     by_program: dict[int, list[ObservedRun]] = defaultdict(list)
     for run in runs:
         by_program[id(run.played)].append(run)
     groups = list(by_program.values()) if len(by_program) > 1 else [[run] for run in runs]
-    folds: list[list[ObservedRun]] = [[] for _ in range(min(_MOST_FOLDS, len(groups)))]
+    count = min(_MOST_FOLDS if len(by_program) > 1 else 2, len(groups))
+    folds: list[list[ObservedRun]] = [[] for _ in range(count)]
     for index, group in enumerate(groups):
         folds[index % len(folds)] += group
     return folds
@@ -234,7 +235,7 @@ def _rows(
             low_s=float(starts[-1]) - reach,
             high_s=float(starts[-1]) + reach,
             left_out_s=left_out,
-            feed_override=_usual([run], _feeds),
+            feed_override=usual_value([run], feeds_of),
             rapid_override=run.rapid_override,
             tools=tools,
             kinds=kinds,
@@ -271,132 +272,3 @@ def _reach(run: ObservedRun, starts: np.ndarray, spread: float, functions: Funct
     cut = sum(float(starts[stretch.lines[1] + 1] - starts[stretch.lines[0]]) for stretch in run.stretches)
     between = len(run.stretches)
     return 2.0 * math.sqrt((spread * cut) ** 2 + between * functions.scatter_s**2)
-
-
-def _feeds(run: ObservedRun) -> list[tuple[float, float]]:
-    """Feed overrides, and the lines that were cut at each."""
-    return [(each.feed_override, each.lines[1] - each.lines[0]) for each in run.stretches]
-
-
-def _usual(runs: Sequence[ObservedRun], values: Callable[[ObservedRun], Sequence[tuple[float, float]]]) -> float:
-    """The value that held for the longest part."""
-    held: dict[float, float] = defaultdict(float)
-    for run in runs:
-        for value, weight in values(run):
-            held[value] += weight
-    return max(held, key=lambda value: held[value]) if held else 1.0
-
-
-def _result(
-    machine: Machine,
-    learned: _Learned,
-    scores: Sequence[FamilyScore],
-    runs: Sequence[ObservedRun],
-    rows: Sequence[LearnedRun],
-    warnings: Sequence[str],
-) -> LearnedClock:
-    motion, functions = learned.motion, learned.functions
-    intervals = parameter_intervals(motion, clocks_of(runs), machine)
-    source = f"logs of {len(runs)} runs"
-    values = machine_values(motion.family, motion.values, motion.rapid_mm_per_s)
-    numbers, not_told = [], []
-    remarks: dict[str, str] = {}
-    for parameter in motion.family.parameters:
-        value = motion.values[parameter.name] * parameter.scale
-        low, high = (bound * parameter.scale for bound in intervals[parameter.name])
-        told = low > value / _KNOWN or high < value * _KNOWN
-        key = parameter.key.format(axis="|".join(parameter.axes))
-        numbers.append(
-            LearnedNumber(
-                key, parameter.meaning, _digits(value), _digits(low), _digits(high), parameter.unit,
-                _had(machine, parameter.key.format(axis=parameter.axes[:1])),
-            )
-        )  # fmt: skip
-        if not told:
-            not_told.append(f"{parameter.meaning} ({key}): the runs bear {low:.3g} to {high:.3g} {parameter.unit}")
-        for axis in parameter.axes or " ":
-            place = parameter.key.format(axis=axis)
-            place = place.rpartition(".")[0] if place.startswith("controller.corner_speed") else place
-            remarks[place] = f"measured ({source}): {low:.4g} ... {high:.4g} {parameter.unit}"
-    values.update(_function_values(functions, runs))
-    for name, key, meaning, unit in _function_rows(functions):
-        numbers.append(
-            LearnedNumber(
-                key, meaning, _digits(functions.values[name]), _digits(functions.low[name]),
-                _digits(functions.high[name]), unit,
-            )
-        )  # fmt: skip
-    for key in values:
-        remarks.setdefault(
-            key, f"measured ({source})" if key.startswith(("times.", "axes.")) else f"as {source} show it"
-        )
-    if not math.isfinite(motion.rapid_mm_per_s):
-        not_told.append("rapid rate: no log shows a rapid that runs steadily; the file keeps what it had")
-    fitted = machine.with_values(values, source=f"{machine.name} with what was learned")
-    return LearnedClock(
-        machine=machine.name,
-        family=motion.family.name,
-        families=tuple(scores),
-        numbers=tuple(numbers),
-        runs=tuple(rows),
-        fitted=fitted.with_remarks(machine.all_remarks() | remarks),
-        remarks=remarks,
-        not_told=tuple(not_told),
-        warnings=tuple(dict.fromkeys(warnings)),
-    )
-
-
-def _digits(value: float) -> float:
-    """A number to what a person reads."""
-    return float(f"{value:.4g}")
-
-
-def _had(machine: Machine, key: str) -> float | None:
-    place: object = machine
-    for name in key.split("."):
-        place = getattr(place, name, None)
-    if isinstance(place, int | float):
-        return float(place)
-    return float(place.x) if place is not None and hasattr(place, "x") else None
-
-
-def _function_rows(functions: FunctionFit) -> list[tuple[str, str, str, str]]:
-    """Name in the fit, key, meaning and unit of what takes time beside the motion."""
-    known = {
-        "start": ("times.program_start_s", "from the start key to the first block", "s"),
-        "tool change": ("times.tool_change_s", "tool change", "s"),
-        "way xy": ("times.unknown_move_s.x|y", "rapid of X and Y on a way that is not known", "s"),
-        "way z": ("times.unknown_move_s.z", "rapid of Z on a way that is not known", "s"),
-        "spindle start": ("times.spindle_start", "start of the spindle, per 1000/min", "s"),
-        "spindle start from": ("times.spindle_start", "start of the spindle takes time from", "1000/min"),
-        "spindle stop": ("times.spindle_stop", "stop of the spindle, per 1000/min", "s"),
-        "spindle stop from": ("times.spindle_stop", "stop of the spindle takes time from", "1000/min"),
-    }
-    return [
-        (name, *known[name]) if name in known else (name, "times.m_codes", f"M{int(name[1:]):02d}", "s")
-        for name in functions.values
-    ]
-
-
-def _function_values(functions: FunctionFit, runs: Sequence[ObservedRun]) -> dict[str, object]:
-    values = functions.values
-    codes = {int(name[1:]): round(value, 3) for name, value in values.items() if name[0] == "M" and name[1:].isdigit()}
-    codes = {code: value for code, value in codes.items() if value >= 0.005}
-    way_xy, way_z = (round(values.get(name, 0.0), 3) for name in ("way xy", "way z"))
-    feed = _usual(runs, _feeds)
-    rapid = _usual(runs, lambda run: [(run.rapid_override, run.duration_s or 0.0)])
-    found: dict[str, object] = {
-        "times.program_start_s": round(values.get("start", 0.0), 3),
-        "times.tool_change_s": round(values.get("tool change", 0.0), 3),
-        "times.last_tool_in_spindle": functions.last_tool_in_spindle,
-        "times.m_function_s": 0.0,
-        "times.unknown_move_s": {"x": way_xy, "y": way_xy, "z": way_z},
-        "times.feed_override_percent": round(100.0 * feed, 2),
-        "times.rapid_override_percent": round(100.0 * rapid, 2),
-        "times.m_codes": {"code": list(codes), "s": list(codes.values())} if codes else None,
-    }
-    for name in ("spindle start", "spindle stop"):
-        rows = spindle_rows(values, name)
-        table = {"rpm": [round(row[0], 1) for row in rows], "s": [round(row[1], 3) for row in rows]} if rows else None
-        found[f"times.{name.replace(' ', '_')}"] = table
-    return found

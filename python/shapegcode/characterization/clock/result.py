@@ -41,19 +41,21 @@ class LearnedNumber:
     Attributes:
         key: of it.
         meaning: in words.
-        value: that was learned; null: the logs do not tell it, and the file keeps what it had.
+        value: that was learned.
         low: least value of the 95 % interval.
         high: largest one.
         unit: of all three.
+        told: whether the runs tell it; else they bear very different values, or only sums with others are told.
         had: what the machine file had before.
     """
 
     key: str
     meaning: str
-    value: float | None
-    low: float | None
-    high: float | None
+    value: float
+    low: float
+    high: float
     unit: str
+    told: bool
     had: float | None = None
 
 
@@ -188,7 +190,7 @@ class LearnedClock(Result):
     def answer(self) -> str:
         """How well it says what the machine did."""
         largest = self.largest_error_percent
-        learned = sum(number.value is not None for number in self.numbers)
+        learned = sum(number.told for number in self.numbers)
         head = f"{self.machine}: {learned} numbers learned from {sum(run.use == 'fit' for run in self.runs)} runs"
         if largest is None:
             return f"{head}; no log holds a whole run to judge them by"
@@ -219,7 +221,7 @@ class LearnedClock(Result):
 
 
 def _interval(number: LearnedNumber) -> str:
-    return "" if number.low is None or number.high is None else f"{number.low:.4g} ... {number.high:.4g}"
+    return f"{number.low:.4g} ... {number.high:.4g}" if number.told else "not told"
 
 
 _RUNS = (
@@ -246,7 +248,7 @@ _FAMILIES = (
 )
 _NUMBERS = (
     Column("number", value="meaning", text=True),
-    Column("value", value=lambda number: "not told" if number.value is None else f"{number.value:.4g} {number.unit}"),
+    Column("value", value=lambda number: f"{number.value:.4g} {number.unit}"),
     Column("95 % interval", value=_interval),
     Column("file had", value=lambda number: None if number.had is None else f"{number.had:.4g}"),
     Column("key", value="key", text=True),

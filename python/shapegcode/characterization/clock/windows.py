@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
-from shapegcode.characterization.clock.observed import ObservedRun, PlayedProgram
+from shapegcode.characterization.clock.observed import ObservedRun
+from shapegcode.characterization.clock.played import PlayedProgram
 
 __all__ = ["SectionClock", "clocks_of", "line_starts", "misfit", "section_residuals"]
 
