@@ -16,7 +16,15 @@ from scipy.optimize import minimize_scalar
 import shapegcode as sg
 from shapegcode.characterization.servo.lag import delayed, rms
 
-SHIPPED = Path(__file__).resolve().parents[1] / "golden" / "measured" / "sinumerik" / "capture.json.gz"
+SHIPPED = (
+    Path(__file__).resolve().parents[2]
+    / "python"
+    / "shapegcode"
+    / "data"
+    / "measured"
+    / "sinumerik"
+    / "capture.json.gz"
+)
 
 
 def own_dead_time(capture: sg.EdgeCapture, axis: int) -> tuple[float, float]:

@@ -16,7 +16,15 @@ import pytest
 import shapegcode as sg
 from edge_writer import edge_document, write_edge
 
-MEASURED = Path(__file__).resolve().parents[1] / "golden" / "measured" / "sinumerik" / "capture.json.gz"
+MEASURED = (
+    Path(__file__).resolve().parents[2]
+    / "python"
+    / "shapegcode"
+    / "data"
+    / "measured"
+    / "sinumerik"
+    / "capture.json.gz"
+)
 
 
 def block(counter: int, text: str, tool: int | str = 6) -> dict[str, Any]:

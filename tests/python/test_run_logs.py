@@ -15,7 +15,7 @@ import pytest
 
 import shapegcode as sg
 
-NIST = Path(__file__).resolve().parents[1] / "golden" / "measured" / "nist"
+NIST = Path(__file__).resolve().parents[2] / "python" / "shapegcode" / "data" / "measured" / "nist"
 
 LOG = """\
 2026-03-02T08:00:00.0000000Z|Current_Tool|4.000000

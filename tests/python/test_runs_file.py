@@ -9,7 +9,7 @@ import pytest
 
 import shapegcode as sg
 
-NIST = Path(__file__).resolve().parents[1] / "golden" / "measured" / "nist"
+NIST = Path(__file__).resolve().parents[2] / "python" / "shapegcode" / "data" / "measured" / "nist"
 
 
 def folder_with(tmp_path: Path, text: str) -> Path:

@@ -18,7 +18,15 @@ from shapegcode import _core
 from shapegcode.characterization.servo.lag import delayed, lag_way
 
 FloatArray = NDArray[np.float64]
-MEASURED = Path(__file__).resolve().parents[1] / "golden" / "measured" / "sinumerik" / "capture.json.gz"
+MEASURED = (
+    Path(__file__).resolve().parents[2]
+    / "python"
+    / "shapegcode"
+    / "data"
+    / "measured"
+    / "sinumerik"
+    / "capture.json.gz"
+)
 PERIOD_S = 0.002
 
 
