@@ -167,7 +167,9 @@ def _smoothed(power: FloatArray, omega: FloatArray, quantity: str) -> FloatArray
 
 
 def _weight(noise: FloatArray, lines: FrfLines) -> FloatArray:
-    least = (_LEAST_NOISE * float(np.max(np.abs(lines.response)))) ** 2
+    # Of the acceleration: noise of a displacement made of it may exceed every mode at the lowest lines.
+    course = lines.omega ** (2.0 - POWERS[lines.quantity])
+    least = (_LEAST_NOISE * float(np.max(np.abs(lines.response * course))) / course) ** 2
     return np.asarray(1.0 / np.sqrt(np.maximum(noise, least)), dtype=np.float64)
 
 
