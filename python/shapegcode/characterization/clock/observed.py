@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,7 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 _LEAST_BLOCKS = 8
+_LEAST_RISING = 0.9  # of the reported lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,20 +131,42 @@ def _lines(entry: RunEntry, log: RunLog, played: PlayedProgram, notes: list[str]
     time_s, line = time_s[within], line[within]
     if len(line) < _LEAST_BLOCKS:
         raise RecordError(f"{where}: the log reports {len(line)} lines of it; {_LEAST_BLOCKS} are needed")
-    # What was reported before the start key is of the run before.
-    highest = np.maximum.accumulate(line)
-    rises = line >= highest
-    if np.mean(rises) < 0.9:
+    # What is reported before the first block is of the run before; single readings may be wrong.
+    rises = _rising(line)
+    if np.mean(rises) < _LEAST_RISING:
+        back = int(np.flatnonzero(~rises)[0])
         raise RecordError(
-            f"{where}: {np.mean(~rises):.0%} of the reported lines go back (the first after {time_s[~rises][0]:.1f} s: "
-            f"{line[~rises][0]} behind {highest[~rises][0]}): log and program do not belong together, or it repeats "
-            "parts of itself, which cannot be laid beside a log by line numbers"
+            f"{where}: {np.mean(~rises):.0%} of the reported lines go back (line {line[back]} after "
+            f"{time_s[back]:.1f} s is out of order): log and program do not belong together, or it repeats parts of "
+            "itself, which cannot be laid beside a log by line numbers"
         )
     if not rises.all():
-        notes.append(f"{int(np.sum(~rises))} reported lines go back and are left out")
+        notes.append(f"{int(np.sum(~rises))} reported lines are out of order and left out")
     time_s, line = time_s[rises], line[rises]
     first = np.concatenate([[True], np.diff(line) > 0])
     return np.asarray(time_s[first], dtype=np.float64), np.asarray(line[first], dtype=np.int64)
+
+
+def _rising(line: IntArray) -> npt.NDArray[np.bool_]:
+    """Which values belong to the longest row that never falls."""
+    ends: list[int] = []  # value at which the best row of each length ends
+    places: list[int] = []  # and where
+    before = np.full(len(line), -1, dtype=np.int64)
+    for index, value in enumerate(line.tolist()):
+        length = bisect_right(ends, value)
+        if length == len(ends):
+            ends.append(value)
+            places.append(index)
+        else:
+            ends[length] = value
+            places[length] = index
+        before[index] = places[length - 1] if length > 0 else -1
+    kept = np.zeros(len(line), dtype=bool)
+    at = places[-1] if places else -1
+    while at >= 0:
+        kept[at] = True
+        at = int(before[at])
+    return kept
 
 
 def _require_same(run: ObservedRun, machine: Machine) -> None:

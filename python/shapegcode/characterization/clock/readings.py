@@ -37,6 +37,7 @@ LEAST_READINGS = 4
 
 _FEED_BIN = 0.0025  # of the programmed feed: readings of a steady feed agree better
 _LEAST_SHARE = 0.06
+_STEPS = (1.0, 0.5, 0.1, 1.0 / 60.0, 0.01, 0.001)  # in which controls show feeds
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,15 @@ class Stretch:
 
 
 def line_numbers(log: RunLog, played: PlayedProgram) -> IntArray:
-    """Lines of the text from what the log counts."""
+    """Lines of the text from what the log counts.
+
+    Args:
+        log: one run.
+        played: its program.
+
+    Returns:
+        (n,) line of each value of `log.block`; 0: none.
+    """
     value = np.asarray(log.block.value, dtype=np.int64)
     if log.block_counts == "line":
         return value
@@ -80,13 +89,30 @@ def line_numbers(log: RunLog, played: PlayedProgram) -> IntArray:
 
 
 def current_lines(signal: Signal, blocks: Signal, line: IntArray) -> IntArray:
-    """Line that was reported when a value came; 0 before the first."""
+    """Line that was reported when a value came.
+
+    Args:
+        signal: with the values.
+        blocks: with the lines.
+        line: (n,) of `blocks`.
+
+    Returns:
+        (m,) of `signal`; 0 before the first.
+    """
     at = np.searchsorted(blocks.time_s, signal.time_s, side="right") - 1
     return np.where(at >= 0, line[np.maximum(at, 0)], 0)
 
 
 def held_longest(signal: Signal, end_s: float | None) -> float:
-    """The value that a signal had for the longest time."""
+    """The value that a signal had for the longest time.
+
+    Args:
+        signal: with at least one value.
+        end_s: of the run; None: its last value.
+
+    Returns:
+        The value.
+    """
     held: dict[float, float] = defaultdict(float)
     until = np.append(signal.time_s[1:], end_s if end_s is not None else signal.time_s[-1])
     for value, begin, end in zip(signal.value, signal.time_s, until, strict=True):
@@ -95,7 +121,19 @@ def held_longest(signal: Signal, end_s: float | None) -> float:
 
 
 def feed_unit(entry: RunEntry, log: RunLog, played: PlayedProgram) -> float:
-    """mm/s of one unit of the logged feed: as stated, else the one in which steady cuts run as programmed."""
+    """The unit of the logged feed: as stated, else the one in which steady cuts run as programmed.
+
+    Args:
+        entry: of the file of runs.
+        log: one run.
+        played: its program.
+
+    Returns:
+        mm/s of one unit; NaN: there is no feed, or too little of it.
+
+    Raises:
+        RecordError: no unit makes the feeds those of the program.
+    """
     if log.feed is None or len(log.feed) < LEAST_READINGS:
         return math.nan
     stated = entry.feed_unit or log.feed_unit
@@ -121,7 +159,14 @@ def feed_unit(entry: RunEntry, log: RunLog, played: PlayedProgram) -> float:
 
 
 def steady_value(values: FloatArray) -> float | None:
-    """Where values heap up within a bin, at their upper heap if there are several; None if nowhere."""
+    """Where values heap up.
+
+    Args:
+        values: feeds over the programmed ones.
+
+    Returns:
+        The middle of the largest heap; None: there is none.
+    """
     ordered = np.sort(values)
     upto = np.searchsorted(ordered, ordered + _FEED_BIN, side="right")
     count = upto - np.arange(len(ordered))
@@ -133,7 +178,18 @@ def steady_value(values: FloatArray) -> float | None:
 
 
 def stretches_of(entry: RunEntry, log: RunLog, played: PlayedProgram, unit: float, notes: list[str]) -> list[Stretch]:
-    """Feed override of each section: what steady cuts show, else what is stated, else that of the run, else 1."""
+    """Feed override of each section: what steady cuts show, else what is stated, else that of the run, else 1.
+
+    Args:
+        entry: of the file of runs.
+        log: one run.
+        played: its program.
+        unit: mm/s of one unit of the logged feed.
+        notes: gets what was found.
+
+    Returns:
+        One stretch for each section of the program.
+    """
     ratio = np.empty(0)
     line = np.empty(0, dtype=np.int64)
     if log.feed is not None and math.isfinite(unit):
@@ -163,12 +219,21 @@ def stretches_of(entry: RunEntry, log: RunLog, played: PlayedProgram, unit: floa
 
 
 def _step_of(values: FloatArray) -> float:
-    """Smallest step between the values of a signal."""
-    steps = np.diff(np.unique(values))
-    return float(steps.min()) if len(steps) else 0.0
+    """The step in which values are shown: the largest usual one that all of them are multiples of; 0: none is."""
+    for step in _STEPS:
+        if np.all(np.abs(values / step - np.round(values / step)) < 1e-3):
+            return step
+    return 0.0
 
 
 def as_dialled(ratio: float) -> float:
-    """As a dial has it: whole percents where they are within what a reading means."""
+    """As a dial has it: whole percents where they are within what a reading means.
+
+    Args:
+        ratio: as it was read.
+
+    Returns:
+        Ratio.
+    """
     whole = round(ratio, 2)
     return whole if abs(ratio - whole) < 0.002 else round(ratio, 4)
