@@ -16,6 +16,7 @@ from shapegcode.machine import Machine
 
 __all__ = ["feeds_of", "learned_machine", "usual_value"]
 
+_USUAL = 0.75  # of the time
 _KNOWN = 4.0  # an interval that reaches so far from its value to both sides tells nothing
 
 
@@ -112,6 +113,15 @@ def _function_numbers(functions: FunctionFit) -> list[LearnedNumber]:
     return numbers
 
 
+def _shops_usual(dialled: Sequence[tuple[float, float]]) -> float:
+    """The override at which most of the time was run; 1 where the operator had it now so, now otherwise."""
+    held: dict[float, float] = defaultdict(float)
+    for value, seconds in dialled:
+        held[value] += seconds
+    most = max(held, key=lambda value: held[value])
+    return most if held[most] >= _USUAL * sum(held.values()) else 1.0
+
+
 def _digits(value: float) -> float:
     """A number to what a person reads."""
     return float(f"{value:.4g}")
@@ -149,8 +159,8 @@ def _function_values(functions: FunctionFit, runs: Sequence[ObservedRun]) -> dic
     codes = {int(name[1:]): round(value, 3) for name, value in values.items() if name[0] == "M" and name[1:].isdigit()}
     codes = {code: value for code, value in codes.items() if value >= 0.005}
     way_xy, way_z = (round(values.get(name, 0.0), 3) for name in ("way xy", "way z"))
-    feed = usual_value(runs, feeds_of)
-    rapid = usual_value(runs, lambda run: [(run.rapid_override, run.duration_s or 0.0)])
+    feed = _shops_usual([(usual_value([run], feeds_of), run.duration_s or 0.0) for run in runs])
+    rapid = _shops_usual([(run.rapid_override, run.duration_s or 0.0) for run in runs])
     found: dict[str, object] = {
         "times.program_start_s": round(values.get("start", 0.0), 3),
         "times.tool_change_s": round(values.get("tool change", 0.0), 3),
