@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -216,38 +216,47 @@ def _rows(
     observed: Sequence[ObservedRun], learned: _Learned, others: dict[int, _Learned]
 ) -> tuple[list[LearnedRun], list[str]]:
     spread = _spread(observed, learned, others)
-    rows, warnings = [], []
-    for run in observed:
-        starts = learned.starts(run)
-        holds = holds_of(run, starts)
-        tools, kinds = shares_of(run, starts, holds)
-        held = sum(length for _, length, _ in holds)
-        other = others.get(id(run))
-        left_out = float(other.starts(run)[-1]) if other is not None else None
-        reach = _reach(run, starts, spread, learned.functions)
-        row = LearnedRun(
-            program=str(run.entry.program),
-            log=run.log.source,
-            use=run.entry.use,
-            measured_s=run.duration_s,
-            held_s=held,
-            predicted_s=float(starts[-1]),
-            low_s=float(starts[-1]) - reach,
-            high_s=float(starts[-1]) + reach,
-            left_out_s=left_out,
-            feed_override=usual_value([run], feeds_of),
-            rapid_override=run.rapid_override,
-            tools=tools,
-            kinds=kinds,
-            holds=tuple(f"{begin:.1f} s: {length:.1f} s, {why}" for begin, length, why in holds),
-            notes=run.notes,
-        )
-        rows.append(row)
+    rows = [_row(run, learned, others.get(id(run)), spread) for run in observed]
+    # What whole runs left out were off by is in the interval, too: a start that an operator delays, a tool at hand.
+    off = [row.left_out_percent / 100.0 for row in rows if row.left_out_percent is not None]
+    whole = 2.0 * math.sqrt(sum(each**2 for each in off) / len(off)) if off else 0.0
+    rows = [_widened(row, whole) for row in rows]
+    warnings = []
+    for row in rows:
         judged = row.judged_percent
         if judged is not None and abs(judged) > TOLERANCE_PERCENT:
             warnings.append(f"{row.name}: {judged:+.1f} % from what it took, more than {TOLERANCE_PERCENT:g} %")
         warnings += [f"{row.name}: held at {hold}" for hold in row.holds]
     return rows, warnings
+
+
+def _row(run: ObservedRun, learned: _Learned, other: _Learned | None, spread: float) -> LearnedRun:
+    starts = learned.starts(run)
+    holds = holds_of(run, starts)
+    tools, kinds = shares_of(run, starts, holds)
+    reach = _reach(run, starts, spread, learned.functions)
+    return LearnedRun(
+        program=str(run.entry.program),
+        log=run.log.source,
+        use=run.entry.use,
+        measured_s=run.duration_s,
+        held_s=sum(length for _, length, _ in holds),
+        predicted_s=float(starts[-1]),
+        low_s=float(starts[-1]) - reach,
+        high_s=float(starts[-1]) + reach,
+        left_out_s=float(other.starts(run)[-1]) if other is not None else None,
+        feed_override=usual_value([run], feeds_of),
+        rapid_override=run.rapid_override,
+        tools=tools,
+        kinds=kinds,
+        holds=tuple(f"{begin:.1f} s: {length:.1f} s, {why}" for begin, length, why in holds),
+        notes=run.notes,
+    )
+
+
+def _widened(row: LearnedRun, ratio: float) -> LearnedRun:
+    low, high = row.predicted_s * (1.0 - ratio), row.predicted_s * (1.0 + ratio)
+    return replace(row, low_s=min(row.low_s, low), high_s=max(row.high_s, high))
 
 
 def _spread(observed: Sequence[ObservedRun], learned: _Learned, others: dict[int, _Learned]) -> float:

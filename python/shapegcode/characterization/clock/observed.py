@@ -13,6 +13,7 @@ from shapegcode import _core
 from shapegcode.characterization.clock.played import PlayedProgram
 from shapegcode.characterization.clock.readings import (
     Stretch,
+    current_lines,
     feed_unit,
     held_longest,
     line_numbers,
@@ -89,6 +90,7 @@ def observe(entry: RunEntry, log: RunLog, played: PlayedProgram, machine: Machin
     """
     notes = list(log.notes)
     time_s, line = _lines(entry, log, played, notes)
+    _compare_tools(entry, log, played, notes)
     unit = feed_unit(entry, log, played)
     stretches = tuple(stretches_of(entry, log, played, unit, notes))
     run = ObservedRun(
@@ -145,6 +147,31 @@ def _lines(entry: RunEntry, log: RunLog, played: PlayedProgram, notes: list[str]
     time_s, line = time_s[rises], line[rises]
     first = np.concatenate([[True], np.diff(line) > 0])
     return np.asarray(time_s[first], dtype=np.float64), np.asarray(line[first], dtype=np.int64)
+
+
+def _compare_tools(entry: RunEntry, log: RunLog, played: PlayedProgram, notes: list[str]) -> None:
+    """The tools that the log names must be those that the program calls there; numbers of another kind are noted.
+
+    Raises:
+        RecordError: it names tools that the program calls elsewhere.
+    """
+    if log.tool is None:
+        return
+    called = {int(tool) for tool in played.tools if tool >= 0}
+    line = np.clip(current_lines(log.tool, log.block, line_numbers(log, played)), 0, played.line_count)
+    wrong = []
+    for value, at in zip(log.tool.value.tolist(), line.tolist(), strict=True):
+        # The number changes within the block that changes the tool.
+        here = {int(tool) for tool in played.tools[max(at - 2, 0) : at + 3] if tool >= 0}
+        if value > 0.0 and at > 0 and here and int(value) not in here:
+            wrong.append((int(value), at, here))
+    if not wrong:
+        return
+    value, at, here = wrong[0]
+    said = f"tool {value} in the spindle at line {at}, where the program has T{min(here)}"
+    if len(wrong) > 1 and all(each[0] in called for each in wrong):
+        raise RecordError(f"{log.source}: {said}: it is not the log of {entry.program.name} as it stands")
+    notes.append(f"{said}: numbers of another kind, or of a tool that was there before the start")
 
 
 def _rising(line: IntArray) -> npt.NDArray[np.bool_]:

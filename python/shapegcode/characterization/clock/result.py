@@ -230,6 +230,7 @@ _RUNS = (
     Column("measured", "s", "measured_s", digits=1),
     Column("held", "s", lambda run: run.held_s or None, digits=1),
     Column("predicted", "s", "predicted_s", digits=1),
+    Column("95 %", "s", lambda run: f"{run.low_s:.0f}-{run.high_s:.0f}"),
     Column("error", "%", "error_percent", digits=2),
     Column("left out", "%", "left_out_percent", digits=2),
 )
