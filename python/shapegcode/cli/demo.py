@@ -1,4 +1,4 @@
-"""``shapegcode demo``: repeat a paper's figures."""
+"""``shapegcode demo``: repeat a paper's figures, or hold a prediction against what machines did."""
 
 from __future__ import annotations
 
@@ -28,6 +28,10 @@ _DEMOS = {
         "equivalent systems, and what end mill and collet deflect: Back, Ko and Kim, 2003 (paper 003)",
     ),
     "corner": ("corner", "cornering cuts, the feeds of the paper and the scheduler's: Kim and Ko, 2001 (paper 001)"),
+    "evidence": (
+        "evidence",
+        "clocks of two machining centres learned from their logs, other programs predicted: NIST's test bed (minutes)",
+    ),
 }
 
 
@@ -35,8 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
         "Repeats the figures of a paper with this program's models, and shows both; papers in full: "
-        "docs/references.md. "
-        "Exit code 1 if a statement of the paper differs and why is not known."
+        "docs/references.md. evidence: predicted beside measured, docs/evidence.md. "
+        "Exit code 1 if a statement of the paper differs and why is not known, or a prediction is out of its limits."
     )
     parser.add_argument(
         "name",
