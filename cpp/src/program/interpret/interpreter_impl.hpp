@@ -91,6 +91,7 @@ class Interpreter {
   void set_tool_offset(int kind);
   void m_codes(LineFlow& flow);
   void length_offset(int whole);
+  void rapid();
   void move(LineFlow& flow, const ModalState& before, std::size_t begin, std::size_t end);
   void cut(const char* why_kept, const ModalState& before, std::size_t begin, std::size_t end);
   void keep_cut(const char* why, const Vector3& end, const std::array<bool, 3>& known_after);

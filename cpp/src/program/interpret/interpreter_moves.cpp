@@ -106,6 +106,21 @@ Segment Interpreter::cutting_segment(const Vector3& end) const {
   return segment;
 }
 
+void Interpreter::rapid() {
+  Vector3 to;
+  std::array<bool, 3> known_after{};
+  bool relative = false;
+  const bool measurable = target(to, known_after, relative);
+  if (foreign_ == 0) {
+    unknown_way(words().present, true);
+    OtherMove rapid{make_line(measurable ? state_.position_mm : to, to, 0.0, line_number_), 0.0};
+    rapid.segment.kind = SegmentKind::rapid;
+    add_move(rapid);
+    state_.position_mm = to;
+    state_.known = known_after;
+  }
+}
+
 void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t begin, std::size_t end) {
   check_range();
   if (!distance_given_) {
@@ -133,18 +148,7 @@ void Interpreter::move(LineFlow& flow, const ModalState& before, std::size_t beg
   }
   if (state_.motion == 0) {
     close_region();
-    Vector3 to;
-    std::array<bool, 3> known_after{};
-    bool relative = false;
-    const bool measurable = target(to, known_after, relative);
-    if (foreign_ == 0) {
-      unknown_way(words().present, true);
-      OtherMove rapid{make_line(measurable ? state_.position_mm : to, to, 0.0, line_number_), 0.0};
-      rapid.segment.kind = SegmentKind::rapid;
-      add_move(rapid);
-      state_.position_mm = to;
-      state_.known = known_after;
-    }
+    rapid();
     return;
   }
   const char* why_kept = nullptr;
