@@ -135,6 +135,19 @@ def few_readings(folder: Path) -> None:
     log.write_text(HiddenControl(poll=30.0).run(written_program(1))[0])
 
 
+def broken_off(folder: Path) -> None:
+    log = folder / "p1-0.txt"
+    rows = log.read_text().splitlines()
+    half = rows[: len(rows) // 2]
+    stamp = half[-1].partition("|")[0]
+    log.write_text("\n".join([*half, f"{stamp}|Program_Status|PROGRAM_COMPLETED"]) + "\n")
+
+
+def unit_of_another(folder: Path) -> None:
+    file = folder / "RUNS.toml"
+    file.write_text(file.read_text() + 'feed_unit = "mm/s"\n')  # the log shows mm/min
+
+
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
@@ -142,6 +155,8 @@ def few_readings(folder: Path) -> None:
         (shorter_program, "do not belong together"),
         (without_lines, "Block_Number|block"),
         (few_readings, "reports|readings|lines"),
+        (broken_off, "completed at line .* s before its end"),
+        (unit_of_another, "mm/s does not make that an override.*feed_unit"),
     ],
 )
 def test_what_does_not_belong_together_is_refused(spoil: Callable[[Path], None], said: str, tmp_path: Path) -> None:
@@ -149,6 +164,20 @@ def test_what_does_not_belong_together_is_refused(spoil: Callable[[Path], None],
     spoil(tmp_path)
     with pytest.raises(sg.ShapegcodeError, match=said):
         sg.learn_clock(file, sg.Machine.load("vx500"), families=ONE)
+
+
+def test_a_log_that_begins_in_the_middle_is_no_whole_run(tmp_path: Path) -> None:
+    file = shop(tmp_path, HiddenControl(), [1, 2], [])
+    log = tmp_path / "p2-0.txt"
+    rows = log.read_text().splitlines()
+    stamp = rows[len(rows) // 2].partition("|")[0]
+    log.write_text("\n".join([f"{stamp}|Program_Status|ACTIVE", *rows[len(rows) // 2 :]]) + "\n")
+    clock = sg.learn_clock(file, sg.Machine.load("vx500"), families=ONE)
+    run = next(run for run in clock.runs if run.log.endswith("p2-0.txt"))
+    assert run.measured_s is None
+    assert any("in the middle of the program" in note for note in run.notes)
+    other = next(run for run in clock.runs if run.log.endswith("p1-0.txt"))
+    assert abs(other.error_percent or 99.0) < 2.0
 
 
 def test_the_kind_of_look_ahead_is_chosen_by_runs_left_out(tmp_path: Path) -> None:

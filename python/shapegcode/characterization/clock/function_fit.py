@@ -171,7 +171,7 @@ def _spans(run: ObservedRun) -> list[_Span]:
     for index in range(int(cuts[0]) if len(cuts) else -1, len(line)):
         add(index, index + 1)
     if len(cuts):
-        if not run.log.cut_start:
+        if run.whole and not run.log.cut_start:
             add(-1, int(cuts[0]))
         for first, last in pairwise(cuts.tolist()):
             if last > first + 1:

@@ -30,6 +30,7 @@ __all__ = ["learn_clock"]
 _MOST_FOLDS = 4
 _BETTER = 0.97  # a family further down the list must be better by so much to be taken
 _LEAST_SPREAD = 0.005  # of what a machine takes for its cuts: no model is truer
+_MOST_HOLDS = 6  # of one run that may be true
 _CALLS = 2500  # of the misfit that one fit takes, about; for the bar
 
 
@@ -226,7 +227,13 @@ def _rows(
         judged = row.judged_percent
         if judged is not None and abs(judged) > TOLERANCE_PERCENT:
             warnings.append(f"{row.name}: {judged:+.1f} % from what it took, more than {TOLERANCE_PERCENT:g} %")
-        warnings += [f"{row.name}: held at {hold}" for hold in row.holds]
+        if len(row.holds) > _MOST_HOLDS:
+            warnings.append(
+                f"{row.name}: stood {len(row.holds)} times where the program does not ask for it, first at "
+                f"{row.holds[0]}: the program may have been changed after the run"
+            )
+        else:
+            warnings += [f"{row.name}: held at {hold}" for hold in row.holds]
     return rows, warnings
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +31,7 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 _LEAST_BLOCKS = 8
+_MISSING_S, _MISSING = 15.0, 0.15  # of a program: more than a machine's own times explain
 _LEAST_RISING = 0.9  # of the reported lines
 
 
@@ -49,6 +50,7 @@ class ObservedRun:
         rapid_override: ratio of the rapid rates.
         feed_unit_mm_per_s: what one unit of the logged feed is; NaN without a feed.
         notes: what was found and bridged.
+        whole: whether the log begins where the program does.
     """
 
     name: str
@@ -61,11 +63,12 @@ class ObservedRun:
     rapid_override: float
     feed_unit_mm_per_s: float
     notes: tuple[str, ...]
+    whole: bool = True
 
     @property
     def duration_s(self) -> float | None:
         """From start to completion; None: the log does not hold both."""
-        return self.log.duration_s if self.log.complete else None
+        return self.log.duration_s if self.log.complete and self.whole else None
 
     @property
     def feed_overrides(self) -> tuple[float, ...]:
@@ -105,8 +108,9 @@ def observe(entry: RunEntry, log: RunLog, played: PlayedProgram, machine: Machin
         feed_unit_mm_per_s=unit,
         notes=tuple(notes),
     )
+    whole = _is_whole(run, machine, notes)
     _require_same(run, machine)
-    return run
+    return replace(run, whole=whole, notes=tuple(notes))
 
 
 def _stated_rapid_override(entry: RunEntry, log: RunLog) -> float:
@@ -196,19 +200,47 @@ def _rising(line: IntArray) -> npt.NDArray[np.bool_]:
     return kept
 
 
+def _line_times(run_line: IntArray, played: PlayedProgram, machine: Machine) -> tuple[FloatArray, float]:
+    """When reported lines begin by the machine's own limits, NaN where a line does not move; and the whole time."""
+    timed = _core.time_program(played.program.core, controller_model(machine), True)
+    begin = np.full(played.line_count + 2, np.nan)
+    begin[timed.blocks["line"][::-1]] = timed.blocks["start_s"][::-1]
+    return begin[run_line], float(timed.total_s)
+
+
+def _is_whole(run: ObservedRun, machine: Machine, notes: list[str]) -> bool:
+    """Whether the log begins where the program does.
+
+    Raises:
+        RecordError: the log says that the program is completed, and much of it was not run.
+    """
+    begin, total_s = _line_times(run.line, run.played, machine)
+    known = np.flatnonzero(np.isfinite(begin))
+    if not len(known) or run.log.duration_s is None:
+        return True
+    missing_s = total_s - float(begin[known[-1]])
+    if missing_s > max(_MISSING_S, _MISSING * total_s):
+        raise RecordError(
+            f"{run.log.source}: completed at line {run.line[-1]} of the {run.played.line_count} lines of "
+            f"{run.entry.program.name}, {missing_s:.0f} s before its end: log and program do not belong together"
+        )
+    if float(begin[known[0]]) - float(run.time_s[known[0]]) > max(_MISSING_S, _MISSING * total_s):
+        notes.append(f"begins at line {run.line[known[0]]}, in the middle of the program: the run is not whole")
+        return False
+    return True
+
+
 def _require_same(run: ObservedRun, machine: Machine) -> None:
     """The way that the program goes between the reported lines must take time where the log says that it did.
 
     Raises:
         RecordError: it does not: the log is of another program.
     """
-    rows = _core.time_program(run.played.program.core, controller_model(machine), True).blocks
-    begin = np.full(run.played.line_count + 2, np.nan)
-    begin[rows["line"][::-1]] = rows["start_s"][::-1]
-    known = np.isfinite(begin[run.line]) & ~run.played.function[run.line]
+    begin, _ = _line_times(run.line, run.played, machine)
+    known = np.isfinite(begin) & ~run.played.function[run.line]
     if known.sum() < _LEAST_BLOCKS:
         return
-    expected, seen = np.diff(begin[run.line][known]), np.diff(run.time_s[known])
+    expected, seen = np.diff(begin[known]), np.diff(run.time_s[known])
     groups = max(4, len(expected) // 6)
     edges = np.linspace(0, len(expected), groups + 1).astype(int)[:-1]
     one, other = np.log(np.add.reduceat(expected, edges) + 0.05), np.log(np.add.reduceat(seen, edges) + 0.05)

@@ -37,6 +37,7 @@ LEAST_READINGS = 4
 
 _FEED_BIN = 0.0025  # of the programmed feed: readings of a steady feed agree better
 _LEAST_SHARE = 0.06
+_LEAST_OVERRIDE, _MOST_OVERRIDE = 0.2, 2.0
 _STEPS = (1.0, 0.5, 0.1, 1.0 / 60.0, 0.01, 0.001)  # in which controls show feeds
 
 
@@ -136,24 +137,23 @@ def feed_unit(entry: RunEntry, log: RunLog, played: PlayedProgram) -> float:
     """
     if log.feed is None or len(log.feed) < LEAST_READINGS:
         return math.nan
-    stated = entry.feed_unit or log.feed_unit
-    if stated is not None:
-        unit = find_unit(stated)
-        if unit is not None:
-            return float(unit.factor) * 1000.0
     line = np.clip(current_lines(log.feed, log.block, line_numbers(log, played)), 0, played.line_count + 1)
     ratio = log.feed.value / played.feed_mm_per_s[line]
     ratio = ratio[np.isfinite(ratio) & (ratio > 0.0)]
     steady = steady_value(np.log(ratio)) if len(ratio) else None
+    name = entry.feed_unit or log.feed_unit
+    stated = find_unit(name) if name is not None else None
     if steady is None:
-        return math.nan
+        return float(stated.factor) * 1000.0 if stated is not None else math.nan
     # An override is between a half and twice the programmed feed: units lie further apart.
-    best = min(FEED_UNITS.values(), key=lambda unit: abs(steady + math.log(unit)))
+    units = [float(stated.factor) * 1000.0] if stated is not None else list(FEED_UNITS.values())
+    best = min(units, key=lambda unit: abs(steady + math.log(unit)))
     if abs(steady + math.log(best)) > math.log(2.0):
+        tried = name if stated is not None else f"no unit of {', '.join(FEED_UNITS)}"
         raise RecordError(
             f"{log.source}: steady feeds of {entry.program.name} are {math.exp(steady):.4g} times the programmed ones "
-            f"in mm/s: no unit of {', '.join(FEED_UNITS)} makes that an override of 50 to 200 %; the log is of another "
-            "program, or feed_unit must be stated"
+            f"in mm/s: {tried} does not make that an override of 50 to 200 %; the log is of another program, or feed_unit "
+            "must be stated" + (" otherwise" if stated is not None else "")
         )
     return best
 
@@ -197,7 +197,7 @@ def stretches_of(entry: RunEntry, log: RunLog, played: PlayedProgram, unit: floa
         ratio = log.feed.value * unit / played.feed_mm_per_s[line]
         # A control shows feeds in steps: where one is much of the feed, it tells nothing.
         fine = played.feed_mm_per_s[line] * _FEED_BIN > _step_of(log.feed.value) * unit
-        keep = np.isfinite(ratio) & (ratio > 0.2) & (ratio < 2.5) & played.free[line] & fine
+        keep = np.isfinite(ratio) & (ratio > 0.0) & played.free[line] & fine
         ratio, line = ratio[keep], line[keep]
     whole = steady_value(ratio) if len(ratio) else None
     stated = entry.override_percent / 100.0 if entry.override_percent is not None else None
@@ -205,7 +205,7 @@ def stretches_of(entry: RunEntry, log: RunLog, played: PlayedProgram, unit: floa
         stated = held_longest(log.feed_override, log.duration_s)
     found = []
     for first, last in played.sections:
-        inside = ratio[(line >= first) & (line <= last)]
+        inside = ratio[(line >= first) & (line <= last) & (ratio >= _LEAST_OVERRIDE) & (ratio <= _MOST_OVERRIDE)]
         seen = steady_value(inside) if len(inside) else None
         fallback = stated if stated is not None else whole
         value = seen if seen is not None else fallback if fallback is not None else 1.0
