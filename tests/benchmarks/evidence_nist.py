@@ -21,7 +21,7 @@ import numpy as np
 import shapegcode as sg
 from shapegcode._core import SegmentKind
 from shapegcode.characterization.clock.learn import learn_clock
-from shapegcode.demos.evidence import STUDIES, TOOL_PERCENT, Study, evidence_demo, nist_folder, nist_runs, study_of
+from shapegcode.demos.evidence import STUDIES, Study, evidence_demo, nist_folder, nist_runs, study_of
 from shapegcode.results import plot
 from shapegcode.timing.cycle_time import cycle_time
 
@@ -148,33 +148,29 @@ def curve() -> list[Point]:
 
 
 def plot_curve(points: Sequence[Point], ax: Axes | None = None) -> Axes:
-    """How the error of what was left out falls with the number of runs, and of blocks, learned from."""
-    ((left, right),) = plot.grid(
-        ax, 1, 2, size_inch=(10.0, 4.2), title="Error of runs left out, by what was learned from"
-    )
+    """Does the error of what was left out fall with the number of runs, and of blocks, learned from?
+
+    The line is the mean of points that hold every program of the study; the others are hollow.
+    """
+    ((left, right),) = plot.grid(ax, 1, 2, size_inch=(10.0, 4.2), title="Programs left out, by what was learned from")
+    needed = {title: {name.replace("_", " ") for name in learned} for title, learned, _ in STUDIES}
     for number, title in enumerate(dict.fromkeys(point.title for point in points)):
+        colour = plot.COLOURS[number]
         own = [point for point in points if point.title == title]
-        counts = sorted({point.runs for point in own})
-        middle = [np.mean([point.error_percent for point in own if point.runs == count]) for count in counts]
-        left.plot(counts, middle, "-", color=plot.COLOURS[number], label=f"{title}, mean")
-        left.plot(
-            [point.runs for point in own], [point.error_percent for point in own], "o", color=plot.COLOURS[number]
-        )
-        right.plot([point.blocks for point in own], [point.tool_percent for point in own], "|", markersize=11,
-                   color=plot.COLOURS[number])  # fmt: skip
-        right.plot(
-            [point.blocks for point in own], [point.error_percent for point in own], "o", color=plot.COLOURS[number]
-        )
-    left.axhline(2.0, color=plot.GREY, linewidth=0.8)
-    right.axhline(TOOL_PERCENT, color=plot.GREY, linewidth=0.8)
-    left.set_xlabel("runs")
-    left.set_ylabel("largest error of a whole run, %")
-    right.set_xlabel("blocks run")
-    right.set_ylabel("largest error, % (o run, | tool)")
-    right.set_xscale("log")
-    for panel in (left, right):
+        whole = [point for point in own if all(name in point.learned.replace("_", " ") for name in needed[title])]
+        counts = sorted({point.runs for point in whole})
+        middle = [np.mean([point.error_percent for point in whole if point.runs == count]) for count in counts]
+        left.plot(counts, middle, "-", color=colour, label=title)
+        for point in own:
+            fill = colour if point in whole else "white"
+            left.plot(point.runs, point.error_percent, "o", color=colour, markerfacecolor=fill)
+            right.plot(point.blocks / 1000.0, point.error_percent, "o", color=colour, markerfacecolor=fill)
+    for panel, text in ((left, "runs"), (right, "thousand blocks run")):
+        panel.axhline(2.0, color=plot.GREY, linewidth=0.8)
+        panel.set_xlabel(text)
+        panel.set_ylabel("error of a whole run, %")
         panel.set_ylim(bottom=0.0)
-    plot.legend_below(left)
+    plot.legend_below(left, columns=1)
     return left
 
 
