@@ -67,6 +67,15 @@ def learned_machine(
     values = machine_values(motion.family, motion.values, motion.rapid_mm_per_s)
     values.update(_function_values(functions, runs))
     numbers, remarks = _motion_numbers(machine, motion, runs, source)
+    if math.isfinite(motion.rapid_mm_per_s):
+        rate = motion.rapid_mm_per_s * 60.0
+        bounds = _digits(rate), _digits(0.99 * rate), _digits(1.01 * rate)
+        had = machine.axes.x.rapid_mm_per_min
+        numbers.append(
+            LearnedNumber(
+                "axes.x|y|z.rapid_mm_per_min", "rate of rapids, of the fastest axis", *bounds, "mm/min", True, had
+            )
+        )
     numbers += _function_numbers(functions)
     not_told = [
         f"{number.meaning} ({number.key}): the runs bear {number.low:.3g} to {number.high:.3g} {number.unit}"

@@ -29,6 +29,7 @@ _READING_S = 0.1  # scatter of the time between two readings
 _OUTLIER = 3.0  # of it: what is further off counts less
 _RIDGE = 0.02  # pull of every number to 0, against its scatter of a reading
 _MOST_S = 60.0
+_UNSEEN = 1e-3  # sum of derivatives, in scatters of a reading
 _TOOL_CHANGE = 6
 _SPEEDS_KRPM = (0.0, 60.0)
 _TABLE_KRPM = 30.0  # a spindle's table is written up to so far above where its time begins
@@ -211,7 +212,9 @@ def _fit(spans: Sequence[_Span], names: list[str], motion: MotionFit, machine: M
     # Each stretch is counted about twice: as a whole, and in its readings.
     slope = np.asarray(found.jac)
     spread = np.linalg.pinv(slope.T @ slope) * 2.0 * max(1.0, (middle / _READING_S) ** 2)
-    reach = 2.0 * np.sqrt(np.maximum(np.diag(spread), 0.0))
+    # A number that changes nothing is not told.
+    unseen = np.abs(slope[: len(spans)]).sum(axis=0) < _UNSEEN
+    reach = np.where(unseen, _MOST_S, 2.0 * np.sqrt(np.maximum(np.diag(spread), 0.0)))
     low = {name: max(0.0, values[name] - float(each)) for name, each in zip(names, reach, strict=True)}
     high = {name: min(_MOST_S, values[name] + float(each)) for name, each in zip(names, reach, strict=True)}
     return FunctionFit(values, low, high, kept, middle if math.isfinite(middle) else 0.0, len(spans))

@@ -18,7 +18,7 @@ from shapegcode.characterization.clock.observed import ObservedRun, observe
 from shapegcode.characterization.clock.played import PlayedProgram, played_program
 from shapegcode.characterization.clock.predict import holds_of, predicted_starts, shares_of
 from shapegcode.characterization.clock.result import TOLERANCE_PERCENT, FamilyScore, LearnedClock, LearnedRun
-from shapegcode.characterization.clock.shown import rapid_rate, seen_arc_acceleration
+from shapegcode.characterization.clock.shown import rapid_rate, seen_arc_acceleration, with_override
 from shapegcode.characterization.clock.windows import clocks_of, misfit, section_residuals
 from shapegcode.characterization.runs_file import RunsFile, load_runs
 from shapegcode.errors import ArgumentError
@@ -80,8 +80,10 @@ def learn_clock(
     file = runs if isinstance(runs, RunsFile) else load_runs(runs)
     tried = _families(families)
     observed = _observed(file, machine)
-    rate, observed = rapid_rate(observed)
-    fitted = [run for run in observed if run.entry.use == "fit"]
+    # The rate of the machine is what the runs show that are learned from; of the others it tells the override.
+    fitted, others_seen = ([run for run in observed if run.entry.use == use] for use in ("fit", "test"))
+    rate, fitted = rapid_rate(fitted)
+    observed = [*fitted, *(with_override(run, rate) for run in others_seen)]
     if not fitted:
         raise ArgumentError(f'{file.path}: no run has use = "fit": there is nothing to learn from')
     folds = _folds(fitted)
@@ -275,8 +277,12 @@ def _spread(observed: Sequence[ObservedRun], learned: _Learned, others: dict[int
         who = others.get(id(run), learned)
         model = fitted_model(who.machine, who.motion.family, who.motion.values, who.motion.rapid_mm_per_s)
         clocks = clocks_of([run])
+        holds = holds_of(run, who.starts(run))
         for clock, residual in zip(clocks, section_residuals(clocks, model), strict=True):
-            took = float(clock.time_s[-1] - clock.time_s[0])
+            begin, end = float(clock.time_s[0]), float(clock.time_s[-1])
+            if any(since < end and since + length > begin for since, length, _ in holds):
+                continue
+            took = end - begin
             error = float(np.median(residual[-4:]) - np.median(residual[:4]))
             square += min(error / took, 0.2) ** 2 * took if took > 0.0 else 0.0
             weight += took

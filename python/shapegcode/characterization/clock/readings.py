@@ -29,8 +29,8 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-FEED_UNITS = {"mm/s": 1.0, "mm/min": 1.0 / 60.0, "m/min": 1000.0 / 60.0, "in/min": 25.4 / 60.0, "in/s": 25.4}
-"""mm/s of the units that controls show a feed in."""
+FEED_UNITS = {"mm/s": 1.0, "mm/min": 1.0 / 60.0, "in/min": 25.4 / 60.0}
+"""mm/s of the units that a feed is tried in where none is stated."""
 
 LEAST_READINGS = 4
 """So many readings of one value are no chance."""
@@ -152,8 +152,9 @@ def feed_unit(entry: RunEntry, log: RunLog, played: PlayedProgram) -> float:
         tried = name if stated is not None else f"no unit of {', '.join(FEED_UNITS)}"
         raise RecordError(
             f"{log.source}: steady feeds of {entry.program.name} are {math.exp(steady):.4g} times the programmed ones "
-            f"in mm/s: {tried} does not make that an override of 50 to 200 %; the log is of another program, or feed_unit "
-            "must be stated" + (" otherwise" if stated is not None else "")
+            f"in mm/s: {tried} does not make that an override of 50 to 200 %; the log is of another program, the "
+            "program in another unit (G20, G21), or feed_unit must be stated"
+            + (" otherwise" if stated is not None else "")
         )
     return best
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from shapegcode.machine import Machine
 from shapegcode.results.json import hidden
-from shapegcode.results.result import Result
+from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
 
 __all__ = ["FamilyScore", "LearnedClock", "LearnedNumber", "LearnedRun", "LearnedShare"]
@@ -204,6 +204,10 @@ class LearnedClock(Result):
         if self.ok:
             return "write it with -o FILE; shapegcode time part.nc -m FILE tells what other programs take"
         return "add runs of other programs, or state what the operator had set (override_percent in RUNS.toml)"
+
+    def plots(self) -> Mapping[str, Plot]:
+        """Predicted against measured."""
+        return self._drawn_beside()
 
     def to_toml(self) -> str:
         """The machine file with what was learned; a remark stands behind each key."""

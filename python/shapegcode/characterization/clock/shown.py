@@ -13,7 +13,7 @@ from shapegcode.characterization.clock.observed import ObservedRun
 from shapegcode.characterization.clock.played import PlayedProgram
 from shapegcode.characterization.clock.readings import LEAST_READINGS, as_dialled, current_lines, line_numbers
 
-__all__ = ["rapid_rate", "seen_arc_acceleration"]
+__all__ = ["rapid_rate", "seen_arc_acceleration", "with_override"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def rapid_rate(runs: Sequence[ObservedRun]) -> tuple[float, list[ObservedRun]]:
     shown = {id(run): _shown_rate(run) for run in runs}
     plateaus = [plateau for plateau, _ in shown.values() if math.isfinite(plateau)]
     if not plateaus:
-        return math.nan, [_with_rapids(run, 1.0) for run in runs]
+        return math.nan, [with_override(run, math.nan) for run in runs]
     top = max(plateaus)
     fastest = max(single for _, single in shown.values())
     stated = [run for run in runs if math.isfinite(run.rapid_override) and math.isfinite(shown[id(run)][0])]
@@ -77,16 +77,25 @@ def rapid_rate(runs: Sequence[ObservedRun]) -> tuple[float, list[ObservedRun]]:
         rate = float(np.median([shown[id(run)][0] / run.rapid_override for run in stated if run.rapid_override > 0]))
     elif fastest > 1.05 * top:
         rate = next((top / dial for dial in _DIALS if top / dial >= 0.98 * fastest), fastest)
-    found = []
-    for run in runs:
-        plateau = shown[id(run)][0]
-        if math.isfinite(run.rapid_override):
-            found.append(run)
-            continue
-        override = min(1.0, plateau / rate) if math.isfinite(plateau) else 1.0
-        override = as_dialled(override)
-        found.append(_with_rapids(run, override))
-    return rate, found
+    return rate, [with_override(run, rate) for run in runs]
+
+
+def with_override(run: ObservedRun, rate_mm_per_s: float) -> ObservedRun:
+    """A run with the override of its rapids: as stated, else as its rapids show it, else 1.
+
+    Args:
+        run: observed.
+        rate_mm_per_s: of the machine; NaN: not known.
+
+    Returns:
+        The same run.
+    """
+    if math.isfinite(run.rapid_override):
+        return run
+    plateau = _shown_rate(run)[0]
+    if not (math.isfinite(plateau) and math.isfinite(rate_mm_per_s)):
+        return _with_rapids(run, 1.0)
+    return _with_rapids(run, as_dialled(min(1.0, plateau / rate_mm_per_s)))
 
 
 def _with_rapids(run: ObservedRun, override: float) -> ObservedRun:
