@@ -14,17 +14,7 @@ import numpy as np
 import pytest
 
 import shapegcode as sg
-from edge_writer import edge_document, write_edge
-
-MEASURED = (
-    Path(__file__).resolve().parents[2]
-    / "python"
-    / "shapegcode"
-    / "data"
-    / "measured"
-    / "sinumerik"
-    / "capture.json.gz"
-)
+from edge_writer import MEASURED, edge_document, write_edge
 
 
 def block(counter: int, text: str, tool: int | str = 6) -> dict[str, Any]:

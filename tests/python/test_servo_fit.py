@@ -13,20 +13,11 @@ from scipy.signal import lsim
 
 import shapegcode as sg
 from command import run
-from edge_writer import edge_document, write_edge
+from edge_writer import MEASURED, edge_document, write_edge
 from shapegcode import _core
 from shapegcode.characterization.servo.lag import delayed, lag_way
 
 FloatArray = NDArray[np.float64]
-MEASURED = (
-    Path(__file__).resolve().parents[2]
-    / "python"
-    / "shapegcode"
-    / "data"
-    / "measured"
-    / "sinumerik"
-    / "capture.json.gz"
-)
 PERIOD_S = 0.002
 
 

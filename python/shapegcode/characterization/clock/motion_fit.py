@@ -35,13 +35,11 @@ class MotionFit:
         family: which.
         values: of its parameters by name, in mm, s and rad.
         rapid_mm_per_s: rapid rate of every axis; NaN: the machine's.
-        misfit_s: how badly it keeps the time of what it was fitted to.
     """
 
     family: LookAhead
     values: dict[str, float]
     rapid_mm_per_s: float
-    misfit_s: float
 
 
 def fit_motion(
@@ -110,7 +108,7 @@ def fit_motion(
     for _ in range(restarts):
         end = search(best[1] + generator.normal(0.0, 0.1, len(parameters)), _STEPS)
         best = min(best, end, key=lambda each: each[0])
-    return MotionFit(family, values(best[1]), rapid_mm_per_s, best[0])
+    return MotionFit(family, values(best[1]), rapid_mm_per_s)
 
 
 def parameter_intervals(

@@ -9,14 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from shapegcode import _core
 from shapegcode.characterization.clock.played import PlayedProgram
 from shapegcode.characterization.clock.readings import (
     Stretch,
-    current_lines,
     feed_unit,
     held_longest,
     line_numbers,
+    lines_at,
     stretches_of,
 )
 from shapegcode.characterization.runs_file import RunEntry
@@ -108,8 +107,9 @@ def observe(entry: RunEntry, log: RunLog, played: PlayedProgram, machine: Machin
         feed_unit_mm_per_s=unit,
         notes=tuple(notes),
     )
-    whole = _is_whole(run, machine, notes)
-    _require_same(run, machine)
+    starts = played.starts(controller_model(machine))  # by the machine's own limits, before anything is learned
+    whole = _is_whole(run, starts, notes)
+    _require_same(run, starts)
     return replace(run, whole=whole, notes=tuple(notes))
 
 
@@ -162,7 +162,7 @@ def _compare_tools(entry: RunEntry, log: RunLog, played: PlayedProgram, notes: l
     if log.tool is None:
         return
     called = {int(tool) for tool in played.tools if tool >= 0}
-    line = np.clip(current_lines(log.tool, log.block, line_numbers(log, played)), 0, played.line_count)
+    line = lines_at(log.tool, log, played)
     wrong = []
     for value, at in zip(log.tool.value.tolist(), line.tolist(), strict=True):
         # The number changes within the block that changes the tool.
@@ -200,21 +200,13 @@ def _rising(line: IntArray) -> npt.NDArray[np.bool_]:
     return kept
 
 
-def _line_times(run_line: IntArray, played: PlayedProgram, machine: Machine) -> tuple[FloatArray, float]:
-    """When reported lines begin by the machine's own limits, NaN where a line does not move; and the whole time."""
-    timed = _core.time_program(played.program.core, controller_model(machine), True)
-    begin = np.full(played.line_count + 2, np.nan)
-    begin[timed.blocks["line"][::-1]] = timed.blocks["start_s"][::-1]
-    return begin[run_line], float(timed.total_s)
-
-
-def _is_whole(run: ObservedRun, machine: Machine, notes: list[str]) -> bool:
+def _is_whole(run: ObservedRun, starts: FloatArray, notes: list[str]) -> bool:
     """Whether the log begins where the program does.
 
     Raises:
         RecordError: the log says that the program is completed, and much of it was not run.
     """
-    begin, total_s = _line_times(run.line, run.played, machine)
+    begin, total_s = starts[run.line], float(starts[-1])
     known = np.flatnonzero(np.isfinite(begin))
     if not len(known) or run.log.duration_s is None:
         return True
@@ -230,13 +222,13 @@ def _is_whole(run: ObservedRun, machine: Machine, notes: list[str]) -> bool:
     return True
 
 
-def _require_same(run: ObservedRun, machine: Machine) -> None:
+def _require_same(run: ObservedRun, starts: FloatArray) -> None:
     """The way that the program goes between the reported lines must take time where the log says that it did.
 
     Raises:
         RecordError: it does not: the log is of another program.
     """
-    begin, _ = _line_times(run.line, run.played, machine)
+    begin = starts[run.line]
     known = np.isfinite(begin) & ~run.played.function[run.line]
     if known.sum() < _LEAST_BLOCKS:
         return

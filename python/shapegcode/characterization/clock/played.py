@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from collections import defaultdict
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,6 +19,7 @@ __all__ = ["PlayedProgram", "played_program"]
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
+_SEQUENCE = re.compile(r"[ /]*[Nn](\d{1,7})")
 _LEAST_ARC_MM = 0.5
 _GENTLE_MM_PER_S2 = 100.0  # across the path: no machining centre slows down for it
 
@@ -45,6 +48,36 @@ class PlayedProgram:
     rapid: npt.NDArray[np.bool_]
     function: npt.NDArray[np.bool_]
     sections: tuple[tuple[int, int], ...]
+
+    def starts(self, model: _core.ControllerModel) -> FloatArray:
+        """When the lines begin on a model.
+
+        Args:
+            model: of the controller.
+
+        Returns:
+            (line_count + 2,) s, NaN for a line that takes no time; the last entry is the end of the program.
+        """
+        timed = _core.time_program(self.program.core, model, True)
+        found = np.full(self.line_count + 2, np.nan)
+        # A line may hold several moves: its first one counts.
+        found[timed.blocks["line"][::-1]] = timed.blocks["start_s"][::-1]
+        found[-1] = timed.total_s
+        return found
+
+    @cached_property
+    def text_lines(self) -> list[str]:
+        """The lines of the text that the control runs."""
+        return self.program.core.text.decode("latin-1").splitlines()
+
+    @cached_property
+    def sequence_lines(self) -> dict[int, list[int]]:
+        """Lines by their N number, ascending."""
+        places: dict[int, list[int]] = defaultdict(list)
+        for line, text in enumerate(self.text_lines, start=1):
+            if number := _SEQUENCE.match(text):
+                places[int(number[1])].append(line)
+        return places
 
     @cached_property
     def tools(self) -> IntArray:

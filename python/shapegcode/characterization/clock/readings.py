@@ -19,10 +19,10 @@ __all__ = [
     "LEAST_READINGS",
     "Stretch",
     "as_dialled",
-    "current_lines",
     "feed_unit",
     "held_longest",
     "line_numbers",
+    "lines_at",
     "stretches_of",
 ]
 
@@ -69,39 +69,28 @@ def line_numbers(log: RunLog, played: PlayedProgram) -> IntArray:
     value = np.asarray(log.block.value, dtype=np.int64)
     if log.block_counts == "line":
         return value
-    places: dict[int, list[int]] = defaultdict(list)
-    for number, text in enumerate(played.program.core.text.splitlines(), start=1):
-        words = text.lstrip(b" /" if isinstance(text, bytes) else " /")
-        head = words.decode("latin-1") if isinstance(words, bytes) else words
-        if head[:1] in "Nn" and (digits := head[1:8]):
-            sequence = ""
-            for letter in digits:
-                if not letter.isdigit():
-                    break
-                sequence += letter
-            if sequence:
-                places[int(sequence)].append(number)
     found, at = np.zeros(len(value), dtype=np.int64), 0
     for index, sequence_number in enumerate(value.tolist()):
-        ahead = [place for place in places.get(sequence_number, []) if place >= at]
+        ahead = [place for place in played.sequence_lines.get(sequence_number, []) if place >= at]
         if ahead:
             at = found[index] = ahead[0]
     return found
 
 
-def current_lines(signal: Signal, blocks: Signal, line: IntArray) -> IntArray:
+def lines_at(signal: Signal, log: RunLog, played: PlayedProgram) -> IntArray:
     """Line that was reported when a value came.
 
     Args:
         signal: with the values.
-        blocks: with the lines.
-        line: (n,) of `blocks`.
+        log: one run.
+        played: its program.
 
     Returns:
-        (m,) of `signal`; 0 before the first.
+        (m,) of `signal`, 0 before the first, at most one behind the last line of the program.
     """
-    at = np.searchsorted(blocks.time_s, signal.time_s, side="right") - 1
-    return np.where(at >= 0, line[np.maximum(at, 0)], 0)
+    line = line_numbers(log, played)
+    at = np.searchsorted(log.block.time_s, signal.time_s, side="right") - 1
+    return np.clip(np.where(at >= 0, line[np.maximum(at, 0)], 0), 0, played.line_count + 1)
 
 
 def held_longest(signal: Signal, end_s: float | None) -> float:
@@ -137,7 +126,7 @@ def feed_unit(entry: RunEntry, log: RunLog, played: PlayedProgram) -> float:
     """
     if log.feed is None or len(log.feed) < LEAST_READINGS:
         return math.nan
-    line = np.clip(current_lines(log.feed, log.block, line_numbers(log, played)), 0, played.line_count + 1)
+    line = lines_at(log.feed, log, played)
     ratio = log.feed.value / played.feed_mm_per_s[line]
     ratio = ratio[np.isfinite(ratio) & (ratio > 0.0)]
     steady = steady_value(np.log(ratio)) if len(ratio) else None
@@ -194,7 +183,7 @@ def stretches_of(entry: RunEntry, log: RunLog, played: PlayedProgram, unit: floa
     ratio = np.empty(0)
     line = np.empty(0, dtype=np.int64)
     if log.feed is not None and math.isfinite(unit):
-        line = np.clip(current_lines(log.feed, log.block, line_numbers(log, played)), 0, played.line_count + 1)
+        line = lines_at(log.feed, log, played)
         ratio = log.feed.value * unit / played.feed_mm_per_s[line]
         # A control shows feeds in steps: where one is much of the feed, it tells nothing.
         fine = played.feed_mm_per_s[line] * _FEED_BIN > _step_of(log.feed.value) * unit

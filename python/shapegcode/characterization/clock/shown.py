@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from shapegcode.characterization.clock.observed import ObservedRun
 from shapegcode.characterization.clock.played import PlayedProgram
-from shapegcode.characterization.clock.readings import LEAST_READINGS, as_dialled, current_lines, line_numbers
+from shapegcode.characterization.clock.readings import LEAST_READINGS, as_dialled, lines_at
 
 __all__ = ["rapid_rate", "seen_arc_acceleration", "with_override"]
 
@@ -36,7 +36,7 @@ def seen_arc_acceleration(runs: Sequence[ObservedRun]) -> float:
         log, played = run.log, run.played
         if log.feed is None or not math.isfinite(run.feed_unit_mm_per_s):
             continue
-        line = np.clip(current_lines(log.feed, log.block, line_numbers(log, played)), 0, played.line_count + 1)
+        line = lines_at(log.feed, log, played)
         speed = log.feed.value * run.feed_unit_mm_per_s
         radius = played.arc_radius_mm[line]
         feed = played.feed_mm_per_s[line]
@@ -108,7 +108,7 @@ def _shown_rate(run: ObservedRun) -> tuple[float, float]:
     log, played = run.log, run.played
     if log.feed is None or not math.isfinite(run.feed_unit_mm_per_s):
         return math.nan, 0.0
-    line = np.clip(current_lines(log.feed, log.block, line_numbers(log, played)), 0, played.line_count + 1)
+    line = lines_at(log.feed, log, played)
     moving = np.isnan(played.feed_mm_per_s[line]) & (line > 0)
     value = log.feed.value[moving] * run.feed_unit_mm_per_s
     if not len(value):
@@ -127,9 +127,7 @@ def _shown_rate(run: ObservedRun) -> tuple[float, float]:
 def _along_z(played: PlayedProgram) -> npt.NDArray[np.bool_]:
     """Lines whose only axis word is Z."""
     alone = np.zeros(played.line_count + 2, dtype=bool)
-    text = played.program.core.text
-    lines = text.decode("latin-1").splitlines() if isinstance(text, bytes) else text.splitlines()
-    for number, words in enumerate(lines[: played.line_count], start=1):
+    for number, words in enumerate(played.text_lines[: played.line_count], start=1):
         plain = words.split("(")[0].upper()
         alone[number] = "Z" in plain and "X" not in plain and "Y" not in plain
     return alone

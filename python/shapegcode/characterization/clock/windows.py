@@ -72,12 +72,7 @@ def clocks_of(runs: Sequence[ObservedRun], least: int = _LEAST_READINGS) -> list
 
 def line_starts(played: PlayedProgram, model: _core.ControllerModel) -> FloatArray:
     """(line_count + 2,) When each line begins on a model; the last entry is the end of the program."""
-    timed = _core.time_program(played.program.core, model, True)
-    starts = np.full(played.line_count + 2, np.nan)
-    rows = timed.blocks
-    # A line may hold several moves: its first one counts.
-    starts[rows["line"][::-1]] = rows["start_s"][::-1]
-    starts[-1] = timed.total_s
+    starts = played.starts(model)
     # A line without any move begins with the next one.
     missing = np.isnan(starts)
     following = np.minimum.accumulate(np.where(missing, len(starts), np.arange(len(starts)))[::-1])[::-1]
