@@ -1,0 +1,191 @@
+"""Motion to look at on a page: programs in time, thinned for display, packed so that it is small.
+
+Thinned means: between two kept samples every curve is a straight line in time, within a stated fraction of a pixel
+(Douglas and Peucker 1973, with time as the first coordinate). Extremes are kept. Figures are never taken from here.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["CHANNELS", "Channel", "ModeLine", "Scene", "SceneSpectrum", "Variant", "packed"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A value along the path.
+
+    Attributes:
+        label: what it is.
+        unit: of it.
+        how: one line: how to read a picture of it.
+    """
+
+    label: str
+    unit: str
+    how: str
+
+
+CHANNELS: Mapping[str, Channel] = {
+    "deviation": Channel("deviation from the path", "µm", "Distance of the table from the programmed path."),
+    "vibration": Channel("vibration", "µm", "Distance of the table from where the control wants it at that instant."),
+    "speed": Channel("speed", "mm/min", "Speed of the command; corners and short blocks are slow."),
+    "acceleration": Channel("acceleration", "m/s²", "Acceleration of the command: what shakes the machine."),
+    "block_s": Channel("time per block", "s", "How long the block under the tool takes: what is slow shows bright."),
+    "force": Channel("force", "N", "Cutting force, or force of the motors where the plant has drives."),
+}
+"""Values along the path that a scene may hold, by name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """A program in time.
+
+    Attributes:
+        key: "original" or "emitted", or another name of small letters.
+        label: for people.
+        file: name of the program.
+        text: of the program.
+        sample: which interpolation periods are kept, (n,), rising.
+        line: of the text, of the block that is interpolated, (n,), from 1.
+        block: rank of that block among the motion blocks, (n,), from 0.
+        command_mm: set-points, (n, 3).
+        deviation_um: of the table from the path, or where that is not known from its command, (n, 3).
+        channels: values along the path by the names of `CHANNELS`, each (n,).
+        samples: how many periods were played.
+    """
+
+    key: str
+    label: str
+    file: str
+    text: str
+    sample: npt.NDArray[np.int64]
+    line: npt.NDArray[np.int64]
+    block: npt.NDArray[np.int64]
+    command_mm: FloatArray
+    deviation_um: FloatArray
+    channels: Mapping[str, FloatArray]
+    samples: int
+
+
+@dataclass(frozen=True)
+class ModeLine:
+    """A mode of the machine in a spectrum.
+
+    Attributes:
+        axis: "x", "y" or "z".
+        frequency_hz: of it.
+        label: for example "X 46 Hz (assumed)".
+    """
+
+    axis: str
+    frequency_hz: float
+    label: str
+
+
+@dataclass(frozen=True, eq=False)
+class SceneSpectrum:
+    """SceneSpectrum of the acceleration of the command along an axis.
+
+    Attributes:
+        axis: "x", "y" or "z".
+        variant: key of its variant.
+        frequency_hz: (m,).
+        amplitude: (m,), m/s² per line.
+    """
+
+    axis: str
+    variant: str
+    frequency_hz: FloatArray
+    amplitude: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What a page shows of motion.
+
+    Attributes:
+        period_s: interpolation period.
+        variants: programs, the original first.
+        thinned: how far the thinning may be seen, in a sentence.
+        spectra: of axes that move.
+        modes: of the machine.
+        link_lines: lines of the emitted text and the lines of the original that they stand for: rows of first and last
+            emitted, first and last original.
+    """
+
+    period_s: float
+    variants: tuple[Variant, ...]
+    thinned: str
+    spectra: tuple[SceneSpectrum, ...] = ()
+    modes: tuple[ModeLine, ...] = ()
+    link_lines: tuple[tuple[int, int, int, int], ...] = field(default=())
+
+
+def packed(scene: Scene) -> tuple[dict[str, Any], str]:
+    """A scene as the page's script reads it.
+
+    Numbers are 16-bit ranks between the least and the largest value of their column (`low`, `high`), stored as
+    differences modulo 65536 (`u2d`); samples, lines and blocks are 32-bit differences (`i4d`).
+
+    Args:
+        scene: to pack.
+
+    Returns:
+        A head for JSON, which says of every column at which byte it begins, how many numbers it has, of which kind and
+        between which limits; and the bytes, compressed by gzip, in base64.
+    """
+    body = bytearray()
+
+    def add(data: bytes, **said: Any) -> dict[str, Any]:
+        body.extend(bytes(-len(body) % 4))
+        place = {"at": len(body)} | said
+        body.extend(data)
+        return place
+
+    def whole(values: npt.NDArray[np.int64]) -> dict[str, Any]:
+        steps = np.diff(values, prepend=0).astype("<i4")
+        return add(steps.tobytes(), count=len(values), kind="i4d")
+
+    def ranks(values: FloatArray) -> dict[str, Any]:
+        low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
+        span = (high - low) or 1.0
+        rank = np.round((values - low) / span * 65535.0).astype(np.int64)
+        steps = (np.diff(rank, prepend=0) % 65536).astype("<u2")
+        return add(steps.tobytes(), count=len(values), kind="u2d", low=low, high=low + span)
+
+    variants = []
+    for variant in scene.variants:
+        text = variant.text.encode()
+        columns = {name: whole(getattr(variant, name)) for name in ("sample", "line", "block")}
+        for name, table in (("", variant.command_mm), ("d", variant.deviation_um)):
+            columns |= {name + axis: ranks(table[:, number]) for number, axis in enumerate("xyz")}
+        columns |= {name: ranks(values) for name, values in variant.channels.items()}
+        said = {"key": variant.key, "label": variant.label, "file": variant.file, "samples": variant.samples}
+        variants.append(said | {"columns": columns, "text": add(text, count=len(text))})
+    spectra = [
+        {"axis": one.axis, "variant": one.variant}
+        | {"frequency_hz": ranks(one.frequency_hz), "amplitude": ranks(one.amplitude)}
+        for one in scene.spectra
+    ]
+    shown = {name for variant in scene.variants for name in variant.channels}
+    head = {
+        "format": 1,
+        "period_s": scene.period_s,
+        "thinned": scene.thinned,
+        "variants": variants,
+        "channels": {name: vars(channel) for name, channel in CHANNELS.items() if name in shown},
+        "spectra": spectra,
+        "modes": [vars(mode) for mode in scene.modes],
+        "link_lines": scene.link_lines,
+    }
+    return head, base64.b64encode(gzip.compress(bytes(body), 9, mtime=0)).decode()
