@@ -21,6 +21,7 @@ PYBIND11_MODULE(_core, module) {
   register_emission(module);
   register_simulation(module);
   register_metrology(module);
+  register_follow(module);
   register_timing(module);
   register_played_stream(module);
   register_engagement(module);

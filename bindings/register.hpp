@@ -20,6 +20,7 @@ void register_emission(pybind11::module_& module);
 void register_plant(pybind11::module_& module);
 void register_feed_drive(pybind11::module_& module);
 void register_metrology(pybind11::module_& module);
+void register_follow(pybind11::module_& module);
 void register_identification(pybind11::module_& module);
 void register_simulation(pybind11::module_& module);
 void register_timing(pybind11::module_& module);

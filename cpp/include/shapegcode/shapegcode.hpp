@@ -19,6 +19,7 @@
 #include "shapegcode/identify/equivalent_mass.hpp"
 #include "shapegcode/identify/modal_fit.hpp"
 #include "shapegcode/measure/contour.hpp"
+#include "shapegcode/measure/follow.hpp"
 #include "shapegcode/measure/sections.hpp"
 #include "shapegcode/milling/corner.hpp"
 #include "shapegcode/milling/feed.hpp"
