@@ -1,7 +1,8 @@
 #include "shapegcode/measure/follow.hpp"
 
+#include <algorithm>
 #include <cmath>
-#include <string>
+#include <span>
 #include <utility>
 
 #include "base/refuse.hpp"
@@ -11,23 +12,35 @@ namespace {
 
 using detail::refuse;
 
+// A curve full of peaks is divided near its ends again and again, at a cost that grows with the square of the rows: it
+// is divided in windows, whose ends remain.
+constexpr Eigen::Index window_rows = 512;
+
 struct Furthest {
   Eigen::Index row;
   double times;  // of its tolerance
 };
 
+// Rows beside each other: columns that lie a power of two apart would share a few lines of the cache.
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
 // Between two rows that remain, the one whose curves are furthest from the straight lines.
-Furthest furthest_between(const Eigen::VectorXd& times, const Eigen::MatrixXd& scaled, Eigen::Index first,
-                          Eigen::Index last) {
+Furthest furthest_between(std::span<const double> times, const Rows& scaled, Eigen::Index first, Eigen::Index last) {
   Furthest found{first, 0.0};
-  const double rate = 1.0 / (times[last] - times[first]);
-  for (Eigen::Index curve = 0; curve < scaled.cols(); ++curve) {
-    const double* const values = scaled.col(curve).data();
-    const double slope = (values[last] - values[first]) * rate;
-    for (Eigen::Index row = first + 1; row < last; ++row) {
-      const double off = std::abs(values[row] - (values[first] + slope * (times[row] - times[first])));
-      if (off > found.times) found = {row, off};
+  const auto curves = static_cast<std::size_t>(scaled.cols());
+  const auto at = [&](Eigen::Index row) { return std::span(scaled.data() + row * scaled.cols(), curves); };
+  const std::span<const double> begin = at(first);
+  const std::span<const double> end = at(last);
+  const double begin_time = times[static_cast<std::size_t>(first)];
+  const double rate = 1.0 / (times[static_cast<std::size_t>(last)] - begin_time);
+  for (Eigen::Index row = first + 1; row < last; ++row) {
+    const double share = (times[static_cast<std::size_t>(row)] - begin_time) * rate;
+    const std::span<const double> values = at(row);
+    double off = 0.0;
+    for (std::size_t curve = 0; curve < curves; ++curve) {
+      off = std::max(off, std::abs(values[curve] - begin[curve] - share * (end[curve] - begin[curve])));
     }
+    if (off > found.times) found = {row, off};
   }
   return found;
 }
@@ -65,18 +78,22 @@ std::vector<std::size_t> thin_curves(const Eigen::Ref<const Eigen::VectorXd>& ti
   if (rows == 0) return kept;
   kept.push_back(0);
   if (rows == 1) return kept;
-  const Eigen::MatrixXd scaled = values * tolerances.cwiseInverse().asDiagonal();
-  // Depth first, left half before right half: rows come out in order.
-  std::vector<std::pair<Eigen::Index, Eigen::Index>> open{{0, rows - 1}};
-  while (!open.empty()) {
-    const auto [first, last] = open.back();
-    open.pop_back();
-    const Furthest furthest = furthest_between(times, scaled, first, last);
-    if (furthest.times > 1.0) {
-      open.emplace_back(furthest.row, last);
-      open.emplace_back(first, furthest.row);
-    } else {
-      kept.push_back(static_cast<std::size_t>(last));
+  const std::span<const double> passed(times.data(), static_cast<std::size_t>(rows));
+  const Rows scaled = values * tolerances.cwiseInverse().asDiagonal();
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> open;
+  for (Eigen::Index begin = 0; begin < rows - 1; begin += window_rows) {
+    open.emplace_back(begin, std::min(begin + window_rows, rows - 1));
+    // Depth first, left half before right half: rows come out in order.
+    while (!open.empty()) {
+      const auto [first, last] = open.back();
+      open.pop_back();
+      const Furthest furthest = furthest_between(passed, scaled, first, last);
+      if (furthest.times > 1.0) {
+        open.emplace_back(furthest.row, last);
+        open.emplace_back(first, furthest.row);
+      } else {
+        kept.push_back(static_cast<std::size_t>(last));
+      }
     }
   }
   return kept;

@@ -30,9 +30,9 @@ class PathFollower {
 
 /// Fewer samples of curves over time: which rows remain so that every curve, drawn straight between them, stays within
 /// its tolerance at every row that is left out (Douglas and Peucker 1973, with distance taken along the value). First
-/// and last row remain. `times`: (n), rising; `values`: (n, curves); `tolerances`: one for each curve, above 0.
-/// O(n log n) as a rule. Throws Error(argument) on other shapes, times that do not rise, a tolerance that is not above
-/// 0, or a value that is not finite.
+/// and last row remain, and one of 512 at the least. `times`: (n), rising; `values`: (n, curves); `tolerances`: one for
+/// each curve, above 0. O(n). Throws Error(argument) on other shapes, times that do not rise, a tolerance that is not
+/// above 0, or a value that is not finite.
 [[nodiscard]] std::vector<std::size_t> thin_curves(const Eigen::Ref<const Eigen::VectorXd>& times,
                                                    const Eigen::Ref<const Eigen::MatrixXd>& values,
                                                    const Eigen::Ref<const Eigen::VectorXd>& tolerances);

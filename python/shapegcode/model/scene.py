@@ -1,0 +1,224 @@
+"""Programs played for a page: one motion in time beside the other, thinned as it passes by.
+
+Memory does not grow with the length of a program: each piece is thinned as soon as it was played.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode import _core
+from shapegcode.machine import Machine
+from shapegcode.model.controller import controller_model
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.modes import axis_modes
+from shapegcode.model.stream import Chunk, stream
+from shapegcode.program import Program
+from shapegcode.program.pairing import paired_regions
+from shapegcode.results.page.scene import ModeLine, Scene, SceneSpectrum, Variant
+from shapegcode.results.page.spectrum import AccelerationSpectrum
+from shapegcode.results.page.thinning import PIXELS_HIGH, PIXELS_WIDE, Kept, Thinner
+
+__all__ = ["MOST_POINTS", "scene_of"]
+
+MOST_POINTS = 60_000
+"""Samples of a program that a page shows, at most."""
+
+FloatArray = npt.NDArray[np.float64]
+
+_HALF_PIXEL = 0.5
+_LEAST_EXTENT_MM = 1e-3
+_FLAT = {
+    "deviation": 1e-3,
+    "vibration": 1e-3,
+    "speed": 1e-3,
+    "acceleration": 1e-6,
+}  # a curve within so little is flat
+
+
+@dataclass(frozen=True)
+class _Nominal:
+    """A cut that is played, and the path that it shall follow."""
+
+    first_line: int
+    last_line: int
+    path: _core.Path
+
+
+@dataclass
+class _Followed:
+    """Follows the cuts of a program along their paths, one after the other."""
+
+    cuts: list[_Nominal]
+    _at: int = -1
+    _follower: _core.PathFollower | None = field(default=None, repr=False)
+
+    def deviations_mm(self, chunk: Chunk) -> FloatArray:
+        """From path to table, (k, 3); from command to table where no path is known."""
+        found = chunk.error_mm.copy()
+        firsts = np.array([cut.first_line for cut in self.cuts])
+        cut_of = np.searchsorted(firsts, chunk.line, side="right") - 1
+        lasts = np.array([cut.last_line for cut in self.cuts] or [0])
+        cut_of[(cut_of >= 0) & (chunk.line > lasts[np.maximum(cut_of, 0)])] = -1
+        borders = np.flatnonzero(np.diff(cut_of)) + 1
+        for begin, end in zip([0, *borders], [*borders, len(chunk)], strict=True):
+            rank = int(cut_of[begin])
+            if rank < 0:
+                continue
+            if rank != self._at or self._follower is None:
+                self._at, self._follower = rank, _core.PathFollower(self.cuts[rank].path)
+            found[begin:end] = self._follower.step(chunk.command_mm[begin:end], chunk.response_mm[begin:end])
+        return found
+
+
+def scene_of(
+    original: Program,
+    machine: Machine,
+    emitted: Program | None = None,
+    *,
+    labels: tuple[str, str] = ("original", "emitted"),
+    plant: str = "modal",
+    most_points: int = MOST_POINTS,
+    on_progress: Callable[[float], None] = lambda _done: None,
+) -> Scene:
+    """Play a program, and the one that was made of it, for a page.
+
+    Args:
+        original: what is played.
+        machine: controller and plant.
+        emitted: made of it; its table is measured against the original's path. None: none.
+        labels: of both, for people.
+        plant: "modal" or "feed-drive".
+        most_points: samples of each that are kept, at most.
+        on_progress: called with the share that is done.
+
+    Returns:
+        Both motions, their spectra, and the machine's modes.
+
+    Raises:
+        ArgumentError: `emitted` has no cut that the original has, or a plant that does not exist.
+        MachineError: the machine has no feed drives.
+        NumericError: the integrator of a feed drive fails.
+    """
+    programs = [original, *([emitted] if emitted is not None else [])]
+    period_s = MachineModel(machine).period_s
+    variants, spectra, said = [], [], []
+    for rank, (program, label) in enumerate(zip(programs, labels, strict=False)):
+        key = ("original", "emitted")[rank]
+
+        def done(share: float, rank: int = rank) -> None:
+            on_progress((rank + share) / len(programs))
+
+        variant, lines, kept = _variant(key, label, program, original, machine, plant, most_points, done)
+        variants.append(variant)
+        spectra += lines
+        said.append(
+            f"{label}: {len(variant.sample)} of {variant.samples} samples, path within {kept.path_pixels:.1f} pixel of "
+            f"{PIXELS_WIDE}, curves within {kept.pixels / PIXELS_HIGH * 100.0:.1f} % of their range"
+        )
+    return Scene(
+        period_s=period_s,
+        variants=tuple(variants),
+        thinned=f"Thinned for display, extremes kept ({'; '.join(said)}). The figures are not thinned.",
+        spectra=tuple(spectra),
+        modes=tuple(_mode_lines(machine)),
+        link_lines=() if emitted is None else tuple(_links(original, emitted)),
+    )
+
+
+def _variant(
+    key: str,
+    label: str,
+    program: Program,
+    nominal: Program,
+    machine: Machine,
+    plant: str,
+    most_points: int,
+    on_progress: Callable[[float], None],
+) -> tuple[Variant, list[SceneSpectrum], Kept]:
+    period_s = MachineModel(machine).period_s
+    whole_s = _core.time_program(program.core, controller_model(machine)).total_s or period_s
+    cuts = [_Nominal(mine.first_line, mine.last_line, other.path) for mine, other in paired_regions(program, nominal)]
+    followed = _Followed(sorted(cuts, key=lambda cut: cut.first_line))
+    thinner, spectrum = Thinner(_scales(nominal), most_points), AccelerationSpectrum(period_s)
+    blocks = _Blocks()
+    velocity: FloatArray | None = None
+    for chunk in stream(program, machine, plant=plant):
+        before = chunk.velocity_mm_per_s[:1] if velocity is None else velocity
+        acceleration = np.diff(np.concatenate([before, chunk.velocity_mm_per_s]), axis=0) / period_s * 1e-3
+        velocity = chunk.velocity_mm_per_s[-1:].copy()
+        spectrum.add(acceleration)
+        deviation_um = followed.deviations_mm(chunk) * 1e3
+        curves = {
+            "deviation": np.linalg.norm(deviation_um, axis=1),
+            "vibration": np.linalg.norm(chunk.error_mm, axis=1) * 1e3,
+            "speed": np.linalg.norm(chunk.velocity_mm_per_s, axis=1) * 60.0,
+            "acceleration": np.linalg.norm(acceleration, axis=1),
+        }
+        if chunk.motor_force_n is not None:
+            curves["force"] = np.linalg.norm(chunk.motor_force_n, axis=1)
+        rank, starts = blocks.add(chunk)
+        thinner.add(chunk.sample, np.column_stack([chunk.line, rank]), chunk.command_mm, deviation_um, curves, starts)
+        on_progress(min(float(chunk.time_s[-1]) / whole_s, 1.0))
+    kept = thinner.result()
+    line, block = kept.labels.T
+    channels = dict(kept.curves) | {"block_s": blocks.durations()[block] * period_s}
+    text = program.expanded_text.decode("utf-8", "replace")
+    variant = Variant(
+        key, label, program.source, text, kept.sample, line, block, kept.command_mm, kept.deviation_um, channels,
+        thinner.samples,
+    )  # fmt: skip
+    return variant, spectrum.lines(key, most_hz=_most_hz(machine, period_s)), kept
+
+
+class _Blocks:
+    """Ranks of the blocks that are interpolated, and how long each takes."""
+
+    def __init__(self) -> None:
+        self._last_line = -1
+        self._counts: list[npt.NDArray[np.int64]] = []
+        self._rank = -1
+
+    def add(self, chunk: Chunk) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.intp]]:
+        """Of each sample the rank of its block, (k,), and the rows at which blocks begin."""
+        line = chunk.line.astype(np.int64)
+        begins = np.diff(line, prepend=self._last_line) != 0
+        rank = self._rank + np.cumsum(begins)
+        self._last_line, self._rank = int(line[-1]), int(rank[-1])
+        self._counts.append(np.stack(np.unique(rank, return_counts=True)))
+        return rank, np.flatnonzero(begins)
+
+    def durations(self) -> npt.NDArray[np.int64]:
+        """Of each block, in samples."""
+        ranks, counts = np.concatenate(self._counts, axis=1)
+        found = np.zeros(self._rank + 1, dtype=np.int64)
+        np.add.at(found, ranks, counts)
+        return found
+
+
+def _scales(program: Program) -> dict[str, float]:
+    """What half a pixel is, of the path in mm; of a curve the range below which it is flat."""
+    corners = [corner for region in program.regions for corner in (region.path.polyline(),) if len(corner)]
+    extent = float(np.ptp(np.concatenate(corners), axis=0).max()) if corners else 0.0
+    return {"path": max(extent, _LEAST_EXTENT_MM) * _HALF_PIXEL / PIXELS_WIDE} | _FLAT
+
+
+def _most_hz(machine: Machine, period_s: float) -> float:
+    """Up to where a spectrum is drawn: twice the highest mode and at least 200 Hz, as far as there are samples."""
+    highest = max((mode.frequency_hz for modes in axis_modes(machine) for mode in modes), default=0.0)
+    return min(max(2.0 * highest, 200.0), 0.5 / period_s)
+
+
+def _mode_lines(machine: Machine) -> Iterator[ModeLine]:
+    for axis, modes in zip("xyz", axis_modes(machine), strict=True):
+        for mode in modes:
+            yield ModeLine(axis, mode.frequency_hz, f"mode of {axis.upper()}, {mode.frequency_hz:g} Hz")
+
+
+def _links(original: Program, emitted: Program) -> Iterator[tuple[int, int, int, int]]:
+    for made, own in paired_regions(emitted, original):
+        yield made.first_line, made.last_line, own.first_line, own.last_line
