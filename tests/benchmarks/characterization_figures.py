@@ -1,4 +1,4 @@
-"""The figures of docs/characterize.md: `python tests/benchmarks/characterization_figures.py` prints them."""
+"""The figures of docs/howto/characterize.md: `python tests/benchmarks/characterization_figures.py` prints them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Our shapers beside the Vibration Guard of ISG's CNC kernel, on its own terms: the last tables of docs/comparison.md.
+"""Our shapers beside the Vibration Guard of ISG's CNC kernel, on its own terms: docs/evidence/comparison.md.
 
 Run from the root of the repository: ``python tests/benchmarks/compare_shapers.py --bands``. One mode of 30 Hz (the
 rival's default) damped by .1; the band in which at most 5 % is left is found by the formula of

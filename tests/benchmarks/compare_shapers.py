@@ -1,4 +1,4 @@
-"""What each shaper does to the same programs, all through the conversion: the tables of docs/comparison.md.
+"""What each shaper does to the same programs, all through the conversion: the tables of docs/evidence/comparison.md.
 
 Run from the root of the repository: ``python tests/benchmarks/compare_shapers.py``. The machine is `vx500`; every
 figure is of the text that was written, read back and played, with the modes where they are and 5 and 10 % off.

@@ -1,4 +1,4 @@
-"""The figures of docs/evidence.md on NIST's test bed: `python tests/benchmarks/evidence_nist.py [--curve]`.
+"""The figures of docs/evidence/evidence.md on NIST's test bed: `python tests/benchmarks/evidence_nist.py [--curve]`.
 
 Prints the demonstration's tables, what the runs of runs.csv took that have no log here beside the learned machine's
 time, and what length over feed and the built-in machine say. `--curve` learns from 1, 2, 4 runs as well (some ten

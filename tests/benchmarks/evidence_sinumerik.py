@@ -1,4 +1,4 @@
-"""The figures of docs/evidence.md on the Sinumerik capture: `python tests/benchmarks/evidence_sinumerik.py [CAPTURE]`.
+"""Figures of docs/evidence/evidence.md, Sinumerik capture: `python tests/benchmarks/evidence_sinumerik.py [CAPTURE]`.
 
 Prints what the servo lag, the same behind a dead time, and the drive leave of the following error; the dead time of the
 control's own model; what a shift of one sample does to a gain that is taken from the commanded speed. `--plots DIR`

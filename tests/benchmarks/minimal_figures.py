@@ -1,4 +1,4 @@
-"""The figures of docs/shapers.md on minimal shapers: `python tests/benchmarks/minimal_figures.py` prints them."""
+"""Figures of docs/concepts/shapers.md on minimal shapers: `python tests/benchmarks/minimal_figures.py` prints them."""
 
 from __future__ import annotations
 

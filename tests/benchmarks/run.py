@@ -1,4 +1,4 @@
-"""Measures shapegcode against named peers in the same run: `make bench`. What each row means: docs/benchmarks.md."""
+"""Measures shapegcode against named peers in the same run: `make bench`. The rows: docs/evidence/benchmarks.md."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from shapegcode import _core
 
 Vector = npt.NDArray[np.float64]
 
-_CONTACT_SHARE = 0.1  # docs/feed_drive.md: over this share of the gap the stiffness builds up
+_CONTACT_SHARE = 0.1  # docs/concepts/feed_drive.md: over this share of the gap the stiffness builds up
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""What docs/comparison.md claims beside the Vibration Guard, by a residual formula of its own."""
+"""What docs/evidence/comparison.md claims beside the Vibration Guard, by a residual formula of its own."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def test_errors_of_contour_are_those_of_a_shaped_path() -> None:
 
 def test_the_page_has_these_figures() -> None:
     """Durations and bands of the table, designed anew and swept."""
-    page = (ROOT / "docs" / "comparison.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "evidence" / "comparison.md").read_text(encoding="utf-8")
     found = re.findall(r"^\| (?:`(robust|mirrored)`, same band) +\| −([\d.]+) / \+([\d.]+) % +\| ([\d.]+) ", page, re.M)
     assert len(found) == 5
     wanted = [*guard.MODES, guard.MODES[3]]

@@ -1,4 +1,4 @@
-"""Cells of docs/comparison.md by the judge, which reads, plays and measures the emitted text with code of its own."""
+"""Cells of docs/evidence/comparison.md by the judge, which reads, plays and measures the text by code of its own."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import shapegcode as sg
 from judge import residual_um, response
 from shapegcode.shaping import design, machine_bands
 
-TABLES = Path(__file__).parents[2] / "docs" / "comparison.md"
+TABLES = Path(__file__).parents[2] / "docs" / "evidence" / "comparison.md"
 PAPER_PATH = Path(sg.__file__).parent / "data" / "paper_path.nc"
 WIDE_UM = 1000.0  # contour tolerance that slows nothing
 

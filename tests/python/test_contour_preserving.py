@@ -82,7 +82,7 @@ def test_the_feed_follows_from_the_tolerance(target: str, tolerance_um: float) -
     assert (found.residual_um < 1.0).all()
     plain, _ = within(arcs_and_corners(), "off", tolerance_um)
     assert plain.command_um <= tolerance_um + 0.15
-    if target == "command" or tolerance_um > 2.0:  # see docs/contour.md: the response at the least increment
+    if target == "command" or tolerance_um > 2.0:  # see docs/concepts/contour.md: the response at the least increment
         assert report["within"]
         assert found.time_s < 0.95 * plain.time_s
 

@@ -138,7 +138,7 @@ def test_the_command(
     plots = ["--plots", str(tmp_path / "plots")]
     assert main(["demo", "corner", "--json", str(tmp_path / "corner.json"), *plots]) == 0
     out = capsys.readouterr().out
-    assert "4 of 11 statements of Kim and Ko, 2001 (paper 001 in docs/references.md) agree, 2 differ for a known" in out
+    assert "4 of 11 statements of Kim and Ko, 2001 (paper 001 in docs/evidence/references.md) agree" in out
     assert "next: shapegcode feed" in out
     result = json.loads((tmp_path / "corner.json").read_text(encoding="utf-8"))
     jsonschema.validate(result, schema(CornerDemo))

@@ -107,7 +107,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeyp
     monkeypatch.setattr(canvas, "FORMATS", (".svg",))  # PNG takes three times as long
     assert main(["demo", "shaper", "--json", str(tmp_path / "demo.json"), "--plots", str(tmp_path / "plots")]) == 0
     out = capsys.readouterr().out
-    assert "Park, Hong and Danielson, 2009 (paper 002 in docs/references.md)" in out
+    assert "Park, Hong and Danielson, 2009 (paper 002 in docs/evidence/references.md)" in out
     assert "next:" in out
     result = json.loads((tmp_path / "demo.json").read_text(encoding="utf-8"))
     jsonschema.validate(result, schema(ShaperDemo))

@@ -172,7 +172,7 @@ def test_layers_follow_the_program() -> None:
         core.layer_borders(paths, 0.0, -1.0, 0.5)
 
 
-@pytest.mark.parametrize("page", ["engagement.md", "cutting_force.md", "feed.md"])
+@pytest.mark.parametrize("page", ["concepts/engagement.md", "concepts/cutting_force.md", "howto/feed.md"])
 def test_examples_of_the_pages_run_as_they_stand(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, file in (("POCKET.NC", "part.nc"), ("pocket_tool.toml", "T8.toml"), ("pocket_stock.toml", "block.toml")):
         shutil.copy(GOLDEN / name, tmp_path / file)

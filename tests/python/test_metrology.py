@@ -362,7 +362,7 @@ def test_the_band_narrows_and_the_radius_moves_as_the_model_must() -> None:
 
 
 def test_the_document_states_what_the_demo_gives() -> None:
-    text = (ROOT / "docs" / "metrology.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "howto" / "metrology.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (100|200) \| ([^|]+) \| (\d+\.\d+) \|[^|]+\| ([\d.]+) \| ([\d.]+) / ([\d.]+) / ([\d.]+) \|",
                       text, re.MULTILINE)  # fmt: skip
     assert len(rows) == len(demo().cases)

@@ -295,7 +295,7 @@ def test_robust_grid_compares_the_periods() -> None:
     choice = choose_block_period(PAPER_BANDS, 0.001, 0.002, max_block_period_s=0.008)
     assert [round(each.period_s * 1e3) for each in choice.candidates] == [2, 3, 4, 5, 6, 7, 8]
     durations_s = [each.shaper.duration_s for each in choice.candidates if each.shaper is not None]
-    assert durations_s[:5] == pytest.approx([0.022, 0.024, 0.024, 0.030, 0.042])  # as docs/shapers.md says
+    assert durations_s[:5] == pytest.approx([0.022, 0.024, 0.024, 0.030, 0.042])  # as docs/concepts/shapers.md says
     for each in choice.candidates[:4]:
         assert each.shaper is not None
         assert each.shaper.duration_s == pytest.approx(minimax_robust(PAPER_BANDS, each.period_s).shaper.duration_s)

@@ -413,7 +413,7 @@ def test_random_modes_on_random_grids() -> None:
 
 def documented(columns: int) -> list[list[str]]:
     """The rows of the section's table with that many columns: the family, then the others."""
-    text = (Path(__file__).resolve().parents[2] / "docs" / "shapers.md").read_text(encoding="utf-8")
+    text = (Path(__file__).resolve().parents[2] / "docs" / "concepts" / "shapers.md").read_text(encoding="utf-8")
     section = text.split("## Families")[1].split("\n## ")[0]
     rows = [
         [cell.strip(" `") for cell in line.strip("|").split("|")] for line in re.findall(r"^\| `.*$", section, re.M)

@@ -24,7 +24,7 @@ from shapegcode.errors import FileError, StockError
 DATA = resources.files("shapegcode") / "data" / "milling"
 RADIUS = 4.0  # of the tool
 Z = -5.0
-NEAR_MM = 5e-4  # as docs/tool_files.md says
+NEAR_MM = 5e-4  # as docs/reference/tool_files.md says
 NEAR_MM2 = 5e-3  # between outlines some 100 mm long
 
 

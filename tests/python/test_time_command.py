@@ -372,7 +372,7 @@ def test_demo_shows_both_sets_beside_the_paper(folder: Path, capsys: pytest.Capt
     assert main(["demo", "cycle-time", "--json", "demo.json"]) == 0
     out = capsys.readouterr().out
     assert "is not published" in " ".join(out.split())
-    assert "Lee, Ro, Song and Oh, 2022 (paper 004 in docs/references.md)" in out
+    assert "Lee, Ro, Song and Oh, 2022 (paper 004 in docs/evidence/references.md)" in out
     data = json.loads((folder / "demo.json").read_text())
     jsonschema.validate(data, schema(demos.CycleTimeDemo))
     assert [row["published_measured_s"] for row in data["cases"]] == [2169.1, 2157.3]

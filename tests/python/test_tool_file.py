@@ -268,7 +268,7 @@ def test_every_entry_makes_coefficients_that_the_core_takes() -> None:
 
 
 def test_every_key_of_a_tool_file_is_in_the_documentation() -> None:
-    text = (ROOT / "docs" / "tool_files.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "reference" / "tool_files.md").read_text(encoding="utf-8")
     for name, field in Tool.model_fields.items():
         assert f"### `[{name}]`" in text
         for key in field.annotation.model_fields:  # type: ignore[union-attr]

@@ -7,6 +7,8 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import write_schemas
+
 import shapegcode as sg
 from shapegcode.cutting.documentation import file_documentation
 from shapegcode.machine import key_documentation
@@ -21,7 +23,7 @@ _HEAD = """\
 `import shapegcode as sg` offers these names. `help(sg.convert)` says what each takes, with shapes and units, what it
 returns and raises, and where the method comes from. Every function that takes a program takes a `Program` or its path.
 Every result of a command is a frozen dataclass with `ok`, `warnings`, `next_step`, `to_dict()`, `tables()`, `plots()`;
-the keys of its JSON are in [schema](schema). `result.plots()` draws its pictures by name,
+the keys of its JSON are in [schemas](schemas.md). `result.plots()` draws its pictures by name,
 `result.save_plots(folder)` writes them.
 
     machine = sg.Machine.load("vx500").with_values("tolerance.contour_um", 10)
@@ -52,10 +54,33 @@ def first_sentence(doc: str) -> str:
     return (found[0] if found else text).rstrip(":.").replace("|", "\\|") + "."
 
 
+_SCHEMAS = """\
+# JSON schemas
+
+<!-- Generated: make docs -->
+
+`--json FILE` of a command writes its result. The keys of each kind of result stand in a JSON Schema, with units and
+meaning; Draft 2020-12, without references outside of the file.
+
+| kind | what it is |
+|---|---|
+"""
+
+
+def schema_documentation() -> str:
+    """Every kind of result with its schema."""
+    rows = [
+        f"| [{name}](../schema/{name}.json) | {first_sentence(inspect.getdoc(cls) or '')} |"
+        for name, cls in write_schemas.results().items()
+    ]
+    return _SCHEMAS + "\n".join(rows) + "\n"
+
+
 PAGES: dict[str, Callable[[], str]] = {
-    "machine.md": key_documentation,
-    "tool_files.md": file_documentation,
-    "api.md": api_documentation,
+    "reference/machine.md": key_documentation,
+    "reference/tool_files.md": file_documentation,
+    "reference/api.md": api_documentation,
+    "reference/schemas.md": schema_documentation,
 }
 """What writes each page, by its name."""
 

@@ -99,7 +99,7 @@ struct ShapingOptions {
   /// time.
   double feed_excess_ratio = MotionLimits::none;
   /// Weight of the correction's second differences on half the block grid. Less of it follows the path more closely and
-  /// asks for more beside the modes' frequencies, which shows where these are off: docs/contour.md.
+  /// asks for more beside the modes' frequencies, which shows where these are off: docs/concepts/contour.md.
   double contour_smoothness = 0.4;
 };
 

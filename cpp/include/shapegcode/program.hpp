@@ -217,8 +217,8 @@ struct ProgramEntry {
 /// numbers are none that can be read.
 [[nodiscard]] std::vector<ProgramEntry> list_programs(const std::string& text);
 
-/// Reads a program text into regions of canonical moves (FANUC milling dialect; see docs/dialect.md for what is read,
-/// passed through and refused). Pure function of its arguments. Throws Error(program) with line and column.
+/// Reads a program text into regions of canonical moves (FANUC milling dialect: docs/reference/dialect.md, what is
+/// read, passed through and refused). Pure function of its arguments. Throws Error(program) with line and column.
 [[nodiscard]] Program read_program(std::string text, const ReaderOptions& options = {});
 
 }  // namespace shapegcode

@@ -221,7 +221,7 @@ def fit_rapids(facts: LogFacts, axis: str, parts: list[PartLog]) -> list[tuple[f
 def _short_ramp(facts: LogFacts, fits: list[_Rapid]) -> tuple[float, float]:
     """Between which time constants rapids lie that do not reach the rate.
 
-    Half of such a rapid lasts ceil(sqrt(nominal * A) / T) T (eq. 16 of paper 004, docs/references.md).
+    Half of such a rapid lasts ceil(sqrt(nominal * A) / T) T (eq. 16 of paper 004, docs/evidence/references.md).
     """
     period = facts.tick
     halves = [(whole_periods(fit.ramp[0] - 0.3 * period, period), fit) for fit in fits]

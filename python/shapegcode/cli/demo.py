@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.description = (
         "Repeats the figures of a paper with this program's models, and shows both; papers in full: "
-        "docs/references.md. evidence: predicted beside measured, docs/evidence.md. "
+        "docs/evidence/references.md. evidence: predicted beside measured, docs/evidence/evidence.md. "
         "Exit code 1 if a statement of the paper differs and why is not known, or a prediction is out of its limits."
     )
     parser.add_argument(

@@ -19,14 +19,14 @@ def add_cutting_arguments(parser: argparse.ArgumentParser, *, required: bool) ->
         metavar="T.toml",
         action="append",
         required=required,
-        help="tool file: end mill, cutting force, limits (docs/tool_files.md); may be repeated, then each file needs "
+        help="tool file: end mill, cutting force, limits (docs/reference/tool_files.md); repeated, each file needs "
         "its T number",
     )
     parser.add_argument(
         "--stock",
         metavar="S.toml",
         required=required,
-        help="stock file: what is there before the first block (docs/tool_files.md)",
+        help="stock file: what is there before the first block (docs/reference/tool_files.md)",
     )
     parser.add_argument(
         "--margin",

@@ -1,4 +1,4 @@
-"""The reference of tool and stock files as Markdown: what ``docs/tool_files.md`` holds; ``make docs`` writes it."""
+"""The reference of tool and stock files as Markdown: ``docs/reference/tool_files.md``; ``make docs`` writes it."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ says so. Outlines are right within half a micrometre.
 
 
 def file_documentation() -> str:
-    """The text of ``docs/tool_files.md``."""
+    """The text of ``docs/reference/tool_files.md``."""
     lines = _INTRODUCTION.splitlines()
     lines += ["", *_fenced(_example("paper001_tool.toml"))]
     lines += ["", "A tool for steel with limits:", "", *_fenced(STEEL_TOOL)]

@@ -1,6 +1,6 @@
 """Cornering cuts: three corners in closed form, the feeds of the paper's equation 7, and the scheduler on the same.
 
-What the paper says (Kim and Ko, 2001; paper 001 in docs/references.md) is printed beside what is computed from its
+What the paper says (Kim and Ko, 2001; paper 001 in docs/evidence/references.md) is printed beside what comes from its
 numbers; where the two differ, the difference stays.
 """
 

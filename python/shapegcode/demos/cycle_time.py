@@ -1,6 +1,6 @@
 """Cycle time of a test piece with both sets of constants of a testbed.
 
-Lee, Ro, Song and Oh, 2022 (paper 004 in docs/references.md): section 3.
+Lee, Ro, Song and Oh, 2022 (paper 004 in docs/evidence/references.md): section 3.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Specimens of line, quarter arc and line, measured on the model: radius, width, roughness and vibration.
 
-What the paper measured on cut specimens (Ko, Lim and Hong, 2023; paper 000 in docs/references.md) stands beside what
+What Ko, Lim and Hong, 2023 (paper 000 in docs/evidence/references.md) measured on cut specimens stands beside what
 the model gives.
 """
 

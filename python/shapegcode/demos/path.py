@@ -1,6 +1,6 @@
 """Line, quarter arc, line at two feeds and two reductions: the model's figures beside the published ones.
 
-Ko, Lim and Hong, 2023 (paper 000 in docs/references.md): table 2 and the text on time.
+Ko, Lim and Hong, 2023 (paper 000 in docs/evidence/references.md): table 2 and the text on time.
 """
 
 from __future__ import annotations

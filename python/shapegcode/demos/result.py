@@ -20,7 +20,7 @@ PAPERS = {
     "003": "Back, Ko and Kim, 2003",
     "004": "Lee, Ro, Song and Oh, 2022",
 }
-"""Authors and year by the short name of the paper; in full in docs/references.md."""
+"""Authors and year by the short name of the paper; in full in docs/evidence/references.md."""
 
 Agreement = Literal["agrees", "differs", "explained", "open"]
 """Of a statement: it holds here; it does not; it does not, and why is known (a slip of the paper, other conditions);
@@ -109,7 +109,7 @@ class Demonstration(Result):
     Its pictures are drawn by the module beside it whose name ends with `_plots`.
 
     Attributes:
-        paper: authors, year, and under which name docs/references.md has it in full.
+        paper: authors, year, and under which name docs/evidence/references.md has it in full.
         title: what is repeated.
         rows: the paper's statements beside ours.
         remark: how to read the differences.
@@ -126,15 +126,15 @@ class Demonstration(Result):
 
     @staticmethod
     def cited(number: str) -> str:
-        """The `paper` of a demonstration: "Park, Hong and Danielson, 2009 (paper 002 in docs/references.md)".
+        """The `paper` of a demonstration: "Park, Hong and Danielson, 2009 (paper 002 in docs/evidence/references.md)".
 
         Args:
-            number: as docs/references.md counts them, for example "002".
+            number: as docs/evidence/references.md counts them, for example "002".
 
         Returns:
             Authors, year and number.
         """
-        return f"{PAPERS[number]} (paper {number} in docs/references.md)"
+        return f"{PAPERS[number]} (paper {number} in docs/evidence/references.md)"
 
     @property
     def ok(self) -> bool:

@@ -1,6 +1,6 @@
 """Minimal two-mode shapers for 1 Hz and 4 Hz, their sensitivity, and their test on a stage.
 
-Park, Hong and Danielson, 2009 (paper 002 in docs/references.md) print durations and signs in the text; their curves are
+Park, Hong and Danielson, 2009 (paper 002 in docs/evidence/references.md) print durations and signs; their curves are
 pictures without numbers. So what can be compared is what the text states, beside what the models here give; nothing is
 tuned.
 """

@@ -56,7 +56,7 @@ def identify(
         RecordError: no record can be used; what was found and what is needed.
         OSError: a file cannot be read.
 
-    Source: Back, Ko and Kim, 2003 (paper 003 in docs/references.md) for the ARMA models that it starts from; the fit in
+    Source: Back, Ko and Kim, 2003 (paper 003 in docs/evidence/references.md) for its ARMA models; the fit in
     time, intervals and refusals are this project's.
     """
     for name, number in (("most_modes", most_modes), ("modes", modes)):

@@ -44,7 +44,7 @@ class ChartPole:
 
 @dataclass(frozen=True)
 class MassCheck:
-    """The equivalent mass by the method of Back, Ko and Kim, 2003 (paper 003 in docs/references.md).
+    """The equivalent mass by the method of Back, Ko and Kim, 2003 (paper 003 in docs/evidence/references.md).
 
     Attributes:
         closed_form_kg: one simulation; the RMS of the response is proportional to 1/m.

@@ -1,7 +1,7 @@
 """A control's parameter dump as a machine.
 
 :func:`import_parameters` takes from a dump what it says about motion and programs, and from a base machine what it does
-not say. Every value carries the parameter it comes from. See docs/parameters.md.
+not say. Every value carries the parameter it comes from. See docs/reference/parameters.md.
 """
 
 from __future__ import annotations

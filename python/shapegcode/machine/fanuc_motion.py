@@ -1,6 +1,6 @@
 """What a parameter dump says about the motion: limits, acceleration, filters, corners, rapids, servo.
 
-Sources of the meanings stand in docs/parameters.md, with those that no text confirmed.
+Sources of the meanings stand in docs/reference/parameters.md, with those that no text confirmed.
 """
 
 from __future__ import annotations

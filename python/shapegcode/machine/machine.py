@@ -3,7 +3,7 @@
 A machine file is TOML. :class:`Machine` is its model; it and its tables, one file each, are the only place that holds
 defaults for it: every other module takes the values from here. Each key carries its unit, its meaning and, where the
 number is not known for real machines, the remark *assumed*; :func:`key_documentation` turns that into
-``docs/machine.md``.
+``docs/reference/machine.md``.
 """
 
 from __future__ import annotations
@@ -347,7 +347,7 @@ def inherited_text(name: str) -> str:
 
 
 def key_documentation() -> str:
-    """The reference of the machine file's keys as Markdown: what ``docs/machine.md`` holds, word for word.
+    """The reference of the machine file's keys as Markdown: what ``docs/reference/machine.md`` holds, word for word.
 
     Returns:
         The page; ``make docs`` writes it.

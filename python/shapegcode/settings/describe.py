@@ -81,7 +81,7 @@ class _TomlWriter:
     def write(self, machine: TomlTable) -> str:
         self._lines = []
         self._comment(
-            "Machine file of shapegcode. Keys and defaults: docs/machine.md. A key that is left "
+            "Machine file of shapegcode. Keys and defaults: docs/reference/machine.md. A key that is left "
             "out has its default; `shapegcode machine show FILE` prints every value."
         )
         self._lines.append("")

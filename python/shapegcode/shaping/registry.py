@@ -28,7 +28,7 @@ class Family:
     Attributes:
         name: short name, as it is typed and as it stands in reports.
         title: what people call it.
-        source: where it comes from; in full in docs/references.md.
+        source: where it comes from; in full in docs/evidence/references.md.
         validity: for which modes and on which times it exists, and what it does not do.
         continuous: whether it can be designed at continuous times.
         on_grid: whether it can be designed on a grid.

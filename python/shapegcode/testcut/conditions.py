@@ -113,7 +113,7 @@ class CutConditions:
 
 @dataclass(frozen=True)
 class CornerShape:
-    """An inside corner between two straight walls at a right angle (paper 001, figure 1; see docs/references.md).
+    """An inside corner between two straight walls at a right angle (paper 001, figure 1; docs/evidence/references.md).
 
     Attributes:
         allowance_mm: radial depth on the walls; None: 0.1 D of the tool.

@@ -1,4 +1,4 @@
-"""What the corner test tells: measured against expected resultant (paper 001, figure 7; see docs/references.md)."""
+"""What the corner test tells: measured against expected resultant (paper 001, figure 7)."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 @dataclass(frozen=True)
 class CuttingLaw:
-    """The seven coefficients of the force law, as in the tool file's ``[cutting]``; see docs/cutting_force.md.
+    """The seven coefficients of the force law, as in the tool file's ``[cutting]``; see docs/concepts/cutting_force.md.
 
     Attributes:
         specific_n_per_mm2: specific cutting force k1 at a chip 1 mm thick.

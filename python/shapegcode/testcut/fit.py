@@ -31,7 +31,7 @@ def fit_test_cut(
 
     Args:
         cut: the test cut, or its side file.
-        records: files of the passes in their order, or by the number of the pass, from 1; see docs/test_cuts.md.
+        records: files of the passes in their order, or by the number of the pass, from 1; see docs/howto/test_cuts.md.
         forces_on: on what the measured forces act, "workpiece" (as a dynamometer below it measures) or "tool".
         chip_thickness: taper: to which the power laws belong, "mean" of the engagement or "local".
         edge_forces: taper: fit the forces of the edge, K_te and K_re, too.

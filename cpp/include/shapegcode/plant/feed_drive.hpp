@@ -97,7 +97,7 @@ struct FeedDriveLinearModel {
 /// Motor, ball screw and table of one axis with its position and speed controller, integrated by CVODE (BDF with an
 /// analytic Jacobian). Set-points come once per period and are joined by straight lines; the speed that is fed forward
 /// steps at each of them. A copy takes over the state, not the integrator's history: its next step is as accurate, but
-/// not the same to the last digit. docs/feed_drive.md has the equations.
+/// not the same to the last digit. docs/concepts/feed_drive.md has the equations.
 class FeedDrive {
  public:
   /// At rest at zero. `rtol` relative tolerance (of following error, deflections and speeds), `atol_mm` absolute
@@ -144,7 +144,7 @@ class FeedDrive {
 /// Rosenbrock method (L-stable, third order: Rodas3 of Sandu et al. 1997) whose linear systems are solved in place.
 /// After construction no allocation, no lock, no exception. Each step() costs the same, except where a set-point asks
 /// for what no machine follows (metres per second at once): steps that fail there are divided, at most to 21 times the
-/// work. docs/feed_drive.md states the error beside FeedDrive for the usual drives; twice the substeps show it for
+/// work. docs/concepts/feed_drive.md states the error beside FeedDrive for usual drives; twice the substeps show it for
 /// another.
 class FeedDriveRealTime {
  public:

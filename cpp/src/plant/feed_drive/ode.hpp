@@ -58,7 +58,7 @@ class OdeSolver {
   /// Continues at time() from `y`: call it where f jumps (running on over a jump ends in CV_ERR_FAILURE). CVODE forgets
   /// its history, as it must, and searches a first step again. Handing it one was measured and saves little: on a feed
   /// drive 10 % of the evaluations, none of the steps. Where f has only kinks do not restart: the history is worth more
-  /// (a fifth of the evaluations at a quarter of the error, docs/feed_drive.md).
+  /// (a fifth of the evaluations at a quarter of the error, docs/concepts/feed_drive.md).
   void restart(const Eigen::VectorXd& y);
   /// The same with another time, e.g. for the next run of the same plant.
   void restart(const Eigen::VectorXd& y, double t);
