@@ -10,6 +10,7 @@ apart.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,7 @@ __all__ = [
     "legend_below",
     "save",
     "save_all",
+    "svg_text",
 ]
 
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
@@ -196,3 +198,59 @@ def save(drawn: Axes | Figure, file: str | Path) -> None:
             figure.savefig(path, format="svg", metadata={"Date": None})
     else:
         figure.savefig(path, format="png", dpi=150, metadata={"Software": None})
+
+
+_MANY_POINTS = 6000
+_ID = re.compile(r'(\bid="|xlink:href="#|\bhref="#|url\(#)')
+
+
+def svg_text(drawn: Axes | Figure, key: str, *, label: str) -> str:
+    """The picture to which the axes belong as an `svg` element for a page that holds several; same data, same text.
+
+    What has very many points is drawn as pixels inside of it, so that a page stays small.
+
+    Args:
+        drawn: axes or figure.
+        key: stands before each of its ids, unique on the page.
+        label: what it shows, for those who cannot see it.
+
+    Returns:
+        The element, as wide as its place.
+    """
+    import io
+    from html import escape
+
+    import matplotlib
+
+    figure: Any = drawn.figure.figure
+    for artist in figure.findobj(_is_heavy):
+        artist.set_rasterized(True)
+    stream = io.StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": "shapegcode", "svg.fonttype": "none"}):
+        figure.savefig(stream, format="svg", dpi=150, metadata={"Date": None})
+    text = stream.getvalue()
+    text = text[text.index("<svg") :]
+    head, _, body = text.partition(">")
+    box = re.search(r'viewBox="[^"]*"', head)
+    assert box is not None
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+    body = _ID.sub(rf"\g<1>{key}-", body)
+    # matplotlib's style is for every element of a page: keep it inside.
+    body = body.replace('<style type="text/css">*{', f'<style type="text/css">#{key}-svg *{{')
+    width = float(box[0].split()[2])
+    return (
+        f'<svg id="{key}-svg" {box[0]} role="img" aria-label="{escape(label)}" style="max-width:{width * 1.5:.0f}px"'
+        f' xmlns:xlink="http://www.w3.org/1999/xlink">{body.strip()}'
+    )
+
+
+def _is_heavy(artist: Any) -> bool:
+    from matplotlib.collections import Collection
+    from matplotlib.lines import Line2D
+
+    if isinstance(artist, Line2D):
+        return len(artist.get_path()) > _MANY_POINTS
+    if isinstance(artist, Collection):
+        offsets: Any = artist.get_offsets()
+        return sum(map(len, artist.get_paths())) * max(len(offsets), 1) > _MANY_POINTS
+    return False

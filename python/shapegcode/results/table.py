@@ -100,7 +100,8 @@ class Table:
         whole = [[column.heading for column in self.columns], *filled]
         return [[cells[rank] for rank in kept] for cells in whole]
 
-    def _shown(self) -> list[Column]:
+    def shown(self) -> list[Column]:
+        """The columns that are not empty in every row, as `cells` has them."""
         return [column for column in self.columns if not self.rows or any(column.cell(row) for row in self.rows)]
 
     def __str__(self) -> str:
@@ -129,7 +130,7 @@ class Table:
         from rich.table import Table as RichTable
         from rich.text import Text
 
-        shown = self._shown()
+        shown = self.shown()
         table = RichTable(
             box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0),
         )  # fmt: skip

@@ -27,9 +27,13 @@ __all__ = [
     "Page",
     "Part",
     "Picture",
+    "Script",
     "Section",
     "Text",
 ]
+
+Script = Literal["inline", "beside"]
+"""Where the script of a page is: in its file, or in one beside it."""
 
 Light = Literal["green", "amber", "red"]
 """Run it; heed something first; do not."""

@@ -1,0 +1,189 @@
+"""A page as one HTML file that needs no server and no network.
+
+What is text stands in the file as HTML and is read without a script; the motion is drawn by the scripts in
+`shapegcode/data/page`, with Plotly for curves. The file forbids itself every connection (Content-Security-Policy), and
+runs no script but those whose hash it names.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import json
+from functools import cache
+from html import escape
+from importlib import metadata, resources
+from pathlib import Path
+from typing import Any
+
+from shapegcode.errors import ArgumentError
+from shapegcode.io.atomic import write_bytes, write_text
+from shapegcode.results.page.markup import light_sign, prose, section_of
+from shapegcode.results.page.model import Page, Script
+from shapegcode.results.page.scene import packed
+
+__all__ = ["SCRIPTS", "STYLES", "plotly_name", "save", "to_html"]
+
+SCRIPTS = ("page.js",)
+STYLES = ("page.css", "print.css")
+"""Files of `shapegcode/data/page`, in the order in which they are put together."""
+
+
+def to_html(page: Page, script: Script = "inline") -> str:
+    """The file of a page.
+
+    Args:
+        page: what stands on it.
+        script: "inline": with Plotly in it; "beside": Plotly is the file `plotly_name()` in the same folder.
+
+    Returns:
+        HTML, without a reference to anything else.
+
+    Raises:
+        ArgumentError: another `script`.
+    """
+    if script not in ("inline", "beside"):
+        raise ArgumentError(f'script must be "inline" or "beside", not {script!r}')
+    own = _assets(SCRIPTS)
+    before, after = page.sections[: page.before_scene], page.sections[page.before_scene :]
+    parts = [section_of(section) for section in before]
+    scripts = [_data("result", page.report)]
+    allowed = [_hash(own)]
+    if page.scene is not None:
+        head, data = packed(page.scene)
+        head["plotly"] = "" if script == "inline" else plotly_name()
+        parts.append(_asset("scene.html"))
+        scripts.append(_data("scene-head", head))
+        scripts.append(f'<script type="text/plain" id="scene-data">{data}</script>')
+        if script == "inline":
+            text, source = _plotly()
+            allowed.append(text)
+            scripts.append(f'<script type="text/plain" id="plotly-data">{source}</script>')
+        else:
+            allowed += ["'self'", "file:"]
+    parts += [section_of(section) for section in after]
+    policy = (
+        f"default-src 'none'; script-src {' '.join(allowed)}; style-src 'unsafe-inline'; img-src data: blob:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    named = [(section.key, section.title) for section in before]
+    named += [("scene", "Motion")] if page.scene is not None else []
+    named += [(section.key, section.title) for section in after]
+    links = "".join(f'<li><a href="#{escape(key)}">{escape(title)}</a></li>' for key, title in named)
+    body = "\n".join(parts)
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<meta name="generator" content="shapegcode {_version()}">
+<meta name="referrer" content="no-referrer">
+<title>{escape(page.title)}</title>
+<style>{_assets(STYLES)}</style>
+</head>
+<body>
+<header id="top">
+<p class="tools needs-script"><button type="button" id="theme">Dark</button>
+<button type="button" id="print">Print</button></p>
+<h1>{escape(page.title)}</h1>
+{light_sign(page.light)}
+<p class="verdict">{prose(page.verdict)}</p>
+<p class="reason"><b>Why:</b> {prose(page.reason)}</p>
+{_problems(page)}
+</header>
+<nav aria-label="Parts of the page"><ul>{links}</ul></nav>
+<main>
+{body}
+</main>
+<footer><p>Made by shapegcode {_version()}. The numbers are those of the JSON that this file holds:
+<button type="button" id="save-json" class="needs-script">Save the JSON</button></p></footer>
+{chr(10).join(scripts)}
+<script>{own}</script>
+</body>
+</html>
+"""
+
+
+def _problems(page: Page) -> str:
+    if not page.problems:
+        return ""
+    rows = "".join(f"<li>{prose(problem)}</li>" for problem in page.problems)
+    title = "<h2>Heed this about the report itself</h2>"
+    return f'<div class="warning problems" role="alert">{title}<ul>{rows}</ul></div>'
+
+
+def save(page: Page, path: str | Path, script: Script = "inline") -> list[str]:
+    """Write the file of a page; it is either complete or as it was before.
+
+    Args:
+        page: what stands on it.
+        path: of the file.
+        script: "beside": Plotly is written once into the same folder, for all pages there.
+
+    Returns:
+        The files that were written.
+
+    Raises:
+        ArgumentError: another `script`.
+        OSError: a file cannot be written.
+    """
+    text = to_html(page, script)
+    wrote = []
+    if script == "beside" and page.scene is not None:
+        shared = Path(path).parent / plotly_name()
+        source = _plotly_source().encode()
+        if not shared.is_file() or shared.stat().st_size != len(source):
+            write_bytes(shared, source)
+            wrote.append(str(shared))
+    write_text(path, text)
+    return [*wrote, str(path)]
+
+
+def plotly_name() -> str:
+    """Name of the file that holds Plotly's script for the pages beside it."""
+    return f"plotly-{metadata.version('plotly')}.min.js"
+
+
+@cache
+def _plotly_source() -> str:
+    """Read as a file: importing Plotly's package takes longer."""
+    package = metadata.distribution("plotly").locate_file("plotly/package_data/plotly.min.js")
+    return Path(str(package)).read_text(encoding="utf-8")
+
+
+@cache
+def _plotly() -> tuple[str, str]:
+    """Its hash, and the script compressed, in base64: a third of its size, and read only when curves are looked at."""
+    source = _plotly_source()
+    return _hash(source), base64.b64encode(gzip.compress(source.encode(), 9, mtime=0)).decode()
+
+
+@cache
+def _asset(name: str) -> str:
+    return (resources.files("shapegcode") / "data" / "page" / name).read_text(encoding="utf-8")
+
+
+@cache
+def _assets(names: tuple[str, ...]) -> str:
+    return "\n".join(map(_asset, names))
+
+
+@cache
+def _version() -> str:
+    return metadata.version("shapegcode")
+
+
+def _hash(script: str) -> str:
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    return f"'sha256-{digest}'"
+
+
+def _data(key: str, value: Any) -> str:
+    """JSON inside of HTML: what could end the element or start another one is written by its number."""
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    for sign in "<>&\u2028\u2029":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return f'<script type="application/json" id="{key}">{text}</script>'

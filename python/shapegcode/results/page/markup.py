@@ -1,0 +1,240 @@
+"""The parts of a page as HTML that is read without a script. Every text is escaped where it enters."""
+
+from __future__ import annotations
+
+import re
+from html import escape
+
+from shapegcode.results.page.model import (
+    Bars,
+    Figure,
+    Figures,
+    HeatMap,
+    HeatRow,
+    Light,
+    NextSteps,
+    Notes,
+    Part,
+    Picture,
+    Section,
+    Text,
+)
+from shapegcode.results.table import NO_BREAK, Table
+
+__all__ = ["LIGHT_WORDS", "light_sign", "number", "prose", "section_of"]
+
+LIGHT_WORDS: dict[Light, str] = {"green": "Go ahead", "amber": "Heed first", "red": "Do not use"}
+"""What a traffic light says, for those who cannot see its colour."""
+
+_SIGNS: dict[Light, str] = {
+    # Each colour has a shape of its own: disc, triangle, octagon.
+    "green": '<circle cx="16" cy="16" r="14"/><path class="mark" d="M9 16.5l5 5 9-11"/>',
+    "amber": '<path d="M16 2.5 30.5 29h-29z"/><path class="mark" d="M16 12v8m0 3.2v2.2"/>',
+    "red": '<path d="M10.2 2h11.6L30 10.2v11.6L21.8 30H10.2L2 21.8V10.2z"/>'
+    '<path class="mark" d="M10.5 10.5l11 11m0-11l-11 11"/>',
+}
+_STEPS = 5
+_CODE = re.compile(r"`([^`\n]+)`")
+
+
+def light_sign(light: Light) -> str:
+    """A traffic light: its colour, its shape and its word."""
+    sign = f'<svg viewBox="0 0 32 32" aria-hidden="true" class="sign">{_SIGNS[light]}</svg>'
+    return f'<p class="light {light}">{sign}<strong>{LIGHT_WORDS[light]}</strong></p>'
+
+
+def prose(text: str) -> str:
+    """A sentence; what stands between backticks is code."""
+    return _CODE.sub(r"<code>\1</code>", escape(text))
+
+
+def number(value: float, digits: int, *, key: str = "", factor: float = 1.0) -> str:
+    """A number, and where the JSON has it.
+
+    Args:
+        value: as it is shown.
+        digits: behind the point.
+        key: where the JSON holds it: names and ranks with dots between; empty: nowhere.
+        factor: from the number in the JSON to the one shown.
+
+    Returns:
+        A span that holds the text, the value with all digits, and the place.
+    """
+    place = f' data-json="{escape(key)}" data-factor="{factor!r}" data-digits="{digits}"' if key else ""
+    return f'<span class="number" data-value="{value!r}"{place}>{value:z.{digits}f}</span>'
+
+
+def section_of(section: Section) -> str:
+    """A section with its heading.
+
+    Args:
+        section: of the page.
+
+    Returns:
+        A `section`, or where it is folded a `section` that holds `details`.
+    """
+    kinds = ["part", *(["sheet"] if section.sheet else []), *([] if section.printed else ["unprinted"])]
+    how = f'<p class="how"><b>How to read this:</b> {prose(section.how)}</p>' if section.how else ""
+    body = how + "\n".join(_part(part, f"{section.key}-{rank}") for rank, part in enumerate(section.parts))
+    key, title = escape(section.key), f'<h2 id="{escape(section.key)}-title">{escape(section.title)}</h2>'
+    body = f"<details><summary>{title}</summary>\n{body}</details>" if section.folded else f"{title}\n{body}"
+    return f'<section id="{key}" class="{" ".join(kinds)}" aria-labelledby="{key}-title">\n{body}\n</section>'
+
+
+def _part(part: Part, key: str) -> str:
+    match part:
+        case Figures():
+            return '<div class="cards">' + "\n".join(map(_card, part.rows)) + "</div>"
+        case HeatMap():
+            return _heat_map(part)
+        case Bars():
+            return _bars(part)
+        case Notes():
+            return _notes(part)
+        case NextSteps():
+            return _steps(part)
+        case Picture():
+            return _picture(part, key)
+        case Text():
+            kind = ' class="warning"' if part.warning else ""
+            return f"<div{kind}>" + "".join(f"<p>{prose(text)}</p>" for text in part.paragraphs) + "</div>"
+        case Table():
+            return _table(part)
+
+
+def _card(figure: Figure) -> str:
+    after = number(figure.after, figure.digits, key=figure.key_after, factor=figure.factor)
+    unit = f'<span class="unit">{escape(figure.unit)}</span>'
+    lines = [f'<h3 class="name">{escape(figure.name)}</h3>']
+    if figure.before is None:
+        lines.append(f'<p class="value">{after} {unit}</p>')
+    else:
+        before = number(figure.before, figure.digits, key=figure.key_before, factor=figure.factor)
+        arrow = '<span class="arrow" aria-hidden="true">→</span><span class="unseen"> became </span>'
+        lines.append(f'<p class="value"><span class="before">{before}</span> {arrow} {after} {unit}</p>')
+        if figure.before:
+            change = (figure.after - figure.before) / abs(figure.before) * 100.0
+            lines.append(f'<p class="change">{change:+z.0f} %</p>')
+    kind = ""
+    if figure.limit is not None:
+        within = abs(figure.after) <= figure.limit
+        kind = "within" if within else "over"
+        said = "✓ within" if within else "▲ over"
+        limit = f"{number(figure.limit, figure.digits)} {escape(figure.unit)}"
+        lines.append(f'<p class="limit"><b>{said}</b> the limit of {limit}</p>')
+    return f'<div class="card {kind}">' + "".join(lines) + "</div>"
+
+
+def _heat_map(heat: HeatMap) -> str:
+    has_remarks = any(row.remark for row in heat.rows)
+    columns = ["", *heat.columns, *([""] if has_remarks else [])]
+    head = "".join(f'<th scope="col">{escape(name)}</th>' if name else "<td></td>" for name in columns)
+    rows = "\n".join(_heat_row(row, heat.digits, has_remarks) for row in heat.rows)
+    caption = f'<p class="caption">{prose(heat.caption)}</p>' if heat.caption else ""
+    return (
+        _scrolled(f'<table class="heat"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>')
+        + _LEGEND
+        + caption
+    )
+
+
+def _heat_row(row: HeatRow, digits: int, has_remarks: bool) -> str:
+    cells = []
+    for value, share in zip(row.values, row.shares, strict=True):
+        kind, title = _heat(share)
+        said = "–" if value is None else number(value, digits)
+        mark = '<span class="mark">▲</span>' if kind == "heat-over" else ""
+        cells.append(f'<td class="{kind}"{title}>{mark}{said}</td>')
+    if has_remarks:
+        cells.append(f'<td class="remark">{prose(row.remark)}</td>')
+    name = escape(row.name) if row.counts else f"({escape(row.name)})"
+    kind = "" if row.counts else ' class="shown-only"'
+    return f'<tr{kind}><th scope="row">{name}</th>{"".join(cells)}</tr>'
+
+
+def _heat(share: float | None) -> tuple[str, str]:
+    if share is None:
+        return "heat-none", ""
+    title = f' title="{share * 100.0:.0f} % of the limit"'
+    if share > 1.0:
+        return "heat-over", title
+    return f"heat-{min(int(max(share, 0.0) * _STEPS), _STEPS - 1)}", title
+
+
+_LEGEND = (
+    '<p class="legend">Share of the limit: '
+    + " ".join(
+        f'<span class="swatch heat-{step}">{step * 100 // _STEPS}–{(step + 1) * 100 // _STEPS} %</span>'
+        for step in range(_STEPS)
+    )
+    + ' <span class="swatch heat-over"><span class="mark">▲</span>over</span></p>'
+)
+
+
+def _bars(bars: Bars) -> str:
+    longest = max((value for _, values in bars.rows for value in values), default=0.0) or 1.0
+    rows = []
+    for name, values in bars.rows:
+        lines = []
+        for rank, (label, value) in enumerate(zip(bars.labels, values, strict=True)):
+            width = max(value, 0.0) / longest * 100.0
+            lines.append(
+                f'<div class="bar bar-{rank}"><span class="of">{escape(label)}</span>'
+                f'<span class="track"><span class="fill" style="width:{width:.2f}%"></span></span>'
+                f'<span class="said">{number(value, bars.digits)} {escape(bars.unit)}</span></div>'
+            )
+        rows.append(f'<div class="bars-row"><h3>{escape(name)}</h3>{"".join(lines)}</div>')
+    return '<div class="bars">' + "\n".join(rows) + "</div>"
+
+
+def _notes(notes: Notes) -> str:
+    rows = "".join(
+        f"<div{' class=strong' if topic in notes.strong else ''}><dt>{escape(topic)}</dt><dd>{prose(text)}</dd></div>"
+        for topic, text in notes.rows
+    )
+    return f'<dl class="notes">{rows}</dl>'
+
+
+def _steps(steps: NextSteps) -> str:
+    rows = []
+    for step in steps.rows:
+        command = ""
+        if step.command:
+            copy = '<button type="button" class="copy needs-script" aria-label="Copy the command">Copy</button>'
+            command = f'<div class="command"><code tabindex="0">{escape(step.command)}</code>{copy}</div>'
+        rows.append(f"<li>{prose(step.text)}{command}</li>")
+    return '<ol class="steps">' + "".join(rows) + "</ol>"
+
+
+def _picture(picture: Picture, key: str) -> str:
+    from shapegcode.results.plot import svg_text
+
+    name = escape(picture.name.replace("-", " "))
+    svg = svg_text(picture.plot(), key, label=picture.name.replace("-", " "))
+    how = f"<b>How to read this:</b> {prose(picture.how)}" if picture.how else name
+    paper = f'<div class="paper" tabindex="0" role="group" aria-label="Picture: {name}">{svg}</div>'
+    return f'<figure class="picture">{paper}<figcaption>{how}</figcaption></figure>'
+
+
+def _table(table: Table) -> str:
+    headings, *rows = table.cells()
+    columns = table.shown()
+    kinds = ['class="word"' if column.text or column.left else 'class="figure"' for column in columns]
+    head = "".join(f'<th scope="col" {kind}>{escape(name)}</th>' for kind, name in zip(kinds, headings, strict=True))
+    lines = []
+    for rank, (row, cells) in enumerate(zip(table.rows, rows, strict=True)):
+        style = table.row_style(row) if table.row_style else ""
+        marks = [name for name in ("bold", "red", "dim") if name in style]
+        marks += ["parted"] if rank in table.sections and rank else []
+        body = "".join(
+            f"<td {kind}>{escape(cell.replace(NO_BREAK, ' '))}</td>" for kind, cell in zip(kinds, cells, strict=True)
+        )
+        lines.append(f'<tr class="{" ".join(marks)}">{body}</tr>' if marks else f"<tr>{body}</tr>")
+    title = f"<caption>{escape(table.title)}</caption>" if table.title else ""
+    caption = f'<p class="caption">{prose(table.caption)}</p>' if table.caption else ""
+    return _scrolled(f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>") + caption
+
+
+def _scrolled(table: str) -> str:
+    """Wide tables scroll by themselves, also by keys."""
+    return f'<div class="scrolled" tabindex="0" role="group" aria-label="Table">{table}</div>'
