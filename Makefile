@@ -23,6 +23,7 @@ export SUNDIALS_ROOT := $(CURDIR)/.cache/sundials/usr
 
 BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libfmt-dev python3-dev python3-venv doctest-dev
 TEST_PACKAGES := $(BUILD_PACKAGES) clang-format clang-tidy
+DOCS_PACKAGES := $(BUILD_PACKAGES) doxygen
 FUZZ_PACKAGES := $(BUILD_PACKAGES) clang-14 libclang-rt-14-dev libomp-14-dev
 FUZZ_SECONDS ?= 600
 FUZZ_FLAGS := -timeout=5 -rss_limit_mb=2048 -max_len=2000 -dict=tests/fuzz/gcode.dict
@@ -36,23 +37,25 @@ PACKAGE_INPUTS := CMakeLists.txt cmake $(shell find cpp/include cpp/src bindings
 # With the extension module, for the Python of .venv. The tests are configured where their packages are.
 CONFIGURE_RELEASE = cmake --preset release -D SHAPEGCODE_BUILD_PYTHON=ON -D Python_EXECUTABLE=$(CURDIR)/$(BIN)/python \
   -D pybind11_DIR="$$($(BIN)/python -m pybind11 --cmakedir)"
+SPHINX := $(BIN)/python -m sphinx -W --keep-going -n -q -c docs
 PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
-.PHONY: help demo test test-all lint bench coverage fuzz stubs schemas docs format clean \
+.PHONY: help demo test test-all lint bench coverage fuzz stubs schemas pages docs docs-source docs-links format clean \
         build-packages test-packages package dev tidy tidy-all release plain sanitize stub-check \
         test-all-core test-all-python fuzz-parameters fuzz-merge
 
 help:
 	@echo 'make demo    build, convert a first program and a real one of some thousand lines; results in demo-output/'
 	@echo 'make test    what must hold, in minutes: lint, C++ tests, stubs, Python tests'
-	@echo 'make test-all  slow tests, sanitizers, the plain build and clang-tidy of everything as well'
+	@echo 'make test-all  slow tests, sanitizers, the plain build, clang-tidy of everything and the book as well'
 	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy of what changed since the last test-all'
 	@echo 'make coverage  lines of C++ and Python that `make test` runs'
 	@echo 'make bench   measure, with LinuxCNC rs274 as the independent interpreter'
 	@echo 'make fuzz    FUZZ_SECONDS (600) of coverage-guided fuzzing of the program reader; findings in build/fuzz/findings/'
 	@echo 'make stubs   write python/shapegcode/_core.pyi anew from the built module'
 	@echo 'make schemas  write docs/schema/ anew from the classes of the results'
-	@echo 'make docs    write the pages of docs/ that come from the code, docs/schema/ too'
+	@echo 'make docs    the book: build/docs/html/index.html, with every program in it run; make docs-links asks the net too'
+	@echo 'make pages   write the pages of docs/ that come from the code, docs/schema/ too'
 	@echo 'make format  lay out the C++ and Python sources as lint wants them'
 	@echo 'make clean   remove everything that was built or downloaded'
 
@@ -77,6 +80,7 @@ test-all:
 	$(MAKE) test
 	$(MAKE) test-all-core
 	$(MAKE) test-all-python
+	$(MAKE) docs
 	$(BIN)/python tests/tools/full_pass.py write
 
 test-all-core:
@@ -137,8 +141,21 @@ stubs: package dev
 schemas: package dev
 	$(BIN)/python tests/tools/write_schemas.py
 
-docs: schemas
+pages: schemas
 	$(BIN)/python tests/tools/write_docs.py
+
+# Warnings are errors: a link that leads nowhere, a page in no contents, a program that fails.
+docs: docs-source
+	$(SPHINX) -b html build/docs/source build/docs/html
+	@echo 'docs: build/docs/html/index.html'
+
+docs-links: docs-source
+	$(SPHINX) -b linkcheck build/docs/source build/docs/links
+
+docs-source: pages .venv/.docs
+	@mkdir -p build/docs
+	doxygen docs/Doxyfile
+	$(BIN)/python tests/tools/book.py build/docs/source
 
 format: test-packages dev
 	clang-format -i $(CPP_FILES)
@@ -166,6 +183,11 @@ test-packages:
 
 .venv/.dev: .venv/.runtime
 	$(PIP) install -r <($(PYTHON) tests/tools/requirements.py dev)
+	touch $@
+
+.venv/.docs: .venv/.dev
+	@tests/tools/debian_packages.sh $(DOCS_PACKAGES)
+	$(PIP) install -r <($(PYTHON) tests/tools/requirements.py docs)
 	touch $@
 
 # The extension module is built with the core, in one graph for all processors, and only packed by pip. The build folder

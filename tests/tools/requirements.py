@@ -1,4 +1,4 @@
-"""Prints requirements of pyproject.toml, one per line: `requirements.py [build] [runtime] [dev] [fuzz]`."""
+"""Prints requirements of pyproject.toml, one per line: `requirements.py [build] [runtime] [dev] [docs] [fuzz]`."""
 
 import sys
 import tomllib

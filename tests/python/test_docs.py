@@ -1,0 +1,69 @@
+"""The pages of the book hang together: links and anchors lead somewhere, every page is in the contents. No Sphinx."""
+
+from __future__ import annotations
+
+import functools
+import os
+import re
+from pathlib import Path
+
+import book
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [*book.pages(ROOT / "docs"), *(ROOT / name for name in ("README.md", *book.HOUSE))]
+TOCTREE = re.compile(r"^`{3,}\{toctree\}\n(.*?)^`{3,}$", re.MULTILINE | re.DOTALL)
+
+
+@functools.cache
+def anchors(file: Path) -> set[str]:
+    """What a page offers behind `#`, as GitHub and MyST name its headings."""
+    found: dict[str, int] = {}
+    text = re.sub(r"^(`{3,}).*?^\1", "", file.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    for heading in re.findall(r"^#{1,4} +(.+?) *$", text, re.MULTILINE):
+        plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower()
+        slug = re.sub(r"[^\w\- ]", "", plain).replace(" ", "-")
+        found[slug] = found.get(slug, -1) + 1
+    return {slug if number == 0 else f"{slug}-{number}" for slug, last in found.items() for number in range(last + 1)}
+
+
+def test_links_are_found_outside_of_code() -> None:
+    text = "[a](b.md#c) `[no](x.md)` ![p](q.png)\n\n    [no](y.md)\n\n```text\n[no](z.md)\n```\n"
+    text += "[w](https://w.org) [h](#h)\n"
+    assert [target for *_, target in book.links(text)] == ["b.md#c", "q.png"]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_every_link_leads_somewhere(page: Path) -> None:
+    dead = []
+    for *_, target in book.links(page.read_text(encoding="utf-8")):
+        path, _, anchor = target.partition("#")
+        file = Path(os.path.normpath(page.parent / path))
+        if not file.is_file() or (anchor and file.suffix == ".md" and anchor not in anchors(file)):
+            dead.append(target)
+    assert dead == []
+
+
+def test_every_page_is_in_the_contents(tmp_path: Path) -> None:
+    """Of the book as it is laid out, with the pages that come from the code; each page in one place."""
+    place = tmp_path / "book"
+    book.stage(place)
+    listed: list[Path] = []
+    for page in book.pages(place):
+        for body in TOCTREE.findall(page.read_text(encoding="utf-8")):
+            names = [line.strip() for line in body.splitlines() if line.strip() and not line.startswith(":")]
+            listed += [page.parent / f"{name}.md" for name in names]
+    pages = {page for page in book.pages(place) if not page.is_relative_to(place / "files")} - {place / "index.md"}
+    assert sorted(pages - set(listed)) == [], "in no contents"
+    assert sorted(set(listed) - pages) == [], "in the contents, and not there"
+    assert len(listed) == len(set(listed)), "twice in the contents"
+
+
+def test_every_picture_is_shown() -> None:
+    shown = {
+        os.path.normpath(page.parent / target.partition("#")[0])
+        for page in PAGES
+        for *_, target in book.links(page.read_text(encoding="utf-8"))
+    }
+    kept = {str(file) for file in (ROOT / "docs" / "images").iterdir()}
+    assert sorted(kept - shown) == []
