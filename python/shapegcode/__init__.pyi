@@ -173,6 +173,7 @@ from shapegcode.program.result import Expansion as Expansion
 from shapegcode.results.motion_plots import View as View, plot_feed as plot_feed, plot_vibration as plot_vibration
 from shapegcode.results.path_plots import plot_path as plot_path
 from shapegcode.results.result import Pair as Pair, Result as Result, Xyz as Xyz
+from shapegcode.results.revive import load_result as load_result
 from shapegcode.results.table import Column as Column, Table as Table
 from shapegcode.results.trace import Trace as Trace
 from shapegcode.shaping import (

@@ -75,7 +75,7 @@ def _commands() -> dict[str, str]:
     rows, found = [], {}
     with _page_width(88):
         for command in cli.COMMANDS:
-            whole = cli._build_parser(command.name)
+            whole = cli.parser_of(command.name)
             own = next(each for each in parsers(whole) if each.prog.split()[1:] == [command.name])
             parts = [f"# `shapegcode {command.name}`\n\n{command.help[:1].upper()}{command.help[1:]}.\n"]
             for each in parsers(own):

@@ -23,6 +23,7 @@ from shapegcode.checking.result import (
 )
 from shapegcode.checking.runs import BlockTable, Breaker, CuttingRun, block_table, look_ahead_breakers
 from shapegcode.machine import Machine
+from shapegcode.model.playable import PlayedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program
 from shapegcode.program.operating import no_room
@@ -100,6 +101,7 @@ def check_text(
     too_long = len(data) > machine.controller.max_program_bytes  # and no more of it may have been read
     short: ShortBlocks | None = None
     dnc: SerialLine | None = None
+    played: PlayedPrograms | None = None
     try:
         program = Program.from_text(
             data, machine, source=source, program_number=program_number, collect_alarms=not too_long, folder=folder
@@ -116,6 +118,8 @@ def check_text(
         found += _breaker_findings(program, look_ahead_breakers(program, machine, table))
         found += _feed_findings(program, table)
         found += _low_feed_findings(program, machine)
+        if not program.core.alarms:
+            played = PlayedPrograms(program, machine, labels=("program", ""))
         short = _short_blocks(program, machine, table)
         found += _short_findings(program, machine, table.runs)
         if machine.controller.dnc_baud > 0:
@@ -132,6 +136,7 @@ def check_text(
         machine.controller.program_memory_bytes,
         short,
         dnc,
+        played=played,
     )
 
 

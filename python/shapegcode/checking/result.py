@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
+from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program.operating import no_room
+from shapegcode.results.json import hidden
+from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Result
 from shapegcode.results.table import Column, Table
 
@@ -174,6 +177,7 @@ class Check(Result):
         memory_bytes: of the control.
         short_blocks: blocks that last less than the block time; None: the program was not read.
         dnc: the serial line; None: not drip fed, or not read.
+        played: the program, to play it for a page; None: the control refuses something in it.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "refused": bool}
@@ -187,6 +191,7 @@ class Check(Result):
     memory_bytes: int
     short_blocks: ShortBlocks | None
     dnc: SerialLine | None
+    played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     @property
     def refused(self) -> bool:
@@ -207,6 +212,13 @@ class Check(Result):
     def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
         """The listed findings that are warnings, each with its place."""
         return tuple(f"{each.place}: {each.message}" for each in self.findings if each.severity == "warning")
+
+    def key_figures(self) -> tuple[Figure, ...]:
+        """How many alarms, warnings and notes."""
+        return tuple(
+            Figure(f"{name}s", "", None, float(count), 0, key_after=f"counts.{name}")
+            for name, count in vars(self.counts).items()
+        )
 
     @property
     def answer(self) -> str:

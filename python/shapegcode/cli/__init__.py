@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-__all__ = ["COMMANDS", "Command", "ExitCode", "main"]
+__all__ = ["COMMANDS", "Command", "ExitCode", "main", "parser_of"]
 
 _DEBUG = "--debug"
 
@@ -73,6 +73,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("characterize", "measure a controller with test programs, and fit the machine file to the results"),
     Command("identify", "find vibration modes in a tap test or decay, and put them into the machine file"),
     Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
+    Command("report", "make pages of results that --json has written"),
     Command("demo", "repeat the figures of a paper beside the published ones"),
 )
 """Every sub-command, in the order of the help text. A new one needs a row here and a module of its name."""
@@ -92,7 +93,7 @@ class _Version(argparse.Action):
         parser.exit(ExitCode.OK)
 
 
-def _build_parser(selected: str | None) -> argparse.ArgumentParser:
+def parser_of(selected: str | None) -> argparse.ArgumentParser:
     """The parser with the arguments of the selected command; the others stay names with a help line."""
     parser = argparse.ArgumentParser(
         prog="shapegcode",
@@ -145,7 +146,8 @@ def _message(error: Exception) -> str:
 
 def _run(argv: list[str]) -> int:
     selected = next((word for word in argv if not word.startswith("-")), None)
-    args = _build_parser(selected).parse_args(argv)
+    args = parser_of(selected).parse_args(argv)
+    args.typed = tuple(argv)
     try:
         if getattr(args, "program", None) == "all":
             several = importlib.import_module(f"{__name__}.several")

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, add_plots_argument, load_machine
+from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -74,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where the tests may move, in mm from the point at which they are started (default: %(default)s); write "
         "--box=-50:0,... if it begins with a minus sign",
     )
-    add_json_argument(parser)
+    add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

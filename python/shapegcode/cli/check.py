@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_input_arguments, load_machine
+from shapegcode.cli.options import add_input_arguments, add_result_arguments, load_machine
 
 __all__ = ["add_arguments", "run"]
 
@@ -19,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Exit code 0: nothing of both; 1: warnings; 2: at least one alarm."
     )
     add_input_arguments(parser, metavar="PROGRAM")
-    add_json_argument(parser)
+    add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,12 +7,12 @@ import importlib
 import threading
 from typing import TYPE_CHECKING, Any
 
-from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.feed import add_cutting_arguments
 from shapegcode.cli.options import (
     add_machine_argument,
     add_plots_argument,
     add_program_argument,
+    add_result_arguments,
     load_machine,
     output_file,
 )
@@ -100,7 +100,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_cutting_arguments(parser, required=False)
     add_program_argument(parser)
     add_plots_argument(parser)
-    add_json_argument(parser)
+    add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,7 +6,7 @@ import argparse
 import importlib
 from collections.abc import Callable
 
-from shapegcode.cli.console import add_json_argument
+from shapegcode.cli.options import add_result_arguments
 
 __all__ = ["add_arguments", "run"]
 
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help=f"folder for the pictures, where there are some (PNG and SVG; default: {_FOLDER})",
     )
-    add_json_argument(parser)
+    add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_input_arguments, load_machine
+from shapegcode.cli.options import add_input_arguments, add_result_arguments, load_machine
 
 __all__ = ["add_arguments", "run"]
 
@@ -25,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="expand",
         help="G41/G42 as plain moves of the tool centre, or as they stand (default: %(default)s)",
     )
-    add_json_argument(parser)
+    add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -5,8 +5,13 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_input_arguments, add_plots_argument, load_machine, output_file
+from shapegcode.cli.options import (
+    add_input_arguments,
+    add_plots_argument,
+    add_result_arguments,
+    load_machine,
+    output_file,
+)
 from shapegcode.cli.typed import micrometres, share
 
 __all__ = ["add_arguments", "add_cutting_arguments", "read_cutting_arguments", "run"]
@@ -80,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "write pictures (PNG and SVG) into this folder: force, feed and engagement along the path, the path coloured "
         "by force before and after, the error of the wall",
     )
-    add_json_argument(parser)
+    add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

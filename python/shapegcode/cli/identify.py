@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli import modes, options, typed
-from shapegcode.cli.console import add_json_argument
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -86,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_plots_argument(
         parser, "write pictures (PNG and SVG) of records, fit and stabilisation into this folder"
     )
-    add_json_argument(parser)
+    options.add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapegcode.cli import modes
-from shapegcode.cli.console import add_json_argument
+from shapegcode.cli.options import add_result_arguments
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     modes.add_modes_arguments(take, "--keep-modes")
     take.add_argument("--name", metavar="NAME", help="name of the machine (default: that of the dump's file)")
     take.add_argument("--force", action="store_true", help="overwrite an existing file")
-    add_json_argument(take)
+    add_result_arguments(take)
 
     show = actions.add_parser(
         "show",
@@ -73,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "from another machine, assumed, a choice, stated in the file, or a default.",
     )
     show.add_argument("machine", metavar="FILE_OR_NAME", help="machine file, or name of a built-in machine")
-    add_json_argument(show)
+    add_result_arguments(show)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -5,8 +5,13 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_program_argument, load_machine
+from shapegcode.cli.options import (
+    add_machine_argument,
+    add_plots_argument,
+    add_program_argument,
+    add_result_arguments,
+    load_machine,
+)
 from shapegcode.cli.typed import line_range, micrometres
 
 __all__ = ["add_arguments", "run"]
@@ -58,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--all", action="store_true", help="show every section (default: the 12 with the largest contour error)"
     )
     add_plots_argument(parser, "write pictures of part, walls and width (PNG and SVG) into this folder")
-    add_json_argument(parser)
+    add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

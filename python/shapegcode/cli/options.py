@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.typed import program_choice
 
 if TYPE_CHECKING:
@@ -46,6 +47,28 @@ def add_plots_argument(
 ) -> None:
     """Declare ``--plots DIR``; *what* is its help."""
     parser.add_argument("--plots", metavar="DIR", default=None, help=what)
+
+
+def add_result_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what every command with a result has: ``--json FILE``, ``--html FILE``, ``--html-script``."""
+    add_json_argument(parser)
+    parser.add_argument(
+        "--html",
+        metavar="FILE",
+        default=None,
+        help="write the result as a page: one file that any browser opens, without a network",
+    )
+    add_script_argument(parser)
+
+
+def add_script_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--html-script``."""
+    parser.add_argument(
+        "--html-script",
+        choices=("inline", "beside"),
+        default="inline",
+        help="the page's script in its file (default), or in one beside it, which other pages share",
+    )
 
 
 def add_program_argument(parser: argparse.ArgumentParser) -> None:

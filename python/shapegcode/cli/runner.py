@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli import console as terminal
+from shapegcode.cli.made import given_files, made_by
 from shapegcode.io.atomic import write_bytes
 
 if TYPE_CHECKING:
@@ -28,11 +29,9 @@ if TYPE_CHECKING:
 
 __all__ = ["check_files", "finish", "progress"]
 
-# Options that name a file which a command reads, and those that name one which it writes.
-_READ = (
-    "input", "inputs", "files", "machine", "tool", "stock", "against", "records", "cut", "update", "dump", "base",
-)  # fmt: skip
-_WRITTEN = ("output", "json", "csv", "npz")
+# Options that name a file which a command writes.
+_WRITTEN = ("output", "json", "csv", "npz", "html")
+_NEVER_PIPED = {"npz": "an archive", "html": "a page"}
 
 
 def check_files(
@@ -55,18 +54,14 @@ def check_files(
     piped = ["-o -" if name == "output" else f"--{name} -" for name, value in given.items() if value == "-"]
     if len(piped) > 1:
         raise ArgumentError(f"{' and '.join(piped)}: only one of them can have standard output")
-    if given.get("npz") == "-":
-        raise ArgumentError("--npz -: an archive cannot go to standard output, name a file")
+    for name, what in _NEVER_PIPED.items():
+        if given.get(name) == "-":
+            raise ArgumentError(f"--{name} -: {what} cannot go to standard output, name a file")
     targets = [Path(value) for value in (*given.values(), *also_written) if value != "-"]
-    refuse_same_file(targets, [*_read_files(args), *map(Path, also_read)])
+    read = [Path(name) for _, name in given_files(args)]
+    refuse_same_file(targets, [*read, *map(Path, also_read)])
     for rank, target in enumerate(targets):
         refuse_same_file([target], targets[rank + 1 :])
-
-
-def _read_files(args: argparse.Namespace) -> list[Path]:
-    named: list[Any] = [getattr(args, name, None) for name in _READ]
-    flat = [entry for value in named for entry in (value if isinstance(value, list | tuple) else [value])]
-    return [Path(entry) for entry in flat if entry is not None]
 
 
 def standard_output(args: argparse.Namespace) -> str | None:
@@ -107,6 +102,32 @@ def _write(report: dict[str, Any], json: str | None, output: tuple[str | Path, b
         terminal.write_json(report, json)
 
 
+def _write_page(
+    result: Result,
+    args: argparse.Namespace,
+    report: dict[str, Any],
+    output: tuple[str | Path, bytes] | None,
+    wrote: Sequence[str | Path],
+) -> list[str]:
+    """Say in the JSON what it was made of, and write --html; gives the files."""
+    html = getattr(args, "html", None)
+    if html is None and getattr(args, "json", None) is None:
+        return []  # nobody looks at the hashes
+    from dataclasses import replace
+
+    from shapegcode.results.json import plain
+
+    made = made_by(result, args, output, wrote)
+    report["made"] = plain(made)
+    if html is None:
+        return []
+    from shapegcode.results.page.html import save
+
+    with progress(f"writing {html}", args) as bar:
+        page = result.page(made=made, on_progress=bar.update)
+        return save(replace(page, report=report), html, getattr(args, "html_script", "inline"))
+
+
 def finish(
     result: Result,
     args: argparse.Namespace,
@@ -117,11 +138,11 @@ def finish(
     wrote: Sequence[str | Path] = (),
     output: tuple[str | Path, bytes] | None = None,
 ) -> int:
-    """Write --json, --plots and the program, and say it: answer first, tables, warnings, notes, files, next step.
+    """Write --json, --html, --plots and the program, and say it: answer, tables, warnings, notes, files, next step.
 
     Args:
         result: what was found.
-        args: of the command; `json` and `plots` are looked at where they are there.
+        args: of the command; `json`, `html` and `plots` are looked at where they are there.
         tables: to show; None: those of the result.
         warnings: to show; None: those of the result.
         notes: further lines, below the warnings.
@@ -144,6 +165,7 @@ def finish(
         report["plots"] = pictures
     if output is not None:
         report["output"] = str(output[0])
+    pages = _write_page(result, args, report, output, wrote)
     several: Gathered | None = getattr(args, "several", None)
     if several is not None:
         several.add(report, output)
@@ -163,7 +185,7 @@ def finish(
         console.print(warning_table(said))
     for note in notes:
         say(note)
-    for file in (*wrote, *([output[0]] if output is not None and several is None else [])):
+    for file in (*wrote, *pages, *([output[0]] if output is not None and several is None else [])):
         say(f"wrote {file}")
     if plots is not None:
         say(f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: none are drawn of this")

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["run_all"]
 
-_TABLES = ("csv", "npz")
+_TABLES = ("csv", "npz", "html")
 _COMMENT = re.compile(rb"\([^()\r\n]*\)")
 _RETURNS, _ENDS = re.compile(rb"M *0*99(?!\d)"), re.compile(rb"M *0*(?:2|30)(?!\d)")
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 
-from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, add_plots_argument, load_machine
+from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import positive, ratio, seconds, share
 
 __all__ = ["add_arguments", "run"]
@@ -83,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     add("--all", action="store_true", help="show every design in the table")
     add_plots_argument(parser, "write pictures of the comparison (PNG and SVG) into this folder")
-    add_json_argument(parser)
+    add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

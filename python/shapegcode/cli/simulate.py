@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_input_arguments, add_plots_argument, load_machine
+from shapegcode.cli.options import add_input_arguments, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import count, line_range
 
 __all__ = ["add_arguments", "run"]
@@ -68,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "write pictures (PNG and SVG) into this folder: the motion in time, and path, feed and vibration of the region "
         "that vibrates most",
     )
-    add_json_argument(parser)
+    add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,8 +6,7 @@ import argparse
 import math
 from typing import TYPE_CHECKING, Any
 
-from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_machine_argument, add_plots_argument, load_machine
+from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import positive, program_number
 
 if TYPE_CHECKING:
@@ -90,7 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             needed: dict[str, Any] = {"required": True} if default is _NEEDED else {"default": default}
             cut.add_argument(*names.split(), metavar=metavar, type=kind, help=said, **needed)
         cut.add_argument("--up", action="store_true", help="up milling, material on the left (default: down milling)")
-        add_json_argument(cut)
+        add_result_arguments(cut)
     _add_fit(actions)
 
 
@@ -121,7 +120,7 @@ def _add_fit(actions: Any) -> None:
     fit.add_argument("--edge-forces", action="store_true", help="taper: fit the forces of the edge, K_te and K_re, too")
     fit.add_argument("-o", "--output", metavar="FILE", help="taper: write the table [cutting] (TOML)")
     add_plots_argument(fit, "write pictures (PNG and SVG) of measured and expected forces into this folder")
-    add_json_argument(fit)
+    add_result_arguments(fit)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from shapegcode.cli.console import add_json_argument
-from shapegcode.cli.options import add_input_arguments, add_plots_argument, load_machine
+from shapegcode.cli.options import add_input_arguments, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import override, ratio
 
 __all__ = ["add_arguments", "run"]
@@ -41,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--blocks", action="store_true", help="put every block into the JSON")
     parser.add_argument("--csv", metavar="FILE", default=None, help="write one line per block; - for standard output")
     add_plots_argument(parser, "write the picture of where the time goes (PNG and SVG) into this folder")
-    add_json_argument(parser)
+    add_result_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

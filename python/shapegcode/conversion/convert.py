@@ -33,6 +33,7 @@ from shapegcode.conversion.whole_text import TextWriter, Written, why_kept
 from shapegcode.machine import Machine
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import machine_warnings, region_range_warnings
+from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
 from shapegcode.program.compensation import read_for_conversion, require_decision
 from shapegcode.program.stamp import RAPID_MARK, REGION_MARK, STAMP_BEGIN, judged
@@ -361,6 +362,7 @@ class _Run:
             emitted=settled.emitted,
             placed=tuple(written.placed),
             model=self.model,
+            played=PlayedPrograms(program, machine, settled.emitted, plant=machine.verdict.plant),
         )
 
     def _rests_on(self, settled: _Settled, figures: PlayedFigures) -> tuple[tuple[RestsOn, ...], int]:

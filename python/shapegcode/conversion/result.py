@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 from shapegcode.conversion.benefit import KeptRegion
@@ -22,9 +22,12 @@ from shapegcode.conversion.tables import (
     rests_table,
 )
 from shapegcode.model.machine_model import MachineModel
+from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
 from shapegcode.results.figures import CONTOURS, ContourError
 from shapegcode.results.json import exact, hidden, sparse
+from shapegcode.results.made import Made
+from shapegcode.results.page.model import Light, Page, Section
 from shapegcode.results.result import Pair, Plot, Result, Xyz
 from shapegcode.results.table import Table
 
@@ -63,6 +66,7 @@ class Conversion(PlayedFigures, Result):
         emitted: the same, read back.
         placed: the shaped regions and their places in it.
         model: the machine that it was played on.
+        played: original and emitted program, to play them again for a page.
     """
 
     json_extra: ClassVar[dict[str, Any]] = Result.json_extra | {"within_tolerance": bool, "recommendation": str}
@@ -91,6 +95,7 @@ class Conversion(PlayedFigures, Result):
     emitted: Program = field(metadata=hidden())
     placed: tuple[Placed, ...] = field(metadata=hidden())
     model: MachineModel = field(metadata=hidden())
+    played: PlayedPrograms | None = field(default=None, compare=False, metadata=hidden())
 
     @property
     def ok(self) -> bool:
@@ -175,10 +180,13 @@ class Conversion(PlayedFigures, Result):
         """Original against emitted; the cases of the verdict; what it rests on. None where nothing was shaped."""
         if self.nothing_shaped:
             return []
-        groups = [self._times(), *self._vibrations(), *self._contours(), self._orbits(), self._feeds(), self._sizes()]
         cases = [case_table(self.cases, self.worst_case)] if self.cases else []
         rests = [rests_table(self.rests_on, self.unmeasured_tried)] if self.rests_on else []
-        return [before_after_table(groups), *cases, *rests, control_table(self.at_the_control)]
+        return [before_after_table(self.before_after()), *cases, *rests, control_table(self.at_the_control)]
+
+    def before_after(self) -> list[list[BeforeAfter]]:
+        """Every figure of original and emitted, in groups."""
+        return [self._times(), *self._vibrations(), *self._contours(), self._orbits(), self._feeds(), self._sizes()]
 
     def _times(self) -> list[BeforeAfter]:
         pairs = (("cycle time", self.cycle_time_s), ("cutting time", self.cutting_time_s))
@@ -193,14 +201,21 @@ class Conversion(PlayedFigures, Result):
                     "µm",
                     both.original[axis],
                     both.emitted[axis],
-                    limit=self._residual_limit(axis) if name.startswith("residual") else None,
+                    limit=self.residual_limit_um(axis) if name.startswith("residual") else None,
                 )
                 for axis in "xyz"
                 if both.original[axis] or both.emitted[axis]
             ]
 
-    def _residual_limit(self, axis: str) -> float | None:
-        """Limit of the region with the largest emitted residual, the one that the table shows."""
+    def residual_limit_um(self, axis: str) -> float | None:
+        """Limit of the region with the largest emitted residual, the one that is shown.
+
+        Args:
+            axis: "x", "y" or "z".
+
+        Returns:
+            The limit; None: nothing was shaped.
+        """
         worst = max(self.regions, key=lambda each: each.residual_vibration_um.emitted[axis], default=None)
         return None if worst is None else worst.residual_limit_um[axis]
 
@@ -251,3 +266,41 @@ class Conversion(PlayedFigures, Result):
     def plots(self) -> Mapping[str, Plot]:
         """`path`, `feed` and `vibration` of the region that vibrates most, before and after."""
         return self._drawn_beside()
+
+    @property
+    def light(self) -> tuple[Light, str]:
+        """Colour of the traffic light on its page, and the reason."""
+        found: tuple[Light, str] = self._beside("page").light_of(self)
+        return found
+
+    def page(self, **options: Any) -> Page:
+        """The conversion as a page, see `Result.page`; the emitted program stands there with its verdict.
+
+        Args:
+            options: of `Result.page`.
+
+        Returns:
+            The page, as data.
+
+        Raises:
+            MachineError, NumericError: a program cannot be played.
+        """
+        page = super().page(**options)
+        if page.scene is None or self.from_json:
+            return page
+        # It was read back before it had one.
+        *others, last = page.scene.variants
+        told = replace(last, text=self.text.decode("utf-8", "replace"))
+        return replace(page, scene=replace(page.scene, variants=(*others, told)))
+
+    def page_sections(self, made: Made | None = None) -> tuple[Section, ...]:
+        """What it gains, what that rests on, where the time goes, and the operator's run sheet.
+
+        Args:
+            made: of what it was made; None: it is not known.
+
+        Returns:
+            The sections.
+        """
+        found: tuple[Section, ...] = self._beside("page").sections_of(self, made)
+        return found

@@ -24,6 +24,7 @@ from shapegcode.feed.result import (
 from shapegcode.feed.survey import Survey
 from shapegcode.feed.walk import SurveyedMove, SurveyedRegion
 from shapegcode.machine import Machine
+from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
 from shapegcode.results.result import Pair
 
@@ -86,6 +87,7 @@ def feed_figures(
         survey=surveyed,
         plans=tuple(plans),
         loads=tuple(loads),
+        played=PlayedPrograms(program, machine, written),
     )
 
 

@@ -11,8 +11,10 @@ from shapegcode.feed.load import PathLoad
 from shapegcode.feed.plan import FeedPlan
 from shapegcode.feed.survey import Survey
 from shapegcode.feed.traces import FeedTraces, WallMaps, feed_traces, wall_maps
+from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
 from shapegcode.results.json import hidden
+from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Pair, Plot, Result
 from shapegcode.results.table import Column, Table
 
@@ -184,6 +186,7 @@ class FeedSchedule(Result):
         survey: what the tool meets.
         plans: the feeds of each region that may change; None for the others.
         loads: along each region; None where nothing is known.
+        played: the program before and after, to play both for a page.
     """
 
     program: str
@@ -206,6 +209,7 @@ class FeedSchedule(Result):
     survey: Survey = field(metadata=hidden())
     plans: tuple[FeedPlan | None, ...] = field(metadata=hidden())
     loads: tuple[PathLoad | None, ...] = field(metadata=hidden())
+    played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     @property
     def misses(self) -> tuple[str, ...]:
@@ -250,6 +254,16 @@ class FeedSchedule(Result):
     def walls(self) -> WallMaps | None:
         """The form error of the walls along the cutting path; None where none are made."""
         return None if self.traces is None else wall_maps(self.survey, self.loads, self.traces)
+
+    def key_figures(self) -> tuple[Figure, ...]:
+        """Time and largest force, before and after."""
+        time, force = self.cycle_time_s, self.resultant_force_n
+        return (
+            Figure("cycle time", "s", time.original, time.emitted, 2,
+                   key_before="cycle_time_s.original", key_after="cycle_time_s.emitted"),
+            Figure("largest cutting force", "N", force.original.max, force.emitted.max, 0,
+                   key_before="resultant_force_n.original.max", key_after="resultant_force_n.emitted.max"),
+        )  # fmt: skip
 
     def tables(self) -> list[Table]:
         """Before and after; what holds the feed of which lines."""

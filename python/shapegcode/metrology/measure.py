@@ -22,6 +22,7 @@ from shapegcode.metrology.result import MeasuredProgram, MeasuredRegion, Measure
 from shapegcode.metrology.section import MeasuredSection, WallProfile
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import machine_warnings, region_range_warnings
+from shapegcode.model.playable import PlayedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program, given_program
 
@@ -137,7 +138,15 @@ def measure(
         roughness_lambda_s_mm=lambda_s_mm,
         contour_tolerance_um=limit_um,
         programs=tuple(measured),
+        played=_played(several, machine, plant),
     )
+
+
+def _played(programs: Sequence[Program], machine: Machine, plant: str) -> PlayedPrograms:
+    """The first two programs, under the names of their files."""
+    names = [Path(program.source).name for program in programs]
+    second = programs[1] if len(programs) > 1 else None
+    return PlayedPrograms(programs[0], machine, second, labels=(names[0], names[-1]), plant=plant)
 
 
 def _judged(programs: Sequence[tuple[str, bool, str]]) -> list[bool]:

@@ -10,6 +10,7 @@ from shapegcode import _core
 from shapegcode.metrology.figures import SidedError
 from shapegcode.metrology.section import MeasuredSection
 from shapegcode.metrology.tables import section_table, summary_table
+from shapegcode.model.playable import PlayedPrograms
 from shapegcode.results.figures import Tracks, largest_xyz_um
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Plot, Result, Xyz
@@ -166,6 +167,7 @@ class Measurement(Result):
         roughness_lambda_s_mm: short-wave cut-off; 0: none.
         contour_tolerance_um: of the machine file (`tolerance.contour_um`).
         programs: in the order in which they were given.
+        played: the first two of them, to play them again for a page.
     """
 
     machine: str
@@ -177,6 +179,7 @@ class Measurement(Result):
     roughness_lambda_s_mm: float
     contour_tolerance_um: float
     programs: tuple[MeasuredProgram, ...]
+    played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     @property
     def ok(self) -> bool:

@@ -21,6 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from shapegcode.results.made import Made
+
 __all__ = ["exact", "hidden", "plain", "schema", "sparse", "to_text"]
 
 _DIGITS = 9
@@ -128,7 +130,7 @@ def schema(result: type) -> dict[str, Any]:
 
     Args:
         result: the class. One with `json_extra` (names to types) has those keys too, and where the command wrote
-            pictures and a program, their names under `plots` and `output`.
+            pictures and a program, their names under `plots` and `output`; under `made` of what it was made.
 
     Returns:
         The schema.
@@ -150,7 +152,7 @@ def _object(
     shown = {field.name: hints[field.name] for field in dataclasses.fields(cls) if not field.metadata.get("hidden")}
     shown |= getattr(cls, "json_extra", {})
     left_out = {field.name for field in dataclasses.fields(cls) if field.metadata.get("sparse")}
-    written: dict[str, Any] = {"plots": tuple[str, ...], "output": str} if files else {}
+    written: dict[str, Any] = {"plots": tuple[str, ...], "output": str, "made": Made} if files else {}
     properties = {}
     for name, hint in (shown | written).items():
         properties[name] = _of(arguments.get(hint, hint), definitions)

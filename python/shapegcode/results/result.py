@@ -5,138 +5,196 @@
 >>> time.to_dict()                       # what --json writes
 >>> print(time.tables()[0])              # what the command shows
 >>> time.plots()["time"](ax)             # draws into the caller's axes
-
-The same fields give JSON, table, picture and page. A result's pictures are drawn by the module `plots` beside it, which
-is loaded when somebody asks for them.
+>>> time.report("time.html")             # the page that --html writes
+>>> time.to_pandas("regions")            # a table for pandas
 """
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Protocol
 
-from shapegcode.results.json import plain
+from shapegcode.results.outcome import Outcome, Pair, Plot, Xyz
 
 if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
     from matplotlib.axes import Axes
 
-    from shapegcode.results.table import Table
+    from shapegcode.results.made import Made
+    from shapegcode.results.page.model import Figure, Light, Page, Script, Section
+    from shapegcode.results.page.scene import Scene
 
-__all__ = ["Pair", "Plot", "Result", "Xyz"]
-
-T = TypeVar("T")
-
-Plot = Callable[..., "Axes"]
-"""Draws one picture: ``plot(ax=None) -> Axes``, into the caller's axes or into a new figure."""
+__all__ = ["Pair", "Playable", "Plot", "Result", "Xyz"]
 
 
-@dataclass(frozen=True)
-class Pair(Generic[T]):
-    """A figure before and after.
+class Playable(Protocol):
+    """What can be played again for a page: a program, or two of them, on a machine."""
 
-    Attributes:
-        original: of the program as it was.
-        emitted: of the program as it was written.
-    """
-
-    original: T
-    emitted: T
-
-
-@dataclass(frozen=True)
-class Xyz(Generic[T]):
-    """One value per axis.
-
-    Attributes:
-        x: of X.
-        y: of Y.
-        z: of Z.
-    """
-
-    x: T
-    y: T
-    z: T
-
-    def __iter__(self) -> Iterator[T]:
-        """X, Y, Z."""
-        return iter((self.x, self.y, self.z))
-
-    def __getitem__(self, axis: str) -> T:
-        """The value of "x", "y" or "z"."""
-        if axis not in ("x", "y", "z"):
-            raise KeyError(axis)
-        value: T = getattr(self, axis)
-        return value
-
-
-class Result:
-    """Base of every result. A class that inherits it is a frozen dataclass and says what is abstract here.
-
-    `json_extra` names the properties that the JSON holds beside the fields, with their types.
-    """
-
-    json_extra: ClassVar[dict[str, Any]] = {"ok": bool, "warnings": tuple[str, ...], "next_step": str}
-
-    warnings: tuple[str, ...]
-
-    @property
-    def ok(self) -> bool:
-        """Whether it is done and within tolerance."""
-        raise NotImplementedError
-
-    @property
-    def answer(self) -> str:
-        """What was asked, answered in one line: the first that the command says."""
-        raise NotImplementedError
-
-    @property
-    def next_step(self) -> str:
-        """The one thing to do next, in one sentence."""
-        raise NotImplementedError
-
-    @property
-    def exit_code(self) -> int:
-        """Of the command: 0 done and within tolerance, 1 done but out of tolerance, 2 refused."""
-        return 0 if self.ok else 1
-
-    def to_dict(self) -> dict[str, Any]:
-        """What ``--json`` writes: the fields and `json_extra`, as JSON knows them; see `shapegcode.results.json`."""
-        found: dict[str, Any] = plain(self)
-        return found
-
-    def tables(self) -> list[Table]:
-        """What the command shows below its answer, in this order."""
-        return []
-
-    def plots(self) -> Mapping[str, Plot]:
-        """What can be drawn of it, by name; each is called as ``plot(ax=None)`` and returns the axes."""
-        return {}
-
-    def save_plots(self, folder: str | Path) -> list[str]:
-        """Write every picture as PNG and SVG into a folder, which is made where it is missing.
+    def scene(self, on_progress: Callable[[float], None] = ...) -> Scene | None:
+        """Play it.
 
         Args:
-            folder: where to; made where it is missing.
+            on_progress: called with the share that is done.
+
+        Returns:
+            The motion; None: nothing moves.
+        """
+
+
+class Result(Outcome):
+    """Base of every result. A class that inherits it is a frozen dataclass and says what is abstract in `Outcome`."""
+
+    @property
+    def played(self) -> Playable | None:
+        """What was played, to play it again for a page; a result of programs has a field of this name."""
+        return None
+
+    @property
+    def light(self) -> tuple[Light, str]:
+        """Colour of the traffic light on its page, and the reason."""
+        if not self.ok:
+            return "red", self.next_step
+        if said := len(self.warnings):
+            return "amber", f"{said} warning{'s' if said > 1 else ''} to heed first"
+        return "green", "done and within tolerance, without a warning"
+
+    @property
+    def page_title(self) -> str:
+        """Heading of its page: what was done with what."""
+        from shapegcode.results.page.default import title_of
+
+        return title_of(self)
+
+    def key_figures(self) -> tuple[Figure, ...]:
+        """The few figures that stand first on its page; none as a rule."""
+        return ()
+
+    def page_sections(self, made: Made | None = None) -> tuple[Section, ...]:
+        """What stands on its page between the verdict and what it was made of.
+
+        Args:
+            made: of what the result was made; None: it is not known.
+
+        Returns:
+            Tables and pictures, unless the class has more to show.
+        """
+        from shapegcode.results.page.default import sections_of
+
+        return sections_of(self, self.key_figures())
+
+    def page(
+        self,
+        *,
+        motion: bool = True,
+        made: Made | None = None,
+        problems: Sequence[str] = (),
+        on_progress: Callable[[float], None] = lambda _done: None,
+    ) -> Page:
+        """The result as a page.
+
+        Args:
+            motion: play the programs again for the picture that one can turn; else the page has none.
+            made: of what the result was made; None: from Python, it is not known.
+            problems: what is not as it should be with the page, such as a program that was changed since.
+            on_progress: called with the share that is done.
+
+        Returns:
+            The page, as data.
+
+        Raises:
+            MachineError, NumericError: a program cannot be played.
+        """
+        from shapegcode.results.page.default import page_of
+
+        played = self.played if motion else None
+        return page_of(
+            self,
+            title=self.page_title,
+            light=self.light,
+            sections=self.page_sections(made),
+            scene=None if played is None else played.scene(on_progress),
+            made=made,
+            problems=problems,
+        )
+
+    def report(self, path: str | Path, script: Script = "inline") -> list[str]:
+        """Write the page of the result: one HTML file that opens without a server and without a network.
+
+        Args:
+            path: of the file.
+            script: "inline": all in one file; "beside": the script in a file beside it, which pages can share.
 
         Returns:
             The files written.
 
         Raises:
-            OSError: the folder cannot be made or a file not be written.
+            ArgumentError: another word for `script`.
+            MachineError, NumericError: a program cannot be played.
+            OSError: a file cannot be written.
         """
-        from shapegcode.results.plot import save_all
+        from shapegcode.results.page.html import save
 
-        return save_all(self.plots(), folder)
+        return save(self.page(), path, script)
 
-    def __repr__(self) -> str:
-        """Class and answer: a result may hold millions of samples."""
-        return f"<{type(self).__name__}: {self.answer}>"
+    def plot(self, name: str = "", ax: Axes | None = None) -> Axes:
+        """Draw a picture of it.
 
-    def _drawn_beside(self) -> Mapping[str, Plot]:
-        """The pictures that the module `plots` of the result's folder offers for it: its `plots_of(result)`."""
-        module = importlib.import_module(f"{type(self).__module__.rpartition('.')[0]}.plots")
-        found: Mapping[str, Plot] = module.plots_of(self)
-        return found
+        Args:
+            name: one of `plots()`; empty: the first of them.
+            ax: to draw into; None: a new figure.
+
+        Returns:
+            The axes.
+
+        Raises:
+            ArgumentError: there is no such picture; the message has those that there are.
+        """
+        plots = self.plots()
+        if not plots or (name and name not in plots):
+            there = f"one of {', '.join(plots)}" if plots else "nothing is drawn of this"
+            from shapegcode._core import ArgumentError
+
+            raise ArgumentError(f"plot {name}: {there}" if name else there)
+        return plots[name or next(iter(plots))](ax)
+
+    def to_pandas(self, what: str = "") -> pd.DataFrame:
+        """A table of it for pandas, one row for each entry, units in the names; needs `shapegcode[study]`.
+
+        Args:
+            what: name of the attribute that is a list, such as "regions" or "cases"; empty: the first of them.
+
+        Returns:
+            The table; columns of nested values have dots in their names.
+
+        Raises:
+            ArgumentError: the result has no such list; the message has those that there are.
+            ModuleNotFoundError: pandas is not installed.
+        """
+        from shapegcode.results.study import data_frame
+
+        return data_frame(self, what)
+
+    def to_xarray(self, what: str = "") -> xr.Dataset:
+        """Its arrays for xarray, with dimensions and units; needs `shapegcode[study]`.
+
+        Args:
+            what: name of the attribute that holds them; empty: the first that has arrays.
+
+        Returns:
+            The arrays.
+
+        Raises:
+            ArgumentError: the result has no arrays; the message has those attributes that have.
+            ModuleNotFoundError: xarray is not installed.
+        """
+        from shapegcode.results.study import data_set
+
+        return data_set(self, what)
+
+    def _repr_html_(self) -> str:
+        """Answer and tables, for notebooks."""
+        from shapegcode.results.page.default import short_html
+
+        return short_html(self)

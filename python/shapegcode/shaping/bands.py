@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -50,6 +51,18 @@ class ModeBand:
     def damping_ratio(self) -> float:
         """1 = critically damped."""
         return self.mode.damping_ratio
+
+    @staticmethod
+    def hidden_from_json(data: Mapping[str, float]) -> dict[str, Mode]:
+        """The mode, from what the JSON says of it.
+
+        Args:
+            data: JSON of such an object.
+
+        Returns:
+            The hidden field.
+        """
+        return {"mode": Mode(data["frequency_hz"], data["damping_ratio"])}
 
     def __post_init__(self) -> None:
         """Check the range.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -76,6 +76,18 @@ class Design:
     def negative(self) -> bool:
         """Whether any tap is negative."""
         return self.shaper.has_negative
+
+    @staticmethod
+    def hidden_from_json(data: Mapping[str, Sequence[float]]) -> dict[str, Shaper]:
+        """The shaper, from what the JSON says of it.
+
+        Args:
+            data: JSON of such an object.
+
+        Returns:
+            The hidden field.
+        """
+        return {"shaper": Shaper(data["times_s"], data["amplitudes"])}
 
     def radial_error_um(self, speed_mm_per_s: float, radius_mm: float) -> float:
         """By how much a circle comes out too small, µm: variance*v²/(2R)."""

@@ -10,8 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from shapegcode import _core
+from shapegcode.model.playable import PlayedPrograms
 from shapegcode.results.figures import CONTOURS, ContourError, Tracks
 from shapegcode.results.json import hidden, sparse
+from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Plot, Result, Xyz
 from shapegcode.results.table import Column, Table, xyz_columns
 
@@ -20,6 +22,7 @@ __all__ = ["Motion", "RegionRun", "ShapedFigures", "Simulation"]
 FloatArray = npt.NDArray[np.float64]
 
 # With a feed drive what is left between command and table is vibration and the lag of the servo loop.
+_LEAST_SHOWN_UM = 0.005
 _NAMES = {"modal": ("residual vibration", "peak vibration"), "feed-drive": ("error after the stop", "largest error")}
 
 
@@ -163,6 +166,7 @@ class Simulation(Result):
         of_shaped: the shaped regions alone; None: there are none.
         motion: the whole program in time; None: not asked for.
         warnings: of the program and of the machine.
+        played: the program, to play it again for a page.
     """
 
     program: str
@@ -184,6 +188,7 @@ class Simulation(Result):
     warnings: tuple[str, ...]
     of_shaped: ShapedFigures | None = None
     motion: Motion | None = field(default=None, metadata=sparse())
+    played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     @property
     def ok(self) -> bool:
@@ -220,6 +225,20 @@ class Simulation(Result):
         if self.shaped:
             return "shapegcode measure ORIGINAL SHAPED shows where on the part the errors are"
         return "shapegcode convert shapes this program and shows what it gains"
+
+    def key_figures(self) -> tuple[Figure, ...]:
+        """Time, vibration after a stop and contour error of the table."""
+        residual, _ = _NAMES[self.plant]
+        swings = [
+            Figure(f"{residual} {axis.upper()}", "µm", None, self.residual_vibration_um[axis], 2,
+                   key_after=f"residual_vibration_um.{axis}")
+            for axis in "xyz" if self.residual_vibration_um[axis] >= _LEAST_SHOWN_UM
+        ]  # fmt: skip
+        return (
+            Figure("cycle time", "s", None, self.cycle_time_s, 2, key_after="cycle_time_s"),
+            *swings,
+            Figure(CONTOURS["response"], "µm", None, self._contour.max, 2, key_after="contour_error_um.response.max"),
+        )
 
     def tables(self) -> list[Table]:
         """Vibration and settling by axis; contour and orbit errors; the motion in time."""

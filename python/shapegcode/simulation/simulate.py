@@ -15,6 +15,7 @@ from shapegcode.machine import Machine
 from shapegcode.model.controller import controller_model
 from shapegcode.model.machine_model import MachineModel
 from shapegcode.model.modes import Offset, machine_warnings, region_range_warnings
+from shapegcode.model.playable import PlayedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.model.stream import stream
 from shapegcode.program import Program, given_program
@@ -131,6 +132,7 @@ def simulate(
         of_shaped=_shaped_figures([run for run in runs if run.shaped and not run.was_rapid], of_shaped),
         regions=tuple(runs),
         warnings=tuple(warnings),
+        played=PlayedPrograms(program, machine, labels=("program", ""), plant=plant),
     )
 
 

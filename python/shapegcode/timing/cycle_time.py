@@ -17,6 +17,7 @@ import numpy.typing as npt
 from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.controller import controller_model
+from shapegcode.model.playable import PlayedPrograms
 from shapegcode.model.shaped_program import shaped_warnings
 from shapegcode.program import Program, given_program
 from shapegcode.program.operating import OVERRIDE_LOCKED
@@ -90,6 +91,7 @@ def cycle_time(
             *(why for _, why in shaped_warnings(program, machine)),
             *_locked(program, feed_override),
         ),
+        played=PlayedPrograms(program, machine, labels=("program", "")),
     )
 
 

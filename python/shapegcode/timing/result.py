@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import astuple, dataclass, field, fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
+from shapegcode.model.playable import PlayedPrograms
+from shapegcode.results.json import hidden
+from shapegcode.results.page.model import Figure
 from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table, share_percent
 
@@ -150,6 +153,7 @@ class CycleTime(TimeParts, Result):
         blocks: per block, in order; empty unless asked for.
         shaped_regions: how many of the regions are shaped blocks, as the program's header says; 0: it has none.
         warnings: what the reader noticed; why the verdict in a header of shapegcode does not hold here.
+        played: the program, to play it again for a page.
     """
 
     json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "difference_percent": float | None}
@@ -163,6 +167,7 @@ class CycleTime(TimeParts, Result):
     blocks: tuple[BlockTime, ...]
     shaped_regions: int
     warnings: tuple[str, ...]
+    played: PlayedPrograms | None = field(default=None, compare=False, repr=False, metadata=hidden())
 
     @property
     def difference_percent(self) -> float | None:
@@ -240,6 +245,15 @@ class CycleTime(TimeParts, Result):
     def without_blocks(self) -> CycleTime:
         """The same without the single blocks, of which there may be millions."""
         return replace(self, blocks=())
+
+    def key_figures(self) -> tuple[Figure, ...]:
+        """The whole, and its parts that take time."""
+        parts = [
+            Figure(LABELS[part], "s", None, getattr(self, part), 2, key_after=part)
+            for part in PARTS
+            if getattr(self, part) > 0.0
+        ]
+        return (Figure("cycle time", "s", None, self.cycle_time_s, 2, key_after="cycle_time_s"), *parts)
 
     def tables(self) -> list[Table]:
         """Parts; tools; the slowest regions and blocks."""

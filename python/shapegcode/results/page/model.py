@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from shapegcode.results.outcome import Plot
 from shapegcode.results.page.scene import Scene
-from shapegcode.results.result import Plot
 from shapegcode.results.table import Table
 
 __all__ = [

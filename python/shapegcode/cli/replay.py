@@ -1,0 +1,149 @@
+"""Programs of an earlier run, found again, compared with what they were, and read again."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import io
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
+    from shapegcode.model.playable import PlayedPrograms
+    from shapegcode.results.made import Made, MadeFile
+
+__all__ = ["changes", "played_again"]
+
+_WITH_MOTION = ("Check", "Conversion", "CycleTime", "FeedSchedule", "Measurement", "Simulation")
+
+
+def changes(made: Made, folder: Path) -> tuple[dict[tuple[str, str], Path], list[str]]:
+    """Look for the files of a run where they were, and in a folder.
+
+    Args:
+        made: of what the result was made.
+        folder: where else to look.
+
+    Returns:
+        Where each is that is as it was, by role and name; and what is not as it was, in words.
+    """
+    found: dict[tuple[str, str], Path] = {}
+    problems = []
+    for file in made.files:
+        if file.role in ("wrote", "output of all"):
+            continue
+        place, problem = _looked_up(file, folder)
+        if place is not None:
+            found[file.role, file.name] = place
+        if problem:
+            problems.append(problem)
+    return found, problems
+
+
+def _looked_up(file: MadeFile, folder: Path) -> tuple[Path | None, str]:
+    from shapegcode.machine import Machine
+    from shapegcode.results.made import MadeFile, file_hash
+
+    if file.role == "machine" and file.name in Machine.builtin_names():
+        now = MadeFile.of(file.role, file.name, Machine.builtin_text(file.name).encode()).sha256
+        changed = f"the built-in machine {file.name} is another one in this version: motion is not shown"
+        return Path(file.name), "" if now == file.sha256 else changed
+    places = [place for place in (Path(file.name), folder / Path(file.name).name) if place.is_file()]
+    if not places:
+        return None, f"{file.role} {file.name} is not where it was: motion is not shown"
+    hashes = []
+    for place in places:
+        with contextlib.suppress(OSError):
+            hashes.append(file_hash(place)[0])
+            if hashes[-1] == file.sha256:
+                return place, ""
+    now = hashes[0][:12] if hashes else "not readable"
+    return None, (
+        f"{file.role} {file.name} was changed since: SHA-256 {now}…, it was {file.sha256[:12]}…; the figures are of "
+        "the file as it was, motion is not shown"
+    )
+
+
+def played_again(
+    made: Made, found: Mapping[tuple[str, str], Path], report: Mapping[str, Any]
+) -> tuple[PlayedPrograms | None, str]:
+    """Read the programs and the machine of a run again, with the options that it was run with.
+
+    Args:
+        made: of what the result was made.
+        found: where its files are.
+        report: the JSON of the result.
+
+    Returns:
+        What a page can play; None where there is no motion to show. And why not, if there should be.
+    """
+    from shapegcode._core import ShapegcodeError
+
+    if made.result not in _WITH_MOTION or not made.command or "program_address" in report:
+        return None, ""
+    args = _typed(made.command)
+    if args is None:
+        return None, f"its command cannot be read by this version: {made.command}; motion is not shown"
+    try:
+        return _read_again(made, found, args, str(report.get("plant", "modal"))), ""
+    except (ShapegcodeError, OSError) as error:
+        return None, f"{error}: motion is not shown"
+
+
+def _typed(command: str) -> argparse.Namespace | None:
+    """The options of a command as it was typed; None where it cannot be read."""
+    from shapegcode.cli import COMMANDS, parser_of
+
+    try:
+        words = shlex.split(command)[1:]
+    except ValueError:
+        return None
+    names = {each.name for each in COMMANDS}
+    selected = next((word for word in words if word in names), None)
+    if selected is None:
+        return None
+    # argparse says what it does not know on standard error, and ends the process.
+    with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+        try:
+            return parser_of(selected).parse_args(words)
+        except SystemExit:
+            return None
+
+
+def _read_again(
+    made: Made, found: Mapping[tuple[str, str], Path], args: argparse.Namespace, plant: str
+) -> PlayedPrograms | None:
+    from shapegcode.model.playable import PlayedPrograms
+    from shapegcode.program import Program
+    from shapegcode.program.compensation import read_for_conversion
+
+    inputs = [place for (role, _), place in found.items() if role in ("input", "inputs")]
+    if not inputs:
+        return None
+    machine = _machine(args, found)
+    conversion = made.result == "Conversion"
+    read = read_for_conversion if conversion else Program.read
+    number = None if getattr(args, "program", None) == "all" else getattr(args, "program", None)
+    original = read(inputs[0], machine, program_number=number)
+    made_of_it = next((place for (role, _), place in found.items() if role == "output"), None)
+    labels = ("original", "emitted")
+    if made.result == "Measurement":
+        made_of_it = inputs[1] if len(inputs) > 1 else None
+        labels = (inputs[0].name, made_of_it.name if made_of_it is not None else "")
+    emitted = None if made_of_it is None else Program.read(made_of_it, machine)
+    plant = machine.verdict.plant if conversion else plant
+    return PlayedPrograms(original, machine, emitted, labels=labels, plant=plant)
+
+
+def _machine(args: argparse.Namespace, found: Mapping[tuple[str, str], Path]) -> Machine:
+    from shapegcode.cli.options import load_machine
+    from shapegcode.cli.overrides import overridden
+
+    place = found.get(("machine", str(args.machine)))
+    args.machine = str(place) if place is not None else args.machine
+    module = importlib.import_module(f"shapegcode.cli.{args.command}")
+    return overridden(load_machine(args), args, getattr(module, "MACHINE_KEYS", {}))

@@ -1,0 +1,199 @@
+"""The page of a conversion: whether to run it, what it gains, what that rests on, and the operator's run sheet."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+from shapegcode.conversion.figures import CaseVerdict
+from shapegcode.conversion.result import Conversion
+from shapegcode.conversion.scheduled_result import ScheduledConversion
+from shapegcode.conversion.tables import before_after_table, rests_table
+from shapegcode.results.made import Made
+from shapegcode.results.page.default import next_steps, pictures_of, warnings_of
+from shapegcode.results.page.model import (
+    Bars,
+    Figure,
+    Figures,
+    HeatMap,
+    HeatRow,
+    Light,
+    NextStep,
+    Notes,
+    Section,
+)
+
+__all__ = ["light_of", "sections_of"]
+
+_LONGEST_REGIONS = 8
+_LEAST_SHOWN_UM = 0.05
+_RUN_FIRST = ("first run",)
+
+
+def light_of(conversion: Conversion) -> tuple[Light, str]:
+    """Colour of the traffic light, and the reason.
+
+    Args:
+        conversion: what was made.
+
+    Returns:
+        Red where a tolerance is missed; amber where nothing was shaped, a warning is open, or an unmeasured value
+        could turn the verdict; else green.
+    """
+    if not conversion.ok:
+        return "red", next(conversion.misses(), conversion.next_step)
+    if conversion.nothing_shaped:
+        return "amber", "nothing was shaped: run the original"
+    turning = [row.key for row in conversion.rests_on if row.moved_um > row.limit_um]
+    if turning:
+        return "amber", f"a value that nobody measured on this machine could turn the verdict: {turning[0]}"
+    if said := len(conversion.warnings):
+        return "amber", f"{said} warning{'s' if said > 1 else ''} to settle first"
+    return "green", f"every tolerance is kept in all {sum(case.counts for case in conversion.cases)} cases that count"
+
+
+def sections_of(conversion: Conversion, made: Made | None = None) -> tuple[Section, ...]:
+    """What stands on the page.
+
+    Args:
+        conversion: what was made.
+        made: of what; None: it is not known.
+
+    Returns:
+        The sections, in their order.
+    """
+    return tuple(_sections(conversion, made))
+
+
+def _sections(conversion: Conversion, made: Made | None) -> Iterator[Section]:
+    how = "Each card: original → emitted. The limit is what the emitted figure is judged by."
+    yield Section("gain", "What it gains", (Figures(tuple(_figures(conversion))),), how=how)
+    yield from warnings_of(conversion)
+    yield next_steps(conversion, *_further(conversion))
+    if conversion.cases:
+        yield _cases(conversion)
+    if conversion.rests_on:
+        table = rests_table(conversion.rests_on, conversion.unmeasured_tried)
+        how = "Measure the topmost first: it moves the verdict furthest. Red: it could turn it."
+        yield Section("rests", "What the verdict rests on", (table,), how=how)
+    yield _times(conversion)
+    if isinstance(conversion, ScheduledConversion):
+        yield Section("feeds", "Feeds and cutting forces", tuple(conversion.feed_schedule.tables()), printed=False)
+    if not conversion.nothing_shaped:
+        table = before_after_table(conversion.before_after())
+        yield Section("figures", "All figures, before and after", (table,), folded=True, printed=False)
+    yield from pictures_of(conversion)
+    if conversion.at_the_control:
+        yield _sheet(conversion, made)
+
+
+def _figures(conversion: Conversion) -> Iterator[Figure]:
+    """The few that people look at first."""
+    residual = conversion.residual_vibration_um
+    for axis in "xyz":
+        if max(residual.original[axis], residual.emitted[axis]) >= _LEAST_SHOWN_UM:
+            yield Figure(
+                f"residual vibration {axis.upper()}", "µm", residual.original[axis], residual.emitted[axis],
+                limit=conversion.residual_limit_um(axis),
+                key_before=f"residual_vibration_um.original.{axis}", key_after=f"residual_vibration_um.emitted.{axis}",
+            )  # fmt: skip
+    target = conversion.limits.contour_target
+    error = getattr(conversion.contour_error_um, target)
+    key = f"contour_error_um.{target}"
+    yield Figure(
+        "contour error" + (" of the table" if target == "response" else " of the command"), "µm",
+        error.original.max, error.emitted.max, limit=conversion.limits.contour_um,
+        key_before=f"{key}.original.max", key_after=f"{key}.emitted.max",
+    )  # fmt: skip
+    time = conversion.cycle_time_s
+    yield Figure(
+        "cycle time", "s", time.original, time.emitted, digits=2,
+        key_before="cycle_time_s.original", key_after="cycle_time_s.emitted",
+    )  # fmt: skip
+    yield Figure(
+        "size of the program", "kB", conversion.bytes_read / 1e3, conversion.bytes_emitted / 1e3,
+        key_before="bytes_read", key_after="bytes_emitted", factor=1e-3,
+    )  # fmt: skip
+
+
+def _further(conversion: Conversion) -> Iterator[NextStep]:
+    """What to set on the control, and what to measure."""
+    for note in conversion.at_the_control:
+        if note.topic in ("look-ahead", "override") or "override" in note.topic:
+            yield NextStep(f"At the control, {note.topic}: {note.text}.")
+    if conversion.rests_on:
+        key = conversion.rests_on[0].key
+        text = f"Measure {key}: nobody has on this machine, and the verdict rests on it more than on anything else."
+        yield NextStep(text, "shapegcode identify --tap-plan -m MACHINE.toml" if ".modes" in key else "")
+
+
+def _cases(conversion: Conversion) -> Section:
+    axes = [axis for axis in "xyz" if any(case.residual_um[axis] >= _LEAST_SHOWN_UM for case in conversion.cases)]
+    columns = (*(f"residual {axis.upper()} µm" for axis in axes), "contour, command µm", "contour, table µm",
+               "worst share of its limit %")  # fmt: skip
+    rows = tuple(_case(case, axes, conversion) for case in conversion.cases)
+    how = (
+        "Each line is a condition under which the written program was played. The colour is the share of the limit: "
+        "up to 100 % is within. Lines in brackets are only shown."
+    )
+    counted = sum(case.counts for case in conversion.cases)
+    caption = f"{counted} of {len(rows)} cases count ([verdict] of the machine file)"
+    return Section("cases", "Under which conditions it was tried", (HeatMap(columns, rows, 1, caption),), how=how)
+
+
+def _case(case: CaseVerdict, axes: list[str], conversion: Conversion) -> HeatRow:
+    errors = (case.contour_error_um.command, case.contour_error_um.response)
+    share = None if case.share_of_limit is None else case.share_of_limit * 100.0
+    judged = ("command", "response").index(conversion.limits.contour_target)
+    limit = conversion.limits.contour_um
+    shares: list[float | None] = [None, None]
+    error = errors[judged]
+    if error is not None and limit > 0.0:
+        shares[judged] = error / limit
+    residuals: list[float | None] = []
+    for axis in axes:
+        bound = conversion.residual_limit_um(axis)
+        residuals.append(case.residual_um[axis] / bound if bound else None)
+    worst = " ← decides" if case is conversion.worst_case else ""
+    remark = ("within" if case.within else "OUT") + worst
+    values = (*(case.residual_um[axis] for axis in axes), *errors, share)
+    return HeatRow(case.name, values, (*residuals, *shares, case.share_of_limit), remark, case.counts)
+
+
+def _times(conversion: Conversion) -> Section:
+    whole, cutting = conversion.cycle_time_s, conversion.cutting_time_s
+    rows = [
+        ("whole program", (whole.original, whole.emitted)),
+        ("shaped cuts together", (cutting.original, cutting.emitted)),
+        ("everything else", (whole.original - cutting.original, whole.emitted - cutting.emitted)),
+    ]
+    longest = sorted(conversion.regions, key=lambda region: -region.time_s.emitted)[:_LONGEST_REGIONS]
+    rows += [
+        ("cut in lines {} to {}".format(*region.lines), (region.time_s.original, region.time_s.emitted))
+        for region in longest
+        if len(conversion.regions) > 1
+    ]
+    how = "Two bars each, original above emitted: where they differ, shaping costs or gains time."
+    bars = Bars("s", tuple(rows), ("original", "emitted"), digits=2)
+    return Section("time", "Where the time goes", (bars,), how=how)
+
+
+def _sheet(conversion: Conversion, made: Made | None) -> Section:
+    """What the operator takes to the machine, on one page."""
+    output = None if made is None else made.file("output")
+    name = f"{Path(conversion.program).name}, shaped" if output is None else Path(output.name).name
+    if output is not None:
+        sha256 = output.sha256
+    else:
+        sha256 = "not known" if conversion.from_json else hashlib.sha256(conversion.text).hexdigest()
+    rows = [("load", f"{name}, for {conversion.machine}, {conversion.bytes_emitted} bytes")]
+    rows += [("SHA-256 of what to load", sha256)]
+    for role, name in (("input", "made from"), ("machine", "for the machine file")):
+        if made is not None and (file := made.file(role)) is not None:
+            rows.append((name, f"{Path(file.name).name}, SHA-256 {file.sha256 or 'not known'}"))
+    rows += [(note.topic, note.text) for note in conversion.at_the_control]
+    strong = frozenset(topic for topic, _ in rows if topic in _RUN_FIRST or "override" in topic)
+    title = f"Run sheet: {conversion.recommendation}"
+    how = "For the operator. Go through it from top to bottom before cycle start."
+    return Section("sheet", title, (Notes(tuple(rows), strong),), how=how, sheet=True)

@@ -1,0 +1,54 @@
+"""Programs and the machine they are played on, kept so that a page can play them again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from shapegcode.machine import Machine
+from shapegcode.model.scene import scene_of
+from shapegcode.program import Program
+from shapegcode.results.page.scene import Scene
+
+__all__ = ["PlayedPrograms"]
+
+
+@dataclass(frozen=True, eq=False)
+class PlayedPrograms:
+    """A program, and the one that was made of it.
+
+    Attributes:
+        original: what is played.
+        machine: controller and plant.
+        emitted: made of it; None: none.
+        labels: of both, for people.
+        plant: "modal" or "feed-drive".
+    """
+
+    original: Program
+    machine: Machine
+    emitted: Program | None = None
+    labels: tuple[str, str] = ("original", "emitted")
+    plant: str = "modal"
+
+    def scene(self, on_progress: Callable[[float], None] = lambda _done: None) -> Scene | None:
+        """Play them.
+
+        Args:
+            on_progress: called with the share that is done.
+
+        Returns:
+            Both motions; None: nothing moves.
+
+        Raises:
+            MachineError: the machine has no feed drives.
+            NumericError: the integrator of a feed drive fails.
+        """
+        return scene_of(
+            self.original,
+            self.machine,
+            self.emitted,
+            labels=self.labels,
+            plant=self.plant,
+            on_progress=on_progress,
+        )

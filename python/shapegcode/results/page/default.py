@@ -1,0 +1,292 @@
+"""The page of any result: answer, tables, pictures, warnings, the next step, and what it was made of."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from shapegcode.results.json import plain
+from shapegcode.results.made import Made, this_version
+from shapegcode.results.outcome import NotKeptError, Outcome, Plot
+from shapegcode.results.page.how import HOW, UNKNOWN
+from shapegcode.results.page.model import (
+    Figure,
+    Figures,
+    Light,
+    NextStep,
+    NextSteps,
+    Notes,
+    Page,
+    Part,
+    Picture,
+    Section,
+    Text,
+)
+from shapegcode.results.page.scene import Scene
+from shapegcode.results.table import Column, Table
+
+__all__ = ["next_steps", "page_of", "pictures_of", "raw_page", "sections_of", "short_html", "title_of", "warnings_of"]
+
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+_UNFOLDED_ROWS = 24
+_SHORT_ROWS = 12
+_SHORT_TEXT = 120
+
+
+def title_of(result: Outcome) -> str:
+    """What the result is, in words, and of which program.
+
+    Args:
+        result: of any class.
+
+    Returns:
+        For example "Cycle time of part.nc on vx500".
+    """
+    words = " ".join(word.lower() for word in _WORD.findall(type(result).__name__))
+    name = getattr(result, "program", None)
+    machine = getattr(result, "machine", None)
+    of = f" of {Path(name).name}" if isinstance(name, str) and name else ""
+    on = f" on {machine}" if isinstance(machine, str) and machine else ""
+    return words[:1].upper() + words[1:] + of + on
+
+
+def sections_of(result: Outcome, figures: Sequence[Figure] = ()) -> tuple[Section, ...]:
+    """Key figures, warnings, next step, tables and pictures of any result.
+
+    Args:
+        result: of any class.
+        figures: the few that people look at first.
+
+    Returns:
+        The sections in the order in which they stand on the page.
+    """
+    try:
+        tables = result.tables()
+    except NotKeptError:
+        return (*_first(figures), *warnings_of(result), next_steps(result), _json(result.to_dict()))
+    first = (*_first(figures), *warnings_of(result), next_steps(result))
+    return (*first, *_tables(tables), *pictures_of(result))
+
+
+def _first(figures: Sequence[Figure]) -> Iterator[Section]:
+    if figures:
+        yield Section("gain", "At a glance", (Figures(tuple(figures)),))
+
+
+def warnings_of(result: Outcome) -> Iterator[Section]:
+    """The warnings, if there are any.
+
+    Args:
+        result: of any class.
+
+    Returns:
+        One section or none.
+    """
+    if result.warnings:
+        yield Section("warnings", "Warnings", (Text(tuple(result.warnings), warning=True),))
+
+
+def next_steps(result: Outcome, *further: NextStep) -> Section:
+    """What to do next.
+
+    Args:
+        result: whose next step it is; a command that is named in it is shown to be copied.
+        further: steps behind it.
+
+    Returns:
+        The section.
+    """
+    text = result.next_step
+    said = text[:1].upper() + text[1:]
+    command = next(iter(re.findall(r"`(shapegcode [^`]+)`", text)), "")
+    return Section("next", "What to do next", (NextSteps((NextStep(said, command), *further)),))
+
+
+def _tables(tables: Sequence[Table]) -> Iterator[Section]:
+    """Short tables together, each long one by itself and folded."""
+    short: tuple[Part, ...] = tuple(table for table in tables if len(table.rows) <= _UNFOLDED_ROWS)
+    if short:
+        yield Section("figures", "Figures", short)
+    for rank, table in enumerate(table for table in tables if len(table.rows) > _UNFOLDED_ROWS):
+        title = table.title or f"{len(table.rows)} rows"
+        key = "table" if rank == 0 else f"table-{rank + 1}"
+        yield Section(key, title[:1].upper() + title[1:], (table,), printed=False, folded=True)
+
+
+def pictures_of(result: Outcome) -> Iterator[Section]:
+    """The pictures, each with a line that says how to read it.
+
+    Args:
+        result: of any class.
+
+    Returns:
+        One section or none.
+    """
+    pictures = [Picture(name, plot, how_to_read(name)) for name, plot in _drawable(result).items()]
+    left_out = "Pictures that need the samples of the run are not here: the JSON does not hold them."
+    said = [Text((left_out,))] if result.from_json else []
+    if pictures or said:
+        yield Section("pictures", "Pictures", (*pictures, *said))
+
+
+def _drawable(result: Outcome) -> Mapping[str, Plot]:
+    """The pictures; of a result that came from its JSON those which need nothing else."""
+    try:
+        plots = result.plots()
+    except NotKeptError:
+        return {}
+    return {name: plot for name, plot in plots.items() if not result.from_json or _draws(plot)}
+
+
+def _draws(plot: Plot) -> bool:
+    try:
+        plot()
+    except NotKeptError:
+        return False
+    return True
+
+
+def how_to_read(name: str) -> str:
+    """How to read a picture.
+
+    Args:
+        name: of the picture, as `plots()` has it.
+
+    Returns:
+        One line.
+    """
+    return HOW.get(name, UNKNOWN)
+
+
+def made_section(made: Made) -> Section:
+    """Command, version and files with their hashes.
+
+    Args:
+        made: of what the result was made.
+
+    Returns:
+        The section.
+    """
+    rows = [("by", made.by)]
+    rows += [("command", made.command)] if made.command else []
+    rows += [
+        (each.role, f"{each.name}, {each.size_bytes} bytes, SHA-256 {each.sha256 or 'not known'}")
+        for each in made.files
+    ]
+    how = "The hash of a file changes with every byte of it: compare it before you rely on this page."
+    return Section("made", "What this was made of", (Notes(tuple(rows)),), how=how, folded=True, printed=False)
+
+
+def page_of(
+    result: Outcome,
+    *,
+    title: str,
+    light: tuple[Light, str],
+    sections: Sequence[Section],
+    scene: Scene | None = None,
+    made: Made | None = None,
+    problems: Sequence[str] = (),
+) -> Page:
+    """The page of a result.
+
+    Args:
+        result: of any class.
+        title: heading.
+        light: colour and reason.
+        sections: between the verdict and what it was made of.
+        scene: motion to look at.
+        made: of what the result was made.
+        problems: what is not as it should be with the page itself.
+
+    Returns:
+        The page.
+    """
+    report: dict[str, Any] = result.to_dict()
+    if made is not None:
+        report["made"] = plain(made)
+        sections = (*sections, made_section(made))
+        scene = _named(scene, made)
+    above = next((rank + 1 for rank, section in enumerate(sections) if section.key == "next"), 0)
+    return Page(
+        title=title,
+        light=light[0],
+        verdict=result.answer,
+        reason=light[1],
+        sections=tuple(sections),
+        report=report,
+        scene=scene,
+        before_scene=above,
+        problems=tuple(problems),
+    )
+
+
+def _named(scene: Scene | None, made: Made) -> Scene | None:
+    """With the name of the file that was written; while it was made it had none."""
+    output = made.file("output")
+    if scene is None or output is None or len(scene.variants) < 2:
+        return scene
+    *others, last = scene.variants
+    return replace(scene, variants=(*others, replace(last, file=output.name)))
+
+
+def raw_page(report: Mapping[str, Any], why: str) -> Page:
+    """The page of a result that this version cannot read: its JSON as it stands.
+
+    Args:
+        report: the JSON.
+        why: it cannot be read.
+
+    Returns:
+        The page.
+    """
+    made = report.get("made")
+    by = made.get("by", "another version") if isinstance(made, dict) else "another version"
+    return Page(
+        title="A result of another version",
+        light="amber",
+        verdict=f"This result was written by {by}, and {this_version()} cannot read it.",
+        reason="it is shown as it stands; run the command again for a page",
+        sections=(_json(report),),
+        report=report,
+        problems=(why,),
+    )
+
+
+def _json(report: Mapping[str, Any]) -> Section:
+    """What the JSON says, where nothing better can be shown."""
+    rows = [(key, _short(value)) for key, value in report.items()]
+    columns = (Column("key", value=lambda row: row[0], left=True), Column("value", value=lambda row: row[1], text=True))
+    return Section("json", "The JSON", (Table("", columns, rows),), how="Key by key; long values are cut.")
+
+
+def _short(value: object) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= _SHORT_TEXT else text[: _SHORT_TEXT - 1] + "…"
+
+
+def short_html(result: Outcome) -> str:
+    """Answer, warnings and tables for a notebook.
+
+    Args:
+        result: of any class.
+
+    Returns:
+        HTML without scripts and styles of its own, everything in it escaped.
+    """
+    parts = [f"<p><b>{escape(result.answer)}</b></p>"]
+    parts += [f"<p>warning: {escape(warning)}</p>" for warning in result.warnings]
+    for table in result.tables():
+        heads, *rows = table.cells()
+        title = f"<caption>{escape(table.title)}</caption>" if table.title else ""
+        head = "".join(f"<th>{escape(cell)}</th>" for cell in heads)
+        body = "".join(
+            "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows[:_SHORT_ROWS]
+        )
+        more = f"<p>and {len(rows) - _SHORT_ROWS} more rows</p>" if len(rows) > _SHORT_ROWS else ""
+        parts.append(f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}")
+    return "".join([*parts, f"<p>next: {escape(result.next_step)}</p>"])

@@ -1,0 +1,71 @@
+"""What `shapegcode report` made: pages of results, and what was not as it should be with each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from shapegcode.results.result import Result
+from shapegcode.results.table import Column, Table
+
+__all__ = ["ReportPage", "Reports"]
+
+
+@dataclass(frozen=True)
+class ReportPage:
+    """A page that was written.
+
+    Attributes:
+        source: JSON that it was made of.
+        page: file that was written.
+        result: class of the result; empty: it could not be read back.
+        motion: the programs were found unchanged and played again.
+        problems: what is not as it should be; they stand on the page too.
+    """
+
+    source: str
+    page: str
+    result: str
+    motion: bool
+    problems: tuple[str, ...]
+
+
+@dataclass(frozen=True, repr=False)
+class Reports(Result):
+    """Pages made of results that were written earlier.
+
+    Attributes:
+        pages: in the order of the files.
+        warnings: problems of all pages, each with its file.
+    """
+
+    pages: tuple[ReportPage, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Every page shows its result as it was made."""
+        return not self.warnings
+
+    @property
+    def answer(self) -> str:
+        """How many pages, and whether they can be trusted."""
+        count = len(self.pages)
+        said = f"{count} page{'s' if count > 1 else ''} written"
+        bad = sum(bool(page.problems) for page in self.pages)
+        return f"{said}, {bad} with something to heed" if bad else said
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        if not self.ok:
+            return "run the command again for the program as it is now: its page then has no such remark."
+        return f"open {self.pages[0].page} in a browser."
+
+    def tables(self) -> list[Table]:
+        """The pages."""
+        columns = (
+            Column("result", left=True),
+            Column("page", left=True),
+            Column("motion", value=lambda page: "yes" if page.motion else "no"),
+        )
+        return [Table("", columns, self.pages)]

@@ -1,0 +1,307 @@
+"""Results read back from what ``--json`` wrote: the inverse of `shapegcode.results.json.plain`, by typed fields.
+
+>>> result = sg.load_result("out.json")
+>>> result.answer, result.tables()
+
+What no JSON holds (samples, programs, texts) is missing: who asks for it gets an error that says so.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import importlib
+import json
+import math
+import types
+import typing
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path, PurePath
+from typing import Any
+
+import numpy as np
+
+from shapegcode._core import ArgumentError
+from shapegcode.results.made import FORMAT, Made
+from shapegcode.results.outcome import NotKeptError
+from shapegcode.results.result import Result
+
+__all__ = ["MODULES", "NotKept", "load_result", "made_of", "revived", "written_reports"]
+
+MODULES: Mapping[str, str] = {
+    "Characterisation": "characterization.result",
+    "CharacterisationTests": "characterization.result",
+    "Check": "checking.result",
+    "Conversion": "conversion.result",
+    "CornerDemo": "demos.corner",
+    "CornerResult": "testcut.result",
+    "CutDesign": "testcut.design_result",
+    "CycleTime": "timing.result",
+    "CycleTimeDemo": "demos.cycle_time",
+    "Demonstration": "demos.result",
+    "EvidenceDemo": "demos.evidence",
+    "Expansion": "program.result",
+    "FeedSchedule": "feed.result",
+    "Identification": "identification.result",
+    "IntervalResult": "testcut.result",
+    "LearnedClock": "characterization.clock.result",
+    "MachineDescription": "machine.result",
+    "Measurement": "metrology.result",
+    "MetrologyDemo": "demos.metrology",
+    "ParameterImport": "machine.result",
+    "PathDemo": "demos.path",
+    "Recommendation": "shaping.result",
+    "Reports": "results.report_result",
+    "ScheduledConversion": "conversion.scheduled_result",
+    "ServoFit": "characterization.servo.result",
+    "ShaperDemo": "demos.shaper",
+    "Simulation": "simulation.result",
+    "TapDemo": "demos.tap",
+    "TapPlan": "identification.plan_result",
+    "TaperResult": "testcut.result",
+}
+"""Where each class of results is, below the package; a test holds it against the classes that there are."""
+
+
+class NotKept:
+    """Stands for what the JSON does not hold."""
+
+    def __init__(self, name: str) -> None:
+        """Of a field."""
+        self._name = name
+
+    def _refuse(self, *_: object) -> typing.NoReturn:
+        raise NotKeptError(f"{self._name}: the JSON of a result does not hold it; run the command again to have it")
+
+    __bool__ = __call__ = __float__ = __getitem__ = __iter__ = __len__ = _refuse
+
+    def __getattr__(self, attribute: str) -> typing.NoReturn:
+        """What it would have."""
+        if attribute.startswith("__"):  # asked for by Python itself, such as by copy
+            raise AttributeError(attribute)
+        self._refuse()
+
+    def __repr__(self) -> str:
+        """What is missing."""
+        return f"<{self._name}: not in the JSON>"
+
+
+def written_reports(path: str | Path) -> list[dict[str, Any]]:
+    """The JSON of the results in a file: one, or those of ``--program all``.
+
+    Args:
+        path: of the file that ``--json`` wrote.
+
+    Returns:
+        The objects.
+
+    Raises:
+        ArgumentError: it is cut off, or is no JSON of results; with line and column.
+        OSError: it cannot be read.
+    """
+    data = Path(path).read_bytes()
+    try:
+        text = data.decode()
+        found = json.loads(text)
+    except UnicodeDecodeError as error:
+        raise ArgumentError(f"{path}: byte {error.start} is not UTF-8: this is no JSON of shapegcode") from None
+    except json.JSONDecodeError as error:
+        cut = error.pos >= len(text.rstrip()) or "Unterminated" in error.msg
+        why = f"the file ends in the middle ({len(data)} bytes): it was cut off" if cut else error.msg
+        raise ArgumentError(f"{path}: line {error.lineno}, column {error.colno}: {why}") from None
+    except RecursionError:
+        raise ArgumentError(f"{path}: nested too deeply: this is no JSON of shapegcode") from None
+    found = found if isinstance(found, list) else [found]
+    for rank, each in enumerate(found, 1):
+        if not isinstance(each, dict):
+            where = f"entry {rank} of the list" if len(found) > 1 else "the file"
+            raise ArgumentError(f"{path}: {where} is no object: this is not what --json writes")
+    if not found:
+        raise ArgumentError(f"{path}: an empty list: there is no result in it")
+    return found
+
+
+def load_result(path: str | Path) -> Result:
+    """Read back a result that a command wrote with ``--json``.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        The result, with everything that its JSON holds.
+
+    Raises:
+        ArgumentError: cut off, no JSON of a result, several results, or of a version that this one cannot read.
+        OSError: the file cannot be read.
+    """
+    reports = written_reports(path)
+    if len(reports) > 1:
+        raise ArgumentError(f"{path}: holds {len(reports)} results (--program all), and one is asked for")
+    try:
+        return revived(reports[0])
+    except ArgumentError as error:
+        raise ArgumentError(f"{path}: {error}") from None
+
+
+def made_of(report: Mapping[str, Any]) -> Made:
+    """Of what a result was made.
+
+    Args:
+        report: JSON of a result.
+
+    Returns:
+        What stands under `made`.
+
+    Raises:
+        ArgumentError: nothing stands there, or not what this version writes.
+    """
+    if "error" in report and "made" not in report:
+        raise ArgumentError(f"the command failed for this program: {report['error']}")
+    if "made" not in report:
+        raise ArgumentError(
+            "key made is missing: the JSON was written by an older version or by to_dict(); run the command again "
+            "with --json"
+        )
+    made: Made = _value(Made, report["made"], "made")
+    if made.format != FORMAT:
+        raise ArgumentError(f"made.format = {made.format}: written by {made.by}; this version reads format {FORMAT}")
+    return made
+
+
+def revived(report: Mapping[str, Any], kept: Mapping[str, Any] = types.MappingProxyType({})) -> Result:
+    """A result from its JSON.
+
+    Args:
+        report: as ``--json`` wrote it.
+        kept: values of fields that no JSON holds, where the class has them.
+
+    Returns:
+        The result; its `from_json` is true.
+
+    Raises:
+        ArgumentError: an unknown class, a key too many or too few, or a value of another kind; names the key.
+    """
+    made = made_of(report)
+    if made.result not in MODULES:
+        raise ArgumentError(f"made.result = {made.result}: not a result that this version knows")
+    cls: type[Result] = getattr(importlib.import_module(f"shapegcode.{MODULES[made.result]}"), made.result)
+    beside = {*cls.json_extra, "made", "plots", "output", "program_address"}
+    names = {field.name for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    known = names | beside
+    if unknown := sorted(report.keys() - known):
+        raise ArgumentError(f"key {unknown[0]} is not one of a {made.result}: written by {made.by}")
+    hidden = {name: value for name, value in kept.items() if name in known and value is not None}
+    own = {key: value for key, value in report.items() if key in names}
+    result = cls(**(dict(_fields(cls, own, "", {})) | hidden))
+    object.__setattr__(result, "from_json", True)
+    return result
+
+
+def _value(hint: Any, data: Any, where: str, bound: Mapping[Any, Any] = types.MappingProxyType({})) -> Any:
+    hint = bound.get(hint, hint)
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if hint in (Any, object):
+        return data
+    if origin in (types.UnionType, typing.Union):
+        return _first_that_fits(arguments, data, where, bound)
+    if origin is typing.Literal:
+        return data if data in arguments else _wrong(where, data, f"one of {', '.join(map(str, arguments))}")
+    cls = origin or hint
+    if cls in _SIMPLE:
+        return _simple(cls, data, where)
+    if dataclasses.is_dataclass(cls):
+        return _object(cls, arguments, data, where, bound)
+    if issubclass(cls, enum.Enum):
+        return cls[data] if data in cls.__members__ else _wrong(where, data, f"one of {', '.join(cls.__members__)}")
+    if issubclass(cls, PurePath):
+        return cls(_simple(str, data, where))
+    if issubclass(cls, Mapping):
+        if not isinstance(data, dict):
+            _wrong(where, data, "an object")
+        inner = arguments[1] if arguments else Any
+        return {key: _value(inner, entry, f"{where}.{key}", bound) for key, entry in data.items()}
+    if not isinstance(data, list):
+        _wrong(where, data, "a list")
+    if issubclass(cls, np.ndarray):
+        return np.array(data, dtype=np.float64)
+    return _sequence(cls, arguments, data, where, bound)
+
+
+_SIMPLE = (bool, int, float, str, type(None))
+
+
+def _simple(cls: type, data: Any, where: str) -> Any:
+    if cls is float and data is None:
+        return math.nan  # JSON has no word for it
+    if cls is float and isinstance(data, int | float) and not isinstance(data, bool):
+        return float(data)
+    return data if type(data) is cls else _wrong(where, data, _NAMES[cls])
+
+
+_NAMES = {bool: "true or false", int: "a whole number", float: "a number", str: "a text", type(None): "null"}
+
+
+def _first_that_fits(kinds: Sequence[Any], data: Any, where: str, bound: Mapping[Any, Any]) -> Any:
+    if data is None and type(None) in kinds:
+        return None
+    failed: list[ArgumentError] = []
+    for kind in kinds:
+        try:
+            return _value(kind, data, where, bound)
+        except ArgumentError as error:
+            failed.append(error)
+    raise failed[0]
+
+
+def _sequence(cls: type, arguments: Sequence[Any], data: list[Any], where: str, bound: Mapping[Any, Any]) -> Any:
+    if cls is tuple and arguments and arguments[-1:] != (...,):
+        if len(data) != len(arguments):
+            _wrong(where, data, f"a list of {len(arguments)}")
+        kinds: Sequence[Any] = arguments
+    else:
+        kinds = [arguments[0] if arguments else Any] * len(data)
+    found = [_value(kinds[rank], entry, f"{where}[{rank}]", bound) for rank, entry in enumerate(data)]
+    return found if cls is list else frozenset(found) if issubclass(cls, set | frozenset) else tuple(found)
+
+
+def _object(cls: Any, arguments: Sequence[Any], data: Any, where: str, bound: Mapping[Any, Any]) -> Any:
+    if not isinstance(data, dict):
+        _wrong(where, data, "an object")
+    own = dict(zip(getattr(cls, "__parameters__", ()), (bound.get(each, each) for each in arguments), strict=False))
+    return cls(**dict(_fields(cls, data, where, own)))
+
+
+def _fields(cls: Any, data: Mapping[str, Any], where: str, bound: Mapping[Any, Any]) -> Iterator[tuple[str, Any]]:
+    kept = _from_properties(cls, data, where)
+    hints = typing.get_type_hints(cls)
+    for field in dataclasses.fields(cls):
+        name = f"{where}.{field.name}" if where else field.name
+        optional = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
+        if field.name in data and field.init:
+            yield field.name, _value(hints[field.name], data[field.name], name, bound)
+        elif field.name in kept:
+            yield field.name, kept[field.name]
+        elif optional or not field.init:
+            continue
+        elif field.metadata.get("hidden"):
+            yield field.name, NotKept(name)
+        else:
+            raise ArgumentError(f"key {name} is missing")
+
+
+def _from_properties(cls: Any, data: Mapping[str, Any], where: str) -> Mapping[str, Any]:
+    """Hidden fields that follow from properties in the JSON: of a class with `hidden_from_json(data)`."""
+    made = getattr(cls, "hidden_from_json", None)
+    if made is None:
+        return {}
+    try:
+        found: Mapping[str, Any] = made(data)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArgumentError(f"{where}: {error} is missing or not what it should be") from None
+    return found
+
+
+def _wrong(where: str, data: Any, wanted: str) -> typing.NoReturn:
+    shown = json.dumps(data)
+    shown = shown if len(shown) <= 40 else shown[:37] + "..."
+    raise ArgumentError(f"{where} = {shown}: must be {wanted}")

@@ -1,0 +1,161 @@
+"""Results read back from their JSON: nothing lost, nothing invented; what is wrong with a file is said."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import write_schemas
+
+import shapegcode as sg
+from command import run
+from shapegcode.results.outcome import NotKeptError
+from shapegcode.results.revive import MODULES, load_result
+
+PART = "%\nO0001\nG90 G21 G17 G54\nG0 X0 Y0 Z5.\nG1 Z0. F3000.\nX30. Y40.\nX60. Y0.\nG0 Z5.\nG4 P500\nM30\n%\n"
+COMMANDS = {
+    "Conversion": "convert part.nc -m vx500 -o out.nc",
+    "Simulation": "simulate part.nc -m vx500",
+    "CycleTime": "time part.nc -m vx500",
+    "Check": "check part.nc -m vx500",
+    "Expansion": "expand part.nc -m vx500 -o plain.nc",
+    "Measurement": "measure part.nc -m vx500 --tool-diameter 10mm",
+    "Recommendation": "shaper -m vx500",
+    "MachineDescription": "machine show vx500",
+    "TapPlan": "identify --tap-plan -m vx500",
+    "CharacterisationTests": "characterize --write tests -m vx500",
+    "TapDemo": "demo tap",
+    "CornerDemo": "demo corner",
+    "MetrologyDemo": "demo metrology",
+    "CycleTimeDemo": "demo cycle-time",
+    "PathDemo": "demo path",
+    "ShaperDemo": "demo shaper",
+}
+
+
+def made(folder: Path, name: str) -> Path:
+    """The JSON of a command."""
+    (folder / "part.nc").write_text(PART)
+    done = run(folder, *COMMANDS[name].split(), "--json", "r.json")
+    assert done.returncode in (0, 1), done.stderr
+    return folder / "r.json"
+
+
+def alike(ours: object, written: object) -> bool:
+    """Equal; what follows from numbers of nine digits may differ in the last of them."""
+    if isinstance(ours, dict) and isinstance(written, dict):
+        return ours.keys() == written.keys() and all(alike(ours[key], written[key]) for key in ours)
+    if isinstance(ours, list) and isinstance(written, list):
+        return len(ours) == len(written) and all(map(alike, ours, written))
+    if isinstance(ours, float) and isinstance(written, float):
+        return ours == pytest.approx(written, rel=1e-8)
+    return ours == written
+
+
+def test_every_class_of_results_is_found() -> None:
+    """The list of classes is that of the classes which there are, each in its module."""
+    there = {name: cls.__module__.removeprefix("shapegcode.") for name, cls in write_schemas.results().items()}
+    assert dict(MODULES) == there
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_result_comes_back_from_its_json(name: str, tmp_path: Path) -> None:
+    """The same class, answer and numbers; read from the file alone."""
+    file = made(tmp_path, name)
+    written = json.loads(file.read_text())
+    beside = {key: written.pop(key) for key in ("made", "plots", "output") if key in written}
+    assert beside["made"]["result"] == name
+    result = load_result(file)
+    assert type(result).__name__ == name
+    assert result.from_json
+    assert alike(result.to_dict(), written)
+    assert result.answer
+    assert result.page(motion=False).verdict == result.answer
+
+
+def test_what_the_json_does_not_hold_says_so(tmp_path: Path) -> None:
+    """No silent emptiness in place of programs and samples."""
+    result: Any = load_result(made(tmp_path, "Conversion"))
+    with pytest.raises(NotKeptError, match="placed: the JSON of a result does not hold it"):
+        len(result.placed)
+    with pytest.raises(NotKeptError, match="emitted: the JSON"):
+        _ = result.emitted.regions
+    assert "not in the JSON" in repr(result.text)
+
+
+def edited(file: Path, change: Any) -> Path:
+    report = json.loads(file.read_text())
+    change(report)
+    file.write_text(json.dumps(report))
+    return file
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda r: r.pop("made"), "key made is missing"),
+        (lambda r: r["made"].update(format=99), "made.format = 99: written by shapegcode .*; this version reads"),
+        (lambda r: r["made"].update(result="os.system"), "made.result = os.system: not a result"),
+        (lambda r: r.pop("cycle_time_s"), "key cycle_time_s is missing"),
+        (lambda r: r.update(cycle_time_s="long"), 'cycle_time_s = "long": must be a number'),
+        (lambda r: r.update(regions=3), "regions = 3: must be a list"),
+        (lambda r: r["regions"][0].update(lines=[1]), r"regions\[0\].lines = \[1\]: must be a list of 2"),
+        (lambda r: r.update(unheard=1), "key unheard is not one of a CycleTime"),
+    ],
+)  # fmt: skip
+def test_a_json_of_another_kind_names_the_key(change: Any, said: str, tmp_path: Path) -> None:
+    """The file, the key, the value and what it must be."""
+    file = edited(made(tmp_path, "CycleTime"), change)
+    with pytest.raises(sg.ArgumentError, match=f"r.json: {said}"):
+        load_result(file)
+
+
+def test_a_file_that_was_cut_off_says_where(tmp_path: Path) -> None:
+    """A truncated file, an empty one, one of several results, and one of something else."""
+    file = made(tmp_path, "CycleTime")
+    text = file.read_text()
+    file.write_text(text[: len(text) // 2])
+    with pytest.raises(sg.ArgumentError, match=r"line \d+, column \d+: .*the file ends in the middle"):
+        load_result(file)
+    file.write_bytes(b"\xff\xfe{")
+    with pytest.raises(sg.ArgumentError, match="byte 0 is not UTF-8"):
+        load_result(file)
+    file.write_text("3")
+    with pytest.raises(sg.ArgumentError, match="the file is no object"):
+        load_result(file)
+    file.write_text(f"[{text},{text}]")
+    with pytest.raises(sg.ArgumentError, match="holds 2 results"):
+        load_result(file)
+    file.write_text("[" * 100_000)
+    with pytest.raises(sg.ArgumentError, match=r"nested too deeply|cut off"):
+        load_result(file)
+
+
+def test_results_for_notebooks_and_tables(tmp_path: Path) -> None:
+    """HTML, pandas and xarray say what the result says."""
+    (tmp_path / "a<b>.nc").write_text(PART)
+    machine = sg.Machine.load("vx500")
+    time = sg.cycle_time(tmp_path / "a<b>.nc", machine)
+    html = time._repr_html_()
+    assert "a&lt;b&gt;.nc" in html and "<b>.nc" not in html
+    regions = time.to_pandas("regions")
+    assert list(regions["duration_s"]) == pytest.approx([region.duration_s for region in time.regions])
+    assert regions.attrs["units"]["duration_s"] == "s"
+    with pytest.raises(sg.ArgumentError, match=r"regons: not a list of rows of this result; it has tools, regions"):
+        time.to_pandas("regons")
+    with pytest.raises(sg.ArgumentError, match="it has no arrays"):
+        time.to_xarray()
+    motion = sg.play_motion(tmp_path / "a<b>.nc", machine)
+    simulation = sg.simulate(tmp_path / "a<b>.nc", machine)
+    assert simulation.plot("path").get_xlabel()
+    with pytest.raises(sg.ArgumentError, match="plot nothing: one of"):
+        simulation.plot("nothing")
+    from dataclasses import replace
+
+    data = replace(simulation, motion=motion).to_xarray("motion")
+    assert data["low"].shape == motion.low.shape
+    assert data["low"].dims[0] == "times_s"
+    assert list(data["axis"].values) == ["x", "y", "z"]
+    assert data["times_s"].attrs["units"] == "s"
