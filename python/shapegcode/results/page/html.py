@@ -25,8 +25,8 @@ from shapegcode.results.page.scene import packed
 
 __all__ = ["SCRIPTS", "STYLES", "plotly_name", "save", "to_html"]
 
-SCRIPTS = ("page.js",)
-STYLES = ("page.css", "print.css")
+SCRIPTS = ("page.js", "decode.js", "view.js", "pixels.js", "axes.js", "stage.js", "programs.js", "charts.js", "scene.js")
+STYLES = ("page.css", "scene.css", "print.css")
 """Files of `shapegcode/data/page`, in the order in which they are put together."""
 
 
