@@ -25,7 +25,9 @@ from shapegcode.results.page.scene import packed
 
 __all__ = ["SCRIPTS", "STYLES", "plotly_name", "save", "to_html"]
 
-SCRIPTS = ("page.js", "decode.js", "view.js", "pixels.js", "axes.js", "stage.js", "programs.js", "charts.js", "scene.js")
+SCRIPTS = tuple(
+    f"{name}.js" for name in ("page", "decode", "view", "pixels", "axes", "stage", "programs", "charts", "scene")
+)
 STYLES = ("page.css", "scene.css", "print.css")
 """Files of `shapegcode/data/page`, in the order in which they are put together."""
 
