@@ -116,4 +116,4 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeyp
     assert "4.50 Hz" in Path(result["plots"][0]).read_text(encoding="utf-8")
     assert "end mill: 1.97 µm, 95.5 %" in Path(result["plots"][1]).read_text(encoding="utf-8")
     assert main(["demo", "tap", "--json", "-", *plots]) == 0
-    assert json.loads(capsys.readouterr().out) == result
+    assert {**json.loads(capsys.readouterr().out), "made": None} == {**result, "made": None}
