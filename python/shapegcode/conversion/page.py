@@ -132,17 +132,18 @@ def _cases(conversion: Conversion) -> Section:
     axes = [axis for axis in "xyz" if any(case.residual_um[axis] >= _LEAST_SHOWN_UM for case in conversion.cases)]
     columns = (*(f"residual {axis.upper()} µm" for axis in axes), "contour, command µm", "contour, table µm",
                "worst share of its limit %")  # fmt: skip
-    rows = tuple(_case(case, axes, conversion) for case in conversion.cases)
+    rows = tuple(_case(rank, case, axes, conversion) for rank, case in enumerate(conversion.cases))
     how = (
         "Each line is a condition under which the written program was played. The colour is the share of the limit: "
         "up to 100 % is within. Lines in brackets are only shown."
     )
     counted = sum(case.counts for case in conversion.cases)
     caption = f"{counted} of {len(rows)} cases count ([verdict] of the machine file)"
-    return Section("cases", "Under which conditions it was tried", (HeatMap(columns, rows, 1, caption),), how=how)
+    heat = HeatMap(columns, rows, 1, caption, factors=(*(1.0 for _ in axes), 1.0, 1.0, 100.0))
+    return Section("cases", "Under which conditions it was tried", (heat,), how=how)
 
 
-def _case(case: CaseVerdict, axes: list[str], conversion: Conversion) -> HeatRow:
+def _case(rank: int, case: CaseVerdict, axes: list[str], conversion: Conversion) -> HeatRow:
     errors = (case.contour_error_um.command, case.contour_error_um.response)
     share = None if case.share_of_limit is None else case.share_of_limit * 100.0
     judged = ("command", "response").index(conversion.limits.contour_target)
@@ -158,7 +159,10 @@ def _case(case: CaseVerdict, axes: list[str], conversion: Conversion) -> HeatRow
     worst = " ← decides" if case is conversion.worst_case else ""
     remark = ("within" if case.within else "OUT") + worst
     values = (*(case.residual_um[axis] for axis in axes), *errors, share)
-    return HeatRow(case.name, values, (*residuals, *shares, case.share_of_limit), remark, case.counts)
+    names = (*(f"residual_um.{axis}" for axis in axes), "contour_error_um.command", "contour_error_um.response",
+             "share_of_limit")  # fmt: skip
+    keys = tuple(f"cases.{rank}.{name}" for name in names)
+    return HeatRow(case.name, values, (*residuals, *shares, case.share_of_limit), remark, case.counts, keys)
 
 
 def _times(conversion: Conversion) -> Section:
@@ -168,14 +172,14 @@ def _times(conversion: Conversion) -> Section:
         ("shaped cuts together", (cutting.original, cutting.emitted)),
         ("everything else", (whole.original - cutting.original, whole.emitted - cutting.emitted)),
     ]
-    longest = sorted(conversion.regions, key=lambda region: -region.time_s.emitted)[:_LONGEST_REGIONS]
-    rows += [
-        ("cut in lines {} to {}".format(*region.lines), (region.time_s.original, region.time_s.emitted))
-        for region in longest
-        if len(conversion.regions) > 1
-    ]
+    keys = [("cycle_time_s.original", "cycle_time_s.emitted"), ("cutting_time_s.original", "cutting_time_s.emitted")]
+    keys.append(("", ""))
+    longest = sorted(enumerate(conversion.regions), key=lambda ranked: -ranked[1].time_s.emitted)[:_LONGEST_REGIONS]
+    for rank, region in longest if len(conversion.regions) > 1 else []:
+        rows.append(("cut in lines {} to {}".format(*region.lines), (region.time_s.original, region.time_s.emitted)))
+        keys.append((f"regions.{rank}.time_s.original", f"regions.{rank}.time_s.emitted"))
     how = "Two bars each, original above emitted: where they differ, shaping costs or gains time."
-    bars = Bars("s", tuple(rows), ("original", "emitted"), digits=2)
+    bars = Bars("s", tuple(rows), ("original", "emitted"), digits=2, keys=tuple(keys))
     return Section("time", "Where the time goes", (bars,), how=how)
 
 

@@ -129,7 +129,7 @@ def _heat_map(heat: HeatMap) -> str:
     has_remarks = any(row.remark for row in heat.rows)
     columns = ["", *heat.columns, *([""] if has_remarks else [])]
     head = "".join(f'<th scope="col">{escape(name)}</th>' if name else "<td></td>" for name in columns)
-    rows = "\n".join(_heat_row(row, heat.digits, has_remarks) for row in heat.rows)
+    rows = "\n".join(_heat_row(row, heat, has_remarks) for row in heat.rows)
     caption = f'<p class="caption">{prose(heat.caption)}</p>' if heat.caption else ""
     return (
         _scrolled(f'<table class="heat"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>')
@@ -138,11 +138,13 @@ def _heat_map(heat: HeatMap) -> str:
     )
 
 
-def _heat_row(row: HeatRow, digits: int, has_remarks: bool) -> str:
+def _heat_row(row: HeatRow, heat: HeatMap, has_remarks: bool) -> str:
     cells = []
-    for value, share in zip(row.values, row.shares, strict=True):
+    keys = row.keys or ("",) * len(row.values)
+    factors = heat.factors or (1.0,) * len(row.values)
+    for value, share, key, factor in zip(row.values, row.shares, keys, factors, strict=True):
         kind, title = _heat(share)
-        said = "–" if value is None else number(value, digits)
+        said = "–" if value is None else number(value, heat.digits, key=key, factor=factor)
         mark = '<span class="mark">▲</span>' if kind == "heat-over" else ""
         cells.append(f'<td class="{kind}"{title}>{mark}{said}</td>')
     if has_remarks:
@@ -174,14 +176,15 @@ _LEGEND = (
 def _bars(bars: Bars) -> str:
     longest = max((value for _, values in bars.rows for value in values), default=0.0) or 1.0
     rows = []
-    for name, values in bars.rows:
+    all_keys = bars.keys or (("",) * len(bars.labels),) * len(bars.rows)
+    for (name, values), keys in zip(bars.rows, all_keys, strict=True):
         lines = []
-        for rank, (label, value) in enumerate(zip(bars.labels, values, strict=True)):
+        for rank, (label, value, key) in enumerate(zip(bars.labels, values, keys, strict=True)):
             width = max(value, 0.0) / longest * 100.0
             lines.append(
                 f'<div class="bar bar-{rank}"><span class="of">{escape(label)}</span>'
                 f'<span class="track"><span class="fill" style="width:{width:.2f}%"></span></span>'
-                f'<span class="said">{number(value, bars.digits)} {escape(bars.unit)}</span></div>'
+                f'<span class="said">{number(value, bars.digits, key=key)} {escape(bars.unit)}</span></div>'
             )
         rows.append(f'<div class="bars-row"><h3>{escape(name)}</h3>{"".join(lines)}</div>')
     return '<div class="bars">' + "\n".join(rows) + "</div>"

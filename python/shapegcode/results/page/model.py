@@ -83,6 +83,7 @@ class HeatRow:
         shares: of a limit, which colour the cells: below 1 is within; None: no colour.
         remark: in words, at its end.
         counts: it takes part in the verdict; else it is only shown.
+        keys: of the values, where the JSON holds each, as in `Figure`; empty: nowhere.
     """
 
     name: str
@@ -90,6 +91,7 @@ class HeatRow:
     shares: tuple[float | None, ...]
     remark: str = ""
     counts: bool = True
+    keys: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -101,12 +103,14 @@ class HeatMap:
         rows: from top to bottom.
         digits: behind the point.
         caption: below it.
+        factors: of the columns, from the numbers in the JSON to those shown; empty: 1.
     """
 
     columns: tuple[str, ...]
     rows: tuple[HeatRow, ...]
     digits: int = 2
     caption: str = ""
+    factors: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -118,12 +122,14 @@ class Bars:
         rows: name and values, one value for each label.
         labels: what the values of a row are, for example "original" and "emitted".
         digits: behind the point.
+        keys: of each row's values, where the JSON holds each, as in `Figure`; empty: nowhere.
     """
 
     unit: str
     rows: tuple[tuple[str, tuple[float, ...]], ...]
     labels: tuple[str, ...] = ("",)
     digits: int = 1
+    keys: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True)
