@@ -137,6 +137,27 @@ def test_pictures_go_into_the_callers_axes(tmp_path: Path) -> None:
         assert part in text
 
 
+def test_no_line_joins_the_two_sides_of_a_rounded_corner() -> None:
+    """The table cuts a corner of two lines by 0.5 mm: drawn ten times as far, each side ends by itself."""
+    angle = np.linspace(0, np.pi / 2, 200)
+    rounding = np.stack([38.2 + 1.8 * np.sin(angle), 1.8 - 1.8 * np.cos(angle)], axis=1)
+    table = np.concatenate([np.linspace([0, 0], [38.2, 0], 400)[:-1], rounding, np.linspace([40, 1.8], [40, 40], 400)])
+    response = np.column_stack([table, np.zeros(len(table))])
+    corner = np.array([[0.0, 0, 0], [40, 0, 0], [40, 40, 0]])
+    panel = plot_path(corner, [Trace("cut", 1e-3, response, response)], magnification=10.0)
+    curve = np.asarray(panel.get_lines()[1].get_xydata())
+    steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
+    assert np.isnan(steps).sum() == 2  # to the gap, and from it
+    assert np.nanmax(steps) < 0.3
+    assert "rounds corners off" in " ".join(text.get_text() for text in panel.texts)
+
+
+def test_numbers_in_titles_are_never_powers_of_ten() -> None:
+    said = [plot.number(value) for value in (1113.6, 83.0249, 0.09357, 2.2, 0.0, -1234567.0, 99.96)]
+    assert said == ["1114", "83", "0.0936", "2.2", "0", "-1234567", "100"]
+    assert plot.number(83.0249, 4) == "83.02"
+
+
 def test_following_keeps_to_its_own_pass() -> None:
     there_and_back = np.array([[0.0, 0, 0], [50, 0, 0], [50, 0.001, 0], [0, 0.001, 0]])
     command = np.concatenate([np.linspace(a, b, 2000) for a, b in pairwise(there_and_back)])

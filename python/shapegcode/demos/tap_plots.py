@@ -86,7 +86,7 @@ def plot_deflection(demo: TapDemo, ax: Axes | None = None) -> Axes:
     )
     begin = 0.0
     for number, (name, width, share) in enumerate(parts):
-        label = f"{name}: {width:.3g} µm, {share:.1f} %"
+        label = f"{name}: {plot.number(width)} µm, {share:.1f} %"
         panel.barh(0.0, width, left=begin, height=0.6, color=plot.COLOURS[number], label=label)
         begin += width
     panel.set_yticks([])

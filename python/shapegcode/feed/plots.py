@@ -64,8 +64,9 @@ def _traces(schedule: FeedSchedule) -> FeedTraces:
 def _summary(schedule: FeedSchedule) -> str:
     force, time = schedule.resultant_force_n, schedule.cycle_time_s
     return (
-        f"{Path(schedule.program).name}, {', '.join(schedule.tools)}: peak resultant {force.original.max:.3g} → "
-        f"{force.emitted.max:.3g} N, cycle time {time.original:.4g} → {time.emitted:.4g} s"
+        f"{Path(schedule.program).name}, {', '.join(schedule.tools)}: peak resultant "
+        f"{plot.number(force.original.max)} → {plot.number(force.emitted.max)} N, cycle time "
+        f"{plot.number(time.original, 4)} → {plot.number(time.emitted, 4)} s"
     )
 
 
@@ -204,12 +205,12 @@ def plot_force_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes:
         panel.set_xlim(low[0], high[0])
         panel.set_ylim(low[1], high[1])
         panel.set_aspect("equal")
-        panel.set_title(f"{name}: up to {max(float(force.max()), 0.0):.3g} N", loc="left", fontsize=10)
+        panel.set_title(f"{name}: up to {plot.number(max(float(force.max()), 0.0))} N", loc="left", fontsize=10)
         panel.set_xlabel("X in mm")
         panel.set_ylabel("Y in mm")
     whole: Any = panels[0].figure
     bar = whole.colorbar(coloured, ax=panels, shrink=0.85, pad=0.02, extend="max" if limited else "neither")
-    bar.set_label("peak resultant in N" + (f"; red: above the limit, {limits[0]:.4g} N" if limited else ""))
+    bar.set_label("peak resultant in N" + (f"; red: above the limit, {plot.number(limits[0], 4)} N" if limited else ""))
     return panels[0]
 
 

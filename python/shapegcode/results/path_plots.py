@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,14 @@ _STRAIGHT = (
     "The path is straight: the table deviates along it only,\nwhich no drawing of the path shows. "
     "See the picture of the vibration."
 )
+
+_CUT = "The table rounds corners off: there each side is drawn up to the bisector, magnified from its own line."
+# Less than that between two segments is an arc in pieces.
+_CORNER_RAD = 0.3
+# The two sides of a corner are drawn further apart than that share of the picture: no line joins them.
+_APART = 0.01
+# A drawn curve so many times as long as its path swings.
+_SWINGS = 4.0
 
 
 def plot_path(
@@ -74,10 +82,11 @@ def plot_path(
         raise ValueError(f"magnification = {magnification}: must be finite and greater than 0")
 
     drawn = [(trace, *_deviation(trace, polyline, quantity, whole is None)) for trace in traces]
-    largest_mm = max(float(np.linalg.norm(deviation, axis=1).max()) for _, _, deviation in drawn)
+    largest_mm = max(float(np.linalg.norm(deviation, axis=1).max()) for *_, deviation in drawn)
     size_mm = float(np.linalg.norm(np.ptp(polyline, axis=0)))
     factor = magnification or _round_factor(0.1 * size_mm / largest_mm if largest_mm > 0 else 1.0)
 
+    cut = False
     what = "table" if quantity == "response" else "command"
     widths = [1.0] if whole is None else [2.4, 1.0]
     panels = plot.grid(
@@ -86,16 +95,21 @@ def plot_path(
     )[0]  # fmt: skip
     panel, shown = panels[0], [_AXIS_NAMES.index(name) for name in plane]
     panel.plot(*polyline[:, shown].T, color=plot.GREY, linewidth=3, alpha=0.55, label="programmed path")
-    straight = _only_along(polyline, [deviation for _, _, deviation in drawn])
-    for number, (trace, feet, deviation) in enumerate(drawn):
+    straight = _only_along(polyline, [deviation for *_, deviation in drawn])
+    for number, (trace, along, feet, deviation) in enumerate(drawn):
         curve = (feet + factor * deviation)[:, shown]
+        breaks = _at_corners(along, polyline, curve, _APART * size_mm)
+        cut = cut or bool(len(breaks))
+        curve = np.insert(curve, breaks, np.nan, axis=0)
         label = _path_label(trace, deviation, quantity, is_part=whole is not None)
         # Of a straight path the label alone.
-        panel.plot(*curve[: 0 if straight else None].T, label=label, **line_style(number))
+        panel.plot(*curve[: 0 if straight else None].T, label=label, **_style(number, curve, polyline))
     panel.set_aspect("equal", adjustable="datalim")
     panel.margins(0.08)
     panel.set_xlabel(f"{plane[0]} in mm")
     panel.set_ylabel(f"{plane[1]} in mm")
+    if cut:
+        panel.text(0.0, -0.13, _CUT, transform=panel.transAxes, fontsize=8, color="#555555", va="top")
     if straight:
         panel.text(0.5, 0.3, _STRAIGHT, transform=panel.transAxes, ha="center", va="center")
     else:
@@ -113,11 +127,37 @@ def _checked_polyline(name: str, points: npt.ArrayLike) -> FloatArray:
     return polyline
 
 
-def _deviation(trace: Trace, polyline: FloatArray, quantity: str, is_whole: bool) -> tuple[FloatArray, FloatArray]:
-    """Where each sample belongs on the path, and how far it is from there."""
+def _deviation(
+    trace: Trace, polyline: FloatArray, quantity: str, is_whole: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Where each sample belongs on the path, as distance along it and as place, and how far it is from there."""
     points = trace.response_mm if quantity == "response" else trace.command_mm
-    _, feet = follow(trace.command_mm, points, polyline, complete=trace.stops and is_whole)
-    return feet, points - feet
+    along, feet = follow(trace.command_mm, points, polyline, complete=trace.stops and is_whole)
+    return along, feet, points - feet
+
+
+def _at_corners(along: FloatArray, polyline: FloatArray, curve: FloatArray, apart_mm: float) -> npt.NDArray[np.intp]:
+    """Samples before which the foot goes from one side of a corner to the other, and the drawn curve with it.
+
+    A table that rounds a corner on the inside is nearest to the one side, then, from one sample to the next, to the
+    other. Magnified from there the two lie far apart, and a line between them would close a loop that nobody drove.
+    """
+    steps = np.diff(polyline, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    steps, lengths = steps[lengths > 0], lengths[lengths > 0]
+    directions = steps / lengths[:, None]
+    turn = np.arccos(np.clip(np.einsum("ij,ij->i", directions[:-1], directions[1:]), -1.0, 1.0))
+    passed = np.searchsorted(np.cumsum(lengths)[:-1][turn > _CORNER_RAD], along)
+    far = np.linalg.norm(np.diff(curve, axis=0), axis=1) > apart_mm
+    return np.flatnonzero((np.diff(passed) != 0) & far) + 1
+
+
+def _style(number: int, curve: FloatArray, polyline: FloatArray) -> dict[str, Any]:
+    """Colour and width of a curve; one that swings to and fro is finer, so that its swings do not run together."""
+    swings = float(np.nansum(np.linalg.norm(np.diff(curve, axis=0), axis=1)))
+    way = float(np.linalg.norm(np.diff(polyline, axis=0), axis=1).sum())
+    style = line_style(number)
+    return style if swings < _SWINGS * way else style | {"linewidth": 0.6}
 
 
 def _path_label(trace: Trace, deviation: FloatArray, quantity: str, *, is_part: bool) -> str:

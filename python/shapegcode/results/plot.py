@@ -10,6 +10,7 @@ apart.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -30,6 +31,7 @@ __all__ = [
     "heading",
     "legend_above",
     "legend_below",
+    "number",
     "save",
     "save_all",
     "svg_text",
@@ -129,6 +131,23 @@ def aligned(panels: Sequence[Axes]) -> Axes:
     whole: Any = panels[0].figure
     whole.align_ylabels(panels)
     return panels[0]
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number for a title: so many significant digits at most, never as a power of ten.
+
+    Args:
+        value: what is said.
+        digits: significant ones behind the point; whole numbers keep theirs.
+
+    Returns:
+        1113.6 as "1114", 0.0936 as "0.0936", 2.200 as "2.2".
+    """
+    if value == 0 or not math.isfinite(value):
+        return f"{value:g}"
+    places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    text = f"{value:.{places}f}"
+    return text.rstrip("0").rstrip(".") if places else text
 
 
 def legend_above(panel: Axes, *, columns: int = 4) -> None:

@@ -119,7 +119,10 @@ def plot_pareto(result: Recommendation, ax: Axes | None = None) -> Axes:
         panel.margins(0.05)
     for family in families:
         upper.plot([], [], marker=markers[family], linestyle="none", color=colours[family], label=family)
-    upper.axhline(100.0 * result.vibration_limit, color=plot.GREY, linewidth=1.0, linestyle="--")
+    upper.axhline(
+        100.0 * result.vibration_limit, color=plot.GREY, linewidth=1.0, linestyle="--",
+        label=f"limit {100.0 * result.vibration_limit:g} %",
+    )  # fmt: skip
     upper.set_ylabel("worst residual in %")
     lower.set_ylabel("|σ²| in ms²: µm on R20 at 200 mm/s")
     lower.set_xlabel("duration in ms")

@@ -24,7 +24,7 @@ _SWINGS_SHOWN = 3.0  # of the slowest mode, behind the longest shaper
 
 
 def residual_curve(shaper: Shaper, frequencies_hz: NDArray[np.float64], modes: Sequence[Mode]) -> NDArray[np.float64]:
-    """Residual ratio over frequency, each with the damping ratio of the nearest of the modes.
+    """Residual ratio over frequency, with the damping ratios of the modes and between them what lies between.
 
     Args:
         shaper: whose zeros are looked for.
@@ -34,9 +34,10 @@ def residual_curve(shaper: Shaper, frequencies_hz: NDArray[np.float64], modes: S
     Returns:
         (n,), share of the unshaped vibration that is left.
     """
-    damping = [min(modes, key=lambda mode: abs(mode.frequency_hz - f)).damping_ratio for f in frequencies_hz]
+    known = sorted((mode.frequency_hz, mode.damping_ratio) for mode in modes)
+    damping = np.interp(frequencies_hz, [frequency for frequency, _ in known], [ratio for _, ratio in known])
     pairs = zip(frequencies_hz, damping, strict=True)
-    return np.array([shaper.residual_ratio(Mode(float(f), zeta)) for f, zeta in pairs])
+    return np.array([shaper.residual_ratio(Mode(float(f), float(zeta))) for f, zeta in pairs])
 
 
 def draw_sensitivity(
@@ -57,6 +58,10 @@ def draw_sensitivity(
         The axes that were drawn into.
     """
     panel = plot.axes(ax, size_inch=(9.0, 5.4), title="What is left if the frequency is another one")
+    panel.text(
+        1.0, 1.01, "a curve that comes down to 0 turns there: an amplitude has no sign", ha="right", fontsize=8,
+        color="#555555", transform=panel.transAxes,
+    )  # fmt: skip
     highest = max(band.mode.frequency_hz * (1.0 + band.uncertainty) for band in bands)
     frequencies_hz = np.linspace(0.0, 1.25 * highest, _FREQUENCIES)[1:]
     modes = [band.mode for band in bands]
@@ -69,8 +74,15 @@ def draw_sensitivity(
         frequency, width = band.mode.frequency_hz, band.mode.frequency_hz * band.uncertainty
         panel.axvspan(frequency - width, frequency + width, color="#e4e4e4", zorder=0)
         panel.axvline(frequency, color=plot.GREY, linewidth=0.8, zorder=0)
+        panel.annotate(
+            f" mode {frequency:g} Hz" + (f" ±{100.0 * band.uncertainty:g} %" if width else ""), (frequency, 0.97),
+            xycoords=panel.get_xaxis_transform(), fontsize=8, color="#555555", va="top",
+        )  # fmt: skip
     if vibration_limit is not None:
-        panel.axhline(100.0 * vibration_limit, color=plot.GREY, linewidth=1.0, linestyle="--")
+        panel.axhline(
+            100.0 * vibration_limit, color="black", linewidth=1.0, linestyle="--", zorder=1,
+            label=f"limit {100.0 * vibration_limit:g} %",
+        )  # fmt: skip
     panel.set_ylim(bottom=0.0)
     panel.margins(x=0.01)
     panel.set_xlabel("natural frequency in Hz")
@@ -166,7 +178,7 @@ def draw_branches(branches: MinimalBranches, modes: Sequence[Mode], ax: Axes | N
         curves = np.where(negative == has, durations_s, np.nan)
         panel.plot(branches.ratios * slow, curves.T * scale, color=colour, linewidth=1.4)
         panel.plot([], [], color=colour, label=label)
-    panel.axvline(fast, color=plot.GREY, linewidth=0.8, linestyle="--")
+    panel.axvline(fast, color=plot.GREY, linewidth=0.8, linestyle="--", label=f"the faster mode, {fast:g} Hz")
     panel.set_ylim(bottom=0.0)
     panel.margins(x=0.01)
     panel.set_xlabel("frequency of the faster mode in Hz")

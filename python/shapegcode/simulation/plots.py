@@ -23,6 +23,7 @@ FloatArray = npt.NDArray[np.float64]
 
 _COMMAND, _RESPONSE = plot.COLOURS[1], plot.COLOURS[0]
 _MOVES_MM = 1e-9
+_DENSE = 0.2  # share of the panel's height
 # Label of the axis, factor from the curve's own unit, and which curves it shows: number, colour, name.
 _Row = tuple[str, float, tuple[tuple[int, str, str], ...]]
 _ROWS: tuple[_Row, ...] = (
@@ -89,7 +90,17 @@ def plot_motion(motion: Motion, ax: Axes | None = None) -> Axes:
 
 
 def _band(panel: Axes, times: FloatArray, low: FloatArray, high: FloatArray, colour: str, name: str) -> None:
-    """A curve, or the band that it fills where a stretch of time holds several samples; never thinner than a line."""
-    if not np.array_equal(low, high):
-        panel.fill_between(times, low, high, color=colour, linewidth=0)
-    panel.plot(times, (low + high) / 2, color=colour, linewidth=0.9, label=name)
+    """A curve, or the band that it fills where a stretch of time holds several samples.
+
+    A band that is wide against the picture holds many swings: it is light, so that it does not pass for a solid.
+    """
+    width = high - low
+    tall = float(high.max() - low.min())
+    dense = tall > 0 and float(np.median(width)) > _DENSE * tall
+    if width.any():
+        panel.fill_between(times, low, high, color=colour, alpha=0.3 if dense else 1.0, linewidth=0)
+    if dense:
+        panel.plot(times, np.array([low, high]).T, color=colour, linewidth=0.5)
+        panel.plot([], [], color=colour, alpha=0.4, linewidth=6, label=f"{name}, least to largest of each stretch")
+    else:
+        panel.plot(times, (low + high) / 2, color=colour, linewidth=0.9, label=name)
