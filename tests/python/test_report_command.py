@@ -152,3 +152,18 @@ def test_the_report_from_python(tmp_path: Path) -> None:
     with pytest.raises(sg.ArgumentError, match="script must be"):
         result.report(tmp_path / "q.html", script="outside")  # type: ignore[arg-type]
     assert not (tmp_path / "q.html").exists()
+
+
+def test_the_page_of_feeds_has_the_cutting_force(tmp_path: Path) -> None:
+    """Along the path stands the force that the schedule knows: its largest is the peak of the JSON."""
+    golden = Path(__file__).parents[1] / "golden" / "feed"
+    machine = sg.Machine.load("vx500")
+    tool, stock = sg.Tool.load(golden / "pocket_tool.toml"), sg.Stock.load(golden / "pocket_stock.toml")
+    schedule = sg.schedule_feed(sg.Program.read(golden / "POCKET.NC", machine), machine, tool, stock)
+    scene = schedule.page().scene
+    assert scene is not None
+    for variant, peak in zip(scene.variants, ("original", "emitted"), strict=True):
+        expected = getattr(schedule.resultant_force_n, peak).max
+        assert variant.channels["force"].max() == pytest.approx(expected, rel=0.05)
+        air = variant.line < min(part.region.first_line for part in schedule.survey.regions)
+        assert not variant.channels["force"][air].any()

@@ -10,6 +10,7 @@ from shapegcode.conversion.figures import CaseVerdict
 from shapegcode.conversion.result import Conversion
 from shapegcode.conversion.scheduled_result import ScheduledConversion
 from shapegcode.conversion.tables import before_after_table, rests_table
+from shapegcode.machine import Machine
 from shapegcode.results.made import Made
 from shapegcode.results.page.default import next_steps, pictures_of, warnings_of
 from shapegcode.results.page.model import (
@@ -23,11 +24,13 @@ from shapegcode.results.page.model import (
     Notes,
     Section,
 )
+from shapegcode.results.table import Column, Table
 
 __all__ = ["light_of", "sections_of"]
 
 _LONGEST_REGIONS = 8
 _LEAST_SHOWN_UM = 0.05
+_SHOWN_KEYS = ("axes.", "tolerance.", "verdict.")
 _RUN_FIRST = ("first run",)
 
 
@@ -83,7 +86,9 @@ def _sections(conversion: Conversion, made: Made | None) -> Iterator[Section]:
     if not conversion.nothing_shaped:
         table = before_after_table(conversion.before_after())
         yield Section("figures", "All figures, before and after", (table,), folded=True, printed=False)
-    yield from pictures_of(conversion)
+    if conversion.played is not None:
+        yield _machine(conversion.played.machine)
+    yield from pictures_of(conversion, ("path", "vibration"))
     if conversion.at_the_control:
         yield _sheet(conversion, made)
 
@@ -181,6 +186,21 @@ def _times(conversion: Conversion) -> Section:
     how = "Two bars each, original above emitted: where they differ, shaping costs or gains time."
     bars = Bars("s", tuple(rows), ("original", "emitted"), digits=2, keys=tuple(keys))
     return Section("time", "Where the time goes", (bars,), how=how)
+
+
+def _machine(machine: Machine) -> Section:
+    """What the machine was taken for: modes, tolerances, and every value that nobody measured."""
+    values = [value for value in machine.values() if value.unmeasured or value.key.startswith(_SHOWN_KEYS)]
+    unmeasured = sum(value.unmeasured for value in values)
+    columns = (
+        Column("key", left=True),
+        Column("value", value=lambda row: f"{row.value} {row.unit if row.unit != '1' else ''}".strip(), text=True),
+        Column("where it comes from", value=lambda row: "assumed" if row.assumed else row.origin, text=True),
+        Column("meaning", text=True),
+    )
+    how = f"{unmeasured} values here were not measured on this machine: assumed, inherited, or left at their default."
+    table = Table("", columns, values, row_style=lambda row: "" if row.unmeasured else "bold")
+    return Section("machine", "What the machine was taken for", (table,), how=how, folded=True, printed=False)
 
 
 def _sheet(conversion: Conversion, made: Made | None) -> Section:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from shapegcode.feed.load import PathLoad
 from shapegcode.feed.plan import FeedPlan
@@ -14,7 +15,8 @@ from shapegcode.feed.traces import FeedTraces, WallMaps, feed_traces, wall_maps
 from shapegcode.model.playable import PlayedPrograms
 from shapegcode.program import Program
 from shapegcode.results.json import hidden
-from shapegcode.results.page.model import Figure
+from shapegcode.results.page.model import Figure, Page
+from shapegcode.results.page.scene import Scene
 from shapegcode.results.result import Pair, Plot, Result
 from shapegcode.results.table import Column, Table
 
@@ -254,6 +256,24 @@ class FeedSchedule(Result):
     def walls(self) -> WallMaps | None:
         """The form error of the walls along the cutting path; None where none are made."""
         return None if self.traces is None else wall_maps(self.survey, self.loads, self.traces)
+
+    def page(self, **options: Any) -> Page:
+        """The schedule as a page, see `Result.page`; its motion has the cutting force.
+
+        Args:
+            options: of `Result.page`.
+
+        Returns:
+            The page, as data.
+
+        Raises:
+            MachineError, NumericError: a program cannot be played.
+        """
+        page = super().page(**options)
+        if page.scene is None or self.from_json:
+            return page
+        scene: Scene = self._beside("page").with_forces(page.scene, self)
+        return replace(page, scene=scene)
 
     def key_figures(self) -> tuple[Figure, ...]:
         """Time and largest force, before and after."""

@@ -58,7 +58,7 @@ class Result(Outcome):
             return "red", self.next_step
         if said := len(self.warnings):
             return "amber", f"{said} warning{'s' if said > 1 else ''} to heed first"
-        return "green", "done and within tolerance, without a warning"
+        return "green", "done, without a warning"
 
     @property
     def page_title(self) -> str:

@@ -36,6 +36,7 @@ _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 _UNFOLDED_ROWS = 24
 _SHORT_ROWS = 12
 _SHORT_TEXT = 120
+_PRINTED_PICTURES = 2  # so that the page stays within four sheets
 
 
 def title_of(result: Outcome) -> str:
@@ -102,8 +103,10 @@ def next_steps(result: Outcome, *further: NextStep) -> Section:
         The section.
     """
     text = result.next_step
-    said = text[:1].upper() + text[1:]
-    command = next(iter(re.findall(r"`(shapegcode [^`]+)`", text)), "")
+    is_command = text.startswith("shapegcode ")
+    said = text if is_command else text[:1].upper() + text[1:]
+    command = text if is_command and " -" in text else next(iter(re.findall(r"`(shapegcode [^`]+)`", text)), "")
+    said = "Then:" if command == text else said
     return Section("next", "What to do next", (NextSteps((NextStep(said, command), *further)),))
 
 
@@ -118,20 +121,25 @@ def _tables(tables: Sequence[Table]) -> Iterator[Section]:
         yield Section(key, title[:1].upper() + title[1:], (table,), printed=False, folded=True)
 
 
-def pictures_of(result: Outcome) -> Iterator[Section]:
+def pictures_of(result: Outcome, printed: Sequence[str] = ()) -> Iterator[Section]:
     """The pictures, each with a line that says how to read it.
 
     Args:
         result: of any class.
+        printed: names of those that are on paper too; none: the first two.
 
     Returns:
-        One section or none.
+        A section of those on paper, one of the others; none where there are none.
     """
     pictures = [Picture(name, plot, how_to_read(name)) for name, plot in _drawable(result).items()]
-    left_out = "Pictures that need the samples of the run are not here: the JSON does not hold them."
-    said = [Text((left_out,))] if result.from_json else []
-    if pictures or said:
-        yield Section("pictures", "Pictures", (*pictures, *said))
+    chosen = [each for each in pictures if each.name in printed] or pictures[:_PRINTED_PICTURES]
+    if chosen:
+        yield Section("pictures", "Pictures", tuple(chosen))
+    if others := tuple(each for each in pictures if each not in chosen):
+        yield Section("more-pictures", "More pictures", others, printed=False)
+    if result.from_json:
+        left_out = "Pictures that need the samples of the run are not here: the JSON does not hold them."
+        yield Section("no-pictures", "Pictures that are not here", (Text((left_out,)),), printed=False)
 
 
 def _drawable(result: Outcome) -> Mapping[str, Plot]:
