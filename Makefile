@@ -22,7 +22,7 @@ endif
 export SUNDIALS_ROOT := $(CURDIR)/.cache/sundials/usr
 
 BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libfmt-dev python3-dev python3-venv doctest-dev
-TEST_PACKAGES := $(BUILD_PACKAGES) clang-format clang-tidy
+TEST_PACKAGES := $(BUILD_PACKAGES) clang-format clang-tidy chromium chromium-driver
 DOCS_PACKAGES := $(BUILD_PACKAGES) doxygen
 FUZZ_PACKAGES := $(BUILD_PACKAGES) clang-14 libclang-rt-14-dev libomp-14-dev
 FUZZ_SECONDS ?= 600
@@ -72,6 +72,7 @@ test:
 	$(MAKE) release
 	$(MAKE) stub-check
 	tests/tools/fetch_rs274.sh
+	tests/tools/fetch_axe.sh
 	$(PYTEST) -m 'not slow'
 
 # What takes longer than a person waits; .ci/run does of it what guards a file that changed since it last passed, which
@@ -90,6 +91,7 @@ test-all-core:
 
 test-all-python: package dev
 	tests/tools/fetch_rs274.sh
+	tests/tools/fetch_axe.sh
 	$(PYTEST) -m slow
 
 lint: test-packages dev
@@ -114,6 +116,7 @@ bench: package dev
 
 coverage: test-packages dev
 	tests/tools/fetch_rs274.sh
+	tests/tools/fetch_axe.sh
 	tests/tools/coverage.sh -m 'not slow'
 
 # New inputs go to build/, so that the kept corpus grows only by `fuzz-merge`, which adds what covers more.

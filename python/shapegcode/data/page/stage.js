@@ -41,56 +41,20 @@ class Stage {
     this.values = new Map();
     this.lines = new Map();
     this.paper = document.createElement("canvas");
-    this.paper.className = "letters";
     host.append(this.paper);
-    this.#start();
+    this.context = this.paper.getContext("2d", { alpha: false, willReadFrequently: true });
+    this.painter = new PixelPainter(this.context);
+    motions.forEach((motion) => this.lines.set(motion, this.painter.load(motion)));
     new ResizeObserver(() => this.#resize()).observe(host);
     this.#listen();
-  }
-
-  /** A graphics card where there is one, else pixels by hand. */
-  #start() {
-    const canvas = document.createElement("canvas");
-    this.context = null;
-    try {
-      this.painter = new LinePainter(canvas);
-      this.context = this.paper.getContext("2d");
-      this.host.prepend(canvas);
-      this.host.dataset.drawn = "webgl";
-      canvas.addEventListener("webglcontextlost", () => {
-        canvas.remove();
-        this.#byHand();
-        this.draw();
-      });
-    } catch {
-      this.#byHand();
-    }
-    this.#load();
-  }
-
-  #byHand() {
-    this.context ??= this.paper.getContext("2d", { alpha: false, willReadFrequently: true });
-    this.painter = new PixelPainter(this.context);
-    this.host.dataset.drawn = "pixels";
-    if (this.lines.size) this.#load();
-  }
-
-  #load() {
-    for (const motion of this.motions) {
-      const line = this.painter.load(motion);
-      this.lines.set(motion, line);
-      if (this.values.has(motion)) this.painter.setValues(line, this.values.get(motion));
-    }
   }
 
   #resize() {
     const [wide, high] = [this.host.clientWidth, this.host.clientHeight];
     if (!wide || !high) return;
     this.ratio = Math.min(window.devicePixelRatio || 1, 2);
-    for (const canvas of this.host.querySelectorAll("canvas")) {
-      canvas.width = Math.round(wide * this.ratio);
-      canvas.height = Math.round(high * this.ratio);
-    }
+    this.paper.width = Math.round(wide * this.ratio);
+    this.paper.height = Math.round(high * this.ratio);
     const fresh = this.camera.size[0] === 1;
     this.camera.size = [wide, high];
     if (fresh || !this.touched) this.camera.fit();
@@ -146,8 +110,7 @@ class Stage {
   #letters() {
     const context = this.context;
     context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
-    context.clearRect(0, 0, ...this.camera.size);
-    this.painter.end();
+    this.painter.show();
     const project = this.camera.projector();
     drawAxes(context, this.camera, this.low, this.high, "#c3cad3");
     drawScales(context, this.camera, this.magnify, "#e8ebef");

@@ -60,6 +60,8 @@ def number(value: float, digits: int, *, key: str = "", factor: float = 1.0) -> 
     Returns:
         A span that holds the text, the value with all digits, and the place.
     """
+    # As the JSON rounds it, so that both agree in the last digit.
+    value = float(f"{value / factor:.9g}") * factor
     place = f' data-json="{escape(key)}" data-factor="{factor!r}" data-digits="{digits}"' if key else ""
     return f'<span class="number" data-value="{value!r}"{place}>{value:z.{digits}f}</span>'
 
