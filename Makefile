@@ -37,7 +37,8 @@ PACKAGE_INPUTS := CMakeLists.txt cmake $(shell find cpp/include cpp/src bindings
 # With the extension module, for the Python of .venv. The tests are configured where their packages are.
 CONFIGURE_RELEASE = cmake --preset release -D SHAPEGCODE_BUILD_PYTHON=ON -D Python_EXECUTABLE=$(CURDIR)/$(BIN)/python \
   -D pybind11_DIR="$$($(BIN)/python -m pybind11 --cmakedir)"
-SPHINX := $(BIN)/python -m sphinx -W --keep-going -n -q -c docs
+# Notebooks call the command and the compiler.
+SPHINX := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going -n -q -c docs
 PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
 .PHONY: help demo test test-all lint bench coverage fuzz stubs schemas pages docs docs-source docs-links format clean \

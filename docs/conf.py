@@ -1,5 +1,6 @@
 """How Sphinx builds the book. `make docs` stages the pages below build/docs/source and calls it there."""
 
+import os
 import re
 import tomllib
 from pathlib import Path
@@ -57,6 +58,10 @@ nb_execution_timeout = 120
 nb_execution_show_tb = True
 nb_merge_streams = True
 nb_execution_in_temp = True
+# For the page on C++: where the library was built, and the example that is built against it.
+os.environ.setdefault("SHAPEGCODE_BUILD", str(ROOT / "build" / "release"))
+os.environ |= {"NO_COLOR": "1", "TTY_COMPATIBLE": "0"}  # a notebook calls itself a terminal
+os.environ["SHAPEGCODE_EXAMPLE"] = str(ROOT / "cpp" / "examples" / "controller_prototype")
 
 # --- Python and C++ ---------------------------------------------------------------------------------------------------
 autodoc_typehints = "signature"
