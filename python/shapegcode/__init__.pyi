@@ -152,11 +152,17 @@ from shapegcode.io.run_record import (
     Signal as Signal,
 )
 from shapegcode.machine import Machine as Machine
+from shapegcode.machine.description_result import (
+    MachineDescription as MachineDescription,
+    describe_machine as describe_machine,
+)
+from shapegcode.machine.difference_result import (
+    MachineDifference as MachineDifference,
+    machine_difference as machine_difference,
+)
 from shapegcode.machine.fanuc_import import import_parameters as import_parameters
 from shapegcode.machine.result import (
-    MachineDescription as MachineDescription,
     ParameterImport as ParameterImport,
-    describe_machine as describe_machine,
 )
 from shapegcode.metrology.measure import (
     measure as measure,
@@ -176,6 +182,9 @@ from shapegcode.results.result import Pair as Pair, Result as Result, Xyz as Xyz
 from shapegcode.results.revive import load_result as load_result
 from shapegcode.results.table import Column as Column, Table as Table
 from shapegcode.results.trace import Trace as Trace
+from shapegcode.setup.answers import Answers as Answers, AnswersError as AnswersError, read_answers as read_answers
+from shapegcode.setup.build import set_up as set_up
+from shapegcode.setup.result import MachineSetup as MachineSetup
 from shapegcode.shaping import (
     ModeBand as ModeBand,
     Recommendation as Recommendation,

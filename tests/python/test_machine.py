@@ -16,7 +16,7 @@ from shapegcode.cli import COMMANDS, main
 from shapegcode.cli.console import write_json, write_text
 from shapegcode.errors import MachineError
 from shapegcode.machine import AxisMode, Machine
-from shapegcode.machine.result import MachineDescription
+from shapegcode.machine.description_result import MachineDescription
 from shapegcode.results.json import schema
 from shapegcode.settings.keys import PerAxis
 

@@ -96,7 +96,7 @@ frequency_hz = 2  # second
 
 def test_init_inherits_what_was_measured_on_the_built_in_machine(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
-    assert main(["machine", "init", "vx500", "-o", str(file)]) == 0
+    assert main(["machine", "init", "vx500", "--full", "-o", str(file)]) == 0
     built_in, mine = sg.Machine.load("vx500"), sg.Machine.load(file)
     assert mine == built_in
     found = origins(mine)

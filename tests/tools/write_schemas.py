@@ -7,8 +7,13 @@ import pkgutil
 from pathlib import Path
 
 import shapegcode
+from shapegcode.cutting.stock import Stock
+from shapegcode.cutting.tool import Tool
+from shapegcode.machine import Machine
 from shapegcode.results.json import schema, to_text
 from shapegcode.results.result import Result
+from shapegcode.settings.keys import TomlTable
+from shapegcode.settings.schema import toml_schema
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "schema"
 
@@ -28,6 +33,12 @@ def results() -> dict[str, type[Result]]:
     return dict(sorted(below(Result).items()))
 
 
+def file_texts() -> dict[str, str]:
+    """Schemas of the TOML files, for editors, by the names of their files."""
+    models: dict[str, type[TomlTable]] = {"machine": Machine, "tool": Tool, "stock": Stock}
+    return {f"{kind}.json": to_text(toml_schema(model, f"{kind} file of shapegcode")) for kind, model in models.items()}
+
+
 def texts() -> dict[str, str]:
     """Content of each file of the folder by its name."""
     return {f"{name}.json": to_text(schema(cls)) for name, cls in results().items()}
@@ -39,3 +50,6 @@ if __name__ == "__main__":
         old.unlink()
     for name, text in texts().items():
         (FOLDER / name).write_text(text, encoding="utf-8")
+    (FOLDER / "files").mkdir(exist_ok=True)
+    for name, text in file_texts().items():
+        (FOLDER / "files" / name).write_text(text, encoding="utf-8")

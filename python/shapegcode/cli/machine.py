@@ -12,6 +12,8 @@ from shapegcode.cli.options import add_result_arguments
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
+    from shapegcode.machine.description_result import MachineDescription
+    from shapegcode.settings.keys import TomlTable
 
 __all__ = ["add_arguments", "run"]
 
@@ -20,7 +22,7 @@ _DEFAULT_MACHINE = "vx500"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare ``init``, ``import`` and ``show``."""
+    """Declare the actions."""
     parser.epilog = "example: shapegcode machine import CNC-PARA.TXT --from vx500 -o machine.toml"
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True, title="actions")
 
@@ -38,6 +40,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         default=_DEFAULT_FILE,
         help="file to write (default: %(default)s); - for standard output",
+    )
+    init.add_argument(
+        "--full",
+        action="store_true",
+        help="every key with its meaning (600 lines), not only what differs from a default",
     )
     init.add_argument("--force", action="store_true", help="overwrite an existing file")
 
@@ -73,7 +80,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "from another machine, assumed, a choice, stated in the file, or a default.",
     )
     show.add_argument("machine", metavar="FILE_OR_NAME", help="machine file, or name of a built-in machine")
+    show.add_argument(
+        "--for",
+        dest="input",
+        metavar="PROGRAM",
+        default=None,
+        help="convert this program, and rank the values that nobody measured by how far each moves its verdict",
+    )
     add_result_arguments(show)
+
+    diff = actions.add_parser(
+        "diff",
+        help="list the values in which two machines differ",
+        description="List the values in which two machines differ, defaults included. Exit code 0 if they have the "
+        "same values, 1 if not; where a value comes from does not count.",
+    )
+    diff.add_argument("files", metavar="MACHINE", nargs=2, help="machine file, or name of a built-in machine")
+    add_result_arguments(diff)
+
+    scheme = actions.add_parser(
+        "schema",
+        help="print the JSON Schema of machine, tool or stock files, for editors",
+        description="Print the JSON Schema of a TOML file. Editors with TOML support (taplo, Even Better TOML) "
+        "complete and check a file that begins with `#:schema machine.schema.json`.",
+    )
+    scheme.add_argument("kind", choices=("machine", "tool", "stock"), nargs="?", default="machine", help="kind of file")
+    scheme.add_argument("-o", "--output", metavar="FILE", default="-", help="file to write (default: standard output)")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -87,14 +119,16 @@ def run(args: argparse.Namespace) -> int:
         ArgumentError: the file to write exists.
         OSError: a file cannot be read or written.
     """
-    actions = {"init": _init, "import": _import, "show": _show}
+    actions = {"init": _init, "import": _import, "show": _show, "diff": _diff, "schema": _schema}
     return actions[args.action](args)
 
 
 def _init(args: argparse.Namespace) -> int:
-    from shapegcode.machine import inherited_text
+    from shapegcode.machine import Machine, inherited_text
 
     text = inherited_text(args.name)
+    if not args.full:
+        text = Machine.from_toml(text, args.name).to_toml(short=True)
     if args.output == "-":
         sys.stdout.write(text)
         return 0
@@ -149,10 +183,60 @@ def _sorted(files: list[str]) -> tuple[str, list[str]]:
 
 def _show(args: argparse.Namespace) -> int:
     from shapegcode.cli import runner
-    from shapegcode.machine.result import describe_machine
+    from shapegcode.machine.description_result import describe_machine
 
     runner.check_files(args)
-    return runner.finish(describe_machine(args.machine), args)
+    found = describe_machine(args.machine)
+    return runner.finish(found if args.input is None else _ranked(found, args), args)
+
+
+def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescription:
+    """With the values that nobody measured, by what they do to a program."""
+    from dataclasses import replace
+
+    from shapegcode.cli import runner
+    from shapegcode.conversion.convert import convert
+    from shapegcode.machine import Machine
+    from shapegcode.machine.description_result import OpenValue
+
+    with runner.progress(f"converting {args.input}", args):
+        conversion = convert(args.input, Machine.load(args.machine))
+    matters = tuple(
+        OpenValue(
+            row.key, row.value, row.origin, row.moved,
+            f"{row.figure} {row.figure_um:.1f} → {row.moved_um:.1f}, limit {row.limit_um:.1f}", row.share,
+        )
+        for row in conversion.rests_on
+    )  # fmt: skip
+    said = f"{args.input}: nothing in it was shaped, so nothing is ranked"
+    warnings = found.warnings if conversion.worst_case is not None else (*found.warnings, said)
+    return replace(found, program=args.input, matters=matters, warnings=warnings)
+
+
+def _diff(args: argparse.Namespace) -> int:
+    from shapegcode.cli import runner
+    from shapegcode.machine.difference_result import machine_difference
+
+    runner.check_files(args)
+    return runner.finish(machine_difference(*args.files), args)
+
+
+def _schema(args: argparse.Namespace) -> int:
+    from shapegcode.cutting.stock import Stock
+    from shapegcode.cutting.tool import Tool
+    from shapegcode.io.atomic import write_text
+    from shapegcode.machine import Machine
+    from shapegcode.results.json import to_text
+    from shapegcode.settings.schema import toml_schema
+
+    models: dict[str, type[TomlTable]] = {"machine": Machine, "tool": Tool, "stock": Stock}
+    scheme = toml_schema(models[args.kind], f"{args.kind} file of shapegcode")
+    if args.output == "-":
+        sys.stdout.write(to_text(scheme))
+    else:
+        write_text(args.output, to_text(scheme))
+        print(f"wrote {args.output}\nnext: put `#:schema {args.output}` into the first line of a {args.kind} file")
+    return 0
 
 
 def _write(args: argparse.Namespace, text: str) -> None:

@@ -26,7 +26,7 @@ from shapegcode.machine.input import Input
 from shapegcode.machine.output import Emission, Shaping, Tolerance, Verdict
 from shapegcode.machine.times import Times
 from shapegcode.settings import change
-from shapegcode.settings.describe import documentation, values_of, write_toml
+from shapegcode.settings.describe import documentation, values_of, write_short_toml, write_toml
 from shapegcode.settings.keys import KeyInfo, KeyValue, PerAxis, Text, TomlTable, key, toml
 from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem
@@ -273,12 +273,13 @@ class Machine(TomlTable):
             raise MachineError(name, (Problem("", "", f"no built-in machine; built in: {', '.join(names)}"),))
         return (resources.files("shapegcode") / "data" / f"{name}.toml").read_text(encoding="utf-8")
 
-    def to_toml(self, remarks: Mapping[str, str] | None = None) -> str:
+    def to_toml(self, remarks: Mapping[str, str] | None = None, *, short: bool = False) -> str:
         """The machine as a commented machine file, which loads back to an equal machine; origins of values stay.
 
         Args:
             remarks: text for the end of a key's line by its dotted key (modes count from 1:
                 ``axes.x.modes.1.frequency_hz``), for example where the value comes from; in place of the machine's own.
+            short: leave out what is a default, and the words on what each key means.
 
         Returns:
             The text of the file.
@@ -286,6 +287,9 @@ class Machine(TomlTable):
         Raises:
             KeyError: a remark for a key that does not exist.
         """
+        if short:
+            held = {value.key: value.remark for value in self.values() if value.remark}
+            return write_short_toml(self, held | dict(remarks or {}))
         return write_toml(self, self.all_remarks() | dict(remarks or {}))
 
     @overload

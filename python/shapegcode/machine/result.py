@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import groupby
-from pathlib import Path
 
 from shapegcode.machine.axes import Axis
 from shapegcode.machine.machine import Machine
 from shapegcode.results.json import hidden
 from shapegcode.results.result import Result, Xyz
 from shapegcode.results.table import Column, Table
-from shapegcode.settings.keys import KeyValue, toml
+from shapegcode.settings.keys import toml
 
 __all__ = [
     "AssumedValue",
-    "MachineDescription",
     "MissingParameter",
     "ParameterImport",
     "ReadParameter",
     "ReadTable",
     "Value",
-    "describe_machine",
 ]
 
 Value = bool | int | float | str | tuple[int, ...] | Xyz[float]
@@ -209,97 +205,3 @@ def _shown(row: ReadParameter | AssumedValue) -> str:
         one = value.x == value.y == value.z
         return toml(value.x) if one else toml({axis: value[axis] for axis in "xyz"})
     return value if isinstance(value, str) else toml(value)
-
-
-@dataclass(frozen=True, repr=False)
-class MachineDescription(Result):
-    """Every value of a machine with its unit, origin and meaning.
-
-    Attributes:
-        machine: the tables of the machine file, defaults as well.
-        keys: every value by its dotted key, in the order of the file.
-        warnings: none.
-    """
-
-    machine: Mapping[str, object]
-    keys: Mapping[str, KeyValue]
-    warnings: tuple[str, ...] = ()
-
-    @property
-    def ok(self) -> bool:
-        """Whether the machine can be used: always, as one that cannot is refused."""
-        return True
-
-    @property
-    def answer(self) -> str:
-        """Name and description."""
-        return f"{self.machine['name']}: {self.machine['description']}".rstrip(": ")
-
-    @property
-    def next_step(self) -> str:
-        """The one thing to do next, in one sentence."""
-        open_keys = sum(value.unmeasured for value in self.keys.values())
-        if open_keys:
-            what = f"what is assumed or inherited ({open_keys} keys)"
-            return f"look up or measure {what}: shapegcode machine import, identify --update, characterize."
-        return "use it: shapegcode convert IN -m MACHINE -o OUT."
-
-    def tables(self) -> list[Table]:
-        """The keys, those of one table of the file below its name."""
-        rows = list(self._rows())
-        heads = [rank for rank, row in enumerate(rows) if isinstance(row, str)]
-        columns = (
-            Column("key", value=lambda row: f"[{row}]" if isinstance(row, str) else _last(row.key), left=True),
-            Column("value", value=_with_unit, text=True),
-            Column("origin", value=_origin, left=True),
-            Column("meaning", value=lambda row: getattr(row, "meaning", None), text=True),
-        )
-        counts = Counter(_origin(value) or "" for value in self.keys.values())
-        summary = (Column("origin", value=lambda row: row[0], left=True), Column("keys", value=lambda row: row[1]))
-        return [
-            Table("", columns, rows, sections=heads, row_style=lambda row: "bold" if isinstance(row, str) else ""),
-            Table("origins", summary, counts.most_common()),
-        ]
-
-    def _rows(self) -> Iterator[str | KeyValue]:
-        section = ""
-        for key, value in self.keys.items():
-            table = key.rpartition(".")[0]
-            if table != section:
-                section = table
-                yield table
-            yield value
-
-
-def _last(key: str) -> str:
-    return key.rpartition(".")[2]
-
-
-def _with_unit(row: str | KeyValue) -> str | None:
-    if isinstance(row, str):
-        return None
-    return f"{row.value} {row.unit}" if row.unit not in ("", "1") and row.value != "not set" else row.value
-
-
-def _origin(row: str | KeyValue) -> str | None:
-    if isinstance(row, str):
-        return None
-    return "assumed" if row.assumed else row.origin
-
-
-def describe_machine(machine: Machine | str | Path) -> MachineDescription:
-    """Every value of a machine: from the file, a default, or a default that is an assumption.
-
-    Args:
-        machine: a machine, its file, or the name of a built-in one.
-
-    Returns:
-        The values with their units and meanings.
-
-    Raises:
-        MachineError: the file is not TOML or has wrong keys or values; every problem is listed.
-        OSError: the file cannot be read.
-    """
-    loaded = machine if isinstance(machine, Machine) else Machine.load(machine)
-    keys = {value.key: value for value in loaded.values()}
-    return MachineDescription(loaded.model_dump(mode="json"), keys)

@@ -8,7 +8,17 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from shapegcode.settings.keys import InlineTable, KeyInfo, KeyValue, TomlTable, item_type, key_info, table_type, toml
+from shapegcode.settings.keys import (
+    InlineTable,
+    KeyInfo,
+    KeyValue,
+    TomlTable,
+    facts,
+    item_type,
+    key_info,
+    table_type,
+    toml,
+)  # fmt: skip
 from shapegcode.settings.remarks import origin_of
 
 _LINE_WIDTH = 110
@@ -53,6 +63,26 @@ def values_of(
                 fanuc=info.fanuc,
                 remark=remark,
             )
+
+
+def write_short_toml(machine: TomlTable, remarks: Mapping[str, str]) -> str:
+    """A machine as a file of what differs from the defaults, or of which it is known where it comes from.
+
+    Args:
+        machine: what to write.
+        remarks: text for the end of a key's line by its dotted key.
+
+    Returns:
+        The text of the file, which loads back to a machine with the same values.
+    """
+    return _ShortWriter(dict(remarks)).write(machine)
+
+
+_SHORT_HEAD = (
+    "Machine file of shapegcode, the short form: what is not here has its default. `shapegcode machine show FILE` "
+    "prints every value with its meaning; docs/reference/machine.md explains the keys."
+)
+_TOLD = ("measured", "dump")
 
 
 def write_toml(machine: TomlTable, remarks: Mapping[str, str]) -> str:
@@ -146,6 +176,68 @@ class _TomlWriter:
             self._table(table, f"{key}.{number}.")
 
 
+class _ShortWriter(_TomlWriter):
+    """Leaves out what a reader would have anyway."""
+
+    def write(self, machine: TomlTable) -> str:
+        self._lines = []
+        self._comment(_SHORT_HEAD)
+        self._lines.append("")
+        self._table(machine, "")
+        return "\n".join(self._lines).rstrip("\n") + "\n"
+
+    def _table(self, table: TomlTable, prefix: str) -> None:
+        """Head and keys of a table alone where something is left of it."""
+        below: list[tuple[str, FieldInfo, Any]] = []
+        for name, field in type(table).model_fields.items():
+            value = getattr(table, name)
+            if (isinstance(value, TomlTable) and not isinstance(value, InlineTable)) or item_type(field):
+                below.append((f"{prefix}{name}", field, value))
+            elif self._is_told(f"{prefix}{name}", table, name, field):
+                remark = self._remarks.get(f"{prefix}{name}", "")
+                line = f"# {name} = ..." if value is None else f"{name} = {toml(value)}"
+                self._lines.append(f"{line}  # {remark}" if remark else line)
+        for key, field, value in below:
+            if item_type(field):
+                self._short_list(key, value)
+            elif value is not None:
+                self._short_table(f"[{key}]", value, f"{key}.")
+
+    def _short_table(self, head: str, table: TomlTable, prefix: str) -> None:
+        before = list(self._lines)
+        self._head(head, "")
+        headed = len(self._lines)
+        self._table(table, prefix)
+        if len(self._lines) == headed:
+            self._lines = before
+        elif self._lines[headed] == "":
+            # Nothing but tables of its own.
+            self._lines = [*before, *self._lines[headed:]]
+
+    def _short_list(self, key: str, tables: tuple[TomlTable, ...]) -> None:
+        remark = self._remarks.get(key, "")
+        if not tables and remark:
+            self._lines.append(f"# [[{key}]]  # {remark}")
+        for number, table in enumerate(tables, start=1):
+            self._short_table(f"[[{key}]]", table, f"{key}.{number}.")
+
+    def _is_told(self, key: str, table: TomlTable, name: str, field: FieldInfo) -> bool:
+        """Whether the file must hold it, or holds it with a word of where it comes from."""
+        value = getattr(table, name)
+        if field.is_required():
+            return True
+        remark, assumed = self._remarks.get(key, ""), bool(facts(field).get("assumed"))
+        origin = origin_of(remark)
+        # What equals the default goes where nothing is lost: an assumption whose default is marked as one, a statement
+        # without a word of where it comes from whose default is not.
+        told = {"assumed": not assumed, "inherited": not assumed, "file": bool(remark) or assumed}.get(
+            origin, origin in _TOLD
+        )
+        if value is None:
+            return self._remarks.get(key, "").startswith("assumed")
+        return name in table.model_fields_set and (told or value != field.get_default(call_default_factory=True))
+
+
 def documentation(model: type[TomlTable], builtin_names: Sequence[str]) -> str:
     """The reference of a machine file's keys as Markdown.
 
@@ -162,9 +254,10 @@ def documentation(model: type[TomlTable], builtin_names: Sequence[str]) -> str:
         "",
         "<!-- Generated: make docs -->",
         "",
-        "A machine file is TOML. `shapegcode machine init` writes a commented one to start from,",
-        "`shapegcode machine show FILE` prints every value with its origin. An unknown key, a number that is",
-        "not finite or a value outside its limits is an error, and all errors of a file are listed at once.",
+        "A machine file is TOML. [`shapegcode setup`](../howto/setup.md) writes a short one from answers,",
+        "`shapegcode machine init --full` one with every key. `shapegcode machine show FILE` prints every value with",
+        "its origin. An unknown key, a number that is not finite or a value outside its limits is an error, and all",
+        "errors of a file are listed at once.",
         "",
         f"Built-in machines, usable by name in place of a file: {builtin}.",
         'For one run `--set KEY=VALUE` replaces a value, in Python `machine.with_values("tolerance.contour_um", 5)`;',

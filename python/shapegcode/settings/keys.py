@@ -85,10 +85,12 @@ class RatioPerAxis(PerAxis):
     z: Annotated[NonNegative, Field(le=1)] = key("value of the Z axis")
 
 
-AxisValues = Annotated[PerAxis, BeforeValidator(_spread)]
-PositiveAxisValues = Annotated[PositivePerAxis, BeforeValidator(_spread)]
-AxisTimes = Annotated[TimePerAxis, BeforeValidator(_spread)]
-AxisRatios = Annotated[RatioPerAxis, BeforeValidator(_spread)]
+AxisValues = Annotated[PerAxis, BeforeValidator(_spread, json_schema_input_type=NonNegative | PerAxis)]
+PositiveAxisValues = Annotated[
+    PositivePerAxis, BeforeValidator(_spread, json_schema_input_type=Positive | PositivePerAxis)
+]
+AxisTimes = Annotated[TimePerAxis, BeforeValidator(_spread, json_schema_input_type=NonNegative | TimePerAxis)]
+AxisRatios = Annotated[RatioPerAxis, BeforeValidator(_spread, json_schema_input_type=NonNegative | RatioPerAxis)]
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,7 @@ from shapegcode.results.table import Column, Table
 __all__ = ["next_steps", "page_of", "pictures_of", "raw_page", "sections_of", "short_html", "title_of", "warnings_of"]
 
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+_NO_WORD = re.compile(r"^-|[A-Z0-9./=]")
 _UNFOLDED_ROWS = 24
 _SHORT_ROWS = 12
 _SHORT_TEXT = 120
@@ -105,9 +106,20 @@ def next_steps(result: Outcome, *further: NextStep) -> Section:
     text = result.next_step
     is_command = text.startswith("shapegcode ")
     said = text if is_command else text[:1].upper() + text[1:]
-    command = text if is_command and " -" in text else next(iter(re.findall(r"`(shapegcode [^`]+)`", text)), "")
+    command = text if _is_typed(text) else next(iter(re.findall(r"`(shapegcode [^`]+)`", text)), "")
     said = "Then:" if command == text else said
     return Section("next", "What to do next", (NextSteps((NextStep(said, command), *further)),))
+
+
+def _is_typed(text: str) -> bool:
+    """Whether all of it can be typed: behind the command stand options with their values, and files."""
+    program, _, *words = text.split(" ") if " " in text else (text, "")
+    values = (word.startswith("-") for word in ("", *words))
+    return (
+        program == "shapegcode"
+        and bool(words)
+        and all(value or _NO_WORD.search(word) for word, value in zip(words, values, strict=False))
+    )
 
 
 def _tables(tables: Sequence[Table]) -> Iterator[Section]:

@@ -1,0 +1,165 @@
+"""Every value of a machine with its unit, origin and meaning; and which of those that nobody measured matter."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from shapegcode.machine.machine import Machine
+from shapegcode.results.result import Result
+from shapegcode.results.table import Column, Table
+from shapegcode.settings.keys import KeyValue
+
+__all__ = ["MachineDescription", "OpenValue", "describe_machine"]
+
+
+@dataclass(frozen=True)
+class OpenValue:
+    """A value that nobody measured on the machine, and what it would do to a program.
+
+    Attributes:
+        key: dotted name.
+        value: as it stands in the file, with its unit.
+        origin: "assumed", "inherited" or "default".
+        moved: what it was moved to, in words; empty: it was not tried.
+        effect: what that does to the figure that it moves furthest, in words; empty: it was not tried.
+        share: how far the figure moves, of its limit; None: it was not tried.
+    """
+
+    key: str
+    value: str
+    origin: str
+    moved: str = ""
+    effect: str = ""
+    share: float | None = None
+
+
+@dataclass(frozen=True, repr=False)
+class MachineDescription(Result):
+    """Every value of a machine with its unit, origin and meaning.
+
+    Attributes:
+        machine: the tables of the machine file, defaults as well.
+        keys: every value by its dotted key, in the order of the file.
+        warnings: none.
+        program: for which the values that nobody measured were ranked; None: for none.
+        matters: those of them that move its verdict, the furthest first.
+    """
+
+    machine: Mapping[str, object]
+    keys: Mapping[str, KeyValue]
+    warnings: tuple[str, ...] = ()
+    program: str | None = None
+    matters: tuple[OpenValue, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether the machine can be used: always, as one that cannot is refused."""
+        return True
+
+    @property
+    def answer(self) -> str:
+        """How much of it nobody measured, and which of that matters most."""
+        name, count = self.machine["name"], len(self._open())
+        if self.program is None:
+            said = f"{count} of {len(self.keys)} values are assumed or inherited" if count else "every value is said"
+            return f"{name}: {said}"
+        if not self.matters:
+            return f"{name}: none of {count} values that nobody measured matters for {Path(self.program).name}"
+        first = self.matters[0]
+        return (
+            f"{name}: {len(self.matters)} of {count} values that nobody measured matter for "
+            f"{Path(self.program).name}, most of all {first.key} ({first.effect})"
+        )
+
+    def _open(self) -> list[KeyValue]:
+        return [value for value in self.keys.values() if value.unmeasured]
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        if self.matters:
+            key = self.matters[0].key
+            how = (
+                "`shapegcode identify --tap-plan` says how"
+                if ".modes" in key
+                else "docs/howto/characterize.md says how"
+            )
+            return f"measure {key} first: {how}."
+        if self._open() and self.program is None:
+            return "`shapegcode machine show MACHINE --for part.nc` ranks them by what they do to your program."
+        return "use it: shapegcode convert IN -m MACHINE -o OUT."
+
+    def tables(self) -> list[Table]:
+        """The keys, those of one table of the file below its name."""
+        rows = list(self._rows())
+        heads = [rank for rank, row in enumerate(rows) if isinstance(row, str)]
+        columns = (
+            Column("key", value=lambda row: f"[{row}]" if isinstance(row, str) else _last(row.key), left=True),
+            Column("value", value=_with_unit, text=True),
+            Column("origin", value=_origin, left=True),
+            Column("meaning", value=lambda row: getattr(row, "meaning", None), text=True),
+        )
+        counts = Counter(_origin(value) or "" for value in self.keys.values())
+        summary = (Column("origin", value=lambda row: row[0], left=True), Column("keys", value=lambda row: row[1]))
+        return [
+            *self._ranking(),
+            Table("", columns, rows, sections=heads, row_style=lambda row: "bold" if isinstance(row, str) else ""),
+            Table("origins", summary, counts.most_common()),
+        ]
+
+    def _ranking(self) -> list[Table]:
+        """What nobody measured: for a program those values that matter, the furthest first."""
+        if self.program is not None:
+            columns = (
+                Column("matters most", value="key", left=True),
+                Column("value → if it were", value=lambda row: f"{row.value} {row.origin} → {row.moved}", text=True),
+                Column("then, µm", value="effect", text=True),
+            )
+            return [Table("", columns, self.matters)] if self.matters else []
+        return []
+
+    def _rows(self) -> Iterator[str | KeyValue]:
+        section = ""
+        for key, value in self.keys.items():
+            table = key.rpartition(".")[0]
+            if table != section:
+                section = table
+                yield table
+            yield value
+
+
+def _last(key: str) -> str:
+    return key.rpartition(".")[2]
+
+
+def _with_unit(row: str | KeyValue) -> str | None:
+    if isinstance(row, str):
+        return None
+    return f"{row.value} {row.unit}" if row.unit not in ("", "1") and row.value != "not set" else row.value
+
+
+def _origin(row: str | KeyValue) -> str | None:
+    if isinstance(row, str):
+        return None
+    return "assumed" if row.assumed else row.origin
+
+
+def describe_machine(machine: Machine | str | Path) -> MachineDescription:
+    """Every value of a machine: from the file, a default, or a default that is an assumption.
+
+    Args:
+        machine: a machine, its file, or the name of a built-in one.
+
+    Returns:
+        The values with their units and meanings.
+
+    Raises:
+        MachineError: the file is not TOML or has wrong keys or values; every problem is listed.
+        OSError: the file cannot be read.
+    """
+    loaded = machine if isinstance(machine, Machine) else Machine.load(machine)
+    keys = {value.key: value for value in loaded.values()}
+    return MachineDescription(loaded.model_dump(mode="json"), keys)

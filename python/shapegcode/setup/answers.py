@@ -1,0 +1,204 @@
+"""What a shop is asked about its machine: the questions in their order, and the file that can hold the answers.
+
+    name = "VMC-3"
+    rapid_mm_per_min = 24000
+    delivery = "dnc"
+    dnc_baud = 9600
+    modes = { x = "46:0.02", y = "taps/y.csv", z = "rigid" }
+
+Every question but the name has an answer of its own where nobody knows: the key is left out.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, Strict, model_validator
+
+from shapegcode.errors import FileError
+from shapegcode.settings.keys import InlineTable, Positive, PositiveAxisValues, Text, TomlTable, key
+from shapegcode.settings.load import loaded, validated
+
+__all__ = ["EXPLAINED", "Answers", "AnswersError", "ModesAnswer", "is_mode", "read_answers"]
+
+Delivery = Literal["memory", "dnc", "data server"]
+LookAhead = Literal["none", "G05.1", "G08"]
+
+_MODE = re.compile(r"\s*\d+(\.\d*)?\s*(:\s*\d*\.?\d+)?\s*")
+
+
+class AnswersError(FileError):
+    """Answers that cannot be used; the message lists every problem."""
+
+
+class ModesAnswer(InlineTable):
+    """What is known of the vibration of each axis."""
+
+    x: Text = key('X: a tap test\'s file, "FREQUENCY:DAMPING" in Hz, "rigid", or "unknown"', default="unknown")
+    y: Text = key("Y: likewise", default="unknown")
+    z: Text = key("Z: likewise", default="unknown")
+
+
+class Answers(TomlTable):
+    """What a shop says of its machine."""
+
+    name: Annotated[str, Strict(), Field(min_length=1, max_length=60, pattern=r"^[\x20-\x7e]+$")] = key(
+        "What do you call the machine?"
+    )
+    control: Literal["fanuc", "other"] = key("Which control does it have?", default="fanuc")
+    dump: Text | None = key("Is there a parameter file of the control (CNC-PARA.TXT)?", default=None)
+    rapid_mm_per_min: PositiveAxisValues | None = key(
+        "How fast are the rapids (G00)? One number, or x, y, z", unit="mm/min", default=None
+    )
+    max_feed_mm_per_min: PositiveAxisValues | None = key(
+        "What is the largest cutting feed? One number, or x, y, z", unit="mm/min", default=None
+    )
+    max_acceleration_mm_s2: PositiveAxisValues | None = key(
+        "What is the largest acceleration while cutting? One number, or x, y, z", unit="mm/s²", default=None
+    )
+    least_increment_mm: Annotated[Positive, Field(le=0.1)] | None = key(
+        "What is the least increment?", unit="mm", default=None
+    )
+    delivery: Delivery | None = key("How does a program get to the machine?", default=None)
+    dnc_baud: Annotated[int, Strict(), Field(ge=110, le=10_000_000)] | None = key(
+        "At which speed does the line feed it?", unit="baud", default=None
+    )
+    program_memory_kb: Annotated[Positive, Field(le=1e9)] | None = key(
+        "How large is the program memory?", unit="kB", default=None
+    )
+    look_ahead: LookAhead | None = key("By which code does a look-ahead mode go on?", default=None)
+    contour_um: Positive | None = key("How far may the contour leave the programmed path?", unit="µm", default=None)
+    modes: ModesAnswer = key("What is known of its vibration?", default={})
+
+    @model_validator(mode="after")
+    def _enough(self) -> Answers:
+        if self.dump is None and self.rapid_mm_per_min is None:
+            raise ValueError("rapid_mm_per_min is missing: without a parameter file the rapid rates must be said")
+        if self.delivery == "dnc" and self.dnc_baud is None:
+            raise ValueError('dnc_baud is missing: delivery = "dnc" needs the speed of the line')
+        if self.dnc_baud is not None and self.delivery != "dnc":
+            raise ValueError('dnc_baud is given, and delivery is not "dnc": take one of both out')
+        return self
+
+    def stem_from(self, folder: Path) -> Answers:
+        """The same with its files looked for in a folder.
+
+        Args:
+            folder: of the file of answers.
+
+        Returns:
+            New answers.
+        """
+        taps = {axis: _file_in(folder, said) for axis, said in self.modes.model_dump().items()}
+        dump = None if self.dump is None else str(folder / self.dump)
+        return self.model_copy(update={"dump": dump, "modes": ModesAnswer(**taps)})
+
+
+def is_mode(said: str) -> bool:
+    """Whether an answer on vibration is a frequency in Hz, with or without a damping ratio.
+
+    Args:
+        said: the answer.
+
+    Returns:
+        True for "46" and "46:0.02".
+    """
+    return _MODE.fullmatch(said) is not None
+
+
+def _file_in(folder: Path, said: str) -> str:
+    return said if said in ("rigid", "unknown") or is_mode(said) else str(folder / said)
+
+
+def read_answers(source: str | Path | Mapping[str, Any]) -> Answers:
+    """Answers from a file (TOML, or JSON where its name ends so) or from a mapping.
+
+    Args:
+        source: the file, whose folder relative names of files refer to; or the answers by key.
+
+    Returns:
+        The answers.
+
+    Raises:
+        AnswersError: an unknown key, a value of another kind, or one that is missing; every problem with its line.
+        OSError: the file cannot be read.
+    """
+    if isinstance(source, Mapping):
+        return validated(Answers, dict(source), "answers", "", AnswersError)
+    path = Path(source)
+    if path.suffix.lower() != ".json":
+        return loaded(Answers, path, AnswersError).stem_from(path.parent)
+    import json
+
+    from shapegcode.errors import Problem
+
+    text = path.read_text(encoding="utf-8")
+    try:
+        data = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise AnswersError(str(path), (Problem("", "", f"not JSON: {error.msg}", error.lineno),)) from None
+    if not isinstance(data, dict):
+        raise AnswersError(str(path), (Problem("", "", "must be an object"),))
+    return validated(Answers, data, str(path), text, AnswersError).stem_from(path.parent)
+
+
+def _of_modes(modes: ModesAnswer) -> str:
+    said = modes.model_dump()
+    unknown = "".join(axis.upper() for axis in "xyz" if said[axis] == "unknown")
+    if not unknown:
+        return "Shaping is for the modes that you say; where an axis is rigid, nothing is shaped for it."
+    return f"Until {', '.join(unknown)} is tapped it is taken as rigid, and every verdict says so."
+
+
+EXPLAINED: Mapping[str, Callable[[Any], str]] = {
+    "name": lambda _: "It stands in the header of every program that is written.",
+    "control": lambda said: (
+        "A parameter file of it can be read; look-ahead goes on and off by G05.1 or G08."
+        if said == "fanuc"
+        else "Programs are written as FANUC controls read them: try one above the part first."
+    ),
+    "dump": lambda said: (
+        "Limits, time constants and increments come from it; it holds no vibration."
+        if said
+        else "Limits and time constants are then what you say, or assumed and marked so."
+    ),
+    "rapid_mm_per_min": lambda _: "The time of rapids follows from it.",
+    "max_feed_mm_per_min": lambda said: (
+        "Feeds above it are cut down, and cost time." if said else "The rapid rate is assumed for it."
+    ),
+    "max_acceleration_mm_s2": lambda said: (
+        "It says how sharply corners are taken, and what shakes the machine."
+        if said
+        else "0.3 g is assumed, as usual for a machining centre: measure it with `shapegcode characterize`."
+    ),
+    "least_increment_mm": lambda said: (
+        "Ends of blocks are rounded to it: the finer, the less shaping loses."
+        if said
+        else "0.001 mm is assumed (IS-B)."
+    ),
+    "delivery": lambda said: {
+        "memory": "What is written must fit the memory; convert says whether it does.",
+        "dnc": "Blocks may not come faster than the line: convert --baud fits the program to it.",
+        "data server": "Size and speed of the line hold nothing back.",
+        None: "Nothing is held back for it.",
+    }[said],
+    "dnc_baud": lambda said: (
+        f"{said / 11:.0f} characters a second: some {said / 11 / 25:.0f} short blocks." if said else ""
+    ),
+    "program_memory_kb": lambda said: "A larger program gets a warning." if said else "256 kB are assumed.",
+    "look_ahead": lambda said: (
+        "The mode goes off before each shaped cut and on again behind it."
+        if said not in (None, "none")
+        else "No code is written: the mode must be off while a shaped program runs."
+    ),
+    "contour_um": lambda said: (
+        "Shaping may not leave the path further: tighter costs time at corners."
+        if said
+        else "20 µm hold, for roughing; finishing wants less."
+    ),
+    "modes": _of_modes,
+}
+"""What an answer changes, in one sentence, by the name of the question; called with the answer."""

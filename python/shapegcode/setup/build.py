@@ -1,0 +1,172 @@
+"""A short machine file from answers: what was said, with where it comes from; everything else is a default."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from shapegcode.errors import ArgumentError
+from shapegcode.identification.identify import identify
+from shapegcode.identification.update import update_modes
+from shapegcode.machine import Machine
+from shapegcode.machine.fanuc_import import import_parameters
+from shapegcode.setup.answers import Answers, is_mode
+from shapegcode.setup.result import MachineSetup, OpenQuestion
+
+__all__ = ["set_up"]
+
+_ANSWERED = "answered"
+_ASSUMED_ACCELERATION_MM_S2 = 3000.0
+_LOOK_AHEAD = {"G05.1": (["G05.1 Q0"], ["G05.1 Q1"]), "G08": (["G08 P0"], ["G08 P1"])}
+_LIMITS = ("max_feed_mm_per_min", "rapid_mm_per_min", "max_acceleration_mm_s2")
+
+
+def set_up(answers: Answers) -> MachineSetup:
+    """The machine that a shop describes.
+
+    Args:
+        answers: what it says.
+
+    Returns:
+        The machine, its short file, and what is still open.
+
+    Raises:
+        MachineError: a value that a machine file could not have, or a dump that cannot be read.
+        ArgumentError, RecordError: a tap test without a mode that it supports.
+        OSError: a file cannot be read.
+    """
+    machine, notes = _started(answers)
+    remarks = dict(machine.remarks)
+    values = dict(_said(answers))
+    machine = machine.with_values({key: value for key, (value, _) in values.items()}, source=answers.name)
+    remarks |= {key: remark for key, (_, remark) in values.items()}
+    machine = machine.with_remarks(_for_axes(machine, remarks))
+    text = machine.to_toml(short=True)
+    for axis, said in answers.modes.model_dump().items():
+        if said in ("rigid", "unknown") or is_mode(said):
+            continue
+        found = identify(said)
+        if not found.modes:
+            raise ArgumentError(f"modes.{axis} = {said!r}: no mode that the data support: {found.answer}")
+        update = update_modes(text, axis, found.modes, source=found.source, refused=found.refused, file=answers.name,
+                              keep_modes=_with_modes(answers, axis))  # fmt: skip
+        notes.append(
+            f"{axis.upper()}: {', '.join(f'{mode.frequency_hz.value:g} Hz' for mode in found.modes)} from {said}"
+        )
+        text = update.text
+    machine = Machine.from_toml(text, answers.name)
+    return MachineSetup(
+        machine=answers.name,
+        answered=tuple(sorted(value.key for value in machine.values() if value.remark.startswith(_ANSWERED))),
+        imported=tuple(sorted(value.key for value in machine.values() if value.origin in ("dump", "measured"))),
+        open=tuple(_open(machine)),
+        notes=tuple(notes),
+        warnings=(),
+        text=text,
+    )
+
+
+def _started(answers: Answers) -> tuple[Machine, list[str]]:
+    """The machine of the dump, or one that has what every machine file must have."""
+    rigid = "".join(axis for axis, said in answers.modes.model_dump().items() if said == "rigid")
+    if answers.dump is not None:
+        rapid = answers.rapid_mm_per_min
+        base = None if rapid is None else _plain(answers)
+        found = import_parameters(answers.dump, base, name=answers.name, rigid=rigid)
+        if not found.ok:
+            raise ArgumentError(f"dump = {answers.dump!r}: nothing was read from it: {found.answer}")
+        return found.machine, [f"{len(found.read)} parameters read from {answers.dump}"]
+    return _plain(answers), []
+
+
+def _plain(answers: Answers) -> Machine:
+    """Limits as they are said; what is not said is assumed, and marked so."""
+    rapid = answers.rapid_mm_per_min
+    assert rapid is not None
+    feed, acceleration = answers.max_feed_mm_per_min, answers.max_acceleration_mm_s2
+    axes: dict[str, Any] = {}
+    remarks = {}
+    for axis in "xyz":
+        own = getattr(rapid, axis)
+        axes[axis] = {
+            "max_feed_mm_per_min": own if feed is None else getattr(feed, axis),
+            "rapid_mm_per_min": own,
+            "max_acceleration_mm_s2": (
+                _ASSUMED_ACCELERATION_MM_S2 if acceleration is None else getattr(acceleration, axis)
+            ),
+        }
+        stem = f"axes.{axis}"
+        remarks[f"{stem}.rapid_mm_per_min"] = _ANSWERED
+        remarks[f"{stem}.max_feed_mm_per_min"] = _ANSWERED if feed is not None else "assumed: the rapid rate"
+        said = _ANSWERED if acceleration is not None else "assumed: 0.3 g, usual for a machining centre"
+        remarks[f"{stem}.max_acceleration_mm_s2"] = said
+    whose = "FANUC control" if answers.control == "fanuc" else "control that reads FANUC's G-code"
+    data = {"name": answers.name, "description": f"{whose}; set up by answers", "axes": axes}
+    return Machine.from_data(data, answers.name).with_remarks(remarks)
+
+
+def _said(answers: Answers) -> Iterator[tuple[str, tuple[object, str]]]:
+    """Key of the machine file, value and remark of what was said beside limits and dump."""
+    yield "name", (answers.name, "")
+    if answers.dump is not None:
+        for name in _LIMITS:
+            if (said := getattr(answers, name)) is not None:
+                for axis in "xyz":
+                    yield f"axes.{axis}.{name}", (getattr(said, axis), _ANSWERED)
+    if answers.least_increment_mm is not None:
+        yield "controller.least_increment_mm", (answers.least_increment_mm, _ANSWERED)
+    if answers.dnc_baud is not None:
+        yield "controller.dnc_baud", (answers.dnc_baud, f"{_ANSWERED}: the line that feeds programs")
+    elif answers.delivery is not None:
+        yield "controller.dnc_baud", (0, f"{_ANSWERED}: programs come from {answers.delivery}")
+    if answers.program_memory_kb is not None:
+        yield "controller.program_memory_bytes", (round(answers.program_memory_kb * 1024), _ANSWERED)
+    if answers.look_ahead in _LOOK_AHEAD:
+        off, on = _LOOK_AHEAD[answers.look_ahead]
+        yield "emission.prologue", (off, f"{_ANSWERED}: look-ahead off before a shaped cut")
+        yield "emission.epilogue", (on, f"{_ANSWERED}: and on again")
+    if answers.contour_um is not None:
+        yield "tolerance.contour_um", (answers.contour_um, f"choice, {_ANSWERED}")
+    for axis, said in answers.modes.model_dump().items():
+        if said == "rigid":
+            yield f"axes.{axis}.rigid", (True, f"{_ANSWERED}: no mode counts")
+        elif is_mode(said):
+            frequency, _, damping = said.partition(":")
+            mode = {"frequency_hz": float(frequency), "damping_ratio": float(damping) if damping else 0.02}
+            yield f"axes.{axis}.modes", ([mode], "")
+            if damping:
+                yield f"axes.{axis}.modes.1.damping_ratio", (mode["damping_ratio"], _ANSWERED)
+
+
+def _for_axes(machine: Machine, remarks: dict[str, str]) -> dict[str, str]:
+    """Remarks of the keys that the machine has; modes that were said are in tables of their own."""
+    held = {value.key for value in machine.values()}
+    found = {key: remark for key, remark in remarks.items() if key in held and remark}
+    for axis, table in zip("xyz", machine.axes.as_tuple(), strict=True):
+        stem = f"axes.{axis}"
+        for number in range(1, len(table.modes) + 1):
+            found.setdefault(f"{stem}.modes.{number}.frequency_hz", _ANSWERED)
+            found.setdefault(f"{stem}.modes.{number}.damping_ratio", "assumed: not answered")
+        if not table.modes and not table.rigid:
+            found[f"{stem}.modes"] = "not known: tap it, or say that it is rigid"
+    return found
+
+
+def _with_modes(answers: Answers, axis: str) -> str:
+    """The other axes whose modes were said: they are this machine's."""
+    said = answers.modes.model_dump()
+    return "".join(other for other in "xyz" if other != axis and said[other] not in ("rigid", "unknown"))
+
+
+def _open(machine: Machine) -> Iterator[OpenQuestion]:
+    """What nobody said and a verdict may rest on: axes without modes first."""
+    for letter, axis in zip("xyz", machine.axes.as_tuple(), strict=True):
+        if not axis.modes and not axis.rigid:
+            why = "taken as rigid until it is tapped"
+            yield OpenQuestion(
+                f"axes.{letter}.modes", "none", why, f"shapegcode identify TAP.csv --axis {letter} --update MACHINE"
+            )
+    for value in machine.values():
+        if value.origin == "assumed" and not value.key.endswith(".modes"):
+            unit = "" if value.unit == "1" else value.unit
+            yield OpenQuestion(value.key, f"{value.value} {unit}".strip(), value.remark.removeprefix("assumed: "), "")

@@ -1,0 +1,80 @@
+"""A machine that was set up by answers: its short file, and what is still open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from shapegcode.results.json import hidden
+from shapegcode.results.result import Result
+from shapegcode.results.table import Column, Table
+
+__all__ = ["MachineSetup", "OpenQuestion"]
+
+
+@dataclass(frozen=True)
+class OpenQuestion:
+    """A value that nobody said.
+
+    Attributes:
+        key: of the machine file.
+        value: that holds until then, with its unit.
+        why: where it comes from.
+        command: that finds it; empty: none does.
+    """
+
+    key: str
+    value: str
+    why: str
+    command: str
+
+
+@dataclass(frozen=True, repr=False)
+class MachineSetup(Result):
+    """A machine file made from answers.
+
+    Attributes:
+        machine: its name.
+        answered: keys that were answered.
+        imported: keys that came from a dump of the control or from tap tests.
+        open: values that nobody said, axes without modes first.
+        notes: what was read from which file.
+        warnings: none as a rule.
+        file: that was written; empty: none was.
+        text: the machine file.
+    """
+
+    machine: str
+    answered: tuple[str, ...]
+    imported: tuple[str, ...]
+    open: tuple[OpenQuestion, ...]
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+    text: str = field(metadata=hidden())
+    file: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """The machine can be used: always, as one that cannot is refused."""
+        return True
+
+    @property
+    def answer(self) -> str:
+        """How much of it is said, and what is open."""
+        said = f"{self.machine}: {len(self.answered)} values answered, {len(self.imported)} imported"
+        unknown = [each.key.split(".")[1].upper() for each in self.open if each.key.endswith(".modes")]
+        return f"{said}; vibration of {', '.join(unknown)} is not known" if unknown else said
+
+    @property
+    def next_step(self) -> str:
+        """The one thing to do next, in one sentence."""
+        file = self.file or "MACHINE"
+        return f"`shapegcode machine show {file} --for part.nc` says which of the open values matters for your program."
+
+    def tables(self) -> list[Table]:
+        """What is open."""
+        columns = (
+            Column("open", value="key", left=True),
+            Column("taken as", value="value", text=True),
+            Column("why", text=True),
+        )
+        return [Table("", columns, self.open)] if self.open else []

@@ -1,0 +1,249 @@
+"""The guided start: answers become a short machine file; a dialogue asks again; no other machine is taken."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from prompt_toolkit.application import create_app_session
+from prompt_toolkit.input import create_pipe_input
+from prompt_toolkit.output import DummyOutput
+
+import shapegcode as sg
+from command import run
+from shapegcode.cli.setup import ask_all
+from shapegcode.results.json import schema
+from shapegcode.settings.schema import toml_schema
+
+ANSWERS = """\
+name = "VMC-3"
+rapid_mm_per_min = { x = 24000, y = 24000, z = 18000 }
+delivery = "dnc"
+dnc_baud = 9600
+look_ahead = "G05.1"
+contour_um = 15
+modes = { x = "46:0.02", z = "rigid" }
+"""
+PART = "%\nO0001\nG90 G21 G17 G54\nG0 X0 Y0 Z5.\nG1 Z0. F3000.\nX30. Y40.\nX60. Y0.\nG0 Z5.\nM30\n%\n"
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def answered(folder: Path, text: str = ANSWERS, name: str = "a.toml", code: int = 0) -> str:
+    (folder / name).write_text(text)
+    done = run(folder, "setup", "--answers", name, "-o", "m.toml", "--json", "r.json")
+    assert done.returncode == code, done.stderr
+    return done.stdout if code == 0 else done.stderr
+
+
+def test_answers_become_a_short_file_that_says_why(tmp_path: Path) -> None:
+    """What was answered stands in it, what nobody said is a default or marked as assumed."""
+    said = answered(tmp_path)
+    text = (tmp_path / "m.toml").read_text()
+    assert len(text.splitlines()) < 45
+    data = tomllib.loads(text)
+    assert data["axes"]["z"]["rapid_mm_per_min"] == 18000.0
+    assert data["axes"]["x"]["modes"] == [{"frequency_hz": 46.0, "damping_ratio": 0.02}]
+    assert data["controller"] == {"dnc_baud": 9600}
+    assert data["emission"] == {"prologue": ["G05.1 Q0"], "epilogue": ["G05.1 Q1"]}
+    machine = sg.Machine.load(tmp_path / "m.toml")
+    assert machine.axes.z.rigid and not machine.axes.y.modes and not machine.axes.y.rigid
+    origins = {value.key: value.origin for value in machine.values()}
+    assert origins["axes.x.rapid_mm_per_min"] == "file"
+    assert origins["axes.x.max_acceleration_mm_s2"] == "assumed"
+    assert "vibration of Y is not known" in said.splitlines()[0]
+    report = json.loads((tmp_path / "r.json").read_text())
+    jsonschema.validate(report, schema(sg.MachineSetup))
+    assert report["open"][0]["key"] == "axes.y.modes"
+    assert "axes.x.modes.1.damping_ratio" in report["answered"]
+
+
+def test_the_short_file_converts_like_the_full_one(tmp_path: Path) -> None:
+    """The same values whatever is written down: the emitted program is the same, byte for byte."""
+    answered(tmp_path)
+    machine = sg.Machine.load(tmp_path / "m.toml")
+    (tmp_path / "full.toml").write_text(machine.to_toml())
+    (tmp_path / "part.nc").write_text(PART)
+    for name in ("m", "full"):
+        done = run(tmp_path, "convert", "part.nc", "-m", f"{name}.toml", "-o", f"{name}.nc")
+        assert done.returncode == 0, done.stdout
+    assert (tmp_path / "m.nc").read_bytes() == (tmp_path / "full.nc").read_bytes()
+    same = run(tmp_path, "machine", "diff", "m.toml", "full.toml")
+    assert same.returncode == 0 and "values are the same" in same.stdout.splitlines()[0]
+
+
+@pytest.mark.parametrize("name", sg.Machine.builtin_names())
+def test_init_writes_the_short_form_of_the_same_machine(name: str, tmp_path: Path) -> None:
+    """Short and full have the same values and the same origins where something was said."""
+    for words in ([], ["--full"]):
+        assert run(tmp_path, "machine", "init", name, "-o", f"m{len(words)}.toml", *words).returncode == 0
+    short, full = (sg.Machine.load(tmp_path / f"m{count}.toml") for count in (0, 1))
+    assert short == full
+    lines = [len((tmp_path / f"m{count}.toml").read_text().splitlines()) for count in (0, 1)]
+    assert lines[0] < lines[1] / 4
+    ours, theirs = ({value.key: value for value in each.values()} for each in (short, full))
+    for key, value in ours.items():
+        assert value.unmeasured == theirs[key].unmeasured, key
+
+
+def test_a_dump_and_a_tap_test_are_read(tmp_path: Path) -> None:
+    """Limits come from the control's parameters, modes from a record; what was said besides goes before the dump."""
+    dump = ROOT / "tests" / "golden" / "parameters" / "with_q.txt"
+    (tmp_path / "taps").mkdir()
+    (tmp_path / "taps" / "CNC-PARA.TXT").write_bytes(dump.read_bytes())
+    time = [index / 2000.0 for index in range(3000)]
+    from math import exp, pi, sin
+
+    rows = "\n".join(f"{t:.6f},{exp(-0.02 * 2 * pi * 40 * t) * sin(2 * pi * 40 * t):.8f}" for t in time)
+    (tmp_path / "taps" / "x.csv").write_text("time s,acceleration x m/s^2\n" + rows + "\n")
+    text = 'name = "HM"\ndump = "taps/CNC-PARA.TXT"\nmodes = { x = "taps/x.csv", y = "rigid", z = "rigid" }\n'
+    said = answered(tmp_path, text)
+    assert "parameters read from" in said
+    machine = sg.Machine.load(tmp_path / "m.toml")
+    assert machine.name == "HM"
+    assert machine.axes.x.modes[0].frequency_hz == pytest.approx(40.0, rel=0.005)
+    assert machine.axes.x.modes[0].damping_ratio == pytest.approx(0.02, rel=0.05)
+    assert {value.origin for value in machine.values() if value.key == "axes.x.modes.1.frequency_hz"} == {"measured"}
+    imported = json.loads((tmp_path / "r.json").read_text())["imported"]
+    assert "axes.x.rapid_mm_per_min" in imported
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('rapid_mm_per_min = 24000\n', "name"),
+        ('name = "A"\n', "rapid_mm_per_min is missing"),
+        ('name = "A"\nrapid_mm_per_min = -1\n', "rapid_mm_per_min"),
+        ('name = "A"\nrapid_mm_per_min = 1\nspindle = 3\n', "spindle"),
+        ('name = "A"\nrapid_mm_per_min = 1\ndelivery = "pigeon"\n', "delivery"),
+        ('name = "A"\nrapid_mm_per_min = 1\ndelivery = "dnc"\n', "dnc_baud is missing"),
+        ('name = "A"\nrapid_mm_per_min = 1\nmodes = { x = "none.csv" }\n', "none.csv"),
+        ('name = "A\n', "a.toml:1:"),
+    ],
+)  # fmt: skip
+def test_bad_answers_are_refused_and_nothing_is_written(text: str, said: str, tmp_path: Path) -> None:
+    """The question, the value and the limit; exit code 2."""
+    assert said in answered(tmp_path, text, code=2)
+    assert not (tmp_path / "m.toml").exists()
+
+
+def test_an_existing_file_stays(tmp_path: Path) -> None:
+    """Also without a terminal the reason is said."""
+    (tmp_path / "m.toml").write_text("mine")
+    assert "--force overwrites it" in answered(tmp_path, code=2)
+    assert (tmp_path / "m.toml").read_text() == "mine"
+    alone = run(tmp_path, "setup", "-o", "n.toml")
+    assert alone.returncode == 2 and "--answers FILE" in alone.stderr
+
+
+DOWN, ENTER = "\x1b[B", "\r"
+
+
+@pytest.fixture
+def typed() -> Iterator[Any]:
+    """A terminal into which a test types."""
+    with create_pipe_input() as pipe, create_app_session(input=pipe, output=DummyOutput()):
+        yield pipe
+
+
+def test_the_dialogue_asks_until_the_answers_do(typed: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    """Choices by arrow keys, numbers by typing; a bad one is not taken; each answer is explained."""
+    keys = [
+        "VMC-3" + ENTER,  # name
+        ENTER,  # control: fanuc
+        ENTER,  # no dump
+        "fast" + ENTER + "\x7f" * 4 + "24000" + ENTER,  # rapid: refused, then a number
+        ENTER,  # feed: nobody knows
+        "4000, 4000, 3000" + ENTER,  # acceleration
+        ENTER,  # increment: nobody knows
+        DOWN + ENTER,  # delivery: dnc
+        "9600" + ENTER,
+        DOWN + ENTER,  # look-ahead: G05.1
+        "10" + ENTER,  # contour
+        DOWN + ENTER + "46:0.02" + ENTER,  # X: known
+        DOWN + DOWN + ENTER,  # Y: rigid
+        DOWN + DOWN + DOWN + ENTER,  # Z: nobody knows
+    ]
+    typed.send_text("".join(keys))
+    answers = ask_all()
+    assert answers.rapid_mm_per_min is not None and answers.rapid_mm_per_min.as_tuple() == (24000.0,) * 3
+    assert answers.max_feed_mm_per_min is None
+    assert answers.max_acceleration_mm_s2 is not None
+    assert answers.max_acceleration_mm_s2.as_tuple() == (4000.0, 4000.0, 3000.0)
+    assert (answers.delivery, answers.dnc_baud, answers.look_ahead) == ("dnc", 9600, "G05.1")
+    assert answers.modes.model_dump() == {"x": "46:0.02", "y": "rigid", "z": "unknown"}
+    said = capsys.readouterr().out
+    assert "873 characters a second" in said
+    assert "Until Z is tapped it is taken as rigid" in said
+
+
+def test_giving_up_writes_nothing(typed: Any) -> None:
+    """Ctrl-C ends the dialogue as it ends every command."""
+    typed.send_text("VMC-3" + ENTER + "\x03")
+    with pytest.raises(KeyboardInterrupt):
+        ask_all()
+
+
+def test_show_ranks_what_nobody_measured_on_a_program(tmp_path: Path) -> None:
+    """The first line names the value that matters most; the order is that of the conversion's own ranking."""
+    answered(tmp_path)
+    (tmp_path / "part.nc").write_text(PART)
+    plain = run(tmp_path, "machine", "show", "m.toml")
+    assert re.match(r"VMC-3: \d+ of \d+ values are assumed or inherited", plain.stdout)
+    assert "--for part.nc" in plain.stdout
+    ranked = run(tmp_path, "machine", "show", "m.toml", "--for", "part.nc", "--json", "s.json")
+    report = json.loads((tmp_path / "s.json").read_text())
+    conversion = sg.convert(tmp_path / "part.nc", sg.Machine.load(tmp_path / "m.toml"))
+    assert [row["key"] for row in report["matters"]] == [row.key for row in conversion.rests_on]
+    assert f"most of all {conversion.rests_on[0].key}" in ranked.stdout.splitlines()[0]
+
+
+def test_diff_names_what_differs(tmp_path: Path) -> None:
+    """Key, both values with unit, where they come from; exit code 1."""
+    answered(tmp_path)
+    machine = sg.Machine.load(tmp_path / "m.toml").with_values({"controller.dnc_baud": 19200, "name": "OTHER"})
+    (tmp_path / "n.toml").write_text(machine.to_toml(short=True))
+    done = run(tmp_path, "machine", "diff", "m.toml", "n.toml", "--json", "d.json")
+    assert done.returncode == 1
+    rows = {row["key"]: row for row in json.loads((tmp_path / "d.json").read_text())["different"]}
+    assert set(rows) == {"name", "controller.dnc_baud"}
+    assert (rows["controller.dnc_baud"]["first"], rows["controller.dnc_baud"]["second"]) == ("9600", "19200")
+    assert rows["controller.dnc_baud"]["unit"] == "baud"
+
+
+MODELS: dict[str, tuple[Any, list[str]]] = {
+    "machine": (sg.Machine, ["python/shapegcode/data/vx500.toml", "python/shapegcode/data/kimm004.toml"]),
+    "tool": (sg.Tool, ["tests/golden/feed/pocket_tool.toml", "python/shapegcode/data/milling/paper001_tool.toml"]),
+    "stock": (sg.Stock, ["tests/golden/feed/pocket_stock.toml", "python/shapegcode/data/milling/paper001_stock.toml"]),
+}
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_schemas_for_editors_take_real_files_and_refuse_wrong_ones(kind: str, tmp_path: Path) -> None:
+    """As `jsonschema` reads them: every shipped file passes; a wrong key, a wrong kind, a wrong limit do not."""
+    model, files = MODELS[kind]
+    done = run(tmp_path, "machine", "schema", kind)
+    found = json.loads(done.stdout)
+    assert found == toml_schema(model, f"{kind} file of shapegcode")
+    assert found == json.loads((ROOT / "docs" / "schema" / "files" / f"{kind}.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(found)
+    for file in files:
+        data = tomllib.loads((ROOT / file).read_text())
+        jsonschema.validate(data, found)
+        with pytest.raises(jsonschema.ValidationError, match="unheard"):
+            jsonschema.validate(data | {"unheard": 1}, found)
+        table = next(iter(key for key, value in data.items() if isinstance(value, dict)))
+        with pytest.raises(jsonschema.ValidationError, match=r"is not of type|is not valid under any"):
+            jsonschema.validate(data | {table: "much"}, found)
+
+
+def test_the_schema_says_unit_and_parameter() -> None:
+    """What an editor shows beside a key."""
+    axis = toml_schema(sg.Machine, "")["$defs"]["Axis"]["properties"]
+    assert axis["rapid_mm_per_min"]["description"] == "rapid traverse (G00) [mm/min] (FANUC parameter 1420)"
+    assert axis["rapid_mm_per_min"]["exclusiveMinimum"] == 0
