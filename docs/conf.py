@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -60,7 +61,10 @@ nb_merge_streams = True
 nb_execution_in_temp = True
 # For the page on C++: where the library was built, and the example that is built against it.
 os.environ.setdefault("SHAPEGCODE_BUILD", str(ROOT / "build" / "release"))
-os.environ |= {"NO_COLOR": "1", "TTY_COMPATIBLE": "0"}  # a notebook calls itself a terminal
+os.environ["IPYTHONDIR"] = str(ROOT / "build" / "docs" / "ipython")
+_start = Path(os.environ["IPYTHONDIR"], "profile_default", "startup", "book.py")
+_start.parent.mkdir(parents=True, exist_ok=True)
+shutil.copy(ROOT / "docs" / "notebook_start.py", _start)
 os.environ["SHAPEGCODE_EXAMPLE"] = str(ROOT / "cpp" / "examples" / "controller_prototype")
 
 # --- Python and C++ ---------------------------------------------------------------------------------------------------
