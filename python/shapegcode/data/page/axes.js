@@ -39,6 +39,7 @@ function drawBorders(context, camera) {
 
 function drawEdges(context, camera, low, high) {
   const project = camera.projector();
+  const middle = project(...camera.centre);
   for (let axis = 0; axis < 3; axis++) {
     const [a, b] = [0, 1, 2].filter((k) => k !== axis);
     const edges = [[0, 0], [0, 1], [1, 0], [1, 1]].map(([p, q]) => {
@@ -58,26 +59,34 @@ function drawEdges(context, camera, low, high) {
     context.moveTo(...edge.from);
     context.lineTo(...edge.to);
     context.stroke();
-    context.textAlign = axis < 2 ? "center" : "right";
-    const [dx, dy] = axis < 2 ? [0, 16] : [-8, 4];
+    // Letters outside of the box, names outside of numbers.
+    const centre = edge.at((low[axis] + high[axis]) / 2);
+    const across = [-(edge.to[1] - edge.from[1]) / length, (edge.to[0] - edge.from[0]) / length];
+    const side = (centre[0] - middle[0]) * across[0] + (centre[1] - middle[1]) * across[1] < 0 ? -1 : 1;
+    const outside = ([x, y], away) => [x + side * across[0] * away, y + side * across[1] * away + 4];
+    context.textAlign = "center";
     for (const value of ticksOf(low[axis], high[axis], length)) {
-      const [x, y] = edge.at(value);
-      context.fillRect(x - 1.5, y - 1.5, 3, 3);
-      context.fillText(said(value), x + dx, y + dy);
+      const place = edge.at(value);
+      context.fillRect(place[0] - 1.5, place[1] - 1.5, 3, 3);
+      context.fillText(said(value), ...outside(place, 15));
     }
-    const [x, y] = edge.at((low[axis] + high[axis]) / 2);
-    context.fillText(`${"XYZ"[axis]} mm`, x + (axis < 2 ? 0 : -38), y + (axis < 2 ? 32 : 4));
+    context.fillText(`${"XYZ"[axis]} mm`, ...outside(centre, 48));
   }
 }
 
 /** How long a length and a deviation are drawn. */
-function drawScales(context, camera, magnify, colour) {
-  Object.assign(context, { font: LETTERS, fillStyle: colour, textAlign: "right" });
+function drawScales(context, camera, magnify, colour, ground) {
+  Object.assign(context, { font: LETTERS, textAlign: "right" });
   const right = camera.size[0] - 10;
   const bar = (unit, perUnit, y) => {
     const value = roundBelow(Math.max(110 / perUnit, 1e-9));
+    const text = `${said(value)} ${unit}`;
+    const wide = Math.max(context.measureText(text).width, value * perUnit);
+    context.fillStyle = ground;
+    context.fillRect(right - wide - 5, y - 17, wide + 10, 23);
+    context.fillStyle = colour;
     context.fillRect(right - value * perUnit, y, value * perUnit, 2);
-    context.fillText(`${said(value)} ${unit}`, right, y - 4);
+    context.fillText(text, right, y - 4);
   };
   bar("mm of path", camera.scale, 26);
   bar(`µm of deviation (×${magnify})`, camera.scale * magnify * 1e-3, 52);

@@ -114,7 +114,8 @@ class Charts {
     const share = 1 / rows.length;
     const layout = {
       height, margin: { l: 64, r: 14, t: 34, b: 46 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-      font: { family: 'system-ui, "DejaVu Sans", sans-serif', size: 12, color: text }, hovermode: "x", hoverdistance: -1,
+      font: { family: 'system-ui, "DejaVu Sans", sans-serif', size: 12, color: text },
+      hovermode: "x", hoverdistance: -1,
       modebar: { bgcolor: "rgba(0,0,0,0)", color: styleOf("--faint"), activecolor: text },
       legend: { orientation: "h", y: 1.0, yanchor: "bottom", x: 0 }, dragmode: "zoom",
       xaxis: {
@@ -141,7 +142,10 @@ class Charts {
 
   #config() {
     const without = ["lasso2d", "select2d"];
-    return { responsive: true, displaylogo: false, doubleClick: "reset", modeBarButtonsToRemove: without };
+    const displayModeBar = this.traces.clientWidth > 600 ? "hover" : false;
+    return {
+      responsive: true, displaylogo: false, doubleClick: "reset", displayModeBar, modeBarButtonsToRemove: without,
+    };
   }
 
   async #drawTraces() {

@@ -89,13 +89,13 @@ class Stage {
     this.waiting = true;
     requestAnimationFrame(() => {
       this.waiting = false;
-      this.drawNow();
+      this.drawNow(this.stale);
     });
   }
 
-  drawNow() {
+  drawNow(all = true) {
     if (this.camera.size[0] === 1) return;
-    if (this.stale) {
+    if (all) {
       this.painter.begin(this.camera, this.ratio);
       this.#each((motion, colour) => this.painter.draw(this.lines.get(motion), this.magnify, colour));
     }
@@ -113,7 +113,7 @@ class Stage {
     this.painter.show();
     const project = this.camera.projector();
     drawAxes(context, this.camera, this.low, this.high, "#c3cad3");
-    drawScales(context, this.camera, this.magnify, "#e8ebef");
+    drawScales(context, this.camera, this.magnify, "#e8ebef", GROUND);
     for (const mark of this.marks) if (this.shown.includes(mark.motion)) this.#mark(context, project, mark);
   }
 
