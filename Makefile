@@ -159,6 +159,7 @@ docs-links: docs-source
 docs-source: pages .venv/.docs
 	@mkdir -p build/docs
 	doxygen docs/Doxyfile
+	$(BIN)/python tests/tools/gallery.py build/docs/gallery
 	$(BIN)/python tests/tools/book.py build/docs/source
 
 format: test-packages dev

@@ -2,7 +2,8 @@
 
 The pages of docs/ are copied as they are, so that their links work here and where the repository is read as files. A
 link to what lies outside of docs/ gets a place in the book: the pages of the root under house/, other files under
-files/. Pages that come from the code (commands, Python, C++) are written beside them; see `book_pages`.
+files/. Pages that come from the code (commands, Python, C++, gallery) are written beside them; see
+`book_pages` and `gallery`.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import book_pages
+import gallery
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -91,6 +93,9 @@ def stage(book: Path) -> None:
         place = book / "house" / new
         placed[place] = relinked((ROOT / name).read_text("utf-8"), ROOT / name, place, book)
     placed |= {book / name: text for name, text in book_pages.generated().items()}
+    placed[book / "gallery" / "index.md"] = gallery.page()
+    drawn = book.parent / "gallery"
+    placed |= {book / "gallery" / file.relative_to(drawn): file.read_bytes() for file in sorted(drawn.rglob("*.png"))}
     for old in sorted(book.rglob("*")):
         if old.is_file() and old not in placed and not old.is_relative_to(book / "files"):
             old.unlink()

@@ -278,11 +278,11 @@ def plot_sweep(found: Identification, ax: Axes | None = None) -> Axes:
     """
     sweep = found.sweep
     assert sweep is not None
-    panel = plot.axes(ax, size_inch=(9.0, 4.5), title="Sweep: acceleration over that of the command")
+    panel = plot.axes(ax, size_inch=(9.0, 4.5))
     panel.semilogy(sweep.frequency_hz, sweep.amplitude, color=_MEASURED, linewidth=2.2, label="measured")
     panel.semilogy(sweep.frequency_hz, sweep.fitted, "--", color=_FITTED, linewidth=1.1, label="model")
     panel.set_xlabel("frequency in Hz")
-    panel.set_ylabel("any unit")
+    panel.set_ylabel("acceleration over that\nof the command, any unit")
     _mark_modes([panel], found)
     plot.legend_above(panel)
     return panel

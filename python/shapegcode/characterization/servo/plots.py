@@ -44,7 +44,12 @@ def plot_servo(found: ServoFit, ax: Axes | None = None) -> Axes:
     panels = [
         row[0]
         for row in plot.grid(
-            ax, len(shown), 1, size_inch=(9.0, 0.8 + 1.3 * len(shown)), title=Path(found.source).name, sharex=True
+            ax,
+            len(shown),
+            1,
+            size_inch=(9.0, 0.8 + 1.3 * len(shown)),
+            title=f"How far each axis is off: {Path(found.source).name}",
+            sharex=True,
         )
     ]
     for panel, axis in zip(panels, shown, strict=True):
