@@ -103,7 +103,7 @@ lint: test-packages dev
 	$(MAKE) tidy
 	@echo 'lint: nothing to complain about'
 
-bench: package dev
+bench: test-packages package dev
 	tests/tools/fetch_rs274.sh
 	$(BIN)/python tests/benchmarks/run.py
 	$(BIN)/python tests/benchmarks/linear_plants.py
@@ -114,6 +114,7 @@ bench: package dev
 	$(BIN)/python tests/benchmarks/feed_schedule.py
 	$(BIN)/python tests/benchmarks/milling_force.py
 	$(BIN)/python tests/benchmarks/run_logs.py
+	$(BIN)/python tests/benchmarks/report_page.py
 
 coverage: test-packages dev
 	tests/tools/fetch_rs274.sh

@@ -112,6 +112,8 @@ def test_it_opens_without_network_and_without_complaints(chrome: Browser, folder
         chrome.js("scrollTo(0, 0)")
         chrome.keep(page.removesuffix(".html"), whole=True)
         assert chrome.complaints() == []
+        keys = chrome.js("return [...document.querySelectorAll('body [id]:not(.chart *)')].map(one => one.id)")
+        assert len(keys) == len(set(keys)), "each picture has ids of its own"
         asked = chrome.js("return performance.getEntriesByType('resource').map(one => one.name)")
         assert [name for name in asked if not name.startswith(folder.as_uri() + "/plotly-")] == []
     assert len(list(folder.glob("plotly-*.min.js"))) == 1
@@ -163,6 +165,31 @@ def test_figures_are_those_of_the_json(chrome: Browser, folder: Path, page: str)
     for row, case in zip(chrome.all("table.heat tbody tr"), judged, strict=True):
         assert case["name"] in row.text
         assert ("▲" in row.text) == (case["share_of_limit"] > 1.0)
+
+
+@pytest.mark.parametrize("page", ["small.html", "large.html"])
+def test_numbers_of_cards_and_tables_are_in_the_json(chrome: Browser, folder: Path, page: str) -> None:
+    """Those that do not say where: as they stand there, or in another unit, or as the change between two."""
+    chrome.open(folder / page)
+
+    def leaves(value: Any) -> Iterator[float]:
+        if isinstance(value, dict | list):
+            for part in value.values() if isinstance(value, dict) else value:
+                yield from leaves(part)
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            yield float(value)
+
+    held = np.unique([*leaves(chrome.js("return JSON.parse(document.getElementById('result').textContent)"))])
+    texts = chrome.js(
+        "return [...document.querySelectorAll('main .number:not([data-json]), #rests td, #figures td')]"
+        ".filter(e => !e.closest('#scene, .bars')).map(e => e.textContent.trim())"
+    )
+    numbers = [text for text in texts if re.fullmatch(r"-?\d+(\.\d+)?", text)]
+    assert len(numbers) > 10
+    for text in numbers:
+        digits = len(text.partition(".")[2])
+        near = [held * factor for factor in (1.0, 1e3, 1e-3, 100.0)]
+        assert any((abs(values - float(text)) <= 0.5001 * 10.0**-digits).any() for values in near), text
 
 
 def test_a_click_on_the_path_finds_the_line(small: Browser) -> None:
@@ -442,25 +469,52 @@ def test_dark_colours_by_system_and_by_button(chrome: Browser, folder: Path) -> 
     assert chrome.js(ground) == "rgb(255, 255, 255)"
 
 
-@pytest.mark.parametrize("colours", ["light", "dark"])
-def test_it_has_no_barriers(chrome: Browser, folder: Path, colours: str) -> None:
-    """By axe-core: nothing serious, nothing critical."""
+def grave(browser: Browser) -> list[str]:
+    """Serious and critical findings of axe-core on the page that is open."""
     script = ROOT / ".cache" / "axe" / "node_modules" / "axe-core" / "axe.min.js"
     assert script.is_file(), "tests/tools/fetch_axe.sh brings it"
-    chrome.open(folder / "small.html", SEEN)
-    if colours == "dark":
-        chrome.one("#theme").click()
-    chrome.js("document.querySelectorAll('details').forEach(one => { one.open = true; })")
-    chrome.js("document.getElementById('traces').scrollIntoView()")
-    chrome.wait("return document.querySelector('#spectra .main-svg')")
-    chrome.js("scrollTo(0, 0)")
-    chrome.js(script.read_text(encoding="utf-8"))
-    found = chrome.later("axe.run(document, {resultTypes: ['violations']}).then(arguments[0])")
-    assert len(found["passes"]) > 20
-    grave = [
+    browser.js("document.querySelectorAll('details').forEach(one => { one.open = true; })")
+    browser.js(script.read_text(encoding="utf-8"))
+    found = browser.later("axe.run(document, {resultTypes: ['violations']}).then(arguments[0])")
+    assert len(found["passes"]) > 10
+    return [
         f"{one['id']}: {one['help']}: {node['html'][:160]} {node['failureSummary']}"
         for one in found["violations"] if one["impact"] in ("serious", "critical")
         for node in one["nodes"]
     ]  # fmt: skip
-    assert grave == []
+
+
+@pytest.mark.parametrize("colours", ["light", "dark"])
+def test_it_has_no_barriers(chrome: Browser, folder: Path, colours: str) -> None:
+    """By axe-core: nothing serious, nothing critical."""
+    chrome.open(folder / "small.html", SEEN)
+    if colours == "dark":
+        chrome.one("#theme").click()
+    chrome.js("document.getElementById('traces').scrollIntoView()")
+    chrome.wait("return document.querySelector('#spectra .main-svg')")
+    chrome.js("scrollTo(0, 0)")
+    assert grave(chrome) == []
+    chrome.complaints()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("time", NAME, "-m", "vx500"), ("check", NAME, "-m", "vx500"), ("shaper", "--mode", "46:0.02"), ("demo", "path")],
+    ids=lambda words: words[0],
+)
+def test_pages_of_other_results(chrome: Browser, folder: Path, words: tuple[str, ...]) -> None:
+    page = folder / f"{words[0]}.html"
+    done = run(folder, *words, "--html", page.name)
+    assert done.returncode in (0, 1), done.stderr
+    chrome.open(page)
+    if chrome.all("#scene-head"):
+        chrome.wait(SEEN)
+    assert chrome.complaints() == []
+    assert chrome.one(".light strong").text in ("Go ahead", "Heed first", "Do not use")
+    chrome.keep(words[0], whole=True)
+    data = chrome.cdp("Page.printToPDF", preferCSSPageSize=True, printBackground=True)["data"]
+    assert len(pypdf.PdfReader(io.BytesIO(base64.b64decode(data))).pages) <= 4
+    assert grave(chrome) == []
+    with chrome.phone():
+        assert chrome.js("return document.documentElement.scrollWidth") <= 390
     chrome.complaints()
