@@ -295,14 +295,14 @@ def test_amounts_have_colours_units_and_words(small: Browser) -> None:
 
 def test_the_slider_of_time_moves_the_marker(small: Browser) -> None:
     small.one(f"[data-program=original] [data-line='{UP}']").click()
-    slider = small.one("#time")
+    slider = small.one("#clock")
     begin = float(slider.get_attribute("value"))
     slider.send_keys(Keys.ARROW_RIGHT)
-    after = float(small.one("#time").get_attribute("value"))
+    after = float(small.one("#clock").get_attribute("value"))
     assert after > begin
     assert reading(small)["time s"] == f"{after:.3f}"
-    assert small.one("#time-said").text.startswith(f"{after:.3f} s")
-    set_slider(small, "time", 1e9)
+    assert small.one("#clock-said").text.startswith(f"{after:.3f} s")
+    set_slider(small, "clock", 1e9)
     assert marked(small, "original")[1] in ("G0 Z5.", "M30")
     small.one("#block-back").click()
     assert reading(small)["block"] != ""
@@ -310,7 +310,7 @@ def test_the_slider_of_time_moves_the_marker(small: Browser) -> None:
     small.one("#play").click()
     small.wait("return scenePage.playing === false")
     small.js("document.getElementById('pace').value = 1")
-    set_slider(small, "time", 0.0)
+    set_slider(small, "clock", 0.0)
     small.one("#play").click()
     small.wait("return scenePage.time > 0.05")
     small.js("scenePage.stop()")

@@ -13,7 +13,7 @@ class ScenePage {
     this.stage = new Stage(byId("view"), this.motions, (motion, time) => this.seek(motion, time));
     const near = (motion) => (motion === this.chief ? this.time : 0);
     const pick = (motion, line) => this.seek(motion, motion.timeOfLine(line, near(motion)), line);
-    this.lists = this.motions.map((motion) => new ProgramList(byId("programs"), motion, pick));
+    this.lists = this.motions.map((motion) => new ProgramList(byId("program-texts"), motion, pick));
     this.charts = new Charts(scene, (motion, time) => this.seek(motion, time));
     this.#offer();
     this.show(this.motions.length > 1 ? "both" : this.chief.key);
@@ -46,7 +46,7 @@ class ScenePage {
     on("view-plan", "click", () => this.plan(true));
     on("view-fit", "click", () => this.stage.fit());
     on("play", "click", () => (this.playing ? this.stop() : this.play()));
-    on("time", "input", () => { this.stop(); this.seek(this.chief, Number(byId("time").value)); });
+    on("clock", "input", () => { this.stop(); this.seek(this.chief, Number(byId("clock").value)); });
     on("block-back", "click", () => this.step(-1));
     on("block-on", "click", () => this.step(1));
     on("trace-kind", "change", () => this.charts.set({ kind: byId("trace-kind").value }));
@@ -70,8 +70,8 @@ class ScenePage {
     }
     this.lists.forEach((list) => { list.box.hidden = !this.shown.includes(list.motion); });
     this.stage.shown = this.shown;
-    byId("time").max = this.chief.duration;
-    byId("time").step = this.chief.duration / 2000 || "any";
+    byId("clock").max = this.chief.duration;
+    byId("clock").step = this.chief.duration / 2000 || "any";
     this.charts.set({ shown: this.shown });
     if (both) byId("colour").value = "program";
     else if (byId("colour").value === "program") byId("colour").selectedIndex = 0;
@@ -174,9 +174,9 @@ class ScenePage {
     const { here } = this.stage.marks.find((mark) => mark.chief);
     const line = this.chief.line[here.i];
     const time = `${this.time.toFixed(3)} s of ${this.chief.duration.toFixed(3)} s`;
-    byId("time").value = this.time;
-    byId("time").setAttribute("aria-valuetext", `${time}, line ${line}`);
-    byId("time-said").textContent = `${time} (${this.chief.label})`;
+    byId("clock").value = this.time;
+    byId("clock").setAttribute("aria-valuetext", `${time}, line ${line}`);
+    byId("clock-said").textContent = `${time} (${this.chief.label})`;
     const head = ["", "time s", "line", "block", "X mm", "Y mm", "Z mm",
       ...Object.values(this.scene.channels).map(({ label, unit }) => `${label} ${unit}`)];
     const rows = this.stage.marks.filter(({ motion }) => this.shown.includes(motion)).map(({ motion, here: at }) => [

@@ -11,6 +11,7 @@ import base64
 import gzip
 import hashlib
 import json
+import re
 from functools import cache
 from html import escape
 from importlib import metadata, resources
@@ -44,10 +45,13 @@ def to_html(page: Page, script: Script = "inline") -> str:
 
     Raises:
         ArgumentError: another `script`.
+        ValueError: a section has a key that is an id of the page itself.
     """
     if script not in ("inline", "beside"):
         raise ArgumentError(f'script must be "inline" or "beside", not {script!r}')
     own = _assets(SCRIPTS)
+    if taken := {section.key for section in page.sections} & _own_ids():
+        raise ValueError(f"{', '.join(sorted(taken))}: a section cannot have the key of a part of the page")
     before, after = page.sections[: page.before_scene], page.sections[page.before_scene :]
     parts = [section_of(section) for section in before]
     scripts = [_data("result", page.report)]
@@ -130,6 +134,7 @@ def save(page: Page, path: str | Path, script: Script = "inline") -> list[str]:
 
     Raises:
         ArgumentError: another `script`.
+        ValueError: see `to_html`.
         OSError: a file cannot be written.
     """
     text = to_html(page, script)
@@ -171,6 +176,12 @@ def _asset(name: str) -> str:
 @cache
 def _assets(names: tuple[str, ...]) -> str:
     return "\n".join(map(_asset, names))
+
+
+@cache
+def _own_ids() -> set[str]:
+    own = {"top", "theme", "print", "save-json", "result", "scene-head", "scene-data", "plotly-data"}
+    return own | set(re.findall(r'\bid="([^"]+)"', _asset("scene.html")))
 
 
 @cache
