@@ -119,10 +119,13 @@ def test_a_dump_and_a_tap_test_are_read(tmp_path: Path) -> None:
         ('rapid_mm_per_min = 24000\n', "name"),
         ('name = "A"\n', "rapid_mm_per_min is missing"),
         ('name = "A"\nrapid_mm_per_min = -1\n', "rapid_mm_per_min"),
-        ('name = "A"\nrapid_mm_per_min = 1\nspindle = 3\n', "spindle"),
-        ('name = "A"\nrapid_mm_per_min = 1\ndelivery = "pigeon"\n', "delivery"),
-        ('name = "A"\nrapid_mm_per_min = 1\ndelivery = "dnc"\n', "dnc_baud is missing"),
-        ('name = "A"\nrapid_mm_per_min = 1\nmodes = { x = "none.csv" }\n', "none.csv"),
+        ('name = "A"\nrapid_mm_per_min = 9000\nspindle = 3\n', "spindle"),
+        ('name = "A"\nrapid_mm_per_min = 9000\ndelivery = "pigeon"\n', "delivery"),
+        ('name = "A"\nrapid_mm_per_min = 9000\ndelivery = "dnc"\n', "dnc_baud is missing"),
+        ('name = "A"\nrapid_mm_per_min = 9000\nmodes = { x = "none.csv" }\n', "none.csv"),
+        ('name = "A"\nrapid_mm_per_min = 9000\nmodes = { x = "5000:3" }\n', "a.toml:3: modes.x"),
+        ('name = "A"\nrapid_mm_per_min = 24\n', "24.0: must be 100 to 500000 (unit: mm/min; 24 m/min are 24000)"),
+        ('name = "A"\ndump = "none.txt"\n', 'a.toml:2: dump = "none.txt": no such file'),
         ('name = "A\n', "a.toml:1:"),
     ],
 )  # fmt: skip
@@ -157,7 +160,8 @@ def test_the_dialogue_asks_until_the_answers_do(typed: Any, capsys: pytest.Captu
         "VMC-3" + ENTER,  # name
         ENTER,  # control: fanuc
         ENTER,  # no dump
-        "fast" + ENTER + "\x7f" * 4 + "24000" + ENTER,  # rapid: refused, then a number
+        "fast" + ENTER + "\x7f" * 4 + "24" + ENTER,  # rapid: refused, and in mm/min as well
+        " m/min" + ENTER,
         ENTER,  # feed: nobody knows
         "4000, 4000, 3000" + ENTER,  # acceleration
         ENTER,  # increment: nobody knows
@@ -165,7 +169,7 @@ def test_the_dialogue_asks_until_the_answers_do(typed: Any, capsys: pytest.Captu
         "9600" + ENTER,
         DOWN + ENTER,  # look-ahead: G05.1
         "10" + ENTER,  # contour
-        DOWN + ENTER + "46:0.02" + ENTER,  # X: known
+        DOWN + ENTER + "46:3" + ENTER + "\x7f0.02" + ENTER,  # X: known; a damping ratio of 3 is refused
         DOWN + DOWN + ENTER,  # Y: rigid
         DOWN + DOWN + DOWN + ENTER,  # Z: nobody knows
     ]
@@ -178,8 +182,29 @@ def test_the_dialogue_asks_until_the_answers_do(typed: Any, capsys: pytest.Captu
     assert (answers.delivery, answers.dnc_baud, answers.look_ahead) == ("dnc", 9600, "G05.1")
     assert answers.modes.model_dump() == {"x": "46:0.02", "y": "rigid", "z": "unknown"}
     said = capsys.readouterr().out
-    assert "873 characters a second" in said
+    assert "873 characters, or some 35 short blocks a second" in said
     assert "Until Z is tapped it is taken as rigid" in said
+
+
+def test_a_dump_that_lacks_the_rapids_has_them_asked(
+    typed: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its feeds are read, and what neither it nor anybody says is assumed; a file that is no dump is asked again."""
+    monkeypatch.chdir(tmp_path)
+    Path("no.txt").write_text("hello\n")
+    Path("p.txt").write_text("%\nN01430Q1A1P8000.0A2P6000.0A3P8000.0\n%\n")
+    name = "no.txt" + ENTER + "\x7f" * 6 + "p.txt" + ENTER
+    rest = DOWN * 3 + ENTER + ENTER + ENTER + (DOWN * 3 + ENTER) * 3  # delivery, look-ahead, contour, modes
+    typed.send_text("HM" + ENTER + ENTER + name + "20000" + ENTER + rest)
+    answers = ask_all()
+    assert answers.dump == "p.txt" and answers.rapid_mm_per_min is not None
+    machine = sg.set_up(answers).text
+    axis = tomllib.loads(machine)["axes"]["y"]
+    assert (axis["rapid_mm_per_min"], axis["max_feed_mm_per_min"]) == (20000.0, 6000.0)
+    assert re.search(r"max_acceleration_mm_s2 = .*# assumed", machine)
+    alone = sg.read_answers({"name": "HM", "dump": "p.txt"})
+    with pytest.raises(sg.AnswersError, match="rapid_mm_per_min: missing"):
+        sg.set_up(alone)
 
 
 def test_giving_up_writes_nothing(typed: Any) -> None:
@@ -201,6 +226,25 @@ def test_show_ranks_what_nobody_measured_on_a_program(tmp_path: Path) -> None:
     conversion = sg.convert(tmp_path / "part.nc", sg.Machine.load(tmp_path / "m.toml"))
     assert [row["key"] for row in report["matters"]] == [row.key for row in conversion.rests_on]
     assert f"most of all {conversion.rests_on[0].key}" in ranked.stdout.splitlines()[0]
+
+
+def test_without_any_mode_the_axis_to_tap_first_is_named(tmp_path: Path) -> None:
+    """Nothing can be shaped yet; a usual mode swings as it does in the simulation of a machine that has it."""
+    answered(tmp_path, 'name = "A"\nrapid_mm_per_min = 24000\nmodes = { z = "rigid" }\n')
+    (tmp_path / "part.nc").write_text(PART)
+    done = run(tmp_path, "machine", "show", "m.toml", "--for", "part.nc", "--json", "s.json")
+    assert done.returncode == 0, done.stderr
+    rows = {row["key"]: row["effect"] for row in json.loads((tmp_path / "s.json").read_text())["matters"]}
+    assert set(rows) == {"axes.x.modes", "axes.y.modes"}
+    assert f"most of all {next(iter(rows))}" in done.stdout.splitlines()[0]
+    assert "identify --tap-plan" in done.stdout
+    mode = [{"frequency_hz": 40.0, "damping_ratio": 0.02}]
+    shaking = sg.Machine.load(tmp_path / "m.toml").with_values({"axes.x.modes": mode, "axes.y.modes": mode})
+    swing = sg.simulate(tmp_path / "part.nc", shaking).residual_vibration_um
+    for axis in "xy":
+        assert f"0.0 → {getattr(swing, axis):.1f}, limit 3.0" in rows[f"axes.{axis}.modes"]
+    convert = run(tmp_path, "convert", "part.nc", "-m", "m.toml", "-o", "o.nc")
+    assert convert.returncode == 2 and "--tap-plan" in convert.stderr
 
 
 def test_diff_names_what_differs(tmp_path: Path) -> None:

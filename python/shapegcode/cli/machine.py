@@ -182,11 +182,13 @@ def _sorted(files: list[str]) -> tuple[str, list[str]]:
 
 
 def _show(args: argparse.Namespace) -> int:
+    from dataclasses import replace
+
     from shapegcode.cli import runner
     from shapegcode.machine.description_result import describe_machine
 
     runner.check_files(args)
-    found = describe_machine(args.machine)
+    found = replace(describe_machine(args.machine), source=args.machine)
     return runner.finish(found if args.input is None else _ranked(found, args), args)
 
 
@@ -196,20 +198,33 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
 
     from shapegcode.cli import runner
     from shapegcode.conversion.convert import convert
+    from shapegcode.conversion.open_axes import open_axes
     from shapegcode.machine import Machine
     from shapegcode.machine.description_result import OpenValue
 
+    machine, said = Machine.load(args.machine), ""
     with runner.progress(f"converting {args.input}", args):
-        conversion = convert(args.input, Machine.load(args.machine))
+        if any(axis.modes for axis in machine.axes.as_tuple()):
+            conversion = convert(args.input, machine)
+            rows = conversion.rests_on
+            if conversion.worst_case is None:
+                said = f"{args.input}: nothing in it was shaped, so nothing is ranked"
+        else:
+            rows = open_axes(args.input, machine)
+            said = (
+                "no axis has a vibration mode, so there is nothing to shape for: each that may have one was given a "
+                "usual one, and played the program as it is"
+                if rows
+                else "every axis is said to be rigid, so there is nothing to shape for"
+            )
     matters = tuple(
         OpenValue(
             row.key, row.value, row.origin, row.moved,
             f"{row.figure} {row.figure_um:.1f} → {row.moved_um:.1f}, limit {row.limit_um:.1f}", row.share,
         )
-        for row in conversion.rests_on
+        for row in rows
     )  # fmt: skip
-    said = f"{args.input}: nothing in it was shaped, so nothing is ranked"
-    warnings = found.warnings if conversion.worst_case is not None else (*found.warnings, said)
+    warnings = (*found.warnings, said) if said else found.warnings
     return replace(found, program=args.input, matters=matters, warnings=warnings)
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -17,6 +18,20 @@ if TYPE_CHECKING:
 __all__ = ["add_arguments", "ask_all", "run"]
 
 _NOBODY_KNOWS = "nobody knows yet"
+_TITLES = {
+    "fanuc": "FANUC (0i, 16i, 18i, 21i, 30i, 31i, 32i)",
+    "other": "another one that reads programs as FANUC does",
+    "memory": "it is loaded into the memory",
+    "dnc": "a line feeds it while it runs (DNC)",
+    "data server": "from a data server, a memory card or a network",
+    "none": "there is none, or it is never on",
+    "G05.1": "G05.1 Q1 (AI contour control, AI advanced preview control: 0i, 30i)",
+    "G08": "G08 P1 (advanced preview control)",
+}
+_UNITS = {"m/min": ("mm/min", 1000.0), "m/s²": ("mm/s²", 1000.0), "MB": ("kB", 1024.0), "mm": ("µm", 1000.0)}
+"""What people say for a unit, and how much of it that is."""
+_OF_AXES = ("rapid_mm_per_min", "max_feed_mm_per_min", "max_acceleration_mm_s2")
+_ANY = 24_000.0  # mm/min: the rapid rate that a question is tried with
 _VIBRATION = {
     "tapped: I have the record of a tap test": "file",
     "from a data sheet or an earlier test: I know frequency and damping": "known",
@@ -94,7 +109,7 @@ def ask_all() -> Answers:
         answer = _vibration() if name == "modes" else _asked(name, field.description or "", field.annotation, given)
         if answer is not None:
             given[name] = answer
-        value = getattr(read_answers({"name": "m", "rapid_mm_per_min": 1.0} | _alone(name, given)), name)
+        value = getattr(read_answers({"name": "m", "rapid_mm_per_min": _ANY} | _alone(name, given)), name)
         print(f"  {EXPLAINED[name](value)}")
     return read_answers(given)
 
@@ -111,7 +126,11 @@ def _left_out(given: dict[str, Any]) -> Iterator[str]:
     if given.get("control") == "other":
         yield "dump"
     if given.get("dump"):
-        yield from ("rapid_mm_per_min", "max_feed_mm_per_min", "max_acceleration_mm_s2", "least_increment_mm")
+        from shapegcode.setup.build import dump_lacks_rapids
+
+        yield from ("max_feed_mm_per_min", "max_acceleration_mm_s2", "least_increment_mm")
+        if not dump_lacks_rapids(given["dump"]):
+            yield "rapid_mm_per_min"
     if given.get("delivery") != "dnc":
         yield "dnc_baud"
     if given.get("delivery") != "memory":
@@ -128,14 +147,30 @@ def _asked(name: str, question: str, annotation: Any, given: dict[str, Any]) -> 
     field = Answers.model_fields[name]
     if choices:
         open_ended = [] if field.default in choices else [_NOBODY_KNOWS]
-        said = questionary.select(question, choices=[*choices, *open_ended]).unsafe_ask()
+        titled = [questionary.Choice(_TITLES.get(each, each), each) for each in (*choices, *open_ended)]
+        said = questionary.select(question, choices=titled).unsafe_ask()
         return None if said == _NOBODY_KNOWS else said
-    unit = str((field.json_schema_extra or {}).get("unit", "")) if isinstance(field.json_schema_extra, dict) else ""
+    unit = _unit(name)
     needed = name == "name" or (name == "rapid_mm_per_min") or name == "dnc_baud"
     hint = f" [{unit}]" if unit else ""
     hint += "" if needed else " (Enter: nobody knows)" if name != "dump" else " (its file, or Enter: no)"
-    text = questionary.text(question + hint, validate=lambda typed: _problem(name, typed, needed, given)).unsafe_ask()
-    return _parsed(name, text)
+    return _parsed(name, _typed(question + hint, lambda typed: _problem(name, typed, needed, given)))
+
+
+def _typed(question: str, check: Callable[[str], bool | str]) -> str:
+    """One line, which is checked when Enter is pressed: asked again until it does."""
+    import questionary
+
+    said = questionary.text(question, validate=check, validate_while_typing=False).unsafe_ask()
+    return str(said).strip()
+
+
+def _unit(name: str) -> str:
+    """Of a question; empty: it has none."""
+    from shapegcode.settings.keys import facts
+    from shapegcode.setup.answers import Answers
+
+    return str(facts(Answers.model_fields[name]).get("unit", ""))
 
 
 def _choices(annotation: Any) -> list[str]:
@@ -145,13 +180,26 @@ def _choices(annotation: Any) -> list[str]:
 
 
 def _parsed(name: str, typed: str) -> Any:
-    """A text, a number, or one number for each axis."""
+    """A text, a number, or one number for each axis; a unit may stand behind.
+
+    Raises:
+        ValueError: it is none.
+    """
     text = typed.strip()
     if not text:
         return None
     if name in ("name", "dump"):
         return text
-    numbers = [float(part) for part in text.replace(",", " ").split()]
+    found = re.fullmatch(r"([-+.\d\s,;/]*\d\.?)\s*([^\d\s].*)?", text)
+    if found is None:
+        raise ValueError(text)
+    numbers = [float(part) for part in re.split(r"[\s,;/]+", found[1])]
+    unit, said = _unit(name), (found[2] or "").replace("s2", "s²").replace("um", "µm")
+    if said not in ("", unit):
+        into, factor = _UNITS.get(said, ("", 0.0))
+        if into != unit:
+            raise ValueError(said)
+        numbers = [number * factor for number in numbers]
     if len(numbers) == 3:
         return dict(zip("xyz", numbers, strict=True))
     if len(numbers) != 1:
@@ -169,11 +217,16 @@ def _problem(name: str, typed: str, needed: bool, given: dict[str, Any]) -> bool
     try:
         value = _parsed(name, typed)
     except ValueError:
-        return f"{typed}: must be a number, or three with commas between (X, Y, Z)"
-    if name == "dump" and not Path(str(value)).is_file():
-        return f"{value}: no such file"
+        of_axes = ", or three with commas between (X, Y, Z)" if name in _OF_AXES else ""
+        return f"{typed}: must be a number in {_unit(name)}{of_axes}"
+    if name == "dump":
+        if not Path(str(value)).is_file():
+            return f"{value}: no such file"
+        from shapegcode.setup.build import dump_problem
+
+        return dump_problem(str(value)).replace("\n", "; ") or True
     try:
-        read_answers({"name": "m", "rapid_mm_per_min": 1.0} | _alone(name, given | {name: value}))
+        read_answers({"name": "m", "rapid_mm_per_min": _ANY} | _alone(name, given | {name: value}))
     except FileError as error:
         return "; ".join(str(problem) for problem in error.problems)
     return True
@@ -188,17 +241,28 @@ def _vibration() -> dict[str, str]:
         question = f"{axis.upper()}: tapped, from a data sheet, or taken as rigid?"
         kind = _VIBRATION[questionary.select(question, choices=list(_VIBRATION)).unsafe_ask()]
         if kind == "file":
-            kind = questionary.text(
-                "File of the tap test (CSV, UFF, WAV)",
-                validate=lambda typed: Path(typed.strip()).is_file() or f"{typed}: no such file",
-            ).unsafe_ask()
+            kind = _typed("File of the tap test (CSV, UFF, WAV)", _tap)
         elif kind == "known":
-            kind = questionary.text("Frequency in Hz and damping ratio, such as 46:0.02", validate=_mode).unsafe_ask()
-        said[axis] = kind.strip()
+            kind = _typed("Frequency in Hz and damping ratio, such as 46:0.02", _mode)
+        said[axis] = kind
     return said
 
 
-def _mode(typed: str) -> bool | str:
-    from shapegcode.setup.answers import is_mode
+def _tap(typed: str) -> bool | str:
+    from shapegcode.setup.build import tap_problem
 
-    return is_mode(typed) or f"{typed}: must be FREQUENCY:DAMPING in Hz, such as 46:0.02"
+    file = typed.strip()
+    return tap_problem(file).replace("\n", "; ") or True if Path(file).is_file() else f"{file}: no such file"
+
+
+def _mode(typed: str) -> bool | str:
+    from shapegcode.errors import FileError
+    from shapegcode.setup.answers import is_mode, read_answers
+
+    if not is_mode(typed.strip()):
+        return f"{typed}: must be FREQUENCY:DAMPING in Hz, such as 46:0.02"
+    try:
+        read_answers({"name": "m", "rapid_mm_per_min": _ANY, "modes": {"x": typed.strip()}})
+    except FileError as error:
+        return "; ".join(problem.limit for problem in error.problems)
+    return True

@@ -23,7 +23,7 @@ from shapegcode.model.machine_model import MachineModel
 from shapegcode.program import Program
 from shapegcode.settings.keys import KeyValue
 
-__all__ = ["LEAST_SHARE", "RestsOn", "rests_on"]
+__all__ = ["LEAST_SHARE", "RestsOn", "UnknownAxis", "rests_on", "unknown_axes"]
 
 LEAST_SHARE = 0.01
 """Of a limit: a value that moves its figure by less does not matter."""
@@ -205,17 +205,50 @@ def _filters(machine: Machine, unmeasured: Mapping[str, KeyValue]) -> Iterator[_
             yield _Trial(unmeasured[key], f"{other:g} s", each)
 
 
-def _unknown_axes(machine: Machine) -> dict[str, _Trial]:
-    """Axes of which nobody knows whether they have a mode, each with one."""
+@dataclass(frozen=True)
+class UnknownAxis:
+    """An axis of which nobody knows whether it has a mode.
+
+    Attributes:
+        value: its key of the machine file.
+        moved: the usual mode, in words.
+        modes: that mode, as a value of the key.
+    """
+
+    value: KeyValue
+    moved: str
+    modes: Sequence[Mapping[str, float]]
+
+
+def unknown_axes(machine: Machine) -> dict[str, UnknownAxis]:
+    """Axes of which nobody knows whether they have a mode, each with a usual one.
+
+    Args:
+        machine: any.
+
+    Returns:
+        By letter.
+    """
     values = {value.key: value for value in machine.values()}
-    trials = {}
-    for letter, axis in zip("xyz", machine.axes.as_tuple(), strict=True):
-        if axis.modes or (axis.rigid and not values[f"axes.{letter}.rigid"].unmeasured):
-            continue
-        other = machine.with_values({f"axes.{letter}.rigid": False, f"axes.{letter}.modes": [_MODE]})
-        said = f"a mode of {_MODE['frequency_hz']:g} Hz"
-        trials[letter] = _Trial(_as_assumed(values[f"axes.{letter}.modes"]), said, other)
-    return trials
+    return {
+        letter: UnknownAxis(
+            _as_assumed(values[f"axes.{letter}.modes"]), f"a mode of {_MODE['frequency_hz']:g} Hz", [_MODE]
+        )
+        for letter, axis in zip("xyz", machine.axes.as_tuple(), strict=True)
+        if not axis.modes and (not axis.rigid or values[f"axes.{letter}.rigid"].unmeasured)
+    }
+
+
+def _unknown_axes(machine: Machine) -> dict[str, _Trial]:
+    """Each of them as a trial."""
+    return {
+        letter: _Trial(
+            axis.value,
+            axis.moved,
+            machine.with_values({f"axes.{letter}.rigid": False, f"axes.{letter}.modes": axis.modes}),
+        )
+        for letter, axis in unknown_axes(machine).items()
+    }
 
 
 def _as_assumed(value: KeyValue) -> KeyValue:

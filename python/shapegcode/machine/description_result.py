@@ -46,6 +46,7 @@ class MachineDescription(Result):
         warnings: none.
         program: for which the values that nobody measured were ranked; None: for none.
         matters: those of them that move its verdict, the furthest first.
+        source: file of the machine, or its name, where that is known.
     """
 
     machine: Mapping[str, object]
@@ -53,6 +54,7 @@ class MachineDescription(Result):
     warnings: tuple[str, ...] = ()
     program: str | None = None
     matters: tuple[OpenValue, ...] = ()
+    source: str = "MACHINE"
 
     @property
     def ok(self) -> bool:
@@ -64,8 +66,10 @@ class MachineDescription(Result):
         """How much of it nobody measured, and which of that matters most."""
         name, count = self.machine["name"], len(self._open())
         if self.program is None:
-            said = f"{count} of {len(self.keys)} values are assumed or inherited" if count else "every value is said"
-            return f"{name}: {said}"
+            if not count:
+                return f"{name}: every value is said"
+            said = f"{count} of {len(self.keys)} values are assumed or inherited"
+            return f"{name}: {said}; --for part.nc ranks them by what they do to your program"
         if not self.matters:
             return f"{name}: none of {count} values that nobody measured matters for {Path(self.program).name}"
         first = self.matters[0]
@@ -89,8 +93,8 @@ class MachineDescription(Result):
             )
             return f"measure {key} first: {how}."
         if self._open() and self.program is None:
-            return "`shapegcode machine show MACHINE --for part.nc` ranks them by what they do to your program."
-        return "use it: shapegcode convert IN -m MACHINE -o OUT."
+            return f"`shapegcode machine show {self.source} --for part.nc` ranks them by what they do to your program."
+        return f"use it: shapegcode convert IN -m {self.source} -o OUT."
 
     def tables(self) -> list[Table]:
         """The keys, those of one table of the file below its name."""
@@ -111,7 +115,7 @@ class MachineDescription(Result):
         ]
 
     def _ranking(self) -> list[Table]:
-        """What nobody measured: for a program those values that matter, the furthest first."""
+        """What nobody measured: for a program those values that matter, the furthest first; else all by table."""
         if self.program is not None:
             columns = (
                 Column("matters most", value="key", left=True),
@@ -119,7 +123,15 @@ class MachineDescription(Result):
                 Column("then, µm", value="effect", text=True),
             )
             return [Table("", columns, self.matters)] if self.matters else []
-        return []
+        tables: dict[str, list[str]] = {}
+        for value in self._open():
+            tables.setdefault(value.key.rpartition(".")[0], []).append(_last(value.key))
+        listed = [(f"[{table}]", ", ".join(names)) for table, names in tables.items()]
+        by_table = (
+            Column("assumed in", value=lambda row: row[0], left=True),
+            Column("keys", value=lambda row: row[1], text=True),
+        )
+        return [Table("", by_table, listed)] if listed else []
 
     def _rows(self) -> Iterator[str | KeyValue]:
         section = ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from shapegcode.machine.machine import Machine
 from shapegcode.results.result import Result
@@ -74,22 +75,41 @@ class MachineDifference(Result):
         """The one thing to do next, in one sentence."""
         if self.ok:
             return "nothing: programs come out the same on both."
-        return "`shapegcode machine show MACHINE` says what each key means."
+        return f"`shapegcode machine show {self.second}` says what each key means."
 
     def tables(self) -> list[Table]:
-        """The keys that differ."""
+        """The keys that differ, those of one table of the file below its name."""
+        rows: list[str | DifferentValue] = []
+        section = ""
+        for each in self.different:
+            table = each.key.rpartition(".")[0]
+            if table != section:
+                rows.append(section := table)
+            rows.append(each)
         columns = (
-            Column("key", left=True),
-            Column(Path(self.first).name, value=lambda row: _shown(row.first, row.unit), text=True),
-            Column("from", value="first_origin", left=True),
-            Column(Path(self.second).name, value=lambda row: _shown(row.second, row.unit), text=True),
-            Column("from", value="second_origin", left=True),
+            Column("key", value=lambda row: f"[{row}]" if isinstance(row, str) else _last(row), left=True),
+            Column(Path(self.first).name, value=lambda row: _shown(row, "first"), text=True),
+            Column(Path(self.second).name, value=lambda row: _shown(row, "second"), text=True),
         )
-        return [Table("", columns, self.different)] if self.different else []
+        return [Table("", columns, rows, row_style=_bold)] if rows else []
 
 
-def _shown(value: str, unit: str) -> str:
-    return value if unit in ("", "1") or value in (_NONE, "not set") else f"{value} {unit}"
+def _last(row: DifferentValue) -> str:
+    return row.key.rpartition(".")[2]
+
+
+def _bold(row: str | DifferentValue) -> str:
+    return "bold" if isinstance(row, str) else ""
+
+
+def _shown(row: str | DifferentValue, which: Literal["first", "second"]) -> str | None:
+    """A value with its unit, and where it comes from."""
+    if isinstance(row, str):
+        return None
+    value = row.first if which == "first" else row.second
+    origin = row.first_origin if which == "first" else row.second_origin
+    unit = "" if row.unit in ("", "1") or value in (_NONE, "not set") else f" {row.unit}"
+    return value if value == _NONE else f"{value}{unit} ({origin})"
 
 
 def machine_difference(first: Machine | str | Path, second: Machine | str | Path) -> MachineDifference:
@@ -118,6 +138,8 @@ def _different(keys: list[str], ours: dict[str, KeyValue], theirs: dict[str, Key
         own, other = ours.get(key), theirs.get(key)
         if own is not None and other is not None and own.value == other.value:
             continue
+        if {None if each is None else each.value for each in (own, other)} == {None, "not set"}:
+            continue  # neither has it
         known = own or other
         assert known is not None
         yield DifferentValue(

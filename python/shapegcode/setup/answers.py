@@ -11,23 +11,36 @@ Every question but the name has an answer of its own where nobody knows: the key
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, Strict, field_validator, model_validator
 
-from shapegcode.errors import FileError
-from shapegcode.settings.keys import InlineTable, Positive, PositiveAxisValues, Text, TomlTable, key
-from shapegcode.settings.load import loaded, validated
+from shapegcode.errors import FileError, Problem
+from shapegcode.settings.keys import InlineTable, Positive, PositiveAxisValues, Text, TomlTable, key, toml
+from shapegcode.settings.load import parsed, read_text, validated
+from shapegcode.settings.problems import KeyProblem, line_of
 
-__all__ = ["EXPLAINED", "Answers", "AnswersError", "ModesAnswer", "is_mode", "read_answers"]
+__all__ = ["EXPLAINED", "Answers", "AnswersError", "ModesAnswer", "is_mode", "mode_of", "read_answers"]
 
 Delivery = Literal["memory", "dnc", "data server"]
 LookAhead = Literal["none", "G05.1", "G08"]
 
+_HIGHEST_HZ = 10_000.0
+_USUAL_DAMPING = 0.02
+_LIKELY = {
+    "rapid_mm_per_min": (100.0, 500_000.0, "unit: mm/min; 24 m/min are 24000"),
+    "max_feed_mm_per_min": (100.0, 500_000.0, "unit: mm/min; 24 m/min are 24000"),
+    "max_acceleration_mm_s2": (50.0, 100_000.0, "unit: mm/s²; 3 m/s² are 3000, 1 g is 9810"),
+}
+"""What an axis can do: a value beyond it is one in another unit."""
 _MODE = re.compile(r"\s*\d+(\.\d*)?\s*(:\s*\d*\.?\d+)?\s*")
+
+
+_NOT_A_MODE = ' (nor "FREQUENCY:DAMPING", "rigid" or "unknown")'
 
 
 class AnswersError(FileError):
@@ -40,6 +53,18 @@ class ModesAnswer(InlineTable):
     x: Text = key('X: a tap test\'s file, "FREQUENCY:DAMPING" in Hz, "rigid", or "unknown"', default="unknown")
     y: Text = key("Y: likewise", default="unknown")
     z: Text = key("Z: likewise", default="unknown")
+
+    @field_validator("x", "y", "z")
+    @classmethod
+    def _possible(cls, said: str) -> str:
+        if is_mode(said):
+            frequency, damping = mode_of(said)
+            if not 0.0 < frequency <= _HIGHEST_HZ or not 0.0 <= damping < 1.0:
+                raise ValueError(
+                    f"the frequency must be above 0 and at most {_HIGHEST_HZ:g} (unit: Hz), the damping ratio "
+                    "0 or more and below 1"
+                )
+        return said
 
 
 class Answers(TomlTable):
@@ -72,6 +97,14 @@ class Answers(TomlTable):
     look_ahead: LookAhead | None = key("By which code does a look-ahead mode go on?", default=None)
     contour_um: Positive | None = key("How far may the contour leave the programmed path?", unit="µm", default=None)
     modes: ModesAnswer = key("What is known of its vibration?", default={})
+
+    @model_validator(mode="after")
+    def _likely(self) -> Answers:
+        for name, (low, high, example) in _LIKELY.items():
+            said = getattr(self, name)
+            if said is not None and not all(low <= value <= high for value in said.as_tuple()):
+                raise KeyProblem(name, said, f"must be {low:g} to {high:g} ({example})")
+        return self
 
     @model_validator(mode="after")
     def _enough(self) -> Answers:
@@ -109,6 +142,19 @@ def is_mode(said: str) -> bool:
     return _MODE.fullmatch(said) is not None
 
 
+def mode_of(said: str) -> tuple[float, float]:
+    """An answer that `is_mode` as frequency in Hz and damping ratio, 0.02 where none is said.
+
+    Args:
+        said: the answer.
+
+    Returns:
+        Both.
+    """
+    frequency, _, damping = said.partition(":")
+    return float(frequency), float(damping) if damping.strip() else _USUAL_DAMPING
+
+
 def _file_in(folder: Path, said: str) -> str:
     return said if said in ("rigid", "unknown") or is_mode(said) else str(folder / said)
 
@@ -127,22 +173,40 @@ def read_answers(source: str | Path | Mapping[str, Any]) -> Answers:
         OSError: the file cannot be read.
     """
     if isinstance(source, Mapping):
-        return validated(Answers, dict(source), "answers", "", AnswersError)
+        return _with_files(validated(Answers, dict(source), "answers", "", AnswersError), "answers", "")
     path = Path(source)
+    text = read_text(path, AnswersError)
     if path.suffix.lower() != ".json":
-        return loaded(Answers, path, AnswersError).stem_from(path.parent)
-    import json
+        data = parsed(text, str(path), AnswersError)
+    else:
+        try:
+            data = json.loads(text)
+        except json.JSONDecodeError as error:
+            raise AnswersError(str(path), (Problem("", "", f"not JSON: {error.msg}", error.lineno),)) from None
+        if not isinstance(data, dict):
+            raise AnswersError(str(path), (Problem("", "", "must be an object"),))
+    found = validated(Answers, data, str(path), text, AnswersError)
+    return _with_files(found.stem_from(path.parent), str(path), text)
 
-    from shapegcode.errors import Problem
 
-    text = path.read_text(encoding="utf-8")
-    try:
-        data = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise AnswersError(str(path), (Problem("", "", f"not JSON: {error.msg}", error.lineno),)) from None
-    if not isinstance(data, dict):
-        raise AnswersError(str(path), (Problem("", "", "must be an object"),))
-    return validated(Answers, data, str(path), text, AnswersError).stem_from(path.parent)
+def _with_files(answers: Answers, source: str, text: str) -> Answers:
+    """The same, if its files are there.
+
+    Raises:
+        AnswersError: one is not.
+    """
+    named = {"dump": answers.dump} if answers.dump is not None else {}
+    for axis, said in answers.modes.model_dump().items():
+        if said not in ("rigid", "unknown") and not is_mode(said):
+            named[f"modes.{axis}"] = said
+    problems = tuple(
+        Problem(key, toml(file), "no such file" + (_NOT_A_MODE if key != "dump" else ""), line_of(key, text))
+        for key, file in named.items()
+        if not Path(file).is_file()
+    )
+    if problems:
+        raise AnswersError(source, problems)
+    return answers
 
 
 def _of_modes(modes: ModesAnswer) -> str:
@@ -150,7 +214,8 @@ def _of_modes(modes: ModesAnswer) -> str:
     unknown = "".join(axis.upper() for axis in "xyz" if said[axis] == "unknown")
     if not unknown:
         return "Shaping is for the modes that you say; where an axis is rigid, nothing is shaped for it."
-    return f"Until {', '.join(unknown)} is tapped it is taken as rigid, and every verdict says so."
+    are = "is tapped it is" if len(unknown) == 1 else "are tapped they are"
+    return f"Until {', '.join(unknown)} {are} taken as rigid, and every verdict says so."
 
 
 EXPLAINED: Mapping[str, Callable[[Any], str]] = {
@@ -181,12 +246,15 @@ EXPLAINED: Mapping[str, Callable[[Any], str]] = {
     ),
     "delivery": lambda said: {
         "memory": "What is written must fit the memory; convert says whether it does.",
-        "dnc": "Blocks may not come faster than the line: convert --baud fits the program to it.",
+        "dnc": "Blocks cannot come faster than the line carries them.",
         "data server": "Size and speed of the line hold nothing back.",
         None: "Nothing is held back for it.",
     }[said],
     "dnc_baud": lambda said: (
-        f"{said / 11:.0f} characters a second: some {said / 11 / 25:.0f} short blocks." if said else ""
+        f"{said / 11:.0f} characters, or some {said / 11 / 25:.0f} short blocks a second: convert warns where that is "
+        f"too slow, and `--baud {said}` fits the program to it."
+        if said
+        else ""
     ),
     "program_memory_kb": lambda said: "A larger program gets a warning." if said else "256 kB are assumed.",
     "look_ahead": lambda said: (

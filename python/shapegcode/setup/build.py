@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from shapegcode.errors import ArgumentError
+from shapegcode.errors import ArgumentError, FileError, MachineError, Problem, ShapegcodeError
 from shapegcode.identification.identify import identify
 from shapegcode.identification.update import update_modes
 from shapegcode.machine import Machine
 from shapegcode.machine.fanuc_import import import_parameters
-from shapegcode.setup.answers import Answers, is_mode
+from shapegcode.machine.result import ParameterImport
+from shapegcode.settings.keys import PositivePerAxis
+from shapegcode.setup.answers import Answers, AnswersError, is_mode, mode_of
 from shapegcode.setup.result import MachineSetup, OpenQuestion
 
-__all__ = ["set_up"]
+__all__ = ["dump_lacks_rapids", "dump_problem", "set_up", "tap_problem"]
 
 _ANSWERED = "answered"
 _ASSUMED_ACCELERATION_MM_S2 = 3000.0
@@ -70,13 +74,98 @@ def _started(answers: Answers) -> tuple[Machine, list[str]]:
     """The machine of the dump, or one that has what every machine file must have."""
     rigid = "".join(axis for axis, said in answers.modes.model_dump().items() if said == "rigid")
     if answers.dump is not None:
-        rapid = answers.rapid_mm_per_min
-        base = None if rapid is None else _plain(answers)
-        found = import_parameters(answers.dump, base, name=answers.name, rigid=rigid)
+        found = _imported(answers, rigid)
         if not found.ok:
             raise ArgumentError(f"dump = {answers.dump!r}: nothing was read from it: {found.answer}")
         return found.machine, [f"{len(found.read)} parameters read from {answers.dump}"]
     return _plain(answers), []
+
+
+def _imported(answers: Answers, rigid: str) -> ParameterImport:
+    """The machine of the dump; limits that it does not hold are as they are said, or assumed and marked so.
+
+    Raises:
+        AnswersError: it does not hold the rapid rates, and nobody said them.
+        MachineError: no dump, or a value that is not plausible.
+    """
+    dump = answers.dump
+    assert dump is not None
+    try:
+        return import_parameters(dump, name=answers.name, rigid=rigid)
+    except MachineError as error:
+        if any(problem.value or problem.key.rpartition(".")[2] not in _LIMITS for problem in error.problems):
+            raise
+        lacks = _lacks_rapids(error)
+    if answers.rapid_mm_per_min is None:
+        if lacks:
+            said = f"missing: {dump} does not hold the rapid rates (parameter 1420)"
+            raise AnswersError("answers", (Problem("rapid_mm_per_min", "", said),))
+        answers = answers.model_copy(update={"rapid_mm_per_min": PositivePerAxis(x=1.0, y=1.0, z=1.0)})
+    found = import_parameters(dump, _plain(answers), name=answers.name, rigid=rigid)
+    own = {
+        f"axes.{axis}.max_feed_mm_per_min": getattr(found.machine.axes, axis).rapid_mm_per_min
+        for axis in "xyz"
+        if answers.max_feed_mm_per_min is None and f"axes.{axis}.max_feed_mm_per_min" not in _read(found)
+    }
+    machine = found.machine.with_values(own, source=answers.name) if own else found.machine
+    return replace(found, machine=machine.with_remarks(dict(found.machine.remarks)))
+
+
+def _read(found: ParameterImport) -> set[str]:
+    return {each.key for each in found.read}
+
+
+def _lacks_rapids(error: MachineError) -> bool:
+    """Whether a dump could not be taken as it does not hold the rapid rates."""
+    return any(problem.key.endswith(".rapid_mm_per_min") and not problem.value for problem in error.problems)
+
+
+def dump_problem(file: str) -> str:
+    """What is wrong with a parameter file, before the other questions are asked.
+
+    Args:
+        file: of the control.
+
+    Returns:
+        In words; empty: it can be read, and what it lacks can be said.
+    """
+    try:
+        _started(Answers.model_validate({"name": "m", "dump": file, "rapid_mm_per_min": 24_000.0}))
+    except (FileError, ArgumentError, OSError) as error:
+        return str(error)
+    return ""
+
+
+def dump_lacks_rapids(file: str) -> bool:
+    """Whether the rapid rates must be said though there is a parameter file.
+
+    Args:
+        file: of the control, one that can be read.
+
+    Returns:
+        True where it does not hold them.
+    """
+    try:
+        import_parameters(file)
+    except MachineError as error:
+        return _lacks_rapids(error)
+    return False
+
+
+def tap_problem(file: str) -> str:
+    """What is wrong with the record of a tap test, before the other questions are asked.
+
+    Args:
+        file: CSV, UFF or WAV.
+
+    Returns:
+        In words; empty: it holds a mode.
+    """
+    try:
+        found = identify(file)
+    except (ShapegcodeError, OSError) as error:
+        return str(error)
+    return "" if found.modes else f"{file}: no mode that the data support: {found.answer}"
 
 
 def _plain(answers: Answers) -> Machine:
@@ -109,6 +198,7 @@ def _said(answers: Answers) -> Iterator[tuple[str, tuple[object, str]]]:
     """Key of the machine file, value and remark of what was said beside limits and dump."""
     yield "name", (answers.name, "")
     if answers.dump is not None:
+        yield "description", (f"read from {Path(answers.dump).name}; set up by answers", "")
         for name in _LIMITS:
             if (said := getattr(answers, name)) is not None:
                 for axis in "xyz":
@@ -131,10 +221,10 @@ def _said(answers: Answers) -> Iterator[tuple[str, tuple[object, str]]]:
         if said == "rigid":
             yield f"axes.{axis}.rigid", (True, f"{_ANSWERED}: no mode counts")
         elif is_mode(said):
-            frequency, _, damping = said.partition(":")
-            mode = {"frequency_hz": float(frequency), "damping_ratio": float(damping) if damping else 0.02}
+            frequency, damping = mode_of(said)
+            mode = {"frequency_hz": frequency, "damping_ratio": damping}
             yield f"axes.{axis}.modes", ([mode], "")
-            if damping:
+            if ":" in said:
                 yield f"axes.{axis}.modes.1.damping_ratio", (mode["damping_ratio"], _ANSWERED)
 
 

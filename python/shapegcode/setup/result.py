@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 from shapegcode.results.json import hidden
@@ -71,10 +72,21 @@ class MachineSetup(Result):
         return f"`shapegcode machine show {file} --for part.nc` says which of the open values matters for your program."
 
     def tables(self) -> list[Table]:
-        """What is open."""
+        """What is open; axes of which the same is said share a row."""
+        shared: dict[tuple[str, str, str], list[str]] = {}
+        for each in self.open:
+            stem, axis, name = _split(each.key)
+            shared.setdefault((f"{stem}{{}}{name}", each.value, each.why), []).append(axis)
+        rows = [(key.format(", ".join(axes)), value, why) for (key, value, why), axes in shared.items()]
         columns = (
-            Column("open", value="key", left=True),
-            Column("taken as", value="value", text=True),
-            Column("why", text=True),
+            Column("open", value=lambda row: row[0], left=True),
+            Column("taken as", value=lambda row: row[1], text=True),
+            Column("why", value=lambda row: row[2], text=True),
         )
-        return [Table("", columns, self.open)] if self.open else []
+        return [Table("", columns, rows)] if rows else []
+
+
+def _split(key: str) -> tuple[str, str, str]:
+    """What stands before the letter of an axis, the letter, and what stands behind it."""
+    found = re.fullmatch(r"(axes\.)([xyz])(\..*)", key)
+    return (found[1], found[2], found[3]) if found else (key, "", "")

@@ -13,8 +13,13 @@ from shapegcode.results.json import hidden
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["NARROW_PERCENT", "ModeBand", "machine_bands", "parse_mode_band"]
+__all__ = ["NARROW_PERCENT", "NO_MODE", "ModeBand", "machine_bands", "parse_mode_band"]
 
+NO_MODE = (
+    "the machine file gives no vibration mode (axes.x.modes): nothing to shape for; `shapegcode identify --tap-plan` "
+    "says how to find them"
+)
+"""Why there is no shaper."""
 NARROW_PERCENT = 0.2
 """A band of a mode of a machine is designed for if it is wider than this, either way."""
 
@@ -164,5 +169,5 @@ def machine_bands(machine: Machine, uncertainty: float = 0.0) -> list[ModeBand]:
             key = still.frequency_hz, still.damping_ratio
             widths[key] = max(width, widths.get(key, 0.0))
     if not widths:
-        raise ArgumentError("the machine file gives no vibration mode (axes.x.modes): nothing to shape for")
+        raise ArgumentError(NO_MODE)
     return [ModeBand(Mode(*key), width) for key, width in widths.items()]

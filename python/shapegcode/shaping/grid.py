@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from shapegcode import _core
 from shapegcode.machine import Machine
 from shapegcode.model.modes import axis_modes, mode_tables, moving_axis, numbered_modes, still_mode
-from shapegcode.shaping.bands import ModeBand, machine_bands
+from shapegcode.shaping.bands import NO_MODE, ModeBand, machine_bands
 from shapegcode.shaping.block_period import (
     BlockPeriodCandidate,
     BlockPeriodChoice,
@@ -104,7 +104,7 @@ def choose_grid(
             controller.
     """
     if not any(axis.modes for axis in machine.axes.as_tuple()):
-        raise _core.ArgumentError("the machine file gives no vibration mode (axes.x.modes): nothing to shape for")
+        raise _core.ArgumentError(NO_MODE)
     bands = machine_bands(machine)
     shaping, controller = machine.shaping, machine.controller
     period = block_period_s if block_period_s is not None else machine.emission.block_period_s
