@@ -1,4 +1,4 @@
-"""Figures of docs/concepts/shapers.md on minimal shapers: `python tests/benchmarks/minimal_figures.py` prints them."""
+"""Figures of docs/concepts/minimal_shapers.md: `python tests/benchmarks/minimal_figures.py` prints them."""
 
 from __future__ import annotations
 

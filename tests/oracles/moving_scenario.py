@@ -1,4 +1,4 @@
-"""The figures of docs/concepts/shapers.md, modes that move: `python tests/oracles/moving_scenario.py` prints them.
+"""The figures of docs/concepts/moving_modes.md: `python tests/oracles/moving_scenario.py` prints them.
 
 A zig-zag that cuts along X while Z travels 400 mm, with a stop at every turn; the X mode falls from 52 to 41 Hz over Z.
 """

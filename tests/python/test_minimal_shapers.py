@@ -194,7 +194,7 @@ def test_every_listed_shaper_solves_the_paper_s_equations_and_leaves_simulated_m
 
 
 def test_random_sets_have_a_shaper_and_none_is_missed_below_a_proven_duration() -> None:
-    """A small run of minimal_figures.py, whose figures docs/concepts/shapers.md states for 500 sets."""
+    """A small run of minimal_figures.py, whose figures docs/concepts/minimal_shapers.md states for 500 sets."""
     results = [solve(modes, max_boxes=50_000) for modes in random_sets(12, seed=2)]
     assert all(each.found or each.complete for each in results)
     assert max(each.residual for each in results if each.found) <= 1e-10

@@ -341,7 +341,7 @@ def test_a_machine_gets_its_track() -> None:
 
 
 def test_a_zig_zag_along_z_leaves_next_to_nothing_at_its_stops() -> None:
-    """docs/concepts/shapers.md, modes that move: 20 stops over 400 mm, and four long strokes."""
+    """docs/concepts/moving_modes.md: 20 stops over 400 mm, and four long strokes."""
     unshaped, fixed, _, followed, *_ = (residuals for _, _, residuals in scenario.table(20))
     assert unshaped.max() > 100.0
     assert fixed.max() > 0.1 * unshaped.max()

@@ -210,7 +210,7 @@ def test_the_table_is_settled_sooner_and_rings_less_at_the_next_cut() -> None:
         assert now_s < was_s - 0.2
         saved += was_s - now_s
     assert rapids["time_saved_s"] == pytest.approx(saved, abs=0.004)
-    assert saved == pytest.approx(0.47, abs=0.01)  # docs/reference/report.md
+    assert saved == pytest.approx(0.47, abs=0.01)  # docs/howto/shaped_rapids.md
     for move in rapids["moves"]:
         for axis, now in move["residual_vibration_um"]["emitted"].items():
             assert now <= move["residual_limit_um"][axis]
