@@ -60,14 +60,21 @@ def small(chrome: Browser, folder: Path) -> Browser:
     return chrome
 
 
+MARKED = """
+const list = document.querySelector(`[data-program=${arguments[0]}] .lines`);
+const row = list.querySelector("[aria-selected=true]");
+if (!row) return null;
+const [seen, frame] = [row.getBoundingClientRect(), list.getBoundingClientRect()];
+const count = row.querySelector(".count").textContent;
+return seen.top >= frame.top - 1 && seen.bottom <= frame.bottom + 1
+  ? [Number(count), row.textContent.slice(count.length).trim()] : null;
+"""
+
+
 def marked(browser: Browser, program: str) -> tuple[int, str]:
-    """Number and text of the marked line; it must be in sight."""
-    browser.wait("return document.querySelector(`[data-program=${arguments[0]}] [aria-selected=true]`)", program)
-    row = browser.one(f"[data-program={program}] [aria-selected=true]")
-    frame = browser.one(f"[data-program={program}] .lines").rect
-    assert frame["y"] - 1 <= row.rect["y"] <= frame["y"] + frame["height"], "it has scrolled there"
-    count = row.find_element("css selector", ".count").text
-    return int(count), row.text.removeprefix(count).strip()
+    """Number and text of the marked line; the list has scrolled, so that it is in sight."""
+    number, text = browser.wait(MARKED, program)
+    return number, text
 
 
 def reading(browser: Browser, program: str = "original") -> dict[str, str]:
@@ -355,7 +362,9 @@ def test_curves_zoom_together_and_set_the_marker(small: Browser) -> None:
     assert high - low == pytest.approx(0.5 * max(end for _, end in whole), rel=0.15)
     assert all(begin <= low + 0.2 for begin, _ in small.js(spans))
     before = small.js("return scenePage.time")
-    ActionChains(small.driver, duration=0).move_to_element(plot).pause(0.3).click().perform()
+    ActionChains(small.driver, duration=0).move_to_element(plot).perform()
+    small.wait("return document.querySelector('#traces .hovertext')")
+    ActionChains(small.driver, duration=0).click().perform()
     small.wait("return scenePage.time !== arguments[0]", before)
     assert small.js("return scenePage.time") == pytest.approx((low + high) / 2, abs=0.05 * (high - low))
     small.keep("curves")
