@@ -117,6 +117,7 @@ def test_a_dump_and_a_tap_test_are_read(tmp_path: Path) -> None:
     ("text", "said"),
     [
         ('rapid_mm_per_min = 24000\n', "name"),
+        ('name = "Fräse"\nrapid_mm_per_min = 9000\n', "plain ASCII"),
         ('name = "A"\n', "rapid_mm_per_min is missing"),
         ('name = "A"\nrapid_mm_per_min = -1\n', "rapid_mm_per_min"),
         ('name = "A"\nrapid_mm_per_min = 9000\nspindle = 3\n', "spindle"),
@@ -284,6 +285,22 @@ def test_schemas_for_editors_take_real_files_and_refuse_wrong_ones(kind: str, tm
         table = next(iter(key for key, value in data.items() if isinstance(value, dict)))
         with pytest.raises(jsonschema.ValidationError, match=r"is not of type|is not valid under any"):
             jsonschema.validate(data | {table: "much"}, found)
+
+
+def test_the_schema_takes_what_is_written_and_documented(tmp_path: Path) -> None:
+    """The file of a dialogue, short and full forms, the first example of the manual; not a value beyond its limit."""
+    answered(tmp_path)
+    found = toml_schema(sg.Machine, "")
+    example = re.search(r"```toml\n(.*?)```", (ROOT / "docs" / "reference" / "machine.md").read_text(), re.DOTALL)
+    assert example is not None
+    sg.Machine.from_toml(example[1], "example")
+    machine = sg.Machine.load(tmp_path / "m.toml")
+    for text in ((tmp_path / "m.toml").read_text(), machine.to_toml(), example[1]):
+        data = tomllib.loads(text)
+        jsonschema.validate(data, found)
+        data["axes"]["x"]["rapid_mm_per_min"] = 0
+        with pytest.raises(jsonschema.ValidationError, match="exclusive"):
+            jsonschema.validate(data, found)
 
 
 def test_the_schema_says_unit_and_parameter() -> None:

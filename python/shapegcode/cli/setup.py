@@ -47,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "where there are some, and writes a short machine file: what was answered, and why; everything else is a "
         "default. Another machine's modes are never taken."
     )
+    parser.epilog = "example: shapegcode setup -o mine.toml"
     parser.add_argument(
         "-o", "--output", metavar="FILE", default="machine.toml", help="machine file to write (default: %(default)s)"
     )

@@ -7,8 +7,8 @@ from importlib import resources
 from shapegcode.cutting.materials import materials
 from shapegcode.cutting.stock import Stock
 from shapegcode.cutting.tool import Tool
-from shapegcode.settings.describe import key_tables
 from shapegcode.settings.keys import toml
+from shapegcode.settings.reference import key_tables
 
 __all__ = ["STEEL_TOOL", "STOCK_EXAMPLES", "file_documentation"]
 

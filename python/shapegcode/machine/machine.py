@@ -26,10 +26,11 @@ from shapegcode.machine.input import Input
 from shapegcode.machine.output import Emission, Shaping, Tolerance, Verdict
 from shapegcode.machine.times import Times
 from shapegcode.settings import change
-from shapegcode.settings.describe import documentation, values_of, write_short_toml, write_toml
+from shapegcode.settings.describe import values_of, write_short_toml, write_toml
 from shapegcode.settings.keys import KeyInfo, KeyValue, PerAxis, Text, TomlTable, key, toml
 from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem
+from shapegcode.settings.reference import documentation
 from shapegcode.settings.remarks import DEFAULT, inherited, remarks_of, with_remarks
 
 _VARIABLE = re.compile(r"#\d+")

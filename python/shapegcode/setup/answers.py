@@ -70,9 +70,7 @@ class ModesAnswer(InlineTable):
 class Answers(TomlTable):
     """What a shop says of its machine."""
 
-    name: Annotated[str, Strict(), Field(min_length=1, max_length=60, pattern=r"^[\x20-\x7e]+$")] = key(
-        "What do you call the machine?"
-    )
+    name: Text = key("What do you call the machine?")
     control: Literal["fanuc", "other"] = key("Which control does it have?", default="fanuc")
     dump: Text | None = key("Is there a parameter file of the control (CNC-PARA.TXT)?", default=None)
     rapid_mm_per_min: PositiveAxisValues | None = key(
@@ -97,6 +95,13 @@ class Answers(TomlTable):
     look_ahead: LookAhead | None = key("By which code does a look-ahead mode go on?", default=None)
     contour_um: Positive | None = key("How far may the contour leave the programmed path?", unit="µm", default=None)
     modes: ModesAnswer = key("What is known of its vibration?", default={})
+
+    @field_validator("name")
+    @classmethod
+    def _plain(cls, said: str) -> str:
+        if not re.fullmatch(r"[\x20-\x7e]{1,60}", said) or not said.strip():
+            raise ValueError("must be 1 to 60 plain ASCII characters, as it goes into the header of programs")
+        return said
 
     @model_validator(mode="after")
     def _likely(self) -> Answers:
