@@ -65,7 +65,7 @@ demo: package
 	$(BIN)/shapegcode demo path
 	mkdir -p demo-output
 	$(BIN)/shapegcode convert tests/golden/programs/PARALLEL.NC -m vx500 --set tolerance.contour_um=10 \
-	  -o demo-output/PARALLEL.NC --plots demo-output --json demo-output/PARALLEL.json
+	  -o demo-output/PARALLEL.NC --plots demo-output --json demo-output/PARALLEL.json --html demo-output/PARALLEL.html
 
 # One after the other, so that the output reads from top to bottom and ends with pytest's own closing line.
 test:

@@ -25,9 +25,9 @@ extensions = [
 ]
 exclude_patterns = ["Thumbs.db", "**/.ipynb_checkpoints"]
 nitpicky = True
-# Types of others stand in our signatures; without network there is no inventory of theirs to look them up in. Of our
-# own names every one that a page refers to must exist; what signatures mention and nobody exports is told apart below.
-nitpick_ignore_regex = [("py:.*", ".*"), ("cpp:.*", ".*")]
+# Public names (shapegcode.X) that a page refers to must exist. Signatures also name types of others, for which there is
+# no inventory without a network, and inner ones that nobody exports.
+nitpick_ignore_regex = [("py:.*", r"(?!shapegcode\.\w+$).*"), ("cpp:.*", ".*")]
 
 html_theme = "furo"
 html_title = f"shapegcode {release}"
