@@ -153,8 +153,10 @@ def _asked(name: str, question: str, annotation: Any, given: dict[str, Any]) -> 
         return None if said == _NOBODY_KNOWS else said
     unit = _unit(name)
     needed = name == "name" or (name == "rapid_mm_per_min") or name == "dnc_baud"
-    hint = f" [{unit}]" if unit else ""
-    hint += "" if needed else " (Enter: nobody knows)" if name != "dump" else " (its file, or Enter: no)"
+    unknown = "" if needed else "Enter: none" if name == "dump" else "Enter: unknown"
+    kind = "such as CNC-PARA.TXT" if name == "dump" else f"{unit}, or x, y, z" if name in _OF_AXES else unit
+    said = "; ".join(filter(None, (kind, unknown)))
+    hint = f" [{said}]" if said else ""
     return _parsed(name, _typed(question + hint, lambda typed: _problem(name, typed, needed, given)))
 
 
@@ -229,7 +231,7 @@ def _problem(name: str, typed: str, needed: bool, given: dict[str, Any]) -> bool
     try:
         read_answers({"name": "m", "rapid_mm_per_min": _ANY} | _alone(name, given | {name: value}))
     except FileError as error:
-        return "; ".join(str(problem) for problem in error.problems)
+        return "; ".join(f"{problem.value}: {problem.limit}" for problem in error.problems)
     return True
 
 

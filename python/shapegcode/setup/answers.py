@@ -72,15 +72,13 @@ class Answers(TomlTable):
 
     name: Text = key("What do you call the machine?")
     control: Literal["fanuc", "other"] = key("Which control does it have?", default="fanuc")
-    dump: Text | None = key("Is there a parameter file of the control (CNC-PARA.TXT)?", default=None)
-    rapid_mm_per_min: PositiveAxisValues | None = key(
-        "How fast are the rapids (G00)? One number, or x, y, z", unit="mm/min", default=None
-    )
+    dump: Text | None = key("Is there a parameter file of the control?", default=None)
+    rapid_mm_per_min: PositiveAxisValues | None = key("How fast are the rapids (G00)?", unit="mm/min", default=None)
     max_feed_mm_per_min: PositiveAxisValues | None = key(
-        "What is the largest cutting feed? One number, or x, y, z", unit="mm/min", default=None
+        "What is the largest cutting feed?", unit="mm/min", default=None
     )
     max_acceleration_mm_s2: PositiveAxisValues | None = key(
-        "What is the largest acceleration while cutting? One number, or x, y, z", unit="mm/s²", default=None
+        "How fast may an axis accelerate in a cut?", unit="mm/s²", default=None
     )
     least_increment_mm: Annotated[Positive, Field(le=0.1)] | None = key(
         "What is the least increment?", unit="mm", default=None
@@ -93,7 +91,7 @@ class Answers(TomlTable):
         "How large is the program memory?", unit="kB", default=None
     )
     look_ahead: LookAhead | None = key("By which code does a look-ahead mode go on?", default=None)
-    contour_um: Positive | None = key("How far may the contour leave the programmed path?", unit="µm", default=None)
+    contour_um: Positive | None = key("How far may the contour leave the path?", unit="µm", default=None)
     modes: ModesAnswer = key("What is known of its vibration?", default={})
 
     @field_validator("name")
