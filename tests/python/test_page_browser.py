@@ -349,7 +349,9 @@ def test_curves_zoom_together_and_set_the_marker(small: Browser) -> None:
     small.wait("return document.querySelector('#traces .nsewdrag') && document.querySelector('#traces .cursor')")
     titles = small.js("const l = document.getElementById('traces').layout; return Object.keys(l).filter(k => "
                       "/axis/.test(k)).map(k => l[k].title.text)")  # fmt: skip
-    assert set(titles) == {"time s", "µm", "X mm", "Y mm", "Z mm"}
+    assert set(titles) == {"time s", "deviation from<br>the path µm", "X mm", "Y mm", "Z mm"}
+    buttons = small.js("return [...document.querySelectorAll('#traces .modebar-btn')].map(b => b.dataset.title)")
+    assert buttons == ["Download plot as a PNG", "Zoom", "Pan", "Reset axes"], "none sends the data away"
     spans = "return document.getElementById('traces').data.map(one => [one.x[0], one.x[one.x.length - 1]])"
     whole = small.js(spans)
     plot = small.one("#traces .nsewdrag")

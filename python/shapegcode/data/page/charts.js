@@ -38,6 +38,13 @@ function thinned(motion, column, low, high) {
   return { x, y };
 }
 
+/** A name of an axis in two lines, where it is longer than a row is high. */
+function wrapped(text) {
+  const words = text.split(" ");
+  const half = words.findIndex((_, k) => words.slice(0, k + 1).join(" ").length >= text.length / 2 - 2);
+  return text.length < 16 ? text : `${words.slice(0, half + 1).join(" ")}<br>${words.slice(half + 1).join(" ")}`;
+}
+
 const styleOf = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 class Charts {
@@ -92,7 +99,8 @@ class Charts {
   /** Rows from top to bottom: what colours the path, then the axes that move. */
   #rows() {
     const said = this.scene.channels[this.channel];
-    const rows = said ? [{ title: said.unit, name: said.label, of: (motion) => motion.channels[this.channel] }] : [];
+    const named = said ? wrapped(`${said.label} ${said.unit}`) : "";
+    const rows = said ? [{ title: named, name: said.label, of: (motion) => motion.channels[this.channel] }] : [];
     const table = this.kind === "position" ? "place" : "off";
     const unit = this.kind === "position" ? "mm" : "µm";
     for (let k = 0; k < 3; k++) {
@@ -114,7 +122,7 @@ class Charts {
     const share = 1 / rows.length;
     const layout = {
       height, margin: { l: 64, r: 14, t: 34, b: 46 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-      font: { family: 'system-ui, "DejaVu Sans", sans-serif', size: 12, color: text },
+      font: { family: "system-ui, DejaVu Sans, sans-serif", size: 12, color: text },
       hovermode: "x", hoverdistance: -1,
       modebar: { bgcolor: "rgba(0,0,0,0)", color: styleOf("--faint"), activecolor: text },
       legend: { orientation: "h", y: 1.0, yanchor: "bottom", x: 0 }, dragmode: "zoom",
@@ -141,11 +149,10 @@ class Charts {
   }
 
   #config() {
-    const without = ["lasso2d", "select2d"];
+    // Named one by one: Plotly's own list has one that sends the data away.
+    const modeBarButtons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]];
     const displayModeBar = this.traces.clientWidth > 600 ? "hover" : false;
-    return {
-      responsive: true, displaylogo: false, doubleClick: "reset", displayModeBar, modeBarButtonsToRemove: without,
-    };
+    return { responsive: true, displaylogo: false, doubleClick: "reset", displayModeBar, modeBarButtons };
   }
 
   async #drawTraces() {

@@ -116,7 +116,7 @@ def _card(figure: Figure) -> str:
         lines.append(f'<p class="value"><span class="before">{before}</span> {arrow} {after} {unit}</p>')
         if figure.before:
             change = (figure.after - figure.before) / abs(figure.before) * 100.0
-            lines.append(f'<p class="change">{change:+z.0f} %</p>')
+            lines.append(f'<p class="change">{change:+z.{0 if abs(change) >= 10.0 else 1}f} %</p>')
     kind = ""
     if figure.limit is not None:
         within = abs(figure.after) <= figure.limit
