@@ -10,13 +10,17 @@ function ticksOf(low, high, pixels) {
 }
 
 /** Seen from above: along the borders. Else: along edges of the box around the path. */
-function drawAxes(context, camera, low, high, colour) {
+function drawAxes(context, camera, low, high, colour, ground) {
   Object.assign(context, { font: LETTERS, fillStyle: colour, strokeStyle: colour, lineWidth: 1 });
-  if (camera.plan) drawBorders(context, camera); else drawEdges(context, camera, low, high);
+  if (camera.plan) drawBorders(context, camera, colour, ground); else drawEdges(context, camera, low, high);
 }
 
-function drawBorders(context, camera) {
+function drawBorders(context, camera, colour, ground) {
   const [wide, tall] = camera.size;
+  context.fillStyle = ground;
+  context.fillRect(0, 0, 42, tall);
+  context.fillRect(0, tall - 38, wide, 38);
+  context.fillStyle = colour;
   const middle = [wide / 2 + camera.pan[0], tall / 2 - camera.pan[1]];
   const x = (pixel) => camera.centre[0] + (pixel - middle[0]) / camera.scale;
   const y = (pixel) => camera.centre[1] - (pixel - middle[1]) / camera.scale;

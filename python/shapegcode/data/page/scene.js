@@ -251,7 +251,7 @@ class ScenePage {
       const flat = this.stage.flat ? ["#b85000", "#0072b2"][this.motions.indexOf(motion)] : null;
       paintPath(context, motion, project, this.stage.magnify, this.stage.values.get(motion), ramp, flat);
     }
-    drawAxes(context, camera, this.stage.low, this.stage.high, "#000000");
+    drawAxes(context, camera, this.stage.low, this.stage.high, "#000000", "#ffffff");
     drawScales(context, camera, this.stage.magnify, "#000000", "#ffffff");
     const { label, unit } = this.scene.channels[this.colour] ?? {};
     const [low, high] = [this.limits.low, this.limits.high].map((value) => String(Number(value.toPrecision(3))));

@@ -112,7 +112,7 @@ class Stage {
     context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
     this.painter.show();
     const project = this.camera.projector();
-    drawAxes(context, this.camera, this.low, this.high, "#c3cad3");
+    drawAxes(context, this.camera, this.low, this.high, "#c3cad3", GROUND);
     drawScales(context, this.camera, this.magnify, "#e8ebef", GROUND);
     for (const mark of this.marks) if (this.shown.includes(mark.motion)) this.#mark(context, project, mark);
   }
