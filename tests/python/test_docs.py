@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import functools
 import os
 import re
 from pathlib import Path
 
 import book
+import gallery
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -57,6 +59,22 @@ def test_every_page_is_in_the_contents(tmp_path: Path) -> None:
     assert sorted(pages - set(listed)) == [], "in no contents"
     assert sorted(set(listed) - pages) == [], "in the contents, and not there"
     assert len(listed) == len(set(listed)), "twice in the contents"
+
+
+def test_every_picture_that_a_result_draws_is_in_the_gallery() -> None:
+    """By the names in the functions that offer pictures; those of `KEPT` are drawn once and stand in docs/images."""
+    offered = set()
+    for file in (ROOT / "python" / "shapegcode").rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and node.name in {"plots_of", "plots", "motion_pictures"}:
+                for part in ast.walk(node):
+                    keys = part.keys if isinstance(part, ast.Dict) else []
+                    if isinstance(part, ast.Assign) and isinstance(part.targets[0], ast.Subscript):
+                        keys = [part.targets[0].slice]
+                    offered |= {key.value for key in keys if isinstance(key, ast.Constant)}
+    shown = {name for entry in gallery.ENTRIES for name in entry.shown}
+    assert len(offered) > 40
+    assert offered - shown - {Path(name).stem for *_, name, _ in gallery.KEPT} == set()
 
 
 def test_every_picture_is_shown() -> None:

@@ -103,5 +103,16 @@ def stage(book: Path) -> None:
         write(place, content)
 
 
+def keep_public(doxygen: Path) -> None:
+    """Take private members out of Doxygen's XML: it has no setting for that, and Breathe shows what is there."""
+    for file in sorted(doxygen.glob("*.xml")):
+        text = file.read_text(encoding="utf-8")
+        public = re.sub(r'<sectiondef kind="(?:private|friend).*?</sectiondef>', "", text, flags=re.DOTALL)
+        if public != text:
+            file.write_text(public, encoding="utf-8")
+
+
 if __name__ == "__main__":
-    stage(Path(sys.argv[1]).resolve())
+    place = Path(sys.argv[1]).resolve()
+    keep_public(place.parent / "doxygen" / "xml")
+    stage(place)

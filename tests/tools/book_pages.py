@@ -37,6 +37,8 @@ PARTS = {
     "model": "Plants of a machine",
     "results": "What every result has",
     "io": "Files",
+    "setup": "Setup",
+    "errors": "Errors",
 }
 """Title of the page of each folder of the package, in the order of the book; one that is not here has its own name."""
 

@@ -29,6 +29,9 @@ FILES = {
     "pocket.nc": ROOT / "tests" / "golden" / "feed" / "POCKET.NC",
     "tool.toml": ROOT / "tests" / "golden" / "feed" / "pocket_tool.toml",
     "block.toml": ROOT / "tests" / "golden" / "feed" / "pocket_stock.toml",
+    "COVER.NC": DATA / "measured" / "nist" / "programs" / "COVER.NC",
+    "COVER-run1.txt.gz": DATA / "measured" / "nist" / "logs" / "COVER-run1.txt.gz",
+    "COVER-run2.txt.gz": DATA / "measured" / "nist" / "logs" / "COVER-run2.txt.gz",
     "capture.json.gz": DATA / "measured" / "sinumerik" / "capture.json.gz",
 }
 
@@ -134,6 +137,12 @@ ENTRIES = (
         {"servo": "The control's own deviation, and what our model leaves of it where it was not fitted."}, "servo",
     ),
     Entry(
+        "A machine learned from its logs",
+        "characterize --runs RUNS.toml -m vx500",
+        {"clock": "Predicted over measured time of each run: whole, by tool, by kind of motion."},
+        "clock",
+    ),
+    Entry(
         "Paper 001: force at corners", "demo corner",
         {
             "paper001-figure6a-radial-depth": "Radial depth along the corners.",
@@ -212,6 +221,9 @@ def _measured() -> None:
     import test_sweep as sweeps
     import test_test_cuts as cuts
 
+    Path("RUNS.toml").write_text(
+        '[[runs]]\nprogram = "COVER.NC"\nlogs = ["COVER-run1.txt.gz", "COVER-run2.txt.gz"]\n', encoding="utf-8"
+    )
     for seed in (1, 2, 3):
         taps.write_tap(Path(f"tap{seed}.csv"), seed=seed, samples=2048)
     taps.write_stop(Path("stop.csv"))
