@@ -372,6 +372,9 @@ def test_curves_zoom_together_and_set_the_marker(small: Browser) -> None:
     small.keep("curves")
     cursor = small.one("#traces .cursor").rect["x"]
     assert cursor == pytest.approx(small.one("#traces .nsewdrag").rect["x"] + wide / 2, abs=0.06 * wide)
+    ActionChains(small.driver, duration=0).move_to_element(plot).double_click().perform()
+    small.wait("return document.getElementById('traces').data[0].x[0] === 0")
+    assert small.js(spans) == whole
 
 
 def test_spectra_name_the_modes_in_hertz(small: Browser) -> None:
