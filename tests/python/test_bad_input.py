@@ -215,7 +215,7 @@ def test_full_standard_output(folder: Path) -> None:
     ],
 )  # fmt: skip
 def test_bad_machine_file(folder: Path, old: str, new: str, parts: tuple[str, ...]) -> None:
-    assert run(folder, "machine", "init").returncode == 0
+    assert run(folder, "machine", "init", "--full").returncode == 0
     text = (folder / "machine.toml").read_text()
     assert old in text
     (folder / "machine.toml").write_text(text.replace(old, new, 1))
