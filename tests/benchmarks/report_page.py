@@ -29,12 +29,11 @@ from shapegcode.results.page.html import plotly_name, save
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "python"))
-from browser import Browser, chromium  # noqa: E402
+from browser import SEEN, Browser, chromium  # noqa: E402
 
 TURN_S = 5.0
 CATEGORIES = "blink.user_timing,loading,rail,devtools.timeline,disabled-by-default-devtools.timeline.frame"
 SWIFTSHADER = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-SEEN = "return document.getElementById('scene-body') && !document.getElementById('scene-body').hidden"
 TURN = """const done = arguments[0], begun = performance.now();
 (function turn(now) { if (now - begun > %g) return done(); %s; requestAnimationFrame(turn); })(begun);"""
 OURS = "scenePage.stage.camera.turn(4, 0); scenePage.stage.draw()"

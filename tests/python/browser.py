@@ -20,6 +20,9 @@ ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "build" / "report_pages"
 """Where tests leave what they saw."""
 
+SEEN = "return document.getElementById('scene-body') && !document.getElementById('scene-body').hidden"
+"""The motion of a page is there."""
+
 _AT_MOST_S = 30
 
 

@@ -1,4 +1,4 @@
-"""Pages of results in a browser, opened from the disk without a network: what one clicks does what it says."""
+"""Pages of results in a browser, opened from the disk without a network: quiet, complete, on paper, on a phone."""
 
 from __future__ import annotations
 
@@ -13,21 +13,11 @@ from typing import Any
 import numpy as np
 import pypdf
 import pytest
-from selenium.webdriver import ActionChains, Keys
+from selenium.webdriver import Keys
 
-import shapegcode as sg
-from browser import ROOT, Browser, chromium
+from browser import ROOT, SEEN, Browser, chromium
 from command import run
-from shapegcode.model.scene import scene_of
-from shapegcode.program import Program
-
-# A mode along X: the corner at X30 Y40 shakes. The comment and the name of the file would end or begin an element.
-COMMENT = "(</script><script>window.broken=1</script><img src=x onerror=window.broken=2>)"
-TEXT = f"%\nO0001 {COMMENT}\nG90 G21 G17 G54\nG0 X0 Y0 Z5.\nG1 Z0. F3000.\nX30. Y40.\nX60. Y0.\nG0 Z5.\nM30\n%\n"
-NAME = "<img src=x onerror=window.broken=3>.nc"
-LINES = TEXT.splitlines()
-UP, DOWN = LINES.index("X30. Y40.") + 1, LINES.index("X60. Y0.") + 1
-SEEN = "return document.getElementById('scene-body') && !document.getElementById('scene-body').hidden"
+from small_page import COMMENT, NAME, convert, marked, write_small
 
 
 @pytest.fixture(scope="module")
@@ -40,12 +30,9 @@ def chrome() -> Iterator[Browser]:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Pages of a small program and of one of 3741 lines."""
     place = tmp_path_factory.mktemp("pages")
-    (place / NAME).write_text(TEXT)
+    write_small(place)
     (place / "PARALLEL.NC").write_bytes((ROOT / "tests" / "golden" / "programs" / "PARALLEL.NC").read_bytes())
-    words = ("convert", "-m", "vx500", "--set", "tolerance.contour_um=20")
-    for name, out, html in ((NAME, "out.nc", "small"), ("PARALLEL.NC", "P.NC", "large")):
-        done = run(place, *words, name, "-o", out, "--html", f"{html}.html")
-        assert done.returncode == 0, done.stderr
+    convert(place, "PARALLEL.NC", "P.NC", "large.html")
     done = run(place, "simulate", NAME, "-m", "vx500", "--html", "beside.html", "--html-script", "beside")
     assert done.returncode == 0, done.stderr
     return place
@@ -53,61 +40,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def small(chrome: Browser, folder: Path) -> Browser:
-    """The page of the small program, seen from above."""
     chrome.open(folder / "small.html", SEEN)
-    chrome.one("#view-plan").click()
-    chrome.one("[data-show=original]").click()
     return chrome
-
-
-MARKED = """
-const list = document.querySelector(`[data-program=${arguments[0]}] .lines`);
-const row = list.querySelector("[aria-selected=true]");
-if (!row) return null;
-const [seen, frame] = [row.getBoundingClientRect(), list.getBoundingClientRect()];
-const count = row.querySelector(".count").textContent;
-return seen.top >= frame.top - 1 && seen.bottom <= frame.bottom + 1
-  ? [Number(count), row.textContent.slice(count.length).trim()] : null;
-"""
-
-
-def marked(browser: Browser, program: str) -> tuple[int, str]:
-    """Number and text of the marked line; the list has scrolled, so that it is in sight."""
-    number, text = browser.wait(MARKED, program)
-    return number, text
-
-
-def reading(browser: Browser, program: str = "original") -> dict[str, str]:
-    """What is said of the place of the marker."""
-    table = browser.js(
-        "return [...document.querySelectorAll('#reading tr')].map(r => [...r.cells].map(c => c.innerText))"
-    )
-    return next(dict(zip(table[0], row, strict=True)) for row in table[1:] if row[0] == program)
-
-
-def pixel(browser: Browser, x: float, y: float) -> tuple[float, float]:
-    """Where a place of the part is drawn, seen from above, from the middle of the picture."""
-    camera = browser.js("const {centre, scale, pan} = scenePage.stage.camera; return {centre, scale, pan}")
-    return (
-        (x - camera["centre"][0]) * camera["scale"] + camera["pan"][0],
-        -(y - camera["centre"][1]) * camera["scale"] - camera["pan"][1],
-    )
-
-
-def click(browser: Browser, x: float, y: float) -> None:
-    """On the picture of the path, at a place of the part."""
-    view = browser.one("#view")
-    browser.js("arguments[0].scrollIntoView({block: 'center'})", view)
-    right, down = pixel(browser, x, y)
-    ActionChains(browser.driver, duration=0).move_to_element_with_offset(
-        view, round(right), round(down)
-    ).click().perform()
-
-
-def set_slider(browser: Browser, name: str, value: float) -> None:
-    script = "const it = document.getElementById(arguments[0]); it.value = arguments[1]; "
-    script += "it.dispatchEvent(new Event('input'))"
-    browser.js(script, name, value)
 
 
 def test_it_opens_without_network_and_without_complaints(chrome: Browser, folder: Path) -> None:
@@ -197,196 +131,6 @@ def test_numbers_of_cards_and_tables_are_in_the_json(chrome: Browser, folder: Pa
         digits = len(text.partition(".")[2])
         near = [held * factor for factor in (1.0, 1e3, 1e-3, 100.0)]
         assert any((abs(values - float(text)) <= 0.5001 * 10.0**-digits).any() for values in near), text
-
-
-def test_a_click_on_the_path_finds_the_line(small: Browser) -> None:
-    for x, y, line in ((15.0, 20.0, UP), (45.0, 20.0, DOWN)):
-        click(small, x, y)
-        assert marked(small, "original") == (line, LINES[line - 1])
-        place = reading(small)
-        assert float(place["X mm"]) == pytest.approx(x, abs=0.3)
-        assert float(place["Y mm"]) == pytest.approx(y, abs=0.3)
-        assert int(place["line"]) == line
-    small.keep("click-on-the-path")
-    before = reading(small)
-    click(small, 30.0, 10.0)
-    assert reading(small) == before, "there is no path"
-
-
-def test_a_click_on_a_line_finds_its_place(small: Browser) -> None:
-    """Of the original and of what was emitted; keys go from line to line."""
-    small.one("#magnify").send_keys(Keys.HOME)
-    small.one(f"[data-program=original] [data-line='{DOWN}']").click()
-    assert marked(small, "original") == (DOWN, LINES[DOWN - 1])
-    place = reading(small)
-    assert (float(place["X mm"]), float(place["Y mm"])) == pytest.approx((30.0, 40.0), abs=0.5)
-    ring = small.js("const s = scenePage.stage, m = s.marks.find(m => m.chief); return s.placeOf(m.motion, m.here)")
-    middle = [half / 2 for half in small.js("return scenePage.stage.camera.size")]
-    right, down = pixel(small, float(place["X mm"]), float(place["Y mm"]))
-    assert ring == pytest.approx([middle[0] + right, middle[1] + down], abs=1.5)
-    small.one("[data-program=original] .lines").send_keys(Keys.ARROW_UP)
-    assert marked(small, "original")[0] == UP
-    small.one("[data-program=original] .lines").send_keys(Keys.END)
-    assert marked(small, "original")[0] == len(LINES)
-
-    small.one("[data-show=both]").click()
-    small.one(f"[data-program=original] [data-line='{DOWN}']").click()
-    here, there = reading(small, "original"), reading(small, "emitted")
-    for axis in ("X mm", "Y mm"):
-        assert float(there[axis]) == pytest.approx(float(here[axis]), abs=0.5)
-    assert int(there["line"]) == marked(small, "emitted")[0]
-
-
-def test_programs_are_shown_one_or_both(small: Browser) -> None:
-    """In the picture, in the texts and in the figures."""
-
-    def colours() -> tuple[int, int]:
-        seen = small.pixels("#view")
-        orange = (abs(seen - [0xF2, 0x8E, 0x3C]) < 12).all(axis=2)
-        blue = (abs(seen - [0x56, 0xB4, 0xE9]) < 12).all(axis=2)
-        return int(orange.sum()), int(blue.sum())
-
-    small.js("scenePage.stage.marks = []")
-    for show, programs in (("original", ["original"]), ("emitted", ["emitted"]), ("both", ["original", "emitted"])):
-        small.one(f"[data-show={show}]").click()
-        if show != "both":
-            small.js(
-                "const c = document.getElementById('colour'); c.value = 'program'; c.dispatchEvent(new Event('change'))"
-            )
-        small.js("scenePage.stage.marks = []; scenePage.stage.drawNow()")
-        orange, blue = colours()
-        assert (orange > 200) == ("original" in programs)
-        assert (blue > 200) == ("emitted" in programs)
-        assert [one.get_attribute("data-program") for one in small.all(".program:not([hidden])")] == programs
-        pressed = [one.get_attribute("data-show") for one in small.all("#show [aria-pressed=true]")]
-        assert pressed == [show]
-
-
-def test_deviation_is_drawn_as_large_as_it_says(small: Browser, folder: Path) -> None:
-    """The tip of the corner moves by the factor: the table shoots beyond it."""
-
-    def top() -> int:
-        small.js("scenePage.stage.marks = []; scenePage.stage.drawNow()")
-        # Letters are grey.
-        return int(np.flatnonzero((np.ptp(small.pixels("#view"), axis=2) > 60).any(axis=1))[0])
-
-    small.one("#magnify").send_keys(Keys.HOME)
-    assert small.one("#magnify-said").text == "×1"
-    plain = top()
-    small.one("#magnify").send_keys(Keys.ARROW_RIGHT * 7)
-    assert small.one("#magnify-said").text == "×200"
-    machine = sg.Machine.load("vx500")
-    motion = scene_of(Program.read(folder / NAME, machine), machine).variants[0]
-    y = motion.command_mm[:, 1] + 1e-3 * motion.deviation_um[:, 1] * np.array([[1.0], [200.0]])
-    grown = float(np.diff(y.max(axis=1))[0]) * small.js("return scenePage.stage.camera.scale")
-    assert grown > 5
-    assert plain - top() == pytest.approx(grown, abs=2.5)
-
-
-def test_amounts_have_colours_units_and_words(small: Browser) -> None:
-    options = small.js("return [...document.getElementById('colour').options].map(o => [o.value, o.text])")
-    assert {"deviation", "vibration", "speed", "acceleration", "block_s"} <= {value for value, _ in options}
-    seen = set()
-    for value, text in options[:-1]:
-        small.js(
-            "const c = document.getElementById('colour'); c.value = arguments[0]; c.dispatchEvent(new Event('change'))",
-            value,
-        )
-        assert text in small.one("#colours").text
-        assert len(small.one("#colour-how").text) > 20
-        assert re.search(r", (µm|mm/min|m/s²|s|N)$", text)
-        small.js("scenePage.stage.drawNow()")
-        seen.add(small.pixels("#view").tobytes())
-    assert len(seen) == len(options) - 1
-
-
-def test_the_slider_of_time_moves_the_marker(small: Browser) -> None:
-    small.one(f"[data-program=original] [data-line='{UP}']").click()
-    slider = small.one("#clock")
-    begin = float(slider.get_attribute("value"))
-    slider.send_keys(Keys.ARROW_RIGHT)
-    after = float(small.one("#clock").get_attribute("value"))
-    assert after > begin
-    assert reading(small)["time s"] == f"{after:.3f}"
-    assert small.one("#clock-said").text.startswith(f"{after:.3f} s")
-    set_slider(small, "clock", 1e9)
-    assert marked(small, "original")[1] in ("G0 Z5.", "M30")
-    small.one("#block-back").click()
-    assert reading(small)["block"] != ""
-    small.js("document.getElementById('pace').value = 500")
-    small.one("#play").click()
-    small.wait("return scenePage.playing === false")
-    small.js("document.getElementById('pace').value = 1")
-    set_slider(small, "clock", 0.0)
-    small.one("#play").click()
-    small.wait("return scenePage.time > 0.05")
-    small.js("scenePage.stop()")
-    assert small.one("#play").text == "▶ Play"
-    assert reading(small)["time s"] == f"{small.js('return scenePage.time'):.3f}"
-
-
-def test_pointer_wheel_and_keys_turn_and_zoom(small: Browser) -> None:
-    small.one("#view-3d").click()
-    state = "const {yaw, pitch, scale} = scenePage.stage.camera; return [yaw, pitch, scale]"
-    first = small.js(state)
-    view = small.one("#view")
-    ActionChains(small.driver, duration=0).click_and_hold(view).move_by_offset(60, 30).release().perform()
-    turned = small.js(state)
-    assert turned[0] != first[0]
-    assert turned[1] != first[1]
-    view.send_keys(Keys.ARROW_LEFT, "+")
-    keyed = small.js(state)
-    assert keyed[0] != turned[0]
-    assert keyed[2] == pytest.approx(turned[2] * 1.25)
-    small.one("#view-fit").click()
-    assert small.js(state)[2] < keyed[2]
-    small.keep("motion-3d")
-
-
-def test_curves_zoom_together_and_set_the_marker(small: Browser) -> None:
-    small.one("[data-show=both]").click()
-    small.js("document.getElementById('traces').scrollIntoView()")
-    small.wait("return document.querySelector('#traces .nsewdrag') && document.querySelector('#traces .cursor')")
-    titles = small.js("const l = document.getElementById('traces').layout; return Object.keys(l).filter(k => "
-                      "/axis/.test(k)).map(k => l[k].title.text)")  # fmt: skip
-    assert set(titles) == {"time s", "deviation from<br>the path µm", "X mm", "Y mm", "Z mm"}
-    buttons = small.js("return [...document.querySelectorAll('#traces .modebar-btn')].map(b => b.dataset.title)")
-    assert buttons == ["Download plot as a PNG", "Zoom", "Pan", "Reset axes"], "none sends the data away"
-    spans = "return document.getElementById('traces').data.map(one => [one.x[0], one.x[one.x.length - 1]])"
-    whole = small.js(spans)
-    plot = small.one("#traces .nsewdrag")
-    wide = plot.rect["width"]
-    drag = ActionChains(small.driver, duration=50).move_to_element_with_offset(plot, round(-0.25 * wide), 0)
-    drag.click_and_hold().move_by_offset(round(0.5 * wide), 0).release().perform()
-    small.wait("return document.getElementById('traces').layout.xaxis.range[0] > 0")
-    small.wait("return document.getElementById('traces').data[0].x[0] > 0")
-    low, high = small.js("return document.getElementById('traces').layout.xaxis.range")
-    assert high - low == pytest.approx(0.5 * max(end for _, end in whole), rel=0.15)
-    assert all(begin <= low + 0.2 for begin, _ in small.js(spans))
-    before = small.js("return scenePage.time")
-    ActionChains(small.driver, duration=0).move_to_element(plot).perform()
-    small.wait("return document.querySelector('#traces .hovertext')")
-    ActionChains(small.driver, duration=0).click().perform()
-    small.wait("return scenePage.time !== arguments[0]", before)
-    assert small.js("return scenePage.time") == pytest.approx((low + high) / 2, abs=0.05 * (high - low))
-    small.keep("curves")
-    cursor = small.one("#traces .cursor").rect["x"]
-    assert cursor == pytest.approx(small.one("#traces .nsewdrag").rect["x"] + wide / 2, abs=0.06 * wide)
-    ActionChains(small.driver, duration=0).move_to_element(plot).double_click().perform()
-    small.wait("return document.getElementById('traces').data[0].x[0] === 0")
-    assert small.js(spans) == whole
-
-
-def test_spectra_name_the_modes_in_hertz(small: Browser) -> None:
-    small.js("document.getElementById('spectra').scrollIntoView()")
-    small.wait("return document.querySelector('#spectra .annotation')")
-    # The modes of the built-in machine.
-    assert small.js("return document.getElementById('spectra').layout.shapes.map(s => s.x0)") == [46.0, 131.0]
-    assert all("Hz" in one.text for one in small.all("#spectra .annotation"))
-    titles = small.js("const l = document.getElementById('spectra').layout; return Object.keys(l).filter(k => "
-                      "/axis/.test(k)).map(k => l[k].title.text)")  # fmt: skip
-    assert {"frequency Hz", "X m/s²/√Hz", "Y m/s²/√Hz"} <= set(titles)
-    small.keep("spectra")
 
 
 def test_lines_of_both_programs_stand_for_each_other(chrome: Browser, folder: Path) -> None:

@@ -18,11 +18,10 @@ import shapegcode as sg
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "python"))
-from browser import Browser, chromium  # noqa: E402
+from browser import SEEN, Browser, chromium  # noqa: E402
 
 FOLDER = ROOT / "docs" / "images"
 MOST_BYTES = 150_000
-SEEN = "return document.getElementById('scene-body') && !document.getElementById('scene-body').hidden"
 
 
 def write(browser: Browser, name: str, box: dict[str, float]) -> None:
