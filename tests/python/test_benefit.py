@@ -86,7 +86,7 @@ def test_the_command_says_it_first(tmp_path: Path) -> None:
     data = json.loads((tmp_path / "out.json").read_text())
     jsonschema.validate(data, schema(sg.Conversion))
     assert data["recommendation"] == "no benefit: run the original"
-    done = run(tmp_path, "convert", "slow.nc", "-m", "vx500", "-o", "all.nc", "--all")
+    done = run(tmp_path, "convert", "slow.nc", "-m", "vx500", "-o", "all.nc", "--shape-all")
     assert done.stdout.startswith("worth running")
 
 

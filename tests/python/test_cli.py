@@ -116,7 +116,7 @@ def test_plots_are_png_and_svg(folder: Path) -> None:
 
 
 def test_out_of_tolerance_gets_the_suffix_and_exit_code_1(folder: Path) -> None:
-    words = ("convert", "part.nc", "-m", "vx500", "-o", "out.nc", "--all", "--json", "r.json")
+    words = ("convert", "part.nc", "-m", "vx500", "-o", "out.nc", "--shape-all", "--json", "r.json")
     # A limit that no program with words of 1 um can keep.
     strict = ("--set", "tolerance.residual_floor_um=0", "--set", "tolerance.residual_ratio=1e-6",
               "--set", "tolerance.residual_floor_increments=0")  # fmt: skip

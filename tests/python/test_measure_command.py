@@ -159,7 +159,7 @@ def test_many_sections_are_shown_with_all(folder: Path, capsys: pytest.CaptureFi
     few = capsys.readouterr().out
     assert "3 more sections" in few
     assert few.count("length mm, time s") == 12
-    assert main([*words, "--all"]) == 0
+    assert main([*words, "--verbose"]) == 0
     assert capsys.readouterr().out.count("length mm, time s") == 15
 
 

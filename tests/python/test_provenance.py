@@ -379,7 +379,7 @@ def test_verdict_ends_with_what_it_rests_on(started: Path, tmp_path: Path, capsy
     part, report = tmp_path / "part.nc", tmp_path / "r.json"
     part.write_text(PART, encoding="ascii")
     out = str(tmp_path / "out.nc")
-    main(["convert", str(part), "-m", str(started), "-o", out, "--all", "--json", str(report)])
+    main(["convert", str(part), "-m", str(started), "-o", out, "--shape-all", "--json", str(report)])
     shown = capsys.readouterr().out
     rows = json.loads(report.read_text(encoding="utf-8"))["rests_on"]
     keys = [row["key"] for row in rows]

@@ -105,7 +105,18 @@ def test_convert_writes_one_file_with_every_program_in_its_place(end: str, tmp_p
     original = PUNCH.replace("\n", end)
     punch(tmp_path, original)
     told = run(
-        tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--all", "-o", "out.nc", "--json", "r.json"
+        tmp_path,
+        "convert",
+        "all.nc",
+        "-m",
+        "vx500",
+        "--program",
+        "all",
+        "--shape-all",
+        "-o",
+        "out.nc",
+        "--json",
+        "r.json",
     )
     assert told.returncode == 0, told.stderr
     emitted = (tmp_path / "out.nc").read_bytes()
@@ -138,7 +149,18 @@ def test_a_program_that_cannot_be_read_does_not_stop_the_others(tmp_path: Path) 
     bad = f"O0005\n{HEAD}G02 X10. I3. F500\nM30\n"
     punch(tmp_path, "%\n" + program("O0001", 30) + bad + program("O0002", 60) + "%\n")
     told = run(
-        tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--all", "-o", "out.nc", "--json", "r.json"
+        tmp_path,
+        "convert",
+        "all.nc",
+        "-m",
+        "vx500",
+        "--program",
+        "all",
+        "--shape-all",
+        "-o",
+        "out.nc",
+        "--json",
+        "r.json",
     )
     assert told.returncode == 2
     assert "not done: all.nc:12:" in told.stdout and "off its radius" in told.stdout
@@ -150,7 +172,7 @@ def test_a_program_that_cannot_be_read_does_not_stop_the_others(tmp_path: Path) 
 def test_one_program_out_of_tolerance_sends_the_file_beside_the_one_asked_for(tmp_path: Path) -> None:
     punch(tmp_path, "%\n" + program("O0001", 30) + program("O0002", 60) + "%\n")
     told = run(
-        tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--all", "-o", "out.nc",
+        tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--shape-all", "-o", "out.nc",
         "--set", "tolerance.residual_floor_um=1e-6", "--set", "tolerance.residual_ratio=1e-9",
         "--set", "tolerance.residual_floor_increments=0",
     )  # fmt: skip
@@ -164,7 +186,7 @@ def test_one_program_out_of_tolerance_sends_the_file_beside_the_one_asked_for(tm
 
 def test_each_emitted_program_is_held_against_its_own_header(tmp_path: Path) -> None:
     punch(tmp_path)
-    done = run(tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--all", "-o", "out.nc")
+    done = run(tmp_path, "convert", "all.nc", "-m", "vx500", "--program", "all", "--shape-all", "-o", "out.nc")
     assert done.returncode == 0, done.stderr
 
     def codes() -> dict[str, set[str]]:

@@ -139,7 +139,7 @@ def _rows(out: str) -> list[str]:
 def test_the_table_shows_some_and_all(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["shaper", *PAPER, "--continuous", "--block-period", "2ms", "--block-period", "5ms", *FEW]
     rows = []
-    for more in ([], ["--all"]):
+    for more in ([], ["--verbose"]):
         assert main([*words, *more]) == 0
         rows.append(_rows(capsys.readouterr().out))
     result = asked(capsys, *words[1:])

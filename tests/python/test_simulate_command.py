@@ -527,7 +527,7 @@ M30
 def test_an_original_of_unknown_radius_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "pocket.nc").write_text(f"%\nO0002\n{POCKET}%\n")
     known = ["--set", "input.tool_radius_mm.2=5"]
-    words = ["convert", "pocket.nc", "-m", "vx500", *known, "--compensation", "expand", "--all", "-o", "part.nc"]
+    words = ["convert", "pocket.nc", "-m", "vx500", *known, "--compensation", "expand", "--shape-all", "-o", "part.nc"]
     assert main(words) == 0
     capsys.readouterr()
     message = refused(capsys, "--against", "pocket.nc")

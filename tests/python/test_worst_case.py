@@ -301,7 +301,7 @@ def test_exit_code_and_table_follow_the_worst_case(tmp_path: Path, capsys: pytes
     for low, code in ((100.0, 0), (80.0, 1)):
         machine = machine_with({"verdict.override_percent": [low, 100.0], **STRICT})
         (tmp_path / "machine.toml").write_text(machine.to_toml(), encoding="utf-8")
-        args = ["part.nc", "-m", "machine.toml", "-o", f"out{low:g}.nc", "--all", "--json", "report.json"]
+        args = ["part.nc", "-m", "machine.toml", "-o", f"out{low:g}.nc", "--shape-all", "--json", "report.json"]
         with pytest.MonkeyPatch.context() as patch:
             patch.chdir(tmp_path)
             assert main(["convert", *args]) == code
@@ -335,7 +335,7 @@ def test_a_region_that_runs_faster_than_programmed_is_missed(tmp_path: Path) -> 
 
     (tmp_path / "part.nc").write_text(CREEP)
     (tmp_path / "machine.toml").write_text(machine_with(ONLY_Z).to_toml(), encoding="utf-8")
-    args = ["part.nc", "-m", "machine.toml", "-o", "out.nc", "--all", "--block-period", "7ms"]
+    args = ["part.nc", "-m", "machine.toml", "-o", "out.nc", "--shape-all", "--block-period", "7ms"]
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path)
         assert main(["convert", *args]) == 1

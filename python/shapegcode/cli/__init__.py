@@ -22,6 +22,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from shapegcode.cli.arguments import CommandParser
+
 __all__ = ["COMMANDS", "Command", "ExitCode", "main", "parser_of"]
 
 _DEBUG = "--debug"
@@ -96,7 +98,7 @@ class _Version(argparse.Action):
 
 def parser_of(selected: str | None) -> argparse.ArgumentParser:
     """The parser with the arguments of the selected command; the others stay names with a help line."""
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog="shapegcode",
         description="Converts CNC programs into input-shaped FANUC programs that vibrate less.",
         epilog="exit codes: 0 done and within tolerance; 1 done but out of tolerance; 2 bad input. "

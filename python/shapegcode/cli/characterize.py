@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from shapegcode.cli.arguments import one_of
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--runs learns the clock (look-ahead, tool changes, M codes, spindle) from programs and the logs of their "
         "runs. Exit code 1 if results contradict each other, no axis tells its loop, or a run is not told within 2 %%."
     )
-    action = parser.add_mutually_exclusive_group(required=True)
+    action = one_of(parser, "what to do", required=True)
     action.add_argument(
         "--write", metavar="DIR", help="write the test programs, RESULTS.toml to fill in, and README.txt"
     )

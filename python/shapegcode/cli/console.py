@@ -6,7 +6,9 @@ import argparse
 import contextlib
 import json
 import os
+import shutil
 import sys
+import textwrap
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,6 +25,7 @@ __all__ = [
     "add_json_argument",
     "output_console",
     "progress",
+    "wrapped",
     "write_json",
 ]
 
@@ -40,14 +43,35 @@ def add_json_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def output_console(json_target: str | None = None, *, file: TextIO | None = None) -> Console:
-    """Console for tables and text on standard output; silent where the JSON goes there (``--json -``)."""
+def output_console(json_target: str | None = None, *, file: TextIO | None = None, least: int = 0) -> Console:
+    """Console for tables and text on standard output; silent where the JSON goes there (``--json -``).
+
+    Args:
+        json_target: of ``--json``.
+        file: in place of standard output.
+        least: characters that a line must hold, also where the terminal is narrower.
+
+    Returns:
+        The console.
+    """
     from rich.console import Console
 
     stream = file or sys.stdout
     # A pipe has no width: rich would take 80 characters and break the tables.
     width = None if stream.isatty() or "COLUMNS" in os.environ else _PIPE_WIDTH
-    return Console(file=stream, width=width, quiet=json_target == "-", highlight=False, soft_wrap=False)
+    console = Console(file=stream, width=width, quiet=json_target == "-", highlight=False, soft_wrap=False)
+    if least > console.width:
+        console.width = least
+    return console
+
+
+def wrapped(text: str) -> str:
+    """Text in lines between words, where the width is known: a terminal, or COLUMNS; else as it is."""
+    if not sys.stdout.isatty() and "COLUMNS" not in os.environ:
+        return text
+    width = shutil.get_terminal_size().columns
+    lines = [textwrap.wrap(line, width, break_long_words=False, break_on_hyphens=False) for line in text.split("\n")]
+    return "\n".join("\n".join(parts) for parts in lines)
 
 
 def write_json(data: object, target: str | Path) -> None:

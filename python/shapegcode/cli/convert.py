@@ -7,6 +7,7 @@ import importlib
 import threading
 from typing import TYPE_CHECKING, Any
 
+from shapegcode.cli.arguments import add_alias
 from shapegcode.cli.feed import add_cutting_arguments
 from shapegcode.cli.options import (
     add_machine_argument,
@@ -58,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_override_arguments(parser, MACHINE_KEYS)
     parser.add_argument(
-        "--all",
+        "--shape-all",
         action="store_true",
         help="shape every region: also where that gains less than shaping.least_gain_um, or misses a tolerance (then "
         "the program fails as a whole); without it such a region keeps its text",
@@ -101,6 +102,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_program_argument(parser)
     add_plots_argument(parser)
     add_result_arguments(parser)
+    add_alias(parser, "--all", "--shape-all")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -160,7 +162,7 @@ def _converted(args: argparse.Namespace, program: Program, machine: Machine, bar
     def show(stage: str, done: int, total: int) -> None:
         bar.update(begins[stage] + 0.5 * done / total)
 
-    return convert(program, machine, **_options(args), shape_all=args.all, on_progress=show)
+    return convert(program, machine, **_options(args), shape_all=args.shape_all, on_progress=show)
 
 
 def _scheduled(args: argparse.Namespace, program: Program, machine: Machine, bar: ProgressBar) -> Conversion:

@@ -76,7 +76,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "changes within them; everything else stays as it is. Exit code 0: every limit is kept; 1: written, but "
         "somewhere a limit is not kept (the report says where and why); 2: bad input."
     )
-    parser.epilog = "example: shapegcode feed part.nc -m vx500 --tool T8.toml --stock block.toml -o part-feed.nc"
     add_input_arguments(parser)
     add_cutting_arguments(parser, required=True)
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help="program to write")

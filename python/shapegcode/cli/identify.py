@@ -60,7 +60,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "refuses what the data do not support. Exit code 0: all that stands out is supported; 1: some of it is not; "
         "2: nothing is, or bad input."
     )
-    parser.epilog = "example: shapegcode identify tap1.csv tap2.csv tap3.csv --axis x --update mine.toml --plots plots"
     add = parser.add_argument
     add(
         "files", metavar="FILE", nargs="*", help="CSV, UFF (dataset 58), WAV, .frf, .mat; several of one point together"
@@ -79,9 +78,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ignore = "take it as a free decay: do not use the force, even if there is one"
     add("--decay", "--ignore-force", dest="ignore_force", action="store_true", help=ignore)
     add("--start", metavar="TIME", type=typed.start_time, default=None, help=_HELP_TIME)
-    group = parser.add_argument_group("what a file does not say")
     for name, field, how, said in _OF_FILES:
-        group.add_argument(name, dest=field, help=said, **({"default": None} | how))
+        add(name, dest=field, help=said, **({"default": None} | how))
     options.add_plots_argument(
         parser, "write pictures (PNG and SVG) of records, fit and stabilisation into this folder"
     )

@@ -23,7 +23,6 @@ _DEFAULT_MACHINE = "vx500"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the actions."""
-    parser.epilog = "example: shapegcode machine import CNC-PARA.TXT --from vx500 -o machine.toml"
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True, title="actions")
 
     init = actions.add_parser("init", help="write a commented machine file to start from")
@@ -53,7 +52,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="make a machine file from a controller's parameter dump (CNC-PARA.TXT)",
         description="Make a machine file from a FANUC parameter dump, and say what was read, assumed and missing. "
         "Exit code 1 if nothing was read.",
-        epilog="example: shapegcode machine import CNC-PARA.TXT TOOLOFST.TXT MACRO.TXT --from vx500 -o machine.toml",
     )
     take.add_argument(
         "dump",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
+from shapegcode.cli.arguments import add_alias
 from shapegcode.cli.options import (
     add_machine_argument,
     add_plots_argument,
@@ -26,7 +27,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Exit code 0; 1: the response of a program leaves the path by more than tolerance.contour_um (of shaped "
         "programs beside their original the shaped ones count alone); 2: bad input."
     )
-    parser.epilog = "example: shapegcode measure part.nc shaped.nc -m vx500 --tool-diameter 3mm --plots plots"
     parser.add_argument("inputs", metavar="PROGRAM", nargs="+", help="CNC program; several stand side by side")
     add_machine_argument(parser)
     add_program_argument(parser)
@@ -59,11 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     length("--station", default=50.0, help="distance of the places at which walls are measured (default: 0.05mm)")
     length("--cutoff", help="cut-off of the roughness (default: 0.8mm, less on sections shorter than 5.6 mm)")
     length("--lambda-s", default=0.0, help="short-wave cut-off (default: none)")
-    parser.add_argument(
-        "--all", action="store_true", help="show every section (default: the 12 with the largest contour error)"
-    )
     add_plots_argument(parser, "write pictures of part, walls and width (PNG and SVG) into this folder")
     add_result_arguments(parser)
+    add_alias(parser, "--all", "--verbose")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -96,5 +94,5 @@ def run(args: argparse.Namespace) -> int:
             lambda_s_mm=args.lambda_s * 1e-3,
             on_progress=lambda done, total: bar.update(done / total),
         )
-    tables = measurement.tables(every_section=args.all)
+    tables = measurement.tables(every_section=args.verbose)
     return runner.finish(measurement, args, tables=tables, notes=[program.how for program in measurement.programs])

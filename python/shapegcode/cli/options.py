@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from shapegcode.cli.arguments import one_of
 from shapegcode.cli.console import add_json_argument
 from shapegcode.cli.typed import program_choice
 
@@ -50,7 +51,7 @@ def add_plots_argument(
 
 
 def add_result_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what every command with a result has: ``--json FILE``, ``--html FILE``, ``--html-script``."""
+    """Declare ``--json``, ``--html``, ``--html-script``, ``--quiet``, ``--verbose``: of every command with a result."""
     add_json_argument(parser)
     parser.add_argument(
         "--html",
@@ -59,6 +60,16 @@ def add_result_arguments(parser: argparse.ArgumentParser) -> None:
         help="write the result as a page: one file that any browser opens, without a network",
     )
     add_script_argument(parser)
+    add_amount_arguments(parser)
+
+
+def add_amount_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--quiet`` and ``--verbose``."""
+    amount = one_of(parser, "how much is said")
+    amount.add_argument("-q", "--quiet", action="store_true", help="only the answer, warnings and errors")
+    amount.add_argument(
+        "-v", "--verbose", action="store_true", help="every table with every column and row, however wide"
+    )
 
 
 def add_script_argument(parser: argparse.ArgumentParser) -> None:

@@ -17,7 +17,7 @@ __all__ = ["add_arguments", "run"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     from shapegcode.cli.console import add_json_argument
-    from shapegcode.cli.options import add_script_argument
+    from shapegcode.cli.options import add_amount_arguments, add_script_argument
 
     parser.description = (
         "Makes the page that --html writes later, from the JSON: figures from the JSON, and where the programs and the "
@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_script_argument(parser)
     add_json_argument(parser)
+    add_amount_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -155,8 +155,6 @@ def finish(
     Raises:
         OSError: a file cannot be written.
     """
-    from shapegcode.results.table import warning_table
-
     report = result.to_dict()
     plots = getattr(args, "plots", None)
     pictures: list[str] = []
@@ -171,23 +169,54 @@ def finish(
         several.add(report, output)
     else:
         _write(report, getattr(args, "json", None), output)
-    console = terminal.output_console(standard_output(args))
+    pictured = [f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: none are drawn of this"]
+    _say(
+        result,
+        args,
+        result.tables() if tables is None else tables,
+        result.warnings if warnings is None else warnings,
+        notes,
+        [
+            *(f"wrote {file}" for file in (*wrote, *pages)),
+            *([f"wrote {output[0]}"] if output is not None and several is None else []),
+            *(pictured if plots is not None else []),
+            f"next: {result.next_step}",
+        ],
+    )
+    return result.exit_code
+
+
+def _say(
+    result: Result,
+    args: argparse.Namespace,
+    tables: Sequence[Table],
+    warnings: Sequence[str],
+    notes: Sequence[str],
+    last: Sequence[str],
+) -> None:
+    """Say it on standard output: first of all the answer; with --quiet nothing but that and the warnings."""
+    from shapegcode.results.table import warning_table
+
+    quiet, verbose = getattr(args, "quiet", False), getattr(args, "verbose", False)
+    shown = () if quiet else [table.everything() for table in tables] if verbose else tables
+    least = max((table.width() for table in shown), default=0) if verbose else 0
+    console = terminal.output_console(standard_output(args), least=least)
 
     def say(text: str, style: str | None = None) -> None:
-        console.print(text, markup=False, soft_wrap=True, style=style)
+        console.print(terminal.wrapped(text), markup=False, soft_wrap=True, style=style)
 
     say(result.answer, "bold" if result.ok else "bold red")
-    for table in result.tables() if tables is None else tables:
+    for table in shown:
         console.print()
         console.print(table)
-    if said := result.warnings if warnings is None else warnings:
-        console.print()
-        console.print(warning_table(said))
+    if warnings:
+        if not quiet:
+            console.print()
+        console.print(warning_table(warnings))
+    if quiet:
+        return
     for note in notes:
         say(note)
-    for file in (*wrote, *pages, *([output[0]] if output is not None and several is None else [])):
-        say(f"wrote {file}")
-    if plots is not None:
-        say(f"pictures: {', '.join(pictures[::2])}" if pictures else "pictures: none are drawn of this")
-    say(f"next: {result.next_step}")
-    return result.exit_code
+    for line in last:
+        # Paths and commands stay whole, so that they can be copied.
+        console.print(line, markup=False, soft_wrap=True)

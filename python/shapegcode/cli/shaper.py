@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 
+from shapegcode.cli.arguments import add_alias
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import positive, ratio, seconds, share
 
@@ -25,7 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "the vibration if the frequencies are off, contour cost, negative taps; and recommends one. "
         "Exit code 0: it stays within the vibration limit; 1: the best one does not; 2: bad input."
     )
-    parser.epilog = "example: shapegcode shaper --mode 46:0.02±5% --mode 131:0.02 --block-period 5ms"
     add = parser.add_argument
     add(
         "--mode", metavar="HZ[:DAMPING][±BAND]", action="append", default=[],
@@ -80,9 +80,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--radius", metavar="MM", type=positive, default=20.0,
         help="radius of the arc on which it is shown (default: %(default)g)",
     )  # fmt: skip
-    add("--all", action="store_true", help="show every design in the table")
     add_plots_argument(parser, "write pictures of the comparison (PNG and SVG) into this folder")
     add_result_arguments(parser)
+    add_alias(parser, "--all", "--verbose")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -121,5 +121,5 @@ def run(args: argparse.Namespace) -> int:
             on_progress=bar.update,
         )
     result = replace(result, machine=args.machine)
-    tables = result.tables(args.speed, args.radius, everything=args.all)
+    tables = result.tables(args.speed, args.radius, everything=args.verbose)
     return runner.finish(result, args, tables=tables, notes=result.notes())

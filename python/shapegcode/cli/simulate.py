@@ -20,9 +20,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "residual and peak vibration, settling time, contour error of command and response. Of the whole program with "
         "its rapids, dwells and waits: the motion of the axes in time, as table, files and pictures."
     )
-    parser.epilog = (
-        "example: shapegcode simulate part.nc -m mine.toml --plant feed-drive --npz motion.npz --plots plots"
-    )
     add_input_arguments(parser)
     parser.add_argument(
         "--shaped",

@@ -6,6 +6,7 @@ import argparse
 import math
 from typing import TYPE_CHECKING, Any
 
+from shapegcode.cli.arguments import add_alias
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import positive, program_number
 
@@ -45,7 +46,7 @@ _SHAPE = (
     ("--finish-radius", "MM", positive, "of the finished corner (default: D)", None),
 )
 _TAPER = (
-    ("-F --feeds", "F,F,...", _list, "in mm/min; one is passed at its half, once and double", _NEEDED),
+    ("-F --feed", "F,F,...", _list, "in mm/min; one is passed at its half, once and double", _NEEDED),
     ("--radial-depth", "MM:MM", _pair, "at begin and end of the stock (default: 0.05 to 0.35 of the diameter)", None),
     ("--length", "MM", positive, "of the stock along X (default: %(default)s)", 60.0),
 )
@@ -63,7 +64,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "describes the cut; `fit` reads that and the measured forces. Exit code 0; 1: the fit is poor or the result "
         "not as it should be; 2: bad input."
     )
-    parser.epilog = "example: shapegcode testcut taper -m vx500 --tool em8.toml -S 1800 -F 216 -a 15 -o TAPER.NC"
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True, title="actions")
     for name, act, options, meaning, description in (
         (
@@ -90,6 +90,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             cut.add_argument(*names.split(), metavar=metavar, type=kind, help=said, **needed)
         cut.add_argument("--up", action="store_true", help="up milling, material on the left (default: down milling)")
         add_result_arguments(cut)
+        if act is _taper:
+            add_alias(cut, "--feeds", "--feed")
     _add_fit(actions)
 
 
@@ -100,7 +102,6 @@ def _add_fit(actions: Any) -> None:
         description="Reads the side file of a test cut and the records of its passes, in their order: of a taper the "
         "coefficients with 95 % intervals, of a corner measured against expected resultant, of an interval test the "
         "shortest interval that the controller follows.",
-        epilog="example: shapegcode testcut fit pass1.csv pass2.csv pass3.csv --cut TAPER.json -o cutting.toml",
     )
     fit.set_defaults(act=_fit)
     fit.add_argument(
@@ -136,8 +137,8 @@ def run(args: argparse.Namespace) -> int:
 def _taper(args: argparse.Namespace) -> int:
     from shapegcode.testcut.cuts import taper_cut
 
-    feeds = args.feeds if len(args.feeds) > 1 else None
-    return _written(args, taper_cut(_conditions(args, args.feeds[0]), feeds, args.radial_depth, args.length))
+    feeds = args.feed if len(args.feed) > 1 else None
+    return _written(args, taper_cut(_conditions(args, args.feed[0]), feeds, args.radial_depth, args.length))
 
 
 def _corner(args: argparse.Namespace) -> int:

@@ -177,7 +177,7 @@ def section_table(
         Column("limit", value="limit"),
     )
     left_out = count - len(shown)
-    caption = f"{left_out} more sections, whose contour error is less: --all shows them, --json lists them"
+    caption = f"{left_out} more sections, whose contour error is less: --verbose shows them, --json lists them"
     return Table(
         title, columns, rows, caption=caption if left_out else "",
         sections=[rank for rank, row in enumerate(rows) if row.heading],

@@ -192,10 +192,18 @@ def save_all(plots: Mapping[str, Callable[..., Axes]], folder: str | Path) -> li
     files = []
     for name, plot in plots.items():
         drawn = plot()
+        _lay_out(drawn)
         for suffix in FORMATS:
             files.append(place / f"{name}{suffix}")
             save(drawn, files[-1])
     return [str(file) for file in files]
+
+
+def _lay_out(drawn: Axes | Figure) -> None:
+    """Give the panels their places once for every format: to find them takes as long as to draw all."""
+    figure: Any = drawn.figure.figure
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
 
 
 def save(drawn: Axes | Figure, file: str | Path) -> None:

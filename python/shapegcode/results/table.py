@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Literal
@@ -38,6 +38,8 @@ class Column:
         text: of words, which wrap and stand at the left; other columns stand at the right and are never cut.
         left: stands at the left, though it is never cut: a column of names.
         style: of a cell, as rich names it, from the row; None: plain.
+        priority: which columns go first where the table is too wide: those of the highest, of these the last one; 0
+            stays, as the first column does.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Column:
     text: bool = False
     left: bool = False
     style: Callable[[Any], str] | None = None
+    priority: int = 1
 
     @property
     def heading(self) -> str:
@@ -83,6 +86,7 @@ class Table:
         sections: ranks of the rows before which a line is drawn.
         row_style: of a whole row, as rich names it.
         caption_style: as rich names it.
+        whole: no column is left out, however narrow the terminal is.
     """
 
     title: str
@@ -92,6 +96,7 @@ class Table:
     sections: Collection[int] = ()
     row_style: Callable[[Any], str] | None = None
     caption_style: str = ""
+    whole: bool = False
 
     def cells(self) -> list[list[str]]:
         """Headings and rows as texts, without the columns that are empty in every row."""
@@ -121,20 +126,44 @@ class Table:
         # On lines of their own: rich would wrap them at the width of the table.
         if self.title:
             yield Text(self.title, style="bold")
-        yield self._rich(options.max_width)
+        shown = self.shown()
+        kept = shown if self.whole else self._fitting(shown, options.max_width)
+        yield self._rich(kept, options.max_width)
         if self.caption:
             yield Text(self.caption, style=self.caption_style)
+        if left := [column.heading for column in shown if column not in kept]:
+            yield Text(f"left out, as the terminal is too narrow: {', '.join(left)} (--verbose)", style="dim")
 
-    def _rich(self, width: int) -> RichTable:
+    def everything(self) -> Table:
+        """The table with every column, however narrow the terminal is."""
+        return replace(self, whole=True)
+
+    def width(self) -> int:
+        """Characters that the table with every column takes, with texts on one line each."""
+        return _least_width(self.shown(), self._texts(self.shown()), whole=True)
+
+    def _texts(self, shown: Sequence[Column]) -> list[list[str]]:
+        return [[_whole(column, column.cell(row)) for column in shown] for row in self.rows]
+
+    def _fitting(self, shown: list[Column], width: int) -> list[Column]:
+        """The columns that stand side by side in a width without a cut word."""
+        kept = list(shown)
+        while _least_width(kept, self._texts(kept)) > width:
+            free = [rank for rank, column in enumerate(kept) if rank > 0 and column.priority > 0]
+            if not free:
+                break
+            del kept[max(free, key=lambda rank: (kept[rank].priority, rank))]
+        return kept
+
+    def _rich(self, shown: Sequence[Column], width: int) -> RichTable:
         from rich.box import SIMPLE_HEAD
         from rich.table import Table as RichTable
         from rich.text import Text
 
-        shown = self.shown()
         table = RichTable(
             box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0),
         )  # fmt: skip
-        rows = [[_whole(column, column.cell(row)) for column in shown] for row in self.rows]
+        rows = self._texts(shown)
         widths = _widths(shown, rows, width)
         for column, place in zip(shown, widths, strict=True):
             side: Literal["left", "right"] = "left" if column.text or column.left else "right"
@@ -150,11 +179,8 @@ class Table:
         return table
 
 
-def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int) -> list[int]:
-    """How wide each column is, so that no word is cut and the table has no more lines than it must have.
-
-    rich shrinks every column alike, below what it was told to keep, and then cuts the last ones.
-    """
+def _least_and_most(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> tuple[list[int], list[int]]:
+    """How wide each column has to be for its longest word, and for its longest line."""
     least, most = [], []
     for rank, column in enumerate(columns):
         parts = [[cells[rank]] if column.left else cells[rank].split(" ") for cells in rows]
@@ -162,6 +188,21 @@ def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int
         # A path may be longer than the terminal is wide, and folds.
         least.append(min(max(map(len, words), default=1), 24 if column.text else 60))
         most.append(max([len(column.heading), *(len(cells[rank]) for cells in rows)]))
+    return least, most
+
+
+def _least_width(columns: Sequence[Column], rows: Sequence[Sequence[str]], *, whole: bool = False) -> int:
+    """Width of a table, with the space between its columns."""
+    least, most = _least_and_most(columns, rows)
+    return sum(most if whole else least) + 2 * len(columns) - 1
+
+
+def _widths(columns: Sequence[Column], rows: Sequence[Sequence[str]], width: int) -> list[int]:
+    """How wide each column is, so that no word is cut and the table has no more lines than it must have.
+
+    rich shrinks every column alike, below what it was told to keep, and then cuts the last ones.
+    """
+    least, most = _least_and_most(columns, rows)
     found = list(least)
     spare = width - (2 * len(columns) - 1) - sum(least)
     for _ in range(-spare):

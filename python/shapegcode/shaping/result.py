@@ -218,7 +218,7 @@ class Recommendation(Result):
         caption = f"arc: by how much R{radius_mm:g} mm comes out too small at {speed_mm_per_s:g} mm/s"
         return Table(
             f"shapers for {', '.join(map(str, self.modes))}", columns, rows,
-            caption=caption + (f"; {left_out} more designs: --all shows them" if left_out else ""),
+            caption=caption + (f"; {left_out} more designs: --verbose shows them" if left_out else ""),
             row_style=lambda each: "bold" if each is self.design else "",
         )  # fmt: skip
 

@@ -1,0 +1,113 @@
+"""What a person sees of every command: help in groups, examples that parse, how much is said, tables that fit."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from command import run
+from shapegcode.cli import COMMANDS, parser_of
+from shapegcode.cli.arguments import GROUPS
+from shapegcode.cli.examples import EXAMPLES
+from shapegcode.results.table import Column, Table
+
+PART = "%\nO0001\nG90 G17 G21 G94\nG00 X0 Y0 Z5.\nG01 Z-1. F300\nX20. F900\nX20. Y20.\nG00 Z5.\nM30\n%\n"
+
+
+def _actions(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    return next((a.choices for a in parser._actions if isinstance(a, argparse._SubParsersAction)), {})
+
+
+def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:
+    """Every command and action with its parser."""
+    for command in COMMANDS:
+        parser = _actions(parser_of(command.name))[command.name]
+        yield command.name, parser
+        for name, action in _actions(parser).items():
+            yield f"{command.name} {name}", action
+
+
+def test_each_command_has_two_examples_that_it_understands() -> None:
+    found = dict(parsers())
+    assert set(EXAMPLES) == set(found)
+    for name, parser in found.items():
+        examples = EXAMPLES[name]
+        assert len(examples) == 2, name
+        text = parser.format_help()
+        for example in examples:
+            assert f"\n  {example}\n" in text, name
+            words = shlex.split(example.partition(" > ")[0])
+            assert words[0] == "shapegcode"
+            assert words[1 : 1 + len(name.split())] == name.split() or name in ("machine", "testcut")
+            parser_of(words[1]).parse_args(words[1:])
+        assert "exit code" in text.lower(), name
+
+
+def test_options_stand_in_groups() -> None:
+    for name, parser in parsers():
+        loose = [
+            action.option_strings or action.dest
+            for group in parser._action_groups
+            for action in group._group_actions
+            if group.title not in GROUPS
+            and action.dest != "help"
+            and not isinstance(action, argparse._SubParsersAction)
+        ]
+        assert not loose, f"{name}: add them to cli.arguments.GROUPS"
+        sizes = [len(group._group_actions) for group in parser._action_groups]
+        assert max(sizes) <= 15, name
+
+
+def test_a_name_means_the_same_everywhere() -> None:
+    by_option, by_dest = defaultdict(set), defaultdict(set)
+    for _, parser in parsers():
+        for action in parser._actions:
+            for option in action.option_strings:
+                by_option[option].add(action.dest)
+            if action.option_strings:
+                by_dest[action.dest].add(next(o for o in action.option_strings if o.startswith("--")))
+    assert not {option: dests for option, dests in by_option.items() if len(dests) > 1}
+    assert not {dest: options for dest, options in by_dest.items() if len(options) > 1}
+
+
+def test_quiet_says_the_answer_and_verbose_everything(tmp_path: Path) -> None:
+    (tmp_path / "part.nc").write_text(PART)
+    words = ("time", "part.nc", "-m", "vx500")
+    usual, quiet, verbose = (run(tmp_path, *words, *more).stdout for more in ((), ("--quiet",), ("--verbose",)))
+    assert quiet.splitlines()[0] == usual.splitlines()[0] == verbose.splitlines()[0]
+    assert all(line.startswith(("warning:", " ")) for line in quiet.splitlines()[1:])
+    assert quiet.count("\n") < usual.count("\n")
+    assert set(usual.split()) - {"left", "out,"} <= set(verbose.split())
+    both = run(tmp_path, *words, "-q", "-v")
+    assert both.returncode == 2
+    assert "not allowed with" in both.stderr
+    bad = run(tmp_path, "time", "absent.nc", "-m", "vx500", "-q")
+    assert (bad.returncode, bad.stderr.count("absent.nc: no such file")) == (2, 1)
+
+
+@pytest.mark.parametrize("width", [20, 34, 80])
+def test_a_table_leaves_columns_out_by_their_priority(width: int) -> None:
+    columns = (
+        Column("name", value=lambda row: row[0], left=True),
+        Column("first", value=lambda row: row[1], priority=2),
+        Column("second", value=lambda row: row[2]),
+        Column("needed", value=lambda row: row[3], priority=0),
+    )
+    table = Table("title", columns, [("abcdefgh", "11111", "2222222", "33")])
+    from rich.console import Console
+
+    console = Console(width=width, color_system=None)
+    with console.capture() as capture:
+        console.print(table)
+    text = capture.get()
+    assert ("11111" in text, "2222222" in text) == (width >= 34, width >= 34)
+    assert "abcdefgh" in text
+    assert "33" in text
+    assert all(len(line.rstrip()) <= width or line.startswith("left out") for line in text.splitlines())
+    assert ("left out" in text) == (width < 34)
+    assert "left out" not in str(table.everything())
