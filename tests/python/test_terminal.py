@@ -45,7 +45,7 @@ def test_each_command_has_two_examples_that_it_understands() -> None:
             assert words[0] == "shapegcode"
             assert words[1 : 1 + len(name.split())] == name.split() or name in ("machine", "testcut")
             parser_of(words[1]).parse_args(words[1:])
-        assert "exit code" in text.lower(), name
+        assert "exit code" in " ".join(text.lower().split()), name
 
 
 def test_options_stand_in_groups() -> None:
@@ -68,7 +68,8 @@ def test_a_name_means_the_same_everywhere() -> None:
     for _, parser in parsers():
         for action in parser._actions:
             for option in action.option_strings:
-                by_option[option].add(action.dest)
+                if option.startswith("--"):
+                    by_option[option].add(action.dest)
             if action.option_strings:
                 by_dest[action.dest].add(next(o for o in action.option_strings if o.startswith("--")))
     assert not {option: dests for option, dests in by_option.items() if len(dests) > 1}
@@ -82,7 +83,8 @@ def test_quiet_says_the_answer_and_verbose_everything(tmp_path: Path) -> None:
     assert quiet.splitlines()[0] == usual.splitlines()[0] == verbose.splitlines()[0]
     assert all(line.startswith(("warning:", " ")) for line in quiet.splitlines()[1:])
     assert quiet.count("\n") < usual.count("\n")
-    assert set(usual.split()) - {"left", "out,"} <= set(verbose.split())
+    figures = {word for word in usual.split() if word[0].isalnum()}
+    assert figures <= set(verbose.split())
     both = run(tmp_path, *words, "-q", "-v")
     assert both.returncode == 2
     assert "not allowed with" in both.stderr

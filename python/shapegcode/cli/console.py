@@ -66,8 +66,8 @@ def output_console(json_target: str | None = None, *, file: TextIO | None = None
 
 
 def wrapped(text: str) -> str:
-    """Text in lines between words, where the width is known: a terminal, or COLUMNS; else as it is."""
-    if not sys.stdout.isatty() and "COLUMNS" not in os.environ:
+    """Text in lines between words on a terminal; elsewhere, where a line is searched for, as it is."""
+    if not sys.stdout.isatty():
         return text
     width = shutil.get_terminal_size().columns
     lines = [textwrap.wrap(line, width, break_long_words=False, break_on_hyphens=False) for line in text.split("\n")]

@@ -6,7 +6,6 @@ import argparse
 import math
 from typing import TYPE_CHECKING, Any
 
-from shapegcode.cli.arguments import add_alias
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import positive, program_number
 
@@ -46,7 +45,7 @@ _SHAPE = (
     ("--finish-radius", "MM", positive, "of the finished corner (default: D)", None),
 )
 _TAPER = (
-    ("-F --feed", "F,F,...", _list, "in mm/min; one is passed at its half, once and double", _NEEDED),
+    ("-F --feeds", "F,F,...", _list, "in mm/min; one is passed at its half, once and double", _NEEDED),
     ("--radial-depth", "MM:MM", _pair, "at begin and end of the stock (default: 0.05 to 0.35 of the diameter)", None),
     ("--length", "MM", positive, "of the stock along X (default: %(default)s)", 60.0),
 )
@@ -90,8 +89,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             cut.add_argument(*names.split(), metavar=metavar, type=kind, help=said, **needed)
         cut.add_argument("--up", action="store_true", help="up milling, material on the left (default: down milling)")
         add_result_arguments(cut)
-        if act is _taper:
-            add_alias(cut, "--feeds", "--feed")
     _add_fit(actions)
 
 
@@ -137,8 +134,8 @@ def run(args: argparse.Namespace) -> int:
 def _taper(args: argparse.Namespace) -> int:
     from shapegcode.testcut.cuts import taper_cut
 
-    feeds = args.feed if len(args.feed) > 1 else None
-    return _written(args, taper_cut(_conditions(args, args.feed[0]), feeds, args.radial_depth, args.length))
+    feeds = args.feeds if len(args.feeds) > 1 else None
+    return _written(args, taper_cut(_conditions(args, args.feeds[0]), feeds, args.radial_depth, args.length))
 
 
 def _corner(args: argparse.Namespace) -> int:
