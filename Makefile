@@ -22,7 +22,7 @@ endif
 export SUNDIALS_ROOT := $(CURDIR)/.cache/sundials/usr
 
 BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libfmt-dev python3-dev python3-venv doctest-dev
-TEST_PACKAGES := $(BUILD_PACKAGES) clang-format clang-tidy chromium chromium-driver
+TEST_PACKAGES := $(BUILD_PACKAGES) clang-format clang-tidy chromium chromium-driver fish mandoc zsh
 DOCS_PACKAGES := $(BUILD_PACKAGES) doxygen
 FUZZ_PACKAGES := $(BUILD_PACKAGES) clang-14 libclang-rt-14-dev libomp-14-dev
 FUZZ_SECONDS ?= 600
@@ -41,7 +41,7 @@ CONFIGURE_RELEASE = cmake --preset release -D SHAPEGCODE_BUILD_PYTHON=ON -D Pyth
 SPHINX := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going -n -q -c docs
 PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
-.PHONY: help demo test test-all lint bench coverage fuzz stubs schemas pages docs docs-source docs-links format clean \
+.PHONY: help demo test test-all lint bench coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
         build-packages test-packages package dev tidy tidy-all release plain sanitize stub-check \
         test-all-core test-all-python fuzz-parameters fuzz-merge
 
@@ -55,6 +55,7 @@ help:
 	@echo 'make fuzz    FUZZ_SECONDS (600) of coverage-guided fuzzing of the program reader; findings in build/fuzz/findings/'
 	@echo 'make stubs   write python/shapegcode/_core.pyi anew from the built module'
 	@echo 'make schemas  write docs/schema/ anew from the classes of the results'
+	@echo 'make man     manual pages into build/man'
 	@echo 'make docs    the book: build/docs/html/index.html, with every program in it run; make docs-links asks the net too'
 	@echo 'make pages   write the pages of docs/ that come from the code, docs/schema/ too'
 	@echo 'make format  lay out the C++ and Python sources as lint wants them'
@@ -153,6 +154,9 @@ pages: schemas
 docs: docs-source
 	$(SPHINX) -b html build/docs/source build/docs/html
 	@echo 'docs: build/docs/html/index.html'
+
+man: dev
+	$(BIN)/python tests/tools/write_man.py build/man
 
 docs-links: docs-source
 	$(SPHINX) -b linkcheck build/docs/source build/docs/links

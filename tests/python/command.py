@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,12 +16,17 @@ from shapegcode.cli import main
 COMMAND = Path(sys.executable).with_name("shapegcode")
 
 
+def _without_width() -> dict[str, str]:
+    """The environment without the width of the terminal in which the tests run."""
+    return {name: value for name, value in os.environ.items() if name != "COLUMNS"}
+
+
 def run(folder: Path, *words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """The command in a folder, within this process; an error that only --debug may show comes out as it is."""
     out, err = io.StringIO(), io.StringIO()
     with (
         contextlib.chdir(folder),
-        mock.patch.dict("os.environ", environment),
+        mock.patch.dict("os.environ", {**_without_width(), **environment}, clear=True),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
     ):

@@ -113,3 +113,25 @@ def test_a_table_leaves_columns_out_by_their_priority(width: int) -> None:
     assert all(len(line.rstrip()) <= width or line.startswith("left out") for line in text.splitlines())
     assert ("left out" in text) == (width < 34)
     assert "left out" not in str(table.everything())
+
+
+def test_the_bar_moves_within_one_region(tmp_path: Path) -> None:
+    """A program of one cut is not half done for most of the time: at least ten rising shares, the last is the whole."""
+    import shapegcode as sg
+    from shapegcode.cli import convert as command
+
+    (tmp_path / "part.nc").write_text(PART)
+    machine = sg.Machine.load("vx500")
+    program = sg.Program.read(tmp_path / "part.nc", machine)
+    assert len(program.regions) == 1
+    shares: list[float] = []
+
+    class Bar:
+        def update(self, share: float) -> None:
+            shares.append(share)
+
+    args = parser_of("convert").parse_args(["convert", "part.nc", "-m", "vx500", "-o", "out.nc"])
+    command._converted(args, program, machine, Bar())  # type: ignore[arg-type]
+    assert len(set(shares)) >= 10
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)

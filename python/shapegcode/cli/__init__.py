@@ -77,6 +77,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("identify", "find vibration modes in a tap test or decay, and put them into the machine file"),
     Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
     Command("report", "make pages of results that --json has written"),
+    Command("completion", "print the script that has bash, zsh or fish complete at TAB"),
     Command("demo", "repeat the figures of a paper beside the published ones"),
 )
 """Every sub-command, in the order of the help text. A new one needs a row here and a module of its name."""
@@ -174,6 +175,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         Exception: with ``--debug``, the error as it is; without it, only what is a defect of shapegcode.
     """
     words = list(sys.argv[1:] if argv is None else argv)
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks at TAB
+        importlib.import_module(f"{__name__}.completion").complete()
     try:
         return _run([word for word in words if word != _DEBUG])
     except SystemExit as stop:

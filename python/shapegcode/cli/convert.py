@@ -157,10 +157,16 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
 def _converted(args: argparse.Namespace, program: Program, machine: Machine, bar: ProgressBar) -> Conversion:
     from shapegcode.conversion.convert import convert
 
-    begins = {"shaping": 0.0, "shaping again, slower": 0.0, "round trip": 0.5}
+    # Where each stage begins, and how much of the bar it takes; shaping again does not take it back.
+    spans = {"shaping": (0.0, 0.4), "shaping again, slower": (0.0, 0.4), "round trip": (0.4, 0.4)}
+    spans["what it rests on"] = (0.8, 0.2)
+    reached = 0.0
 
     def show(stage: str, done: int, total: int) -> None:
-        bar.update(begins[stage] + 0.5 * done / total)
+        nonlocal reached
+        begin, share = spans[stage]
+        reached = max(reached, begin + share * done / total)
+        bar.update(reached)
 
     return convert(program, machine, **_options(args), shape_all=args.shape_all, on_progress=show)
 

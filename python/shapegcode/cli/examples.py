@@ -97,6 +97,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "shapegcode report result.json",
         "shapegcode report result.json -o result.html --html-script beside",
     ),
+    "completion": ("shapegcode completion bash", "shapegcode completion fish"),
     "demo": (
         "shapegcode demo path",
         "shapegcode demo corner --plots pictures --html corner.html",

@@ -83,7 +83,7 @@ def convert(
         block_period_s: duration of a short block, s: `emission.block_period_s`; None there too: see `choose_grid`.
         shape_all: shape every region, also where that gains less than `shaping.least_gain_um` or misses a tolerance;
             False: such a region keeps its text.
-        on_progress: called with stage, regions done and regions in all.
+        on_progress: called with stage, and how many of its parts are done and there are.
 
     Returns:
         The emitted program with its verdict. It is not written anywhere: `conversion.text` is what a file would hold.
@@ -370,7 +370,7 @@ class _Run:
             return (), 0
         return rests_on(
             self.model, self.judge, settled.figures, settled.written.placed, settled.emitted, figures.worst_case.lines,
-            self.pool,
+            self.pool, partial(self.on_progress, "what it rests on"),
         )  # fmt: skip
 
     def _cycle_time_s(self, settled: _Settled, cutting: Pair[float], rapids: ShapedRapids | None) -> Pair[float]:

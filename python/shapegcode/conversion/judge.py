@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
+from itertools import count
+from typing import TypeVar
 
 import numpy as np
 
@@ -37,6 +39,8 @@ from shapegcode.results.figures import ContourError, Deviation, Tracks, largest_
 from shapegcode.results.result import Pair, Xyz
 
 __all__ = ["OVERRIDES", "Judge", "RegionFigures"]
+
+_T = TypeVar("_T")
 
 OVERRIDES = (0.8, 0.9, 1.1, 1.2)  # of `override_residual`; the cases have more
 _HASTE = 0.9  # of its time: a region that takes less cuts faster than programmed
@@ -103,7 +107,7 @@ class Judge:
             placed: the regions and their places in it.
             originals: the originals' playbacks under way, one per region.
             pool: runs the playbacks.
-            on_step: called with regions done and regions in all.
+            on_step: called with playbacks done and playbacks in all.
 
         Returns:
             The figures of each region, in the order of the text.
@@ -125,12 +129,20 @@ class Judge:
             )  # fmt: skip
             running.append((player, runs, planned, rest, slowed))
         results: list[RegionFigures] = []
+        # A program may be one long region: what moves is the number of its playbacks.
+        done = count(1)
+        total = sum(len(runs) + len(rest) + 3 for _, runs, _, rest, _ in running)
+
+        def result(future: Future[_T]) -> _T:
+            found = future.result()
+            on_step(next(done), total)
+            return found
+
         for original, (player, runs, planned, rest, slowed) in zip(originals, running, strict=True):
-            nominal = tuple(run.result() for run in runs)
-            others = {name: run for part in rest for name, run in part.result().items()}
-            figures = player.figures(nominal, planned.result(), others)
-            results.append(RegionFigures(original.result(), nominal, figures, slowed.result()))
-            on_step(len(results), len(placed))
+            nominal = tuple(result(run) for run in runs)
+            others = {name: run for part in rest for name, run in result(part).items()}
+            figures = player.figures(nominal, result(planned), others)
+            results.append(RegionFigures(result(original), nominal, figures, result(slowed)))
         return results
 
     def contour_um(self, figures: RegionFigures, *, turned: bool = True) -> float:

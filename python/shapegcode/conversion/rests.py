@@ -6,7 +6,7 @@ uncertainty, or by what is usual where none is stated. That takes no more playba
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
@@ -122,6 +122,7 @@ def rests_on(
     emitted: Program,
     deciding_lines: tuple[int, int],
     pool: Executor,
+    on_step: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> tuple[tuple[RestsOn, ...], int]:
     """The unmeasured values that matter for a program, those first that move its verdict furthest towards a limit.
 
@@ -133,6 +134,7 @@ def rests_on(
         emitted: the text, read back.
         deciding_lines: first and last line of the region that comes nearest to a limit.
         pool: runs the playbacks.
+        on_step: called with playbacks done and playbacks in all.
 
     Returns:
         At most eight values, none that moves a figure by less than a hundredth of its limit, but for axes that may
@@ -150,10 +152,10 @@ def rests_on(
     for region, trial in trials:
         left_s -= region.figures.emitted_s
         running.append(pool.submit(region.play, trial, contour=left_s >= 0.0))
-    rows = [
-        _rests(trial.value, trial.moved, region.before, judge_region(run.result(), region.limits))
-        for (region, trial), run in zip(trials, running, strict=True)
-    ]
+    rows = []
+    for done, ((region, trial), run) in enumerate(zip(trials, running, strict=True), start=1):
+        rows.append(_rests(trial.value, trial.moved, region.before, judge_region(run.result(), region.limits)))
+        on_step(done, len(trials))
     rows += _from_cases(model.machine, deciding)
     return _ranked(rows), len({row.key for row in rows})
 
