@@ -196,7 +196,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert output.read_bytes() == before
     assert main([*argv, "--force"]) == 0
     assert main(["machine", "import", "--help"]) == 0
-    assert "example: shapegcode machine import" in capsys.readouterr().out
+    assert "  shapegcode machine import" in capsys.readouterr().out
 
 
 def taken(text: str, **options: Any) -> ParameterImport:

@@ -110,5 +110,10 @@ def test_manual_pages_are_what_a_formatter_takes(tmp_path: Path) -> None:
         ["mandoc", "-T", "utf8", tmp_path / "shapegcode-convert.1"], capture_output=True, text=True, check=False
     ).stdout
     plain = re.sub(r".\x08", "", shown)
-    for said in ("OUTPUT", "--contour-tolerance LENGTH", "shapegcode convert part.nc -m vx500 -o shaped.nc", "exit codes"):
+    for said in (
+        "OUTPUT",
+        "--contour-tolerance LENGTH",
+        "shapegcode convert part.nc -m vx500 -o shaped.nc",
+        "exit codes",
+    ):
         assert said in plain

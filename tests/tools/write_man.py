@@ -10,6 +10,7 @@ from pathlib import Path
 from argparse_manpage.manpage import Manpage
 
 from shapegcode.cli import COMMANDS, parser_of
+from shapegcode.cli.arguments import CommandParser
 from shapegcode.results.made import this_version
 
 _WHO = {"project_name": "shapegcode", "version": this_version().split()[-1], "manual_title": "shapegcode"}
@@ -28,6 +29,8 @@ def pages() -> dict[str, str]:
 
 
 def _page(parser: argparse.ArgumentParser, name: str) -> str:
+    parser.format_help()  # puts the groups into their order
+    parser.epilog = parser.epilogue() if isinstance(parser, CommandParser) else parser.epilog
     parser.prog = name.replace("-", " ", 1)
     page = Manpage(parser, _data=_WHO)
     page.prog = name
