@@ -121,7 +121,7 @@ def plot_feed_along_path(schedule: FeedSchedule, ax: Axes | None = None) -> Axes
 
 def _limit_label(limit: Vector, unit: str) -> str:
     values = np.unique(limit[np.isfinite(limit)])
-    return f"limit {values[0]:.4g} {unit}" if len(values) == 1 else "limit"
+    return f"limit {plot.number(values[0], 4)} {unit}" if len(values) == 1 else "limit"
 
 
 def _feed_axis(panel: Axes, feeds: Vector) -> None:

@@ -230,7 +230,7 @@ def plot_decay(found: Identification, ax: Axes | None = None) -> Axes:
         panel.semilogy(time_s[:end], fitted.envelope[:end], "--", color=_FITTED, linewidth=1.1, label="model")
         panel.axhline(noise, color="black", linewidth=0.8, linestyle=":", label="noise in the band")
         panel.set_ylim(_BELOW_NOISE * noise, 2.0 * top)
-        panel.set_ylabel(f"{frequency:.4g} Hz, {UNITS[record.quantity]}")
+        panel.set_ylabel(f"{plot.number(frequency, 4)} Hz, {UNITS[record.quantity]}")
     for panel in column:
         panel.set_xlim(time_s[0], time_s[min(round(_BEYOND_NOISE * longest), len(time_s) - 1)])
     column[-1].set_xlabel(_FILE_TIME if found.decay else "time since the hit in s")
@@ -347,8 +347,8 @@ def _mark_modes(column: list[Axes], found: Identification) -> None:
         for panel in column:
             panel.axvline(hertz, color="black", linewidth=0.6, linestyle=style)
         column[0].annotate(
-            f"{hertz:.4g} Hz", (hertz, 0.98), (3, 0), xycoords=("data", "axes fraction"), textcoords="offset points",
-            va="top", fontsize=8,
+            f"{plot.number(hertz, 4)} Hz", (hertz, 0.98), (3, 0), xycoords=("data", "axes fraction"),
+            textcoords="offset points", va="top", fontsize=8,
         )  # fmt: skip
 
 
