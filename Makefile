@@ -116,6 +116,7 @@ bench: test-packages package dev
 	$(BIN)/python tests/benchmarks/milling_force.py
 	$(BIN)/python tests/benchmarks/run_logs.py
 	$(BIN)/python tests/benchmarks/report_page.py
+	$(BIN)/python tests/benchmarks/pictures.py
 
 coverage: test-packages dev
 	tests/tools/fetch_rs274.sh
