@@ -103,7 +103,7 @@ class MachineDescription(Result):
         columns = (
             Column("key", value=lambda row: f"[{row}]" if isinstance(row, str) else _last(row.key), left=True),
             Column("value", value=_with_unit, text=True),
-            Column("origin", value=_origin, left=True),
+            Column("origin", value=_origin, left=True, priority=2),
             Column("meaning", value=lambda row: getattr(row, "meaning", None), text=True),
         )
         counts = Counter(_origin(value) or "" for value in self.keys.values())

@@ -202,8 +202,9 @@ def save_all(plots: Mapping[str, Callable[..., Axes]], folder: str | Path) -> li
 def _lay_out(drawn: Axes | Figure) -> None:
     """Give the panels their places once for every format: to find them takes as long as to draw all."""
     figure: Any = drawn.figure.figure
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+    if (engine := figure.get_layout_engine()) is not None:
+        engine.execute(figure)
+        figure.set_layout_engine("none")
 
 
 def save(drawn: Axes | Figure, file: str | Path) -> None:
