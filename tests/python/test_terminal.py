@@ -159,3 +159,32 @@ def test_output_fits_80_columns_and_begins_with_the_answer(tmp_path: Path, name:
         heads = {column.heading for column in table.shown()}
         left = {head for head in heads if any("left out" in line and head in line for line in lines)}
         assert {word for head in heads - left for word in head.split()} <= shown
+
+
+def test_older_names_of_options_still_work() -> None:
+    """No help shows them."""
+    for words, dest in (
+        ("convert part.nc -m vx500 -o out.nc --all", "shape_all"),
+        ("shaper -m vx500 --all", "verbose"),
+        ("measure part.nc -m vx500 --tool-diameter 10mm --all", "verbose"),
+    ):
+        parser = parser_of(words.split()[0])
+        assert getattr(parser.parse_args(words.split()), dest) is True
+        assert "--all" not in _actions(parser)[words.split()[0]].format_help()
+
+
+@pytest.mark.parametrize("no_colour", ["", "1"])
+def test_escape_codes_are_for_terminals_that_want_colours(no_colour: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    import io
+
+    from shapegcode.cli.console import output_console
+
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    monkeypatch.setenv("NO_COLOR", no_colour)
+    monkeypatch.setenv("TERM", "xterm")
+    stream = Terminal()
+    output_console(file=stream).print("answer", style="bold red")
+    assert ("\x1b" in stream.getvalue()) == (not no_colour)

@@ -12,7 +12,7 @@ import textwrap
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Literal, TextIO
 
 from shapegcode.io.atomic import write_text
 
@@ -59,7 +59,11 @@ def output_console(json_target: str | None = None, *, file: TextIO | None = None
     stream = file or sys.stdout
     # A pipe has no width: rich would take 80 characters and break the tables.
     width = None if stream.isatty() or "COLUMNS" in os.environ else _PIPE_WIDTH
-    console = Console(file=stream, width=width, quiet=json_target == "-", highlight=False, soft_wrap=False)
+    # rich would still print in bold.
+    colours: Literal["auto"] | None = None if os.environ.get("NO_COLOR") else "auto"
+    console = Console(
+        file=stream, width=width, quiet=json_target == "-", highlight=False, soft_wrap=False, color_system=colours
+    )
     if least > console.width:
         console.width = least
     return console
