@@ -13,6 +13,7 @@ import pytest
 import shapegcode as sg
 from command import run
 
+ROOT = Path(__file__).resolve().parents[2]
 COMMENT = "(<script>alert`1`</script>)"
 PART = f"%\nO0001 {COMMENT}\nG90 G21 G17 G54\nG0 X0 Y0 Z5.\nG1 Z0. F3000.\nX30. Y40.\nX60. Y0.\nG0 Z5.\nM30\n%\n"
 PIECE = re.compile(r'<script type="application/json" id="(\w[\w-]*)">(.*?)</script>', re.DOTALL)
@@ -167,3 +168,23 @@ def test_the_page_of_feeds_has_the_cutting_force(tmp_path: Path) -> None:
         assert variant.channels["force"].max() == pytest.approx(expected, rel=0.05)
         air = variant.line < min(part.region.first_line for part in schedule.survey.regions)
         assert not variant.channels["force"][air].any()
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        ("machine diff vx500 kimm004", 0),
+        ("shaper -m vx500", 0),
+        (f"machine import {ROOT / 'tests/golden/parameters/with_q.txt'} -o m.toml --rigid XYZ", 1),
+        ("identify --tap-plan -m vx500", 0),
+        ("demo corner", 0),
+    ],
+)
+def test_results_without_programs_have_pages_too(words: str, code: int, tmp_path: Path) -> None:
+    """At once and later; where the JSON does not hold what the page needs, it is shown as it stands."""
+    done = run(tmp_path, *words.split(), "--json", "r.json", "--html", "p.html")
+    assert done.returncode in (0, 1), done.stderr
+    assert pieces(tmp_path / "p.html")["result"] == json.loads((tmp_path / "r.json").read_text())
+    later = run(tmp_path, "report", "r.json")
+    assert later.returncode == code, later.stdout + later.stderr
+    assert pieces(tmp_path / "r.html")["result"] == json.loads((tmp_path / "r.json").read_text())

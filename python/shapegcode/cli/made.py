@@ -12,12 +12,16 @@ if TYPE_CHECKING:
     from shapegcode.results.made import Made, MadeFile
     from shapegcode.results.result import Result
 
-__all__ = ["READ", "given_files", "made_by"]
+__all__ = ["MACHINES", "READ", "given_files", "made_by"]
 
 READ = (
     "input", "inputs", "files", "machine", "tool", "stock", "against", "records", "cut", "update", "dump", "base",
 )  # fmt: skip
 """Options that name a file which a command reads."""
+
+
+MACHINES = ("machine", "base", "files")
+"""Those of them that may name a built-in machine."""
 
 
 def given_files(args: argparse.Namespace) -> Iterator[tuple[str, str]]:
@@ -67,7 +71,7 @@ def made_by(
 def _read(role: str, name: str) -> MadeFile:
     from shapegcode.results.made import MadeFile
 
-    if role == "machine":
+    if role in MACHINES and not Path(name).exists():
         from shapegcode.machine import Machine
 
         if name in Machine.builtin_names():

@@ -45,10 +45,11 @@ def changes(made: Made, folder: Path) -> tuple[dict[tuple[str, str], Path], list
 
 
 def _looked_up(file: MadeFile, folder: Path) -> tuple[Path | None, str]:
+    from shapegcode.cli.made import MACHINES
     from shapegcode.machine import Machine
     from shapegcode.results.made import MadeFile, file_hash
 
-    if file.role == "machine" and file.name in Machine.builtin_names():
+    if file.role in MACHINES and file.name in Machine.builtin_names() and not Path(file.name).exists():
         now = MadeFile.of(file.role, file.name, Machine.builtin_text(file.name).encode()).sha256
         changed = f"the built-in machine {file.name} is another one in this version: motion is not shown"
         return Path(file.name), "" if now == file.sha256 else changed

@@ -79,6 +79,7 @@ def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[flo
     from shapegcode._core import ArgumentError
     from shapegcode.cli.replay import changes, played_again
     from shapegcode.results.made import this_version
+    from shapegcode.results.outcome import NotKeptError
     from shapegcode.results.page.default import raw_page
     from shapegcode.results.revive import made_of, revived
 
@@ -94,5 +95,8 @@ def _page_of(source: Path, report: Mapping[str, Any], on_progress: Callable[[flo
         if not isinstance(report.get("made"), dict):
             raise ArgumentError(f"{source}: {error}") from None
         return raw_page(report, str(error)), ""
-    page = result.page(made=made, problems=problems, on_progress=on_progress)
+    try:
+        page = result.page(made=made, problems=problems, on_progress=on_progress)
+    except NotKeptError as error:
+        return raw_page(report, str(error)), made.result
     return replace(page, report=report), made.result

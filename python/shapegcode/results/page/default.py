@@ -255,7 +255,7 @@ def _named(scene: Scene | None, made: Made) -> Scene | None:
 
 
 def raw_page(report: Mapping[str, Any], why: str) -> Page:
-    """The page of a result that this version cannot read: its JSON as it stands.
+    """The page of a result that cannot be read back: its JSON as it stands.
 
     Args:
         report: the JSON.
@@ -267,9 +267,9 @@ def raw_page(report: Mapping[str, Any], why: str) -> Page:
     made = report.get("made")
     by = made.get("by", "another version") if isinstance(made, dict) else "another version"
     return Page(
-        title="A result of another version",
+        title="A result as its JSON has it",
         light="amber",
-        verdict=f"This result was written by {by}, and {this_version()} cannot read it.",
+        verdict=f"This result was written by {by}, and {this_version()} cannot read it back from its JSON.",
         reason="it is shown as it stands; run the command again for a page",
         sections=(_json(report),),
         report=report,
