@@ -77,6 +77,7 @@ def test_a_page_made_later_is_the_same(tmp_path: Path) -> None:
         (lambda folder: edit(folder / "r.json", by="shapegcode 0.0.9"), "made by shapegcode 0.0.9; this page by"),
         (lambda folder: edit(folder / "r.json", format=7), "made.format = 7: written by"),
         (lambda folder: edit(folder / "r.json", command="shapegcode convert --unheard"), "its command cannot be read"),
+        (lambda folder: edit(folder / "r.json", command="shapegcode machine init -o x.toml"), "its command cannot"),
     ],
 )  # fmt: skip
 def test_what_has_changed_since_is_said_on_the_page_and_here(change: Any, said: str, tmp_path: Path) -> None:
@@ -100,6 +101,7 @@ def test_what_is_no_result_is_refused_and_nothing_is_written(tmp_path: Path) -> 
     file = converted(tmp_path)
     whole = file.read_text()
     (tmp_path / "cut.json").write_text(whole[:500])
+    (tmp_path / "nan.json").write_text('{"cycle_time_s": NaN}')
     (tmp_path / "old.json").write_text(json.dumps({"cycle_time_s": 1.0}))
     for words, said in (
         (["cut.json"], "the file ends in the middle"),
@@ -107,6 +109,7 @@ def test_what_is_no_result_is_refused_and_nothing_is_written(tmp_path: Path) -> 
         (["r.json", "r.json", "-o", "both.html"], "2 results need a page each"),
         (["r.json", "-o", "r.json"], "would overwrite"),
         (["none.json"], "none.json: no such file"),
+        (["nan.json"], "NaN is no number in JSON"),
         (["r.json", "-o", "-"], "name a file"),
     ):
         done = run(tmp_path, "report", *words)

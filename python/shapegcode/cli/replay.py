@@ -87,7 +87,7 @@ def played_again(
     if made.result not in _WITH_MOTION or not made.command or "program_address" in report:
         return None, ""
     args = _typed(made.command)
-    if args is None:
+    if args is None or not hasattr(args, "machine"):
         return None, f"its command cannot be read by this version: {made.command}; motion is not shown"
     try:
         return _read_again(made, found, args, str(report.get("plant", "modal"))), ""

@@ -16,6 +16,7 @@ import math
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -104,7 +105,7 @@ def written_reports(path: str | Path) -> list[dict[str, Any]]:
     data = Path(path).read_bytes()
     try:
         text = data.decode()
-        found = json.loads(text)
+        found = json.loads(text, parse_constant=partial(_no_number, path))
     except UnicodeDecodeError as error:
         raise ArgumentError(f"{path}: byte {error.start} is not UTF-8: this is no JSON of shapegcode") from None
     except json.JSONDecodeError as error:
@@ -121,6 +122,10 @@ def written_reports(path: str | Path) -> list[dict[str, Any]]:
     if not found:
         raise ArgumentError(f"{path}: an empty list: there is no result in it")
     return found
+
+
+def _no_number(path: str | Path, word: str) -> typing.NoReturn:
+    raise ArgumentError(f"{path}: {word} is no number in JSON: this is not what --json writes")
 
 
 def load_result(path: str | Path) -> Result:
