@@ -149,8 +149,8 @@ def test_progress_is_told() -> None:
         shape_all=True,
         on_progress=lambda *step: heard.append(step),
     )
-    assert {stage for stage, _, _ in heard} == {"shaping", "round trip"}
-    for stage in ("shaping", "round trip"):
+    assert {stage for stage, _, _ in heard} == {"shaping", "round trip", "what it rests on"}
+    for stage in ("shaping", "round trip", "what it rests on"):
         steps = [(done, total) for which, done, total in heard if which == stage]
         assert steps == [(k, len(steps)) for k in range(1, len(steps) + 1)]
 
