@@ -34,6 +34,7 @@ RECORD_SAMPLES = 1_000_000
 
 # A longer region shows its worst place and its stop.
 _WHOLE_S = 10.0
+_PLACES = 20_000  # some milliseconds apart in minutes of motion
 _AROUND_S = 1.5
 _BEFORE_STOP_S = 2.0
 
@@ -151,7 +152,7 @@ class _Scene:
         traces, programmed = played.traces, polyline_of(played.path)
         if max(len(trace.command_mm) * trace.period_s for trace in traces) <= _WHOLE_S:
             return cls((View(traces),), played.part, traces, played.part, programmed)
-        worst = _worst_place(traces, programmed)
+        worst = _worst_place(traces, programmed, played.path)
         at = f"at {worst.time_s:.2f} s"
         around = f"{2 * _AROUND_S:g} s around the worst place of the {traces[0].label} ({at})"
         views = [View(worst.traces, f"the worst place, {at}", "time from the worst place in s")]
@@ -178,17 +179,16 @@ class _Worst:
     time_s: float
 
 
-def _worst_place(traces: tuple[Trace, ...], programmed: FloatArray) -> _Worst:
+def _worst_place(traces: tuple[Trace, ...], programmed: FloatArray, path: _core.Path) -> _Worst:
     first = traces[0]
-    _, feet = follow(first.command_mm, first.response_mm, programmed, complete=first.stops)
-    at = int(np.argmax(np.linalg.norm(first.response_mm - feet, axis=1)))
+    away = _core.PathFollower(path).step(first.command_mm, first.response_mm)
+    at = int(np.argmax(np.linalg.norm(away, axis=1)))
     around = round(_AROUND_S / first.period_s)
-    ranks = np.array([max(at - around, 0), at, min(at + around, len(feet) - 1)])
+    ranks = np.array([max(at - around, 0), at, min(at + around, len(away) - 1)])
     limits: FloatArray | None = None
     near: list[Trace] = []
     for trace in traces:
-        progress, _ = follow(trace.command_mm, trace.command_mm, programmed, complete=trace.stops)
-        progress = np.maximum.accumulate(progress)
+        progress = _progress(trace, programmed)
         if limits is None:
             limits = progress[ranks]
         else:
@@ -197,6 +197,16 @@ def _worst_place(traces: tuple[Trace, ...], programmed: FloatArray) -> _Worst:
         near.append(trace.part(begin, end, place))
     assert limits is not None
     return _Worst(tuple(near), piece_of(programmed, float(limits[0]), float(limits[2])), float(first.times_s[at]))
+
+
+def _progress(trace: Trace, programmed: FloatArray) -> FloatArray:
+    """How far along the path each set-point is, (n,), mm, rising; of a long motion between places that are found."""
+    count = len(trace.command_mm)
+    rows = np.unique(np.append(np.arange(0, count, -(-count // _PLACES)), count - 1))
+    command = trace.command_mm[rows]
+    found, _ = follow(command, command, programmed, complete=trace.stops)
+    progress: FloatArray = np.interp(np.arange(count), rows, np.maximum.accumulate(found))
+    return progress
 
 
 def _widest_plane(programmed: FloatArray) -> Plane:
