@@ -111,6 +111,7 @@ Raises:
           py::arg("periods"), "Next piece of at most so many periods, or None behind the last.")
       .def_property_readonly("largest_deviation_mm", &RegionShaper::largest_deviation_mm,
                              "Largest deviation of what shall follow the path, as far as given out, mm.")
+      .def_property_readonly("share", &RegionShaper::share, "How much of the region was given out, 0 to 1.")
       .def_property_readonly("stops", &RegionShaper::stops,
                              "Stops at corners that no speed passes within the tolerance.");
 

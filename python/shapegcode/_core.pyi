@@ -2729,6 +2729,11 @@ class RegionShaper:
         Largest deviation of what shall follow the path, as far as given out, mm.
         """
     @property
+    def share(self) -> float:
+        """
+        How much of the region was given out, 0 to 1.
+        """
+    @property
     def stops(self) -> int:
         """
         Stops at corners that no speed passes within the tolerance.

@@ -142,7 +142,7 @@ def test_errors_are_one_family_and_carry_their_place() -> None:
 
 def test_progress_is_told() -> None:
     machine = sg.Machine.load("vx500")
-    heard: list[tuple[str, int, int]] = []
+    heard: list[tuple[str, float, int]] = []
     sg.convert(
         sg.Program.read(PROGRAMS / "TEST_G90.NC", machine),
         machine,
@@ -150,7 +150,10 @@ def test_progress_is_told() -> None:
         on_progress=lambda *step: heard.append(step),
     )
     assert {stage for stage, _, _ in heard} == {"shaping", "round trip", "what it rests on"}
-    for stage in ("shaping", "round trip", "what it rests on"):
+    shaped = [(done, total) for which, done, total in heard if which == "shaping"]
+    assert shaped == sorted(shaped)
+    assert shaped[-1][0] == shaped[-1][1] == shaped[0][1]
+    for stage in ("round trip", "what it rests on"):
         steps = [(done, total) for which, done, total in heard if which == stage]
         assert steps == [(k, len(steps)) for k in range(1, len(steps) + 1)]
 

@@ -243,7 +243,7 @@ def test_without_any_mode_the_axis_to_tap_first_is_named(tmp_path: Path) -> None
     shaking = sg.Machine.load(tmp_path / "m.toml").with_values({"axes.x.modes": mode, "axes.y.modes": mode})
     swing = sg.simulate(tmp_path / "part.nc", shaking).residual_vibration_um
     for axis in "xy":
-        assert f"0.0 → {getattr(swing, axis):.1f}, limit 3.0" in rows[f"axes.{axis}.modes"]
+        assert f"0.0 → {getattr(swing, axis):.1f}, limit 3.0 µm" in rows[f"axes.{axis}.modes"]
     convert = run(tmp_path, "convert", "part.nc", "-m", "m.toml", "-o", "o.nc")
     assert convert.returncode == 2 and "--tap-plan" in convert.stderr
 

@@ -132,6 +132,8 @@ class RegionShaper {
   [[nodiscard]] bool next(ShapedCommand& piece, std::uint32_t periods);
   /// Largest deviation in mm of what the target says shall follow the path, as far as the runs given out tell.
   [[nodiscard]] double largest_deviation_mm() const noexcept;
+  /// How much of the region was given out, 0 to 1: by segments, within a run by its periods.
+  [[nodiscard]] double share() const noexcept;
   /// Junctions that no speed passes within the tolerance: stops beside the forced ones.
   [[nodiscard]] std::uint32_t stops() const noexcept;
 

@@ -48,6 +48,7 @@ struct RegionShaper::State {
   [[nodiscard]] bool next(ShapedCommand& piece, std::uint32_t periods);
   [[nodiscard]] bool begin_run();
   void note_marks(const PlannedRun& run);
+  [[nodiscard]] double share() const noexcept;
 
   struct Piece {
     std::size_t first, last;  // segments
@@ -158,6 +159,14 @@ void RegionShaper::State::note_marks(const PlannedRun& run) {
   }
 }
 
+double RegionShaper::State::share() const noexcept {
+  double segments = static_cast<double>(now_.last);
+  if (run_ && run_->periods() > 0) {
+    segments -= static_cast<double>(now_.last - now_.first) * (1.0 - static_cast<double>(given_) / run_->periods());
+  }
+  return segments / std::max(1.0, static_cast<double>(path_->size()));
+}
+
 bool RegionShaper::State::next(ShapedCommand& piece, std::uint32_t periods) {
   const std::uint32_t first = period_;
   std::vector<Vector3> grid;
@@ -228,6 +237,8 @@ RegionShaper::~RegionShaper() = default;
 bool RegionShaper::next(ShapedCommand& piece, std::uint32_t periods) { return state_->next(piece, periods); }
 
 double RegionShaper::largest_deviation_mm() const noexcept { return state_->largest_deviation_mm_; }
+
+double RegionShaper::share() const noexcept { return state_->share(); }
 
 std::uint32_t RegionShaper::stops() const noexcept { return state_->stops_; }
 

@@ -103,7 +103,7 @@ def parser_of(selected: str | None) -> argparse.ArgumentParser:
         prog="shapegcode",
         description="Converts CNC programs into input-shaped FANUC programs that vibrate less.",
         epilog="exit codes: 0 done and within tolerance; 1 done but out of tolerance; 2 bad input. "
-        "`shapegcode COMMAND --help` explains a command.",
+        "`shapegcode COMMAND --help` explains a command. NO_COLOR=1 turns colours off.",
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     # Only for the help: main() takes it out, so that it may stand anywhere.

@@ -162,7 +162,7 @@ def _converted(args: argparse.Namespace, program: Program, machine: Machine, bar
     spans["what it rests on"] = (0.8, 0.2)
     reached = 0.0
 
-    def show(stage: str, done: int, total: int) -> None:
+    def show(stage: str, done: float, total: int) -> None:
         nonlocal reached
         begin, share = spans[stage]
         reached = max(reached, begin + share * done / total)

@@ -218,7 +218,7 @@ def _ranked(found: MachineDescription, args: argparse.Namespace) -> MachineDescr
     matters = tuple(
         OpenValue(
             row.key, row.value, row.origin, row.moved,
-            f"{row.figure} {row.figure_um:.1f} → {row.moved_um:.1f}, limit {row.limit_um:.1f}", row.share,
+            f"{row.figure} {row.figure_um:.1f} → {row.moved_um:.1f}, limit {row.limit_um:.1f} µm", row.share,
         )
         for row in rows
     )  # fmt: skip

@@ -48,7 +48,7 @@ _LEAST_FEED_SHARE = 0.5  # of the programmed feed: what runs too fast at that is
 _HELPED = 0.98  # of what was reached before: less room that brings no more is taken back
 _ATTEMPTS = 8  # each with less room for the regions that left the contour tolerance; few need more than two
 
-Progress = Callable[[str, int, int], None]
+Progress = Callable[[str, float, int], None]
 
 
 def convert(
@@ -250,7 +250,7 @@ class _Run:
             (region.first_line, region.last_line), reason, gained_um, self.originals[index].result().duration_s
         )
 
-    def _write(self, grid: Grid, on_progress: Callable[[int, int], None] = lambda _done, _total: None) -> Written:
+    def _write(self, grid: Grid, on_progress: Callable[[float, int], None] = lambda _done, _total: None) -> Written:
         if self.writer.grid is not grid:
             self.writer = TextWriter(self.program, self.model, grid)
         # Of what was given up for a budget, or gains nothing, one sentence speaks for all.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from shapegcode import _core
 from shapegcode.conversion.budget import TransferLoad, measure_load
@@ -21,7 +22,8 @@ __all__ = ["TextWriter", "Written", "why_kept"]
 
 _MOST_PERIODS = 10_000_000  # of a region: what fits into half a gigabyte
 
-Step = Callable[[int, int], None]
+Step = Callable[[float, int], None]
+OnMove = Callable[[float], None]
 
 
 def why_kept(region: _core.Region, machine: Machine, grid: Grid) -> str:
@@ -94,7 +96,7 @@ class TextWriter:
             room_um: deviation that its feed is planned for, per region, µm.
             feed_share: of the programmed feed that it is planned with, per region.
             untold: indices of kept regions that need no warning of their own.
-            on_progress: called with regions done and regions in all.
+            on_progress: called with the moves that are shaped, and how many there are to shape.
 
         Returns:
             The text, and where its shaped regions stand.
@@ -107,7 +109,7 @@ class TextWriter:
         line = 1 + sum(part.count(b"\n") for part in parts)
         position = core.header_offset
         written = Written(b"", [], 0, [], {}, {}, {})
-        blocks, size = 0, core.size
+        blocks, size, begun = 0, core.size, 0
         # Moves that stay as they are: all, less those of the regions that are shaped.
         shaped_moves = sum(len(each.path) for each, why in zip(regions, reasons, strict=True) if not why)
         kept_moves = core.move_count - shaped_moves
@@ -120,7 +122,9 @@ class TextWriter:
                 size -= region.text_end - region.text_begin
                 try:
                     aim = room_um[index], feed_share[index]
-                    shaped = self._shape(index, region, aim, self._room(size, blocks + kept_moves))
+                    room = self._room(size, blocks + kept_moves)
+                    tell = partial(_tell, on_progress, begun, shaped_moves)
+                    shaped = self._shape(index, region, aim, room, tell)
                 except NoRoomError as error:
                     written.no_room[index] = str(error)
             if shaped is None:
@@ -139,7 +143,9 @@ class TextWriter:
                     written.planned_um[index] = shaped.planned_um
                 bits = self._machine.controller.dnc_bits_per_character
                 written.loads[index] = measure_load(region, shaped, self.grid, bits)
-                on_progress(index + 1, len(regions))
+            if not reason:
+                begun += len(region.path)
+                on_progress(begun, shaped_moves)
             line += text.count(b"\n")
             parts += [between, text]
         parts.append(core.slice(position, core.size))
@@ -153,19 +159,26 @@ class TextWriter:
         controller = self._machine.controller
         return Room(controller.max_program_bytes - size, controller.max_program_moves - moves, self._machine)
 
-    def _shape(self, index: int, region: _core.Region, aim: tuple[float, float], room: Room) -> EmittedRegion:
+    def _shape(
+        self, index: int, region: _core.Region, aim: tuple[float, float], room: Room, on_move: OnMove
+    ) -> EmittedRegion:
         """The region's text; one whose tolerance and feed are as they were in the text before is not shaped again."""
         if index not in self._shaped or self._shaped[index][0] != aim:
-            self._shaped[index] = (aim, self._shaped_anew(region, *aim, room))
+            self._shaped[index] = (aim, self._shaped_anew(region, *aim, room, on_move))
         shaped = self._shaped[index][1]
         room.require(len(shaped.text), shaped.blocks)
         return shaped
 
-    def _shaped_anew(self, region: _core.Region, room_um: float, feed_share: float, room: Room) -> EmittedRegion:
+    def _shaped_anew(
+        self, region: _core.Region, room_um: float, feed_share: float, room: Room, on_move: OnMove
+    ) -> EmittedRegion:
         limits = self._model.limits(arc_feed_ratio=self._machine.shaping.arc_feed_ratio)
         limits.feed_override = feed_share
         try:
-            return self._regions.write(self._program, region, limits, self._regions.tolerance(room_um), room)
+            return self._regions.write(
+                self._program, region, limits, self._regions.tolerance(room_um), room,
+                lambda share: on_move(share * len(region.path)),
+            )  # fmt: skip
         except _core.ArgumentError as error:
             raise self._program.region_error(region, str(error)) from error
 
@@ -200,3 +213,7 @@ class TextWriter:
             notes=tuple(notes),
         )
         return stamp.lines()
+
+
+def _tell(on_progress: Step, begun: int, total: int, moves: float) -> None:
+    on_progress(begun + moves, total)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -199,6 +199,7 @@ class RegionWriter:
         limits: _core.MotionLimits,
         tolerance: _core.FilterTolerance,
         room: Room | None = None,
+        on_progress: Callable[[float], None] = lambda _share: None,
     ) -> EmittedRegion:
         """Shape one region and write it.
 
@@ -210,6 +211,7 @@ class RegionWriter:
             limits: of the look-ahead.
             tolerance: see `tolerance`.
             room: what the text may have at most; None: there is no limit.
+            on_progress: called with the share that is written.
 
         Returns:
             The text of the region and the blocks in it.
@@ -245,6 +247,7 @@ class RegionWriter:
             periods.append(fitted.periods)
             if room is not None:
                 room.require(sum(map(len, texts)), sum(map(len, periods)))
+            on_progress(shaper.share)
             piece = following
         # A search for the region's N word must not skip the prologue.
         number = marks.first_word
