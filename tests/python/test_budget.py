@@ -206,7 +206,7 @@ def at_period(ms: int) -> Any:
                 ),
             ],
         ),
-        ({"max_blocks_per_second": 100}, 1),
+        pytest.param({"max_blocks_per_second": 100}, 1, marks=pytest.mark.slow),
         pytest.param({"max_blocks_per_second": 20}, 1, marks=pytest.mark.slow),
     ],
     ids=str,
@@ -296,7 +296,7 @@ def test_what_runs_too_fast_only_for_the_longer_period_is_kept() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["TEST_G90.NC", *(pytest.param(name, marks=pytest.mark.slow) for name in ("TEST_G91.NC", "PROGRAM2.NC"))]
+    "name", [pytest.param(name, marks=pytest.mark.slow) for name in ("TEST_G90.NC", "TEST_G91.NC", "PROGRAM2.NC")]
 )
 def test_sample_under_all_three(name: str) -> None:
     keys = {"controller.calculator_decimal_point": True}

@@ -209,6 +209,7 @@ def test_feed_control_interval_is_that_of_a_brute_force_filter(folder: Path) -> 
     assert found.low is not None and 0.0 < found.low < min(followed)
 
 
+@pytest.mark.slow
 def test_a_control_that_waits_before_a_dwell_is_noticed(folder: Path) -> None:
     hidden = Hidden(dwell_waits_in_position=True)
     fill_in_logs(folder, hidden, np.random.default_rng(5), actual=False)

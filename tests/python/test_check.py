@@ -294,7 +294,7 @@ def test_serial_line_by_hand() -> None:
 # ---- size --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mode", ["", "G61\n"], ids=["run", "exact stops"])
+@pytest.mark.parametrize("mode", ["", pytest.param("G61\n", marks=pytest.mark.slow)], ids=["run", "exact stops"])
 def test_a_long_program_quickly(mode: str) -> None:
     body = f"{mode}G1F3000.\n" + "".join(f"X{k % 1000 * 0.1:.1f}Y{k % 2}.\n" for k in range(1, 40_001))
     check = checked(body)

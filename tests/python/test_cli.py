@@ -197,6 +197,7 @@ def test_an_option_has_one_name_and_one_unit_on_every_command() -> None:
     assert several == {}
 
 
+@pytest.mark.slow
 def test_sample_with_a_setting_it_needs(folder: Path) -> None:
     bottle = PROGRAMS / "BOTTLE.NC"
     refused = run(folder, "convert", bottle, "-m", "vx500", "-o", "out.nc")

@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
+import functools
 import json
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 import write_schemas
 
 import shapegcode as sg
 from command import run
+from page_pieces import pieces
 from shapegcode.results.outcome import NotKeptError
 from shapegcode.results.revive import MODULES, load_result
 
-PART = "%\nO0001\nG90 G21 G17 G54\nG0 X0 Y0 Z5.\nG1 Z0. F3000.\nX30. Y40.\nX60. Y0.\nG0 Z5.\nG4 P500\nM30\n%\n"
+PART = "%\nO0001\nG90 G21 G17 G54\nG0 X0 Y0 Z5.\nG1 Z0. F3000.\nX30. Y40.\nX60. Y0.\nG0 Z5.\nG4 P504\nM30\n%\n"
+
+
+class Shown(NamedTuple):
+    """What a command left: its name, its streams and its files."""
+
+    name: str
+    out: str
+    err: str
+    json: Path
+    page: Path
+
+
 COMMANDS = {
     "Conversion": "convert part.nc -m vx500 -o out.nc",
     "Simulation": "simulate part.nc -m vx500",
@@ -43,6 +58,27 @@ def made(folder: Path, name: str) -> Path:
     return folder / "r.json"
 
 
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Shown]:
+    """Runs each command once: what it printed on a terminal of 80 columns, its JSON and its page."""
+
+    @functools.cache
+    def once(name: str) -> Shown:
+        folder = tmp_path_factory.mktemp(name)
+        (folder / "part.nc").write_text(PART)
+        words = *COMMANDS[name].split(), "--json", "r.json", "--html", "p.html"
+        done = run(folder, *words, COLUMNS="80", NO_COLOR="1")
+        assert done.returncode in (0, 1), done.stderr
+        return Shown(name, done.stdout, done.stderr, folder / "r.json", folder / "p.html")
+
+    return once
+
+
+@pytest.fixture(params=COMMANDS)
+def shown(request: pytest.FixtureRequest, kept: Callable[[str], Shown]) -> Shown:
+    return kept(request.param)
+
+
 def alike(ours: object, written: object) -> bool:
     """Equal; what follows from numbers of nine digits may differ in the last of them."""
     if isinstance(ours, dict) and isinstance(written, dict):
@@ -60,19 +96,38 @@ def test_every_class_of_results_is_found() -> None:
     assert dict(MODULES) == there
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_a_result_comes_back_from_its_json(name: str, tmp_path: Path) -> None:
+def test_a_result_comes_back_from_its_json(shown: Shown) -> None:
     """The same class, answer and numbers; read from the file alone."""
-    file = made(tmp_path, name)
-    written = json.loads(file.read_text())
+    written = json.loads(shown.json.read_text())
     beside = {key: written.pop(key) for key in ("made", "plots", "output") if key in written}
-    assert beside["made"]["result"] == name
-    result = load_result(file)
-    assert type(result).__name__ == name
+    assert beside["made"]["result"] == shown.name
+    result = load_result(shown.json)
+    assert type(result).__name__ == shown.name
     assert result.from_json
     assert alike(result.to_dict(), written)
     assert result.answer
     assert result.page(motion=False).verdict == result.answer
+
+
+def test_its_page_holds_its_json(shown: Shown) -> None:
+    """To the last digit."""
+    assert pieces(shown.page)["result"] == json.loads(shown.json.read_text())
+
+
+def test_output_fits_80_columns_and_begins_with_the_answer(shown: Shown) -> None:
+    """Of paths, commands to copy, and text that a terminal wraps between words, lines may be longer."""
+    assert "\x1b" not in shown.out + shown.err
+    lines = shown.out.splitlines()
+    result = load_result(shown.json)
+    assert lines[0] == result.answer
+    tables = "\n".join(str(table) for table in result.tables())
+    assert max(map(len, tables.splitlines()), default=0) <= 80
+    # A word of a table that is nowhere whole on the screen has been cut.
+    words = set(shown.out.split())
+    for table in result.tables():
+        heads = {column.heading for column in table.shown()}
+        left = {head for head in heads if any("left out" in line and head in line for line in lines)}
+        assert {word for head in heads - left for word in head.split()} <= words
 
 
 def test_what_the_json_does_not_hold_says_so(tmp_path: Path) -> None:

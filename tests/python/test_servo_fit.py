@@ -107,6 +107,7 @@ def test_a_simulated_capture_gives_its_loop_back(dead_s: float, gain: float, for
     assert axis.lag_rms > 100.0 * model.rest
 
 
+@pytest.mark.slow
 def test_a_drive_with_friction_is_told_from_a_lag(tmp_path: Path) -> None:
     """A mass with Coulomb friction, speed loop and gain, integrated in small steps here."""
     way = moves(4, 100.0, 1000.0)

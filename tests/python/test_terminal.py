@@ -15,7 +15,6 @@ from shapegcode.cli import COMMANDS, parser_of
 from shapegcode.cli.arguments import GROUPS
 from shapegcode.cli.examples import EXAMPLES
 from shapegcode.results.table import Column, Table
-from test_result_files import COMMANDS as COMMANDS_OF
 
 PART = "%\nO0001\nG90 G17 G21 G94\nG00 X0 Y0 Z5.\nG01 Z-1. F300\nX20. F900\nX20. Y20.\nG00 Z5.\nM30\n%\n"
 
@@ -136,29 +135,6 @@ def test_the_bar_moves_within_one_region(tmp_path: Path) -> None:
     assert len(set(shares)) >= 10
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize("name", list(COMMANDS_OF))
-def test_output_fits_80_columns_and_begins_with_the_answer(tmp_path: Path, name: str) -> None:
-    """Of paths, commands to copy, and text that a terminal wraps between words, lines may be longer."""
-    from shapegcode.results.revive import load_result
-
-    (tmp_path / "part.nc").write_text(PART)
-    words = COMMANDS_OF[name].split()
-    done = run(tmp_path, *words, "--json", "r.json", COLUMNS="80", NO_COLOR="1")
-    assert done.returncode in (0, 1), done.stderr
-    assert "\x1b" not in done.stdout + done.stderr
-    lines = done.stdout.splitlines()
-    result = load_result(tmp_path / "r.json")
-    assert lines[0] == result.answer
-    tables = "\n".join(str(table) for table in result.tables())
-    assert max(map(len, tables.splitlines()), default=0) <= 80
-    # A word of a table that is nowhere whole on the screen has been cut.
-    shown = set(done.stdout.split())
-    for table in result.tables():
-        heads = {column.heading for column in table.shown()}
-        left = {head for head in heads if any("left out" in line and head in line for line in lines)}
-        assert {word for head in heads - left for word in head.split()} <= shown
 
 
 def test_older_names_of_options_still_work() -> None:
