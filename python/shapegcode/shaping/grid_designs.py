@@ -14,14 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog, nnls
 
 from shapegcode._core import ArgumentError, DesignError, Mode, ShapegcodeError, Shaper, grid_polynomial
 from shapegcode.shaping.bands import ModeBand
+from shapegcode.shaping.linear_program import LinearProgram, non_negative_least_squares
 from shapegcode.shaping.words import mode_names, ms, whole_periods
 
 __all__ = [
-    "RESIDUAL_LIMIT", "check_modes_and_times", "exact_conditions", "lower_hull", "shortest_non_negative", "vertex",
+    "RESIDUAL_LIMIT", "Vertices", "check_modes_and_times", "exact_conditions", "lower_hull", "shortest_non_negative",
 ]  # fmt: skip
 
 FloatArray = NDArray[np.float64]
@@ -111,11 +111,10 @@ def _non_negative_solution(modes: Sequence[Mode], period_s: float, last: int) ->
     tolerance.
     """
     matrix, right = exact_conditions(modes, period_s, last)
-    try:
-        taps, residual = nnls(matrix, right)
-    except RuntimeError:  # it cycled: the linear program decides
-        return vertex(matrix, right, np.zeros(last + 1))
-    return taps if residual <= _FEASIBLE else None
+    taps = non_negative_least_squares(matrix, right)
+    if taps is None:  # it went round in circles: the linear program decides
+        return Vertices(matrix, right)(np.zeros(last + 1))
+    return taps if float(np.linalg.norm(matrix @ taps - right)) <= _FEASIBLE else None
 
 
 def _smallest_feasible(modes: Sequence[Mode], period_s: float, most: int) -> int | None:
@@ -138,23 +137,26 @@ def _smallest_feasible(modes: Sequence[Mode], period_s: float, most: int) -> int
     return enough
 
 
-def vertex(matrix: FloatArray, right: FloatArray, cost: FloatArray) -> FloatArray | None:
-    """Vertex of the taps ``x >= 0`` with ``matrix @ x == right`` that minimises ``cost @ x``; None: not found."""
-    result = linprog(
-        cost,
-        A_eq=matrix,
-        b_eq=right,
-        bounds=(0.0, None),
-        method="highs-ds",
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-    )
-    return np.asarray(result.x, dtype=np.float64) if result.status == 0 else None
+class Vertices:
+    """Vertices of the taps ``x >= 0`` with ``matrix @ x == right``, each of least cost."""
+
+    def __init__(self, matrix: FloatArray, right: FloatArray) -> None:
+        count = matrix.shape[1]
+        self._program = LinearProgram(np.zeros(count), np.full(count, math.inf), (matrix, right))
+
+    def __call__(self, cost: FloatArray) -> FloatArray | None:
+        """The vertex that minimises ``cost @ x``; None: not found."""
+        self._program.set_cost(cost)
+        try:
+            return self._program.solve()
+        except DesignError:
+            return None
 
 
 def _vertices(modes: Sequence[Mode], period_s: float, last: int) -> Iterator[FloatArray]:
     """Solutions worth polishing, the one with the least second central moment first."""
     matrix, right = exact_conditions(modes, period_s, last)
-    yield from lower_hull(lambda cost: vertex(matrix, right, cost), last)
+    yield from lower_hull(Vertices(matrix, right), last)
     # a design at the edge of what is possible may lie within the linear program's tolerance
     taps = _non_negative_solution(modes, period_s, last)
     if taps is not None:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapegcode._core import ArgumentError, DesignError, Fir, FollowingFir, Mode, ModeTable, Shaper, VaryingFir
-from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, shortest_non_negative, vertex
+from shapegcode.shaping.grid_designs import RESIDUAL_LIMIT, Vertices, shortest_non_negative
 from shapegcode.shaping.words import whole_periods
 
 __all__ = [
@@ -225,7 +225,7 @@ def taps_of_mean(
     if mean_s is not None:
         matrix, right = np.vstack([matrix, cost]), np.append(right, mean_s / period_s / periods)
         cost = steps**2 / periods**2
-    taps = vertex(matrix, right, cost)
+    taps = Vertices(matrix, right)(cost)
     if taps is None:
         return None
     support = np.flatnonzero(taps > _SUPPORT)
@@ -268,7 +268,8 @@ def mean_range(modes: Sequence[Mode], period_s: float, periods: int) -> tuple[fl
     """Least and largest mean delay of non-negative taps, in periods."""
     steps = np.arange(periods + 1.0)
     matrix, right = _conditions(modes, period_s, steps)
-    least, largest = vertex(matrix, right, steps / periods), vertex(matrix, right, -steps / periods)
+    vertex = Vertices(matrix, right)
+    least, largest = vertex(steps / periods), vertex(-steps / periods)
     if least is None or largest is None:
         return math.inf, -math.inf
     return float(steps @ least) + _SAME_MEAN, float(steps @ largest) - _SAME_MEAN

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
-from shapegcode._core import Mode, Shaper, sensitivity_curve
+from shapegcode._core import DesignError, Mode, Shaper, sensitivity_curve
 from shapegcode.shaping.families.conditions import Conditions, ResidualLimit
+from shapegcode.shaping.linear_program import LinearProgram
 
 __all__ = ["LIMIT_MARGIN", "RESIDUAL_LIMIT", "GridSearch"]
 
@@ -23,8 +24,6 @@ LIMIT_MARGIN = 1e-3
 """Share of a tolerated residual that the search leaves unused, so that it ends: the shortest is meant with it."""
 
 _SAME_CONDITION = 1e-13  # relative singular value below which two zeros ask for the same thing on this grid
-_TOLERANCES = (1e-10, 1e-9, 1e-8)  # of the linear program; the solver gives up now and then at the first
-_INFEASIBLE = 2
 _SUPPORT_THRESHOLDS = (1e-9, 1e-7, 1e-13)  # magnitudes above one of these are taps
 _FIRST_DIRECTIONS = 8
 _FIRST_FREQUENCIES = 5
@@ -49,6 +48,8 @@ class GridSearch:
     def __init__(self, conditions: Conditions, period_s: float) -> None:
         self._conditions = conditions
         self._period_s = period_s
+        # By number of periods, with the number of planes that are in it.
+        self._programs: dict[int, tuple[LinearProgram, int]] = {}
         self._planes = [
             _plane(each, float(frequency_hz), float(direction))
             for each in conditions.limits
@@ -145,34 +146,44 @@ class GridSearch:
 
         The last variable is the share; with a cost it stays below what the margin leaves.
         """
-        matrix, right = self._equalities(last)
-        planes = self._inequalities(last)
-        limits = np.array([plane.limit for plane in self._planes])
+        program = self._with_planes(last)
+        is_signed = self._conditions.largest_tap is not None
         objective = np.zeros(last + 1) if cost is None else cost
-        largest = self._conditions.largest_tap
-        if largest is not None:
-            # a tap is the difference of two that are not negative, so that its magnitude is linear
-            matrix, planes = np.hstack([matrix, -matrix]), np.hstack([planes, -planes])
+        if is_signed:
             objective = np.full(2 * last + 2, 0.0 if cost is None else 1.0)
-        bounds = [(0.0, largest)] * matrix.shape[1] + [(0.0, None if cost is None else 1.0 - LIMIT_MARGIN)]
-        for tolerance in _TOLERANCES:
-            result = linprog(
-                np.append(objective, 1.0 if cost is None else 0.0),
-                A_eq=np.hstack([matrix, np.zeros((len(matrix), 1))]),
-                b_eq=right,
-                A_ub=np.hstack([planes / limits[:, None], -np.ones((len(planes), 1))]) if len(planes) else None,
-                b_ub=np.zeros(len(planes)) if len(planes) else None,
-                bounds=bounds,
-                method="highs-ds",
-                options={"primal_feasibility_tolerance": tolerance, "dual_feasibility_tolerance": tolerance},
+        program.set_cost(np.append(objective, 1.0 if cost is None else 0.0))
+        program.bound(len(objective), 0.0, math.inf if cost is None else 1.0 - LIMIT_MARGIN)
+        try:
+            solution = program.solve()
+        except DesignError:
+            return None
+        if solution is None:
+            return None
+        taps = solution[: last + 1]
+        return taps - solution[last + 1 : -1] if is_signed else taps, float(solution[-1])
+
+    def _with_planes(self, last: int) -> LinearProgram:
+        """The linear program of a duration, with every plane so far."""
+        largest = self._conditions.largest_tap
+        program, done = self._programs.get(last, (None, 0))
+        if program is None:
+            matrix, right = self._equalities(last)
+            if largest is not None:
+                # a tap is the difference of two that are not negative, so that its magnitude is linear
+                matrix = np.hstack([matrix, -matrix])
+            count = matrix.shape[1]
+            upper = np.full(count + 1, math.inf if largest is None else largest)
+            program = LinearProgram(
+                np.zeros(count + 1), upper, (np.hstack([matrix, np.zeros((len(matrix), 1))]), right)
             )
-            if result.status == 0:
-                *_, share = solution = np.asarray(result.x, dtype=np.float64)
-                taps = solution[: last + 1]
-                return taps if largest is None else taps - solution[last + 1 : -1], float(share)
-            if result.status == _INFEASIBLE:
-                return None
-        return None
+        new = self._planes[done:]
+        if new:
+            planes = self._inequalities(new, last) / np.array([plane.limit for plane in new])[:, None]
+            if largest is not None:
+                planes = np.hstack([planes, -planes])
+            program.add_below(np.hstack([planes, -np.ones((len(new), 1))]), np.zeros(len(new)))
+        self._programs[last] = program, len(self._planes)
+        return program
 
     def _equalities(self, last: int) -> tuple[FloatArray, FloatArray]:
         """Matrix and right-hand side of zeros and sum; the zeros' rows are an orthonormal basis of their span.
@@ -192,9 +203,9 @@ class GridSearch:
         matrix = np.vstack([kept, np.ones(last + 1)])
         return matrix, np.eye(len(matrix))[-1]
 
-    def _inequalities(self, last: int) -> FloatArray:
-        poles = np.array([plane.pole for plane in self._planes])
-        directions = np.array([plane.direction for plane in self._planes])
+    def _inequalities(self, planes: Sequence[_Plane], last: int) -> FloatArray:
+        poles = np.array([plane.pole for plane in planes])
+        directions = np.array([plane.direction for plane in planes])
         phases = poles.imag[:, None] * self._period_s * (np.arange(last + 1) - 0.5 * last) - directions[:, None]
         decay = np.exp(poles.real[:, None] * self._period_s * (last - np.arange(last + 1)))
         return np.asarray(decay * np.cos(phases), dtype=np.float64)

@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from shapegcode._core import DesignError, Shaper
 from shapegcode.shaping.bands import ModeBand
+from shapegcode.shaping.linear_program import LinearProgram
 
 __all__ = ["NO_RESIDUAL", "SAME_RESIDUAL", "Bounds", "CutPool", "TapProblem", "proven_worst"]
 
@@ -39,11 +39,7 @@ _STARTS = 5  # frequencies of a band at which every search begins
 _BOUNDS_SHARE = 0.5  # of the worst residual: a plane that the taps come less close to did not bound them
 _PROOF_SHARE = 1e-4  # of the residual: what a proven sweep may add for what lies between its samples
 _PROOF_SAMPLES = 200_000
-# Tolerance and presolve: now and then the solver gives up, or goes round in circles, at the first of them.
-_WAYS = ((1e-9, True), (1e-9, False), (1e-8, True), (1e-7, True), (1e-7, False))
-_MOST_PIVOTS = 20  # per unknown and condition; some 1 is usual
 _SAME_VALUE = 1e-6  # relative
-_INFEASIBLE = 2
 _QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * math.pi
 
 
@@ -142,6 +138,8 @@ class TapProblem:
     last_tap: float = 0.0
     _bands: list[_Band] = field(init=False)
     _rows: list[list[FloatArray]] = field(init=False)
+    _program: LinearProgram | None = field(init=False, default=None)
+    _limit: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
         """Prepare the sweeps."""
@@ -207,6 +205,7 @@ class TapProblem:
 
     def _forget(self, taps: FloatArray, worst: float) -> None:
         """Take out of the pool what was found on the way and does not bound the result."""
+        self._program = None
         for rows, omegas, directions in zip(self._rows, self.pool.omegas, self.pool.directions, strict=True):
             keep = [
                 k for k in range(len(rows)) if k < self.pool.starts or float(rows[k] @ taps) >= _BOUNDS_SHARE * worst
@@ -215,8 +214,13 @@ class TapProblem:
             omegas[:] = [omegas[k] for k in keep]
             directions[:] = [directions[k] for k in keep]
 
-    def _planes(self) -> FloatArray:
-        """One row per plane of the pool; those of earlier rounds are kept."""
+    def _with_planes(self, limit: float) -> LinearProgram:
+        """The linear program with the planes so far, all of them below a limit.
+
+        Unknowns are the taps (their positive and their negative parts, where they may be negative), and how far above
+        the limit the bound lies.
+        """
+        new: list[FloatArray] = []
         for band, rows, omegas, directions in zip(
             self._bands, self._rows, self.pool.omegas, self.pool.directions, strict=True
         ):
@@ -224,61 +228,45 @@ class TapProblem:
             if done < len(omegas):
                 turned = np.exp(np.outer(omegas[done:], band.q) - 1j * np.array(directions[done:])[:, None])
                 rows.extend(turned.real)
-        return np.array([row for rows in self._rows for row in rows]).reshape(-1, self.last + 1)
+                new.extend(turned.real)
+        if self._program is None or limit != self._limit:
+            self._program, self._limit = self._without_planes(), limit
+            new = [row for rows in self._rows for row in rows]
+        if new:
+            planes = np.array(new)
+            if self.max_abs_sum is not None:
+                planes = np.hstack([planes, -planes])
+            self._program.add_below(np.hstack([planes, np.full((len(new), 1), -1.0)]), np.full(len(new), limit))
+        return self._program
+
+    def _without_planes(self) -> LinearProgram:
+        matrix, right = self.equalities
+        if self.max_abs_sum is not None:
+            matrix = np.hstack([matrix, -matrix])
+        count = matrix.shape[1]
+        least = np.zeros(count + 1)
+        least[self.last] = self.last_tap
+        program = LinearProgram(
+            least, np.full(count + 1, math.inf), (np.hstack([matrix, np.zeros((len(matrix), 1))]), right)
+        )
+        if self.max_abs_sum is not None:
+            program.add_below(np.append(np.ones(count), 0.0)[None, :], np.array([self.max_abs_sum]))
+        return program
 
     def _solve(self, cost: FloatArray | None, limit: float) -> tuple[FloatArray, float] | None:
         """The linear program with the planes so far: least cost below the limit, or the least bound above it."""
-        planes = self._planes()
-        matrix, right = self.equalities
+        program = self._with_planes(limit)
         signed = self.max_abs_sum is not None
-        if signed:
-            planes, matrix = np.hstack([planes, -planes]), np.hstack([matrix, -matrix])
-        count = planes.shape[1]
-        above = np.full(len(planes), limit)
-        if cost is None:  # one more unknown: how far above the limit the bound lies
-            planes = np.hstack([planes, np.full((len(planes), 1), -1.0)])
-            matrix = np.hstack([matrix, np.zeros((len(matrix), 1))])
-            objective = np.eye(count + 1)[count]
-        else:
-            objective = np.tile(cost, 2) if signed else cost
-        if self.max_abs_sum is not None:
-            planes = np.vstack([planes, np.r_[np.ones(count), np.zeros(planes.shape[1] - count)]])
-            above = np.append(above, self.max_abs_sum)
-        least = np.zeros(len(objective))
-        least[self.last] = self.last_tap
-        x = _linear_program(objective, (planes, above), (matrix, right), least)
+        count = (2 if signed else 1) * (self.last + 1)
+        objective = np.zeros(count) if cost is None else np.tile(cost, 2) if signed else cost
+        objective = np.append(objective, 1.0 if cost is None else 0.0)
+        program.set_cost(objective)
+        program.bound(count, 0.0, math.inf if cost is None else 0.0)
+        x = program.solve()
         if x is None:
             return None
         taps = x[: self.last + 1] - x[self.last + 1 : count] if signed else x[:count]
         return taps, float(objective @ x) + (limit if cost is None else 0.0)
-
-
-def _linear_program(
-    objective: FloatArray,
-    above: tuple[FloatArray, FloatArray],
-    equal: tuple[FloatArray, FloatArray],
-    least: FloatArray,
-) -> FloatArray | None:
-    """Least objective over ``x >= least``, ``above[0] @ x <= above[1]`` and ``equal[0] @ x == equal[1]``, or None.
-
-    Raises:
-        DesignError: the solver does not know, whichever way it is asked.
-    """
-    for tolerance, presolve in _WAYS:
-        result = linprog(
-            objective, A_ub=above[0], b_ub=above[1], A_eq=equal[0], b_eq=equal[1],
-            bounds=[(low, None) for low in least.tolist()],
-            method="highs-ds",
-            options={
-                "primal_feasibility_tolerance": tolerance, "dual_feasibility_tolerance": tolerance,
-                "presolve": presolve, "maxiter": _MOST_PIVOTS * (len(objective) + len(above[1])),
-            },
-        )  # fmt: skip
-        if result.status == 0:
-            return np.asarray(result.x, dtype=np.float64)
-        if result.status == _INFEASIBLE:
-            return None
-    raise DesignError(f"the linear program of a shaper with {len(objective)} unknowns failed: {result.message}")
 
 
 def _ends(band: ModeBand) -> tuple[float, float]:

@@ -1,0 +1,67 @@
+"""Linear programs that go on from one another, and non-negative least squares, against SciPy's from the beginning."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import linprog, nnls
+
+from shapegcode.shaping.linear_program import LinearProgram, non_negative_least_squares
+
+FloatArray = NDArray[np.float64]
+
+
+def by_scipy(cost: FloatArray, equal: FloatArray, below: FloatArray, above: FloatArray) -> float | None:
+    found = linprog(cost, A_eq=equal, b_eq=np.eye(len(equal))[0], A_ub=below, b_ub=above, bounds=(0.0, 2.0))
+    assert found.status in (0, 2)
+    return float(found.fun) if found.status == 0 else None
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_each_program_of_a_row_has_the_optimum_of_one_from_the_beginning(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(4, 40))
+    # Taps that add up to 1, and conditions as those on a residual are.
+    equal = np.vstack([np.ones(count), np.cos(np.outer(rng.uniform(0.1, 3.0, 2), np.arange(count)))])
+    program = LinearProgram(np.zeros(count), np.full(count, 2.0), (equal, np.eye(3)[0]))
+    below, above = np.zeros((0, count)), np.zeros(0)
+    for _ in range(8):
+        rows = np.cos(np.outer(rng.uniform(0.1, 3.0, 3), np.arange(count)) + rng.uniform(0.0, math.tau, (3, 1)))
+        limits = rng.uniform(0.05, 0.8, 3)
+        program.add_below(rows, limits)
+        below, above = np.vstack([below, rows]), np.append(above, limits)
+        cost = rng.uniform(-1.0, 1.0, count)
+        program.set_cost(cost)
+        found, expected = program.solve(), by_scipy(cost, equal, below, above)
+        if expected is None:
+            assert found is None
+            return
+        assert found is not None
+        assert float(cost @ found) == pytest.approx(expected, abs=1e-8)
+        assert np.all(below @ found <= above + 1e-8)
+
+
+def test_a_bound_that_moves() -> None:
+    program = LinearProgram(np.zeros(2), np.full(2, math.inf), (np.ones((1, 2)), np.ones(1)))
+    program.set_cost(np.array([1.0, 2.0]))
+    program.bound(0, 0.0, 0.25)
+    assert program.solve() == pytest.approx([0.25, 0.75])
+    program.bound(0, 0.0, 1.0)
+    assert program.solve() == pytest.approx([1.0, 0.0])
+    program.bound(1, 0.5, 0.5)
+    program.bound(0, 0.0, 0.25)
+    assert program.solve() is None
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_least_squares_without_negative_unknowns(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rows, columns = int(rng.integers(1, 12)), int(rng.integers(1, 60))
+    matrix, right = rng.standard_normal((rows, columns)), rng.standard_normal(rows)
+    found = non_negative_least_squares(matrix, right)
+    assert found is not None
+    assert found.min() >= 0.0
+    assert float(np.linalg.norm(matrix @ found - right)) == pytest.approx(nnls(matrix, right)[1], abs=1e-12)
