@@ -27,6 +27,8 @@ from shapegcode.cli.arguments import CommandParser
 __all__ = ["COMMANDS", "Command", "ExitCode", "main", "parser_of"]
 
 _DEBUG = "--debug"
+_WITH_REST = "batch"
+"""Behind -- it takes words for the command that it runs."""
 
 
 class ExitCode:
@@ -76,6 +78,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("characterize", "measure a controller with test programs, and fit the machine file to the results"),
     Command("identify", "find vibration modes in a tap test or decay, and put them into the machine file"),
     Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
+    Command("batch", "run a command over many programs and machines, and go on where it stopped"),
     Command("report", "make pages of results that --json has written"),
     Command("completion", "print the script that has bash, zsh or fish complete at TAB"),
     Command("demo", "repeat the figures of a paper beside the published ones"),
@@ -150,8 +153,13 @@ def _message(error: Exception) -> str:
 
 def _run(argv: list[str]) -> int:
     selected = next((word for word in argv if not word.startswith("-")), None)
+    rest: list[str] = []
+    if selected == _WITH_REST and "--" in argv:
+        at = argv.index("--")
+        argv, rest = argv[:at], argv[at + 1 :]
     args = parser_of(selected).parse_args(argv)
-    args.typed = tuple(argv)
+    args.rest = tuple(rest)
+    args.typed = tuple([*argv, "--", *rest] if rest else argv)
     try:
         if getattr(args, "program", None) == "all":
             several = importlib.import_module(f"{__name__}.several")

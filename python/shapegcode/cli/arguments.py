@@ -13,8 +13,8 @@ __all__ = ["GROUPS", "CommandParser", "add_alias", "one_of"]
 GROUPS: dict[str, tuple[str, ...]] = {
     "input": (
         "input", "inputs", "files", "dump", "name", "kind", "machine", "set", "program", "against", "shaped", "lines",
-        "answers", "base", "compensation", "cut", "mode", "uncertainty", "axes", "axis", "units", "box", "override",
-        "rapid_override", "part_mass", "shell",
+        "answers", "base", "programs", "compensation", "cut", "mode", "uncertainty", "axes", "axis", "units", "box",
+        "override", "rapid_override", "part_mass", "shell",
     ),
     "what to do": ("write", "fit", "servo", "runs", "tap_plan", "list_families"),
     "what to shape": ("shaper", "contour", "per_axis", "shape_rapids", "arc_feed", "shape_all", "block_period"),
@@ -33,6 +33,9 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "what a file does not say": (
         "time_column", "force_column", "response_columns", "time_unit", "force_unit", "response_unit", "period_s",
         "quantity", "force_scale", "response_scale", "force_sensitivity", "response_sensitivity", "response_first",
+    ),
+    "runs": (
+        "batch_command", "resume", "jobs", "time_limit", "memory_limit", "scheduler", "tls_ca", "tls_cert", "tls_key",
     ),
     "output": (
         "output", "update", "force", "full", "csv", "npz", "every", "blocks", "plots", "json", "html", "html_script",

@@ -110,6 +110,12 @@ class ProgressBar:
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=min(max(fraction, 0.0), 1.0), total=1.0)
 
+    def say(self, text: str) -> None:
+        """Say what is being done in other words."""
+        self._description = text
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, description=text)
+
     def wait(self) -> None:
         """Show from the first second on that work goes on, also as long as nobody tells how much of it is done."""
         if self._enabled:

@@ -37,6 +37,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "shapegcode check part.nc -m vx500",
         "shapegcode check memory.nc -m mine.toml --program all --json check.json",
     ),
+    "batch": (
+        "shapegcode batch parts -m mine.toml -o shaped --html pages",
+        "shapegcode batch 'parts/**/*.nc' -m a.toml -m b.toml -o shaped --resume -- --shaper zvd",
+    ),
     "setup": (
         "shapegcode setup -o mine.toml",
         "shapegcode setup --answers answers.toml -o mine.toml --force",

@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 
 _LARGEST_OVERRIDE = 2.54
-_SIZE_UNITS = {"": 1, "k": 1024, "M": 1024 * 1024}
+_SIZE_UNITS = {"": 1, "k": 1024, "M": 1024**2, "G": 1024**3}
 _LENGTH_UNITS = {"um": 1.0, "µm": 1.0, "mm": 1e3}
 _TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 
@@ -238,7 +238,7 @@ def _with_unit(text: str, what: str, units: Mapping[str, float], example: str) -
 
 
 def size(text: str) -> int:
-    """A number of bytes such as ``262144``, ``256k`` or ``1M`` (1024 bytes, 1024 k), above 0.
+    """A number of bytes such as ``262144``, ``256k``, ``1M`` or ``2G`` (1024 bytes, 1024 k, 1024 M), above 0.
 
     Args:
         text: as it is typed.
@@ -249,7 +249,7 @@ def size(text: str) -> int:
     Raises:
         ArgumentTypeError: the text is none.
     """
-    match = re.fullmatch(r"(\d+(?:\.\d+)?)([kM]?)", text)
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)([kMG]?)", text)
     value = math.floor(float(match[1]) * _SIZE_UNITS[match[2]]) if match else 0
     if value < 1:
         raise argparse.ArgumentTypeError(f"{text!r}: must be a number of bytes above 0, for example 65536, 64k or 1M")

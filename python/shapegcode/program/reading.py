@@ -13,7 +13,7 @@ from shapegcode import _core
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
 
-__all__ = ["program_bytes", "program_loader", "reader_options"]
+__all__ = ["PROGRAM_SUFFIXES", "program_bytes", "program_loader", "reader_options"]
 
 _NO_LIMIT = 2**63
 
@@ -124,7 +124,8 @@ def _bindings(machine: Machine) -> _core.CodeBindings:
     return bindings
 
 
-_SUFFIXES = ("", ".nc", ".NC", ".cnc", ".CNC", ".txt", ".TXT", ".tap", ".TAP", ".prg", ".PRG", ".ngc")
+PROGRAM_SUFFIXES = ("", ".nc", ".NC", ".cnc", ".CNC", ".txt", ".TXT", ".tap", ".TAP", ".prg", ".PRG", ".ngc")
+"""Ends of names that programs usually have."""
 
 
 def program_bytes(path: str | Path, most: int) -> bytes:
@@ -161,7 +162,7 @@ def program_loader(folders: Sequence[Path], most: int) -> Callable[[int], tuple[
     def load(number: int) -> tuple[str, bytes] | None:
         for folder in folders:
             for stem in (f"O{number:04d}", f"O{number}", f"o{number:04d}", f"{number:04d}", f"O{number:08d}"):
-                for suffix in _SUFFIXES:
+                for suffix in PROGRAM_SUFFIXES:
                     path = folder / (stem + suffix)
                     if path.is_file():
                         return str(path), program_bytes(path, most)

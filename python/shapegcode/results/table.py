@@ -38,6 +38,7 @@ class Column:
         text: of words, which wrap and stand at the left; other columns stand at the right and are never cut.
         left: stands at the left, though it is never cut: a column of names.
         style: of a cell, as rich names it, from the row; None: plain.
+        link: where a cell of a page leads: as `value`; empty: nowhere.
         priority: which columns go first where the table is too wide: those of the highest, of these the last one; 0
             stays, as the first column does.
     """
@@ -49,6 +50,7 @@ class Column:
     text: bool = False
     left: bool = False
     style: Callable[[Any], str] | None = None
+    link: str | Callable[[Any], str] = ""
     priority: int = 1
 
     @property

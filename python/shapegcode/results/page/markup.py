@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from html import escape
+from operator import attrgetter
+from urllib.parse import quote
 
 from shapegcode.results.page.model import (
     Bars,
@@ -19,7 +21,7 @@ from shapegcode.results.page.model import (
     Section,
     Text,
 )
-from shapegcode.results.table import NO_BREAK, Table
+from shapegcode.results.table import NO_BREAK, Column, Table
 
 __all__ = ["LIGHT_WORDS", "light_sign", "number", "prose", "section_of"]
 
@@ -232,12 +234,20 @@ def _table(table: Table) -> str:
         marks = [name for name in ("bold", "red", "dim") if name in style]
         marks += ["parted"] if rank in table.sections and rank else []
         body = "".join(
-            f"<td {kind}>{escape(cell.replace(NO_BREAK, ' '))}</td>" for kind, cell in zip(kinds, cells, strict=True)
+            f"<td {kind}>{_linked(escape(cell.replace(NO_BREAK, ' ')), column, row)}</td>"
+            for kind, cell, column in zip(kinds, cells, columns, strict=True)
         )
         lines.append(f'<tr class="{" ".join(marks)}">{body}</tr>' if marks else f"<tr>{body}</tr>")
     title = f"<caption>{escape(table.title)}</caption>" if table.title else ""
     caption = f'<p class="caption">{prose(table.caption)}</p>' if table.caption else ""
     return _scrolled(f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>") + caption
+
+
+def _linked(text: str, column: Column, row: object) -> str:
+    if not column.link:
+        return text
+    target = column.link(row) if callable(column.link) else attrgetter(column.link)(row)
+    return f'<a href="{escape(quote(target))}">{text}</a>' if target else text
 
 
 def _scrolled(table: str) -> str:

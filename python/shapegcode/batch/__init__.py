@@ -1,0 +1,1 @@
+"""Many programs, machines and processes: a command over all of them, resumed where it stopped."""

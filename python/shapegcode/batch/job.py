@@ -1,0 +1,149 @@
+"""One run of a command as data: what travels to a process, here or on another machine, and what comes back.
+
+The folder of a run looks like the folder the batch was started in, with nothing but the files of the run in it. So a
+run reads and writes the very bytes that the same command would, typed by hand.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from shapegcode.results.made import this_version
+
+__all__ = ["FAILED_CODES", "Ending", "Job", "Outcome", "Packed", "pack", "working_name"]
+
+Ending = Literal["ended", "crashed", "killed", "out of time", "out of memory", "other version"]
+"""How a run ended: by itself with an exit code, or not."""
+
+FAILED_CODES = {97: "crashed", 98: "out of memory"}
+"""Exit codes of a run that are no command's."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A run that is to be done.
+
+    Attributes:
+        program: what it is of, as it was given.
+        machine: likewise.
+        words: of the command line.
+        files: what it reads: name in its folder, and the file.
+        output: its main file, as a name in its folder; the JSON is beside it.
+        size_bytes: of the program.
+    """
+
+    program: str
+    machine: str
+    words: tuple[str, ...]
+    files: tuple[tuple[str, str], ...]
+    output: str
+    size_bytes: int
+
+    @property
+    def key(self) -> str:
+        """What it is called in the manifest: its main file."""
+        return self.output
+
+    @property
+    def report(self) -> str:
+        """Name of its JSON."""
+        return f"{self.output}.json"
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A run with all that it reads; nothing in it names a file of the machine that sends it.
+
+    Attributes:
+        words: of the command line.
+        files: content by name in the folder of the run.
+        version: of shapegcode that it is meant for.
+        fingerprint: of all of this: equal ones give equal results.
+        seconds: that it may take; 0: any time.
+        memory_bytes: that it may need; 0: any.
+        scratch: folder for the folder of the run; empty: where temporary files go.
+    """
+
+    words: tuple[str, ...]
+    files: Mapping[str, bytes]
+    version: str
+    fingerprint: str
+    seconds: float = 0.0
+    memory_bytes: int = 0
+    scratch: str = ""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came back.
+
+    Attributes:
+        ending: how it ended.
+        code: exit code of the command; 0 where it did not end by itself.
+        said: what it wrote to standard output.
+        complained: what it wrote to standard error, or why it did not end by itself.
+        files: content of what it wrote, by name in its folder.
+        wall_s: how long it took.
+        cpu_s: processor time.
+        peak_bytes: most memory that it had at a time.
+    """
+
+    ending: Ending
+    code: int
+    said: str
+    complained: str
+    files: Mapping[str, bytes]
+    wall_s: float = 0.0
+    cpu_s: float = 0.0
+    peak_bytes: int = 0
+
+
+def working_name(path: str | Path) -> str:
+    """Name of a file in the folder of a run: as it was given, an absolute one from the folder of the batch.
+
+    Args:
+        path: as it was given.
+
+    Returns:
+        A relative name with as few dots as there can be.
+    """
+    given = os.fspath(path)
+    return os.path.normpath(os.path.relpath(given) if os.path.isabs(given) else given)
+
+
+def pack(
+    job: Job, *, seconds: float = 0.0, memory_bytes: int = 0, scratch: str = "", kept: Mapping[str, bytes] | None = None
+) -> Packed:
+    """Read what a run reads.
+
+    Args:
+        job: the run.
+        seconds: see `Packed`.
+        memory_bytes: see `Packed`.
+        scratch: see `Packed`.
+        kept: content of files that many runs read, such as the machine's, by name.
+
+    Returns:
+        The run with its files.
+
+    Raises:
+        OSError: a file cannot be read.
+    """
+    kept = kept or {}
+    files = {name: kept[name] if name in kept else Path(path).read_bytes() for name, path in job.files}
+    version = this_version()
+    return Packed(
+        job.words, files, version, _fingerprint(job.words, files, version), seconds, memory_bytes, scratch
+    )  # fmt: skip
+
+
+def _fingerprint(words: Sequence[str], files: Mapping[str, bytes], version: str) -> str:
+    hashes = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+    whole = json.dumps([version, list(words), hashes], sort_keys=True)
+    return hashlib.sha256(whole.encode()).hexdigest()

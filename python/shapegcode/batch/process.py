@@ -1,0 +1,173 @@
+"""Runs packed jobs, each in a process of its own with limits on time and memory.
+
+A process that has loaded shapegcode once (`shapegcode.cli.host`) forks one for each job, so that a job starts in some
+milliseconds. Each thread that runs jobs has such a host. The same function runs jobs here and on a Dask worker.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import weakref
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from shapegcode.batch.job import FAILED_CODES, Ending, Outcome, Packed
+from shapegcode.results.made import this_version
+
+__all__ = ["end_hosts", "run_packed"]
+
+_own = threading.local()
+_hosts: weakref.WeakSet[_Host] = weakref.WeakSet()
+_stopped = threading.Event()
+
+
+class _Host:
+    """A process that forks one for each job; `ask` may be called by one thread at a time."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "shapegcode.cli.host"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            # Ctrl-C of a terminal is for the batch alone, which ends its hosts itself.
+            start_new_session=True,
+        )
+        _hosts.add(self)
+
+    def ask(self, request: Mapping[str, Any]) -> dict[str, Any] | None:
+        """The host's answer; None: it is gone."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        try:
+            self._process.stdin.write(json.dumps(request).encode() + b"\n")
+            self._process.stdin.flush()
+            line = self._process.stdout.readline()
+        except (OSError, ValueError):
+            return None
+        return json.loads(line) if line.endswith(b"\n") else None
+
+    def end(self) -> None:
+        """End it, and the job that it runs."""
+        # It ends its job when its input ends.
+        with contextlib.suppress(OSError, ValueError):
+            if self._process.stdin is not None:
+                self._process.stdin.close()
+        try:
+            self._process.wait(2.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        with contextlib.suppress(OSError):
+            if self._process.stdout is not None:
+                self._process.stdout.close()
+
+
+def end_hosts() -> None:
+    """End all hosts of this process with what they run; jobs that are asked for later start new ones."""
+    for host in list(_hosts):
+        host.end()
+        _hosts.discard(host)
+
+
+def run_packed(packed: Packed) -> Outcome:
+    """Run a job in a process of its own, in a folder that is gone afterwards.
+
+    Args:
+        packed: the job.
+
+    Returns:
+        What it wrote and how it ended; a crash is an outcome, not an error.
+
+    Raises:
+        OSError: there is no room for its folder.
+    """
+    if packed.version != (mine := this_version()):
+        return Outcome("other version", 0, "", f"this worker has {mine}, the batch needs {packed.version}", {})
+    folder = Path(tempfile.mkdtemp(prefix="job-", dir=packed.scratch or None))
+    try:
+        return _run_in(folder, packed)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _run_in(folder: Path, packed: Packed) -> Outcome:
+    names = [*packed.files]
+    # Names may lead upwards: the run's folder lies so deep that they end within what is removed.
+    depth = max(_ups(word) for word in (*names, *packed.words))
+    cwd = folder.joinpath("files", *("d" for _ in range(depth)))
+    cwd.mkdir(parents=True)
+    for name, content in packed.files.items():
+        target = Path(os.path.normpath(cwd / name))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(content)
+    for word in packed.words:
+        _make_parent(cwd, word)
+    host = getattr(_own, "host", None)
+    if host is None or host not in _hosts:
+        host = _own.host = _Host()
+    answer = host.ask(
+        {"cwd": str(cwd), "logs": str(folder), "words": packed.words, "seconds": packed.seconds,
+         "memory_bytes": packed.memory_bytes}
+    )  # fmt: skip
+    if answer is None:
+        host.end()
+        _hosts.discard(host)
+        _own.host = None
+        return Outcome("killed", 0, "", "the process that ran it was killed", {})
+    said, complained = (_text(folder / name) for name in ("out", "err"))
+    ending, why = _ending(answer, packed, complained)
+    files = dict(_written(folder / "files", cwd, names)) if ending == "ended" else {}
+    return Outcome(
+        ending, answer["code"] if ending == "ended" else 0, said, why, files, answer["wall_s"], answer["cpu_s"],
+        answer["peak_bytes"],
+    )  # fmt: skip
+
+
+def _ups(word: str) -> int:
+    """How many folders upwards a word leads that may be a path."""
+    return sum(part == ".." for part in Path(os.path.normpath(word)).parts) if ".." in word else 0
+
+
+def _make_parent(cwd: Path, word: str) -> None:
+    """Folders of the batch exist also where a run writes."""
+    if os.sep in word and not os.path.isabs(word):
+        Path(os.path.normpath(cwd / word)).parent.mkdir(parents=True, exist_ok=True)
+
+
+def _ending(answer: Mapping[str, Any], packed: Packed, complained: str) -> tuple[Ending, str]:
+    """How it ended, and why or what it complained of."""
+    if answer["out_of_time"]:
+        return "out of time", f"stopped after {packed.seconds:g} s (--time-limit)"
+    code = answer["code"]
+    if code < 0:
+        return "killed", f"killed by signal {-code}"
+    if code in FAILED_CODES:
+        ending = FAILED_CODES[code]
+        if ending == "out of memory":
+            return "out of memory", f"needs more than {packed.memory_bytes / 1e6:.0f} MB (--memory-limit)"
+        last = complained.strip().splitlines()
+        return "crashed", f"crashed: {last[-1] if last else 'no message'}"
+    return "ended", complained
+
+
+def _text(file: Path) -> str:
+    try:
+        return file.read_text(errors="replace")
+    except OSError:
+        return ""
+
+
+def _written(root: Path, cwd: Path, read: list[str]) -> Iterator[tuple[str, bytes]]:
+    """What lies in the folder of a run and was not put there."""
+    given = {os.path.normpath(cwd / name) for name in read}
+    for file in sorted(root.rglob("*")):
+        if file.is_file() and str(file) not in given:
+            yield os.path.relpath(file, cwd), file.read_bytes()

@@ -1,0 +1,246 @@
+"""What a batch came to: a row for each run, sorted by gain and by trouble; the next step."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+from shapegcode.results.json import hidden
+from shapegcode.results.outcome import Pair
+from shapegcode.results.page.model import Figure
+from shapegcode.results.result import Result
+from shapegcode.results.table import Column, Table
+
+__all__ = ["Batch", "BatchRow", "Ended"]
+
+Ended = Literal["ok", "not ok", "refused", "failed"]
+"""Within tolerance; done, but not; the input is bad; it did not end by itself."""
+
+_SHOWN = 20
+
+
+@dataclass(frozen=True)
+class BatchRow:
+    """One program on one machine.
+
+    Attributes:
+        program: as it was given.
+        machine: likewise.
+        ended: how.
+        said: the first line of the command, or why there is none.
+        residual_um: residual vibration of the worst axis; None: the command does not find it.
+        contour_um: contour error, likewise.
+        cycle_time_s: likewise; of a command that writes no program both are the same.
+        alarms: of `check`.
+        output: the program that was written; empty: none.
+        report: its JSON; empty: none.
+        page: its page; empty: none.
+        earlier: done by an earlier batch, and nothing has changed since.
+        wall_s: how long it took.
+        cpu_s: processor time.
+        peak_bytes: most memory at a time.
+    """
+
+    program: str
+    machine: str
+    ended: Ended
+    said: str
+    residual_um: Pair[float] | None
+    contour_um: Pair[float] | None
+    cycle_time_s: Pair[float] | None
+    alarms: int | None
+    output: str
+    report: str
+    page: str
+    earlier: bool
+    wall_s: float
+    cpu_s: float
+    peak_bytes: int
+
+    @property
+    def gain_um(self) -> float:
+        """By how much the residual vibration falls."""
+        return 0.0 if self.residual_um is None else self.residual_um.original - self.residual_um.emitted
+
+    @property
+    def longer_percent(self) -> float | None:
+        """By how much the program takes longer."""
+        pair = self.cycle_time_s
+        if pair is None or pair.original <= 0.0 or pair.original == pair.emitted:
+            return None
+        return 100.0 * (pair.emitted / pair.original - 1.0)
+
+
+def figures_of(report: Mapping[str, Any]) -> dict[str, Any]:
+    """The figures of a row from the JSON of a command.
+
+    Args:
+        report: of `convert`, `time`, `check`, `feed`, `measure` or `simulate`.
+
+    Returns:
+        Values of `BatchRow` by name, as JSON knows them; None where the command does not find one.
+    """
+    return {
+        "residual_um": _pair(report.get("residual_vibration_um"), _largest),
+        "contour_um": _pair(_contour(report), _contour_largest),
+        "cycle_time_s": _pair(report.get("cycle_time_s"), _number),
+        "alarms": report["counts"].get("alarm") if isinstance(report.get("counts"), Mapping) else None,
+    }
+
+
+def _contour(report: Mapping[str, Any]) -> object:
+    """Of what the verdict judges: the table or the command."""
+    tracks = report.get("contour_error_um")
+    if not isinstance(tracks, Mapping):
+        return tracks
+    limits = report.get("limits")
+    target = limits.get("contour_target") if isinstance(limits, Mapping) else None
+    return tracks.get(target or "response")
+
+
+def _pair(value: object, take: Any) -> dict[str, float] | None:
+    if isinstance(value, Mapping) and {"original", "emitted"} <= value.keys():
+        found = {name: take(value[name]) for name in ("original", "emitted")}
+    else:
+        one = take(value)
+        found = {"original": one, "emitted": one}
+    return None if None in found.values() else found
+
+
+def _largest(value: object) -> float | None:
+    numbers = [each for each in value.values() if isinstance(each, int | float)] if isinstance(value, Mapping) else []
+    return float(max(numbers)) if numbers else None
+
+
+def _contour_largest(value: object) -> float | None:
+    return _number(value.get("max") if isinstance(value, Mapping) else value)
+
+
+def _number(value: object) -> float | None:
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+def _both(name: str) -> Any:
+    """A figure before and after, or the one that there is."""
+
+    def cell(row: BatchRow) -> str:
+        pair = getattr(row, name)
+        if pair is None:
+            return ""
+        before, after = f"{pair.original:.1f}", f"{pair.emitted:.1f}"
+        return before if before == after else f"{before}\N{NO-BREAK SPACE}→\N{NO-BREAK SPACE}{after}"
+
+    return cell
+
+
+_RED = {"failed": "bold red", "refused": "red", "not ok": "yellow"}
+_FIGURES = (
+    Column("residual", "µm", _both("residual_um"), priority=0),
+    Column("contour", "µm", _both("contour_um"), priority=2),
+    Column("time", "s", _both("cycle_time_s"), priority=3),
+    Column("longer", "%", "longer_percent", digits=1),
+    Column("alarms", value="alarms"),
+)
+
+
+@dataclass(frozen=True, repr=False)
+class Batch(Result):
+    """A command over many programs and machines.
+
+    Attributes:
+        command: that was run.
+        output: folder of the results.
+        rows: one for each program on each machine, in the order in which they were given.
+        summary: the table of all rows as a file.
+        not_done: runs that were not begun or not ended, because the batch was stopped.
+        stopped: why it was; empty: it was not.
+        warnings: what to heed.
+        wall_s: of the batch.
+        processes: at a time.
+        html: folder of the pages; empty: there are none.
+    """
+
+    json_extra: ClassVar[dict[str, Any]] = {**Result.json_extra, "counts": dict[str, int]}
+
+    command: str
+    output: str
+    rows: tuple[BatchRow, ...]
+    summary: str
+    not_done: int
+    stopped: str = ""
+    warnings: tuple[str, ...] = ()
+    wall_s: float = 0.0
+    processes: int = field(default=1, metadata=hidden())
+    html: str = field(default="", metadata=hidden())
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many runs ended how."""
+        return {name: sum(row.ended == name for row in self.rows) for name in ("ok", "not ok", "refused", "failed")}
+
+    @property
+    def ok(self) -> bool:
+        """Every run was done, and is within tolerance."""
+        return not self.not_done and all(row.ended == "ok" for row in self.rows)
+
+    @property
+    def answer(self) -> str:
+        """How many are done, how many are not, and how long it took."""
+        counts, whole = self.counts, len(self.rows) + self.not_done
+        trouble = [f"{count} {name}" for name, count in counts.items() if count and name != "ok"]
+        trouble += [f"{self.not_done} not begun"] if self.not_done else []
+        earlier = sum(row.earlier for row in self.rows)
+        before = f", {earlier} of them by an earlier batch" if earlier else ""
+        tail = f"; {', '.join(trouble)}" if trouble else ""
+        return f"{counts['ok']} of {whole} runs of {self.command} are ok{before}{tail} ({self.wall_s:.1f} s)"
+
+    @property
+    def next_step(self) -> str:
+        """To the worst of what is left to do."""
+        counts = self.counts
+        if self.not_done or counts["failed"]:
+            return "settle why, then say the same again with --resume: what is done stays."
+        if counts["refused"]:
+            return f"mend what was refused ({self.summary} has why), then say the same again with --resume."
+        if counts["not ok"]:
+            return f"look at the reports of what is not ok; {self.summary} lists them."
+        return "run one of the emitted programs above the workpiece first." if self.command == "convert" else (
+            f"open {self.summary} in a spreadsheet."
+        )  # fmt: skip
+
+    def key_figures(self) -> tuple[Figure, ...]:
+        """How many runs ended how."""
+        return tuple(
+            Figure(name, "runs", None, float(count), 0, None, "", f"counts.{name}")
+            for name, count in self.counts.items()
+            if count or name == "ok"
+        )
+
+    def tables(self) -> list[Table]:
+        """What needs somebody, and what was gained; the first twenty of each."""
+        bad = sorted((row for row in self.rows if row.ended != "ok"), key=lambda row: list(_RED).index(row.ended))
+        good = sorted((row for row in self.rows if row.ended == "ok"), key=lambda row: -row.gain_um)
+        names = (
+            Column("program", value="program", left=True, link=self._link, priority=0),
+            Column("machine", value="machine", left=True, priority=4),
+        )
+        why = (Column("", value="ended", left=True, priority=0), Column("why", value="said", text=True))
+        tables = []
+        if bad:
+            tables.append(self._table("what needs somebody", (*names, *why), bad, lambda row: _RED[row.ended]))
+        if good:
+            tables.append(self._table("what is ok, by gain", (*names, *_FIGURES), good))
+        return tables
+
+    def _link(self, row: BatchRow) -> str:
+        """From the index to the page of a run."""
+        return os.path.relpath(row.page, self.html) if row.page and self.html else ""
+
+    def _table(self, title: str, columns: tuple[Column, ...], rows: list[BatchRow], style: Any = None) -> Table:
+        left = len(rows) - _SHOWN
+        caption = f"and {left} more: {self.summary}" if left > 0 else ""
+        if len({row.machine for row in self.rows}) == 1:
+            columns = tuple(column for column in columns if column.name != "machine")
+        return Table(title, columns, rows[:_SHOWN], caption, row_style=style)

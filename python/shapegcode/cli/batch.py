@@ -1,0 +1,130 @@
+"""``shapegcode batch``: a command over many programs and machines."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from pathlib import Path
+
+from shapegcode.cli.options import add_amount_arguments
+from shapegcode.cli.typed import count, seconds, size
+
+__all__ = ["add_arguments", "run"]
+
+_INDEX = "index.html"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.description = (
+        "Runs a command over many programs and machines, each run in a process of its own. Options of the command "
+        "stand behind --. Results, each complete or absent, go into the folder of -o, with batch.jsonl (what is done) "
+        "and summary.csv (all rows). Exit code 0 if all are within tolerance, 1 if some are not or were refused, 2 if "
+        "none could be started."
+    )
+    parser.add_argument(
+        "programs",
+        nargs="+",
+        metavar="PROGRAMS",
+        help="files, folders (with all below them), patterns in quotes ('parts/**/*.nc'), or @LIST: a file with one of "
+        "these per line",
+    )
+    parser.add_argument(
+        "-m",
+        "--machine",
+        required=True,
+        action="append",
+        metavar="MACHINE",
+        help="machine file or built-in machine; more than one -m: every program on each of them",
+    )
+    parser.add_argument("-o", "--output", required=True, metavar="DIR", help="folder of the results")
+    parser.add_argument(
+        "--command",
+        dest="batch_command",
+        choices=("convert", "time", "check", "feed", "measure", "simulate"),
+        default="convert",
+        help="what is done with each program (default: convert)",
+    )
+    parser.add_argument("--resume", action="store_true", help="do only what is missing, failed or changed since")
+    parser.add_argument(
+        "--jobs", type=count, default=0, metavar="N", help="processes at a time (default: one per processor)"
+    )
+    parser.add_argument(
+        "--time-limit", type=seconds, default=3600.0, metavar="TIME", help="of each run (default: 3600s)"
+    )
+    parser.add_argument(
+        "--memory-limit",
+        type=size,
+        default=0,
+        metavar="SIZE",
+        help="of each run, such as 2G, beyond what is loaded (default: none; Linux only)",
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        default=None,
+        help="run on Dask: tcp://host:port or tls://host:port; local: a cluster on this machine",
+    )
+    for name, what in (("ca", "the authority's certificate"), ("cert", "own certificate"), ("key", "own key")):
+        parser.add_argument(f"--tls-{name}", metavar="FILE", default="", help=f"{what}, for tls:// schedulers")
+    parser.add_argument("--json", metavar="FILE", default=None, help="write all rows as JSON; - for standard output")
+    parser.add_argument(
+        "--html", metavar="DIR", default=None, help="write a page for each run into this folder, and an index of them"
+    )
+    add_amount_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the batch.
+
+    Raises:
+        MachineError, ArgumentError: bad input: of the batch, not of one program.
+        OSError: a file cannot be read or written.
+    """
+    from dataclasses import replace
+
+    from shapegcode.batch.batch import Cluster, batch
+    from shapegcode.cli import ExitCode, runner
+
+    options = list(getattr(args, "rest", ()))
+    _check_options(args, options)
+    cluster = None if args.scheduler is None else Cluster(args.scheduler, args.tls_ca, args.tls_cert, args.tls_key)
+    html, args.html = args.html, None
+    name = f"{args.batch_command}: "
+    with runner.progress(f"{name}reading", args) as bar:
+
+        def tell(share: float, text: str) -> None:
+            bar.update(share)
+            bar.say(name + text)
+
+        result = batch(
+            args.programs,
+            args.machine,
+            args.output,
+            command=args.batch_command,
+            options=options,
+            jobs=args.jobs,
+            cluster=cluster,
+            resume=args.resume,
+            html=html,
+            time_limit_s=args.time_limit,
+            memory_limit_bytes=args.memory_limit,
+            on_progress=tell,
+        )
+    if html is not None:
+        args.html = str(Path(html) / _INDEX)
+        result = replace(result, html=str(html))
+    notes = []
+    if result.stopped:
+        words = [word for word in args.typed if word != "--resume"]
+        notes.append(f"go on with: {shlex.join(['shapegcode', 'batch', '--resume', *words[1:]])}")
+    code = runner.finish(result, args, notes=notes, wrote=[result.summary])
+    return ExitCode.INTERRUPTED if result.stopped == "Ctrl-C" else code
+
+
+def _check_options(args: argparse.Namespace, options: list[str]) -> None:
+    """Refuse what the command does not understand before anything is done; argparse says what."""
+    from shapegcode.cli import parser_of
+
+    target = ["-o", "out"] if args.batch_command in ("convert", "feed") else []
+    parser_of(args.batch_command).parse_args([args.batch_command, "part.nc", "-m", "vx500", *target, *options])

@@ -1,0 +1,133 @@
+"""A process that has everything loaded and forks one for each command line that it is told.
+
+``python -m shapegcode.cli.host`` reads one JSON object per line: the folder of a run, the words of its command line,
+its limits; and answers with one: exit code, time, memory. It ends when its input does, and takes a running command with
+it.
+`shapegcode.batch` is the one that asks.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import json
+import os
+import resource
+import select
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from shapegcode.batch.job import FAILED_CODES
+
+__all__ = ["main"]
+
+_LOADED = (
+    "shapegcode.cli", "shapegcode.conversion.convert", "shapegcode.shaping", "shapegcode.timing",
+    "shapegcode.checking", "shapegcode.results.made", "shapegcode.results.table", "rich.console", "rich.table",
+)  # fmt: skip
+_CODES = {name: code for code, name in FAILED_CODES.items()}
+_DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl
+
+
+def main() -> int:
+    """Serve until the input ends.
+
+    Returns:
+        The exit code.
+    """
+    for name in _LOADED:
+        importlib.import_module(name)
+    answers = os.dup(1)
+    while line := sys.stdin.buffer.readline():
+        reply = _run(json.loads(line))
+        if reply is None:
+            return 0
+        os.write(answers, json.dumps(reply).encode() + b"\n")
+    return 0
+
+
+def _run(job: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Fork, wait, and tell; None: nobody waits for the answer any more."""
+    begin = time.monotonic()
+    ended, held = os.pipe()  # the far end closes when the process ends, however it does
+    parent = os.getpid()
+    pid = os.fork()
+    if pid == 0:
+        os.close(ended)
+        _be_the_command(job, parent)
+    os.close(held)
+    limit = job["seconds"] or None
+    left = limit
+    out_of_time = False
+    while True:
+        ready, _, _ = select.select([ended, sys.stdin.fileno()], [], [], left)
+        if ended in ready:
+            break
+        if not ready or sys.stdin.fileno() in ready:
+            os.kill(pid, signal.SIGKILL)
+            out_of_time = not ready
+            if not out_of_time:
+                os.waitpid(pid, 0)
+                return None
+            left = None
+    os.close(ended)
+    _, status, used = os.wait4(pid, 0)
+    return {
+        "code": os.waitstatus_to_exitcode(status),
+        "out_of_time": out_of_time,
+        "wall_s": time.monotonic() - begin,
+        "cpu_s": used.ru_utime + used.ru_stime,
+        "peak_bytes": used.ru_maxrss * (1 if sys.platform == "darwin" else 1024),
+    }
+
+
+def _be_the_command(job: Mapping[str, Any], parent: int) -> None:
+    """Within the new process: never returns."""
+    code = _CODES["crashed"]
+    try:
+        _follow(parent)
+        logs = Path(job["logs"])
+        nothing = os.open(os.devnull, os.O_RDONLY)
+        os.dup2(nothing, 0)
+        for descriptor, name in ((1, "out"), (2, "err")):
+            os.dup2(os.open(logs / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), descriptor)
+        os.chdir(job["cwd"])
+        if job["memory_bytes"]:
+            _limit_memory(job["memory_bytes"])
+        code = importlib.import_module("shapegcode.cli").main(job["words"])
+    except MemoryError:
+        code = _CODES["out of memory"]
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        try:
+            sys.stdout.flush()
+            sys.stderr.flush()
+        finally:
+            os._exit(code)
+
+
+def _follow(parent: int) -> None:
+    """End when the host ends, though nobody tells this process."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(_CODES["crashed"])
+
+
+def _limit_memory(more_bytes: int) -> None:
+    """So much memory more than the host had loaded already."""
+    if sys.platform != "linux":
+        return  # no other system counts what is used instead of what is reserved
+    pages = int(Path("/proc/self/statm").read_text().split()[5])
+    most = pages * resource.getpagesize() + more_bytes
+    resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
