@@ -40,6 +40,14 @@ from shapegcode._core import (
     worst_residual as worst_residual,
     zv as zv,
 )
+from shapegcode.batching.batch import (
+    Cluster as Cluster,
+    batch as batch,
+)
+from shapegcode.batching.result import (
+    Batch as Batch,
+    BatchRow as BatchRow,
+)
 from shapegcode.characterization.characterize import characterize as characterize
 from shapegcode.characterization.clock.learn import learn_clock as learn_clock
 from shapegcode.characterization.clock.plots import plot_clock as plot_clock

@@ -176,7 +176,7 @@ PACKAGE_FOLDERS = [
     "testcut",
     "demos",
     "setup",
-    "batch",
+    "batching",
     "cli",
 ]
 # What stands at the root of the package; `errors` and the extension module may be imported by all.

@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
     """
     from dataclasses import replace
 
-    from shapegcode.batch.batch import Cluster, batch
+    from shapegcode.batching.batch import Cluster, batch
     from shapegcode.cli import ExitCode, runner
 
     options = list(getattr(args, "rest", ()))

@@ -39,7 +39,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "batch": (
         "shapegcode batch parts -m mine.toml -o shaped --html pages",
-        "shapegcode batch 'parts/**/*.nc' -m a.toml -m b.toml -o shaped --resume -- --shaper zvd",
+        "shapegcode batch 'parts/**/*.nc' -m a.toml -m b.toml -o times --command time --resume",
     ),
     "setup": (
         "shapegcode setup -o mine.toml",

@@ -1,9 +1,9 @@
 """A process that has everything loaded and forks one for each command line that it is told.
 
-``python -m shapegcode.cli.host`` reads one JSON object per line: the folder of a run, the words of its command line,
-its limits; and answers with one: exit code, time, memory. It ends when its input does, and takes a running command with
-it.
-`shapegcode.batch` is the one that asks.
+``python -m shapegcode.cli.host convert`` reads one JSON object per line: the folder of a run, the words of its command
+line, its limits; and answers with one: exit code, time, memory. It ends when its input does, and takes a running
+command with it.
+`shapegcode.batching` is the one that asks.
 """
 
 from __future__ import annotations
@@ -22,14 +22,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from shapegcode.batch.job import FAILED_CODES
+from shapegcode.batching.job import FAILED_CODES
 
 __all__ = ["main"]
 
-_LOADED = (
-    "shapegcode.cli", "shapegcode.conversion.convert", "shapegcode.shaping", "shapegcode.timing",
-    "shapegcode.checking", "shapegcode.results.made", "shapegcode.results.table", "rich.console", "rich.table",
-)  # fmt: skip
+_LOADED = ("shapegcode.cli", "shapegcode.results.made", "shapegcode.results.table", "rich.console", "rich.table")
+_OF_COMMAND = {
+    "convert": ("shapegcode.conversion.convert", "shapegcode.shaping"),
+    "time": ("shapegcode.timing.cycle_time",),
+    "check": ("shapegcode.checking.check",),
+    "feed": ("shapegcode.feed.schedule",),
+    "measure": ("shapegcode.metrology.measure",),
+    "simulate": ("shapegcode.simulation.simulate",),
+}
 _CODES = {name: code for code, name in FAILED_CODES.items()}
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl
 
@@ -40,7 +45,7 @@ def main() -> int:
     Returns:
         The exit code.
     """
-    for name in _LOADED:
+    for name in (*_LOADED, *(name for command in sys.argv[1:] for name in _OF_COMMAND[command])):
         importlib.import_module(name)
     answers = os.dup(1)
     while line := sys.stdin.buffer.readline():

@@ -10,7 +10,6 @@ did stands in the shaped text.
 from __future__ import annotations
 
 import argparse
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,8 +21,6 @@ if TYPE_CHECKING:
 __all__ = ["run_all"]
 
 _TABLES = ("csv", "npz", "html")
-_COMMENT = re.compile(rb"\([^()\r\n]*\)")
-_RETURNS, _ENDS = re.compile(rb"M *0*99(?!\d)"), re.compile(rb"M *0*(?:2|30)(?!\d)")
 
 
 def run_all(args: argparse.Namespace) -> int:
@@ -88,13 +85,13 @@ def _called(several: Gathered, machine: Machine) -> set[int]:
 
 def _left_over(several: Gathered) -> set[int]:
     """Places of subprograms beside shaped programs, whose text has taken in what they called."""
+    from shapegcode.program.several import is_subprogram
     from shapegcode.program.stamp import STAMP_BEGIN
 
     if STAMP_BEGIN not in several.text:
         return set()
     texts = [several.text[place.text_begin : place.text_end] for place in several.places]
-    plain = [b"" if STAMP_BEGIN in text else _COMMENT.sub(b"", text).upper() for text in texts]
-    return {index for index, text in enumerate(plain) if _RETURNS.search(text) and not _ENDS.search(text)}
+    return {index for index, text in enumerate(texts) if STAMP_BEGIN not in text and is_subprogram(text)}
 
 
 def _run_one(args: argparse.Namespace, several: Gathered) -> int:

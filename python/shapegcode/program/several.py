@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 from shapegcode import _core
 
-__all__ = ["ProgramPlace", "place_of", "programs_of"]
+__all__ = ["ProgramPlace", "is_subprogram", "place_of", "programs_of"]
 
 _PLACE = re.compile(r"#([1-9][0-9]{0,8})")
 _NUMBER = re.compile(r"[Oo:]?0*([1-9][0-9]{0,7})")
+_COMMENT = re.compile(rb"\([^()\r\n]*\)")
+_RETURNS, _ENDS = re.compile(rb"M *0*99(?!\d)"), re.compile(rb"M *0*(?:2|30)(?!\d)")
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,19 @@ class ProgramPlace:
     first_line: int
     text_begin: int
     text_end: int
+
+
+def is_subprogram(text: bytes) -> bool:
+    """Whether a program only returns to who called it: M99, and neither M02 nor M30.
+
+    Args:
+        text: of the program.
+
+    Returns:
+        True for a subprogram.
+    """
+    plain = _COMMENT.sub(b"", text).upper()
+    return _RETURNS.search(plain) is not None and _ENDS.search(plain) is None
 
 
 def programs_of(text: bytes) -> tuple[ProgramPlace, ...]:

@@ -30,6 +30,7 @@ from shapegcode.results.result import Result
 __all__ = ["MODULES", "NotKept", "load_result", "made_of", "revived", "written_reports"]
 
 MODULES: Mapping[str, str] = {
+    "Batch": "batching.result",
     "Characterisation": "characterization.result",
     "CharacterisationTests": "characterization.result",
     "Check": "checking.result",

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from shapegcode.batch.inputs import Source, called_files
-from shapegcode.batch.job import Job, working_name
+from shapegcode.batching.inputs import Source, called_files
+from shapegcode.batching.job import BatchJob, working_name
 from shapegcode.errors import ArgumentError
 from shapegcode.machine import Machine
 
@@ -18,6 +18,9 @@ COMMANDS = ("convert", "time", "check", "feed", "measure", "simulate")
 """Commands of one program that can be run over many."""
 
 _WRITES = ("convert", "feed")
+_OF_ONE_RUN = (
+    "-o", "--output", "-m", "--machine", "--json", "--html", "--html-script", "--csv", "--npz", "--plots",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,7 @@ class Plan:
         shared: content of the files that many of them read, by name.
     """
 
-    jobs: tuple[Job, ...]
+    jobs: tuple[BatchJob, ...]
     shared: Mapping[str, bytes]
 
 
@@ -65,9 +68,12 @@ def plan(
     if twice := {label for label in labels if labels.count(label) > 1}:
         raise ArgumentError(f"two machines would be written to {output}/{min(twice)}: rename one of the files")
     loaded = [Machine.load(machine) for machine in machines]
+    for word in options:
+        if word.partition("=")[0] in _OF_ONE_RUN:
+            raise ArgumentError(f"{word} behind --: names a file of one run; a batch has -m, -o and --html itself")
     words, given = _with_files(options)
     shared = {name: Path(path).read_bytes() for name, path in given}
-    jobs: list[Job] = []
+    jobs: list[BatchJob] = []
     for name, label, machine in zip(machines, labels, loaded, strict=True):
         below = label if len(machines) > 1 else ""
         own = [(working_name(name), name)] if os.path.exists(name) else []
@@ -82,7 +88,7 @@ def plan(
             line += [*([] if _says_how_much(words) else ["-q"]), *words]
             files = dict(_read_by(source, machine))
             jobs.append(
-                Job(
+                BatchJob(
                     source.path, name, tuple(line), (*files.items(), *own, *given), target, os.path.getsize(source.path)
                 )
             )

@@ -16,7 +16,7 @@ from typing import Literal
 
 from shapegcode.results.made import this_version
 
-__all__ = ["FAILED_CODES", "Ending", "Job", "Outcome", "Packed", "pack", "working_name"]
+__all__ = ["FAILED_CODES", "Ending", "BatchJob", "JobOutcome", "Packed", "pack", "working_name"]
 
 Ending = Literal["ended", "crashed", "killed", "out of time", "out of memory", "other version"]
 """How a run ended: by itself with an exit code, or not."""
@@ -26,7 +26,7 @@ FAILED_CODES = {97: "crashed", 98: "out of memory"}
 
 
 @dataclass(frozen=True)
-class Job:
+class BatchJob:
     """A run that is to be done.
 
     Attributes:
@@ -80,7 +80,7 @@ class Packed:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class JobOutcome:
     """What came back.
 
     Attributes:
@@ -118,7 +118,12 @@ def working_name(path: str | Path) -> str:
 
 
 def pack(
-    job: Job, *, seconds: float = 0.0, memory_bytes: int = 0, scratch: str = "", kept: Mapping[str, bytes] | None = None
+    job: BatchJob,
+    *,
+    seconds: float = 0.0,
+    memory_bytes: int = 0,
+    scratch: str = "",
+    kept: Mapping[str, bytes] | None = None,
 ) -> Packed:
     """Read what a run reads.
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from shapegcode.errors import ArgumentError
 from shapegcode.program.reading import PROGRAM_SUFFIXES, program_loader
+from shapegcode.program.several import is_subprogram
 
 if TYPE_CHECKING:
     from shapegcode.machine import Machine
@@ -31,10 +32,12 @@ class Source:
     Attributes:
         path: as it was given.
         place: where its results go below the output folder: its path below the folder that was given.
+        subprogram: it stands in a folder that was given, and only returns to who called it: it is done there.
     """
 
     path: str
     place: str
+    subprogram: bool = False
 
 
 def find_programs(given: Sequence[str], output: str | Path) -> tuple[Source, ...]:
@@ -108,7 +111,7 @@ def _in_folder(folder: Path, avoid: Path) -> Iterator[Source]:
             if suffix in PROGRAM_SUFFIXES and (suffix or _NUMBERED.fullmatch(stem)):
                 count += 1
                 path = os.path.join(where, name)
-                yield Source(path, os.path.relpath(path, folder))
+                yield Source(path, os.path.relpath(path, folder), is_subprogram(Path(path).read_bytes()))
     if not count:
         raise ArgumentError(f"{folder}: no program in it; programs end in {', '.join(filter(None, PROGRAM_SUFFIXES))}")
 

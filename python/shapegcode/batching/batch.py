@@ -14,17 +14,18 @@ import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from shapegcode.batch.inputs import find_programs
-from shapegcode.batch.job import Job, Outcome, Packed, pack
-from shapegcode.batch.manifest import Manifest
-from shapegcode.batch.plan import COMMANDS, plan
-from shapegcode.batch.process import end_hosts, run_packed
-from shapegcode.batch.result import Batch, BatchRow
-from shapegcode.batch.row import row_of, row_read
+from shapegcode.batching.inputs import find_programs
+from shapegcode.batching.job import BatchJob, JobOutcome, Packed, pack
+from shapegcode.batching.manifest import Manifest
+from shapegcode.batching.plan import COMMANDS, plan
+from shapegcode.batching.process import end_hosts, run_packed
+from shapegcode.batching.result import Batch, BatchRow
+from shapegcode.batching.row import row_of, row_read
 from shapegcode.errors import ArgumentError
 from shapegcode.io.atomic import write_bytes, write_text
 from shapegcode.results.json import plain
@@ -38,6 +39,7 @@ _SUMMARY = "summary.csv"
 _AHEAD = 2
 """Runs that are ready for each process, so that none waits for files."""
 _TOLD_EVERY_S = 1.0
+_NAMED = 5
 
 
 @dataclass(frozen=True)
@@ -106,40 +108,53 @@ def batch(
         raise ArgumentError(f"jobs {jobs}, time limit {time_limit_s}, memory limit {memory_limit_bytes}: not below 0")
     begin = time.monotonic()
     sources = find_programs([str(each) for each in programs], output)
+    called = [source.path for source in sources if source.subprogram]
+    sources = tuple(source for source in sources if not source.subprogram)
     planned = plan(sources, [str(each) for each in machines], str(output), command, options, html)
     processes = jobs or os.cpu_count() or 1
     with contextlib.ExitStack() as stack:
+        # A scheduler that does not answer is found before anything is written; processes of this machine end before
+        # the folder goes that they work in.
+        remote = None if cluster is None else stack.enter_context(_remote_executor(processes, cluster))
         manifest = Manifest(Path(output), resume=resume)
         stack.callback(manifest.close)
         scratch = Path(output) / _SCRATCH
         shutil.rmtree(scratch, ignore_errors=True)  # of a batch that was killed
         scratch.mkdir()
         stack.callback(shutil.rmtree, scratch, ignore_errors=True)
-        executor, slots = stack.enter_context(_executor(processes, cluster))
+        executor, slots = remote or stack.enter_context(_local_executor(processes))
         prepare = functools.partial(
             pack, seconds=time_limit_s, memory_bytes=memory_limit_bytes, scratch="" if cluster else str(scratch),
             kept=planned.shared,
         )  # fmt: skip
-        run = _Run(planned.jobs, manifest, [Path(output), *([Path(html)] if html else [])], resume, on_progress)
+        run = _Runs(planned.jobs, manifest, [Path(output), *([Path(html)] if html else [])], resume, on_progress)
         stopped = run.all(executor, slots, prepare)
     rows = tuple(run.rows[job.key] for job in planned.jobs if job.key in run.rows)
     summary = Path(output) / _SUMMARY
     write_text(summary, "".join(summary_lines(rows)))
     return Batch(
         command, str(output), rows, str(summary), len(planned.jobs) - len(rows), stopped,
-        tuple([f"stopped: {stopped}"] if stopped else []), time.monotonic() - begin, slots,
+        _warnings(stopped, called), time.monotonic() - begin, slots,
     )  # fmt: skip
 
 
-@contextlib.contextmanager
-def _executor(processes: int, cluster: Cluster | None) -> Iterator[tuple[Executor, int]]:
-    if cluster is not None:
-        from shapegcode.batch.cluster import cluster_executor
+def _warnings(stopped: str, called: Sequence[str]) -> tuple[str, ...]:
+    found = [f"stopped: {stopped}"] if stopped else []
+    if called:
+        more = f" and {len(called) - _NAMED} more" if len(called) > _NAMED else ""
+        found.append(f"subprograms (M99), done where they are called: {', '.join(called[:_NAMED])}{more}")
+    return tuple(found)
 
-        tls = {name: getattr(cluster, name) for name in ("tls_ca", "tls_cert", "tls_key")}
-        with cluster_executor(cluster.scheduler, processes=processes, **tls) as found:
-            yield found
-        return
+
+def _remote_executor(processes: int, cluster: Cluster) -> AbstractContextManager[tuple[Executor, int]]:
+    from shapegcode.batching.cluster import cluster_executor
+
+    tls = {name: getattr(cluster, name) for name in ("tls_ca", "tls_cert", "tls_key")}
+    return cluster_executor(cluster.scheduler, processes=processes, **tls)
+
+
+@contextlib.contextmanager
+def _local_executor(processes: int) -> Iterator[tuple[Executor, int]]:
     executor = ThreadPoolExecutor(max_workers=processes)
     try:
         yield executor, processes
@@ -149,11 +164,11 @@ def _executor(processes: int, cluster: Cluster | None) -> Iterator[tuple[Executo
         executor.shutdown()
 
 
-class _Run:
+class _Runs:
     """The runs of one batch."""
 
     def __init__(
-        self, jobs: Sequence[Job], manifest: Manifest, folders: Sequence[Path], resume: bool, on_progress: Progress
+        self, jobs: Sequence[BatchJob], manifest: Manifest, folders: Sequence[Path], resume: bool, on_progress: Progress
     ) -> None:
         self.rows: dict[str, BatchRow] = {}
         self._jobs, self._manifest, self._resume, self._on_progress = jobs, manifest, resume, on_progress
@@ -161,15 +176,15 @@ class _Run:
         self._whole_bytes = sum(job.size_bytes for job in jobs) or 1
         self._done_bytes, self._told = 0, 0.0
 
-    def all(self, executor: Executor, slots: int, prepare: Callable[[Job], Packed]) -> str:
+    def all(self, executor: Executor, slots: int, prepare: Callable[[BatchJob], Packed]) -> str:
         """Do them; gives why it stopped before the end, or nothing."""
-        waiting: dict[Future[Outcome], tuple[Job, str]] = {}
+        waiting: dict[Future[JobOutcome], tuple[BatchJob, str]] = {}
         try:
             for job in self._jobs:
                 try:
                     packed = prepare(job)
                 except OSError as error:
-                    outcome = Outcome("crashed", 0, "", f"{error.filename}: {error.strerror}", {})
+                    outcome = JobOutcome("crashed", 0, "", f"{error.filename}: {error.strerror}", {})
                     self._keep(job, "", outcome)
                     continue
                 if self._is_done(job, packed.fingerprint):
@@ -190,7 +205,7 @@ class _Run:
                 future.cancel()
         return ""
 
-    def _collect(self, waiting: dict[Future[Outcome], tuple[Job, str]], slots: int) -> None:
+    def _collect(self, waiting: dict[Future[JobOutcome], tuple[BatchJob, str]], slots: int) -> None:
         """Wait for one of them at least, and keep what came back."""
         while True:
             self._tell(min(slots, len(waiting)))
@@ -206,12 +221,12 @@ class _Run:
             except OSError as error:
                 if error.errno in (errno.ENOSPC, errno.EDQUOT):
                     raise
-                outcome = Outcome("crashed", 0, "", str(error), {})
+                outcome = JobOutcome("crashed", 0, "", str(error), {})
             except Exception as error:
-                outcome = Outcome("killed", 0, "", f"{type(error).__name__}: {error}".splitlines()[0], {})
+                outcome = JobOutcome("killed", 0, "", f"{type(error).__name__}: {error}".splitlines()[0], {})
             self._keep(job, fingerprint, outcome)
 
-    def _is_done(self, job: Job, fingerprint: str) -> bool:
+    def _is_done(self, job: BatchJob, fingerprint: str) -> bool:
         """An earlier batch did the same, and its files are there as it left them."""
         row = self._manifest.earlier.get(job.key) if self._resume else None
         if row is None or row.get("fingerprint") != fingerprint or row["ended"] == "failed":
@@ -222,7 +237,7 @@ class _Run:
         self.rows[job.key] = row_read(row, earlier=True)
         return True
 
-    def _keep(self, job: Job, fingerprint: str, outcome: Outcome) -> None:
+    def _keep(self, job: BatchJob, fingerprint: str, outcome: JobOutcome) -> None:
         """Write what a run wrote, then its row."""
         row, written = row_of(job, outcome)
         if row.ended == "failed" and os.strerror(errno.ENOSPC) in outcome.complained:

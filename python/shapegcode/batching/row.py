@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from shapegcode.batch.job import Job, Outcome
-from shapegcode.batch.result import BatchRow, Ended, figures_of
+from shapegcode.batching.job import BatchJob, JobOutcome
+from shapegcode.batching.result import BatchRow, Ended, figures_of
 from shapegcode.results.outcome import Pair
 
 __all__ = ["row_of", "row_read"]
@@ -20,7 +20,7 @@ _PAIRS = ("residual_um", "contour_um", "cycle_time_s")
 _PREFIX = "shapegcode: "
 
 
-def row_of(job: Job, outcome: Outcome) -> tuple[BatchRow, Mapping[str, bytes]]:
+def row_of(job: BatchJob, outcome: JobOutcome) -> tuple[BatchRow, Mapping[str, bytes]]:
     """The row of a run, and the files of it that count.
 
     Args:
@@ -52,7 +52,7 @@ def row_of(job: Job, outcome: Outcome) -> tuple[BatchRow, Mapping[str, bytes]]:
     return row_read(row, earlier=False), written
 
 
-def _said(outcome: Outcome, ended: Ended) -> str:
+def _said(outcome: JobOutcome, ended: Ended) -> str:
     """The answer, or what went wrong."""
     text = outcome.said if ended in ("ok", "not ok") else outcome.complained
     lines = [line for line in text.strip().splitlines() if line]

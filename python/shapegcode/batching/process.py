@@ -19,7 +19,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from shapegcode.batch.job import FAILED_CODES, Ending, Outcome, Packed
+from shapegcode.batching.job import FAILED_CODES, Ending, JobOutcome, Packed
 from shapegcode.results.made import this_version
 
 __all__ = ["end_hosts", "run_packed"]
@@ -32,9 +32,9 @@ _stopped = threading.Event()
 class _Host:
     """A process that forks one for each job; `ask` may be called by one thread at a time."""
 
-    def __init__(self) -> None:
+    def __init__(self, command: str) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "shapegcode.cli.host"],
+            [sys.executable, "-m", "shapegcode.cli.host", command],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             # Ctrl-C of a terminal is for the batch alone, which ends its hosts itself.
@@ -77,7 +77,7 @@ def end_hosts() -> None:
         _hosts.discard(host)
 
 
-def run_packed(packed: Packed) -> Outcome:
+def run_packed(packed: Packed) -> JobOutcome:
     """Run a job in a process of its own, in a folder that is gone afterwards.
 
     Args:
@@ -90,7 +90,7 @@ def run_packed(packed: Packed) -> Outcome:
         OSError: there is no room for its folder.
     """
     if packed.version != (mine := this_version()):
-        return Outcome("other version", 0, "", f"this worker has {mine}, the batch needs {packed.version}", {})
+        return JobOutcome("other version", 0, "", f"this worker has {mine}, the batch needs {packed.version}", {})
     folder = Path(tempfile.mkdtemp(prefix="job-", dir=packed.scratch or None))
     try:
         return _run_in(folder, packed)
@@ -98,7 +98,7 @@ def run_packed(packed: Packed) -> Outcome:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _run_in(folder: Path, packed: Packed) -> Outcome:
+def _run_in(folder: Path, packed: Packed) -> JobOutcome:
     names = [*packed.files]
     # Names may lead upwards: the run's folder lies so deep that they end within what is removed.
     depth = max(_ups(word) for word in (*names, *packed.words))
@@ -112,7 +112,7 @@ def _run_in(folder: Path, packed: Packed) -> Outcome:
         _make_parent(cwd, word)
     host = getattr(_own, "host", None)
     if host is None or host not in _hosts:
-        host = _own.host = _Host()
+        host = _own.host = _Host(packed.words[0])
     answer = host.ask(
         {"cwd": str(cwd), "logs": str(folder), "words": packed.words, "seconds": packed.seconds,
          "memory_bytes": packed.memory_bytes}
@@ -121,11 +121,11 @@ def _run_in(folder: Path, packed: Packed) -> Outcome:
         host.end()
         _hosts.discard(host)
         _own.host = None
-        return Outcome("killed", 0, "", "the process that ran it was killed", {})
+        return JobOutcome("killed", 0, "", "the process that ran it was killed", {})
     said, complained = (_text(folder / name) for name in ("out", "err"))
     ending, why = _ending(answer, packed, complained)
     files = dict(_written(folder / "files", cwd, names)) if ending == "ended" else {}
-    return Outcome(
+    return JobOutcome(
         ending, answer["code"] if ending == "ended" else 0, said, why, files, answer["wall_s"], answer["cpu_s"],
         answer["peak_bytes"],
     )  # fmt: skip
