@@ -192,7 +192,7 @@ def test_an_option_has_one_name_and_one_unit_on_every_command() -> None:
         importlib.import_module(command.module).add_arguments(parser)
         look(parser)
     # What is written has the name of what it is, and the program of a test cut its number.
-    written = {"--output", "--program"}
+    written = {"--html", "--output", "--program"}
     several = {option: rules for option, rules in found.items() if len(rules) > 1 and option not in written}
     assert several == {}
 

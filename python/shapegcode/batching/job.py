@@ -16,7 +16,7 @@ from typing import Literal
 
 from shapegcode.results.made import this_version
 
-__all__ = ["FAILED_CODES", "Ending", "BatchJob", "JobOutcome", "Packed", "pack", "working_name"]
+__all__ = ["FAILED_CODES", "BatchJob", "Ending", "JobOutcome", "Packed", "pack", "working_name"]
 
 Ending = Literal["ended", "crashed", "killed", "out of time", "out of memory", "other version"]
 """How a run ended: by itself with an exit code, or not."""
