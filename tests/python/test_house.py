@@ -15,6 +15,8 @@ from pathlib import Path
 import pytest
 import write_docs
 
+from shapegcode.program.stamp import REGION_MARK
+
 ROOT = Path(__file__).resolve().parents[2]
 CPP = ROOT / "cpp"
 PACKAGE = ROOT / "python" / "shapegcode"
@@ -282,6 +284,26 @@ HEAVY = {"numpy", "scipy", "matplotlib", "pydantic"}
 )
 def test_the_command_line_starts_light(statement: str) -> None:
     assert loaded_after(statement) & HEAVY == set()
+
+
+def test_ten_lines_are_converted_without_what_takes_long_to_load(tmp_path: Path) -> None:
+    """Nor do a choice of shapers, a check and a cycle time load SciPy."""
+    program = tmp_path / "ten.nc"
+    square = ("G01 Z0. F1000.", "G01 X40. Y0. F3000.", "X40. Y30.", "G03 X20. Y50. R20.", "G01 X0. Y50.", "X0. Y0.")
+    program.write_text("\n".join(("G21 G17 G90 G54", "G00 X0. Y0. Z5.", *square, "G00 Z5.", "M30", "")))
+    output = tmp_path / "shaped.nc"
+    commands = [
+        ["convert", str(program), "-m", "vx500", "-o", str(output)],
+        ["check", str(program), "-m", "vx500"],
+        ["time", str(program), "-m", "vx500"],
+        ["shaper", "--mode", "46:0.02", "--mode", "80:0.02"],
+    ]
+    loaded = loaded_after(
+        "import contextlib\nfrom shapegcode.cli import main\n"
+        f"with contextlib.redirect_stdout(sys.stderr):\n    for words in {commands!r}:\n        assert main(words) < 2"
+    )
+    assert loaded & {"scipy", "shapely", "matplotlib", "plotly", "pandas", "xarray", "pyuff"} == set()
+    assert REGION_MARK in output.read_text(encoding="ascii")  # it was shaped
 
 
 def test_plotting_is_loaded_only_when_used() -> None:
