@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -11,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from shapegcode import _core
+from shapegcode.conversion.ahead import cores
 from shapegcode.conversion.benefit import KeptRegion, gain_um, most_to_gain_um
 from shapegcode.conversion.budget import Budget
 from shapegcode.conversion.figures import (
@@ -114,8 +114,8 @@ def convert(
             f"{program.source}:1:1: written by shapegcode already (its header says so): convert the original"
         )
     _refuse_own_marks(program)
-    # Plays the originals, and what was emitted, on all cores.
-    pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
+    # Shapes regions, plays the originals, and what was emitted, on all cores.
+    pool = ThreadPoolExecutor(max_workers=cores())
     try:
         run = _Run(program, machine, block_period_s, budget, pool, on_progress)
         return run.conversion(shape_all=shape_all)
@@ -176,7 +176,7 @@ class _Run:
         self._grid_for = partial(choose_grid, machine, fastest_mm_per_s=fastest)
         self.grid = self._grid_for(block_period_s)
         self.model = MachineModel(machine)
-        self.writer = TextWriter(program, self.model, self.grid)
+        self.writer = TextWriter(program, self.model, self.grid, pool)
         self.judge = Judge(self.model)
         self.reasons = [why_kept(region, machine, self.grid) for region in program.regions]
         self.feed_share = [1.0] * len(program.regions)
@@ -252,7 +252,7 @@ class _Run:
 
     def _write(self, grid: Grid, on_progress: Callable[[float, int], None] = lambda _done, _total: None) -> Written:
         if self.writer.grid is not grid:
-            self.writer = TextWriter(self.program, self.model, grid)
+            self.writer = TextWriter(self.program, self.model, grid, self.pool)
         # Of what was given up for a budget, or gains nothing, one sentence speaks for all.
         given_up = {} if self.spending is None else self.spending.given_up
         written = self.writer.write(self.reasons, self.room_um, self.feed_share, {*given_up, *self.kept}, on_progress)

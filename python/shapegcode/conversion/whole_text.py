@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from functools import partial
 
 from shapegcode import _core
+from shapegcode.conversion.ahead import Ahead, OnShare
 from shapegcode.conversion.budget import TransferLoad, measure_load
 from shapegcode.conversion.readback import Placed
 from shapegcode.conversion.spending import keepable
@@ -23,7 +24,8 @@ __all__ = ["TextWriter", "Written", "why_kept"]
 _MOST_PERIODS = 10_000_000  # of a region: what fits into half a gigabyte
 
 Step = Callable[[float, int], None]
-OnMove = Callable[[float], None]
+Aim = tuple[float, float]
+"""Tolerance, µm, and share of the feed for which a region is shaped."""
 
 
 def why_kept(region: _core.Region, machine: Machine, grid: Grid) -> str:
@@ -70,16 +72,18 @@ class TextWriter:
         program: the original.
         model: of the machine; its file says how text is written.
         grid: block period and shapers.
+        pool: shapes regions that do not touch each other; the text does not depend on its threads.
     """
 
-    def __init__(self, program: Program, model: MachineModel, grid: Grid) -> None:
+    def __init__(self, program: Program, model: MachineModel, grid: Grid, pool: Executor) -> None:
         self._program = program
         self._machine = model.machine
         self._model = model
         self.grid = grid
         self._regions = RegionWriter(model, grid)
+        self._pool = pool
         # By region: tolerance and feed for which it was shaped, and what it came to.
-        self._shaped: dict[int, tuple[tuple[float, float], EmittedRegion]] = {}
+        self._shaped: dict[int, tuple[Aim, EmittedRegion]] = {}
 
     def write(
         self,
@@ -109,10 +113,12 @@ class TextWriter:
         line = 1 + sum(part.count(b"\n") for part in parts)
         position = core.header_offset
         written = Written(b"", [], 0, [], {}, {}, {})
-        blocks, size, begun = 0, core.size, 0
+        blocks, size = 0, core.size
+        aims = {index: (room_um[index], feed_share[index]) for index, why in enumerate(reasons) if not why}
         # Moves that stay as they are: all, less those of the regions that are shaped.
-        shaped_moves = sum(len(each.path) for each, why in zip(regions, reasons, strict=True) if not why)
+        shaped_moves = sum(len(regions[index].path) for index in aims)
         kept_moves = core.move_count - shaped_moves
+        ahead = self._ahead(aims, lambda done: on_progress(done, shaped_moves))
         for index, (region, reason) in enumerate(zip(regions, reasons, strict=True)):
             between = core.slice(position, region.text_begin)
             position = region.text_end
@@ -121,11 +127,10 @@ class TextWriter:
             if not reason:
                 size -= region.text_end - region.text_begin
                 try:
-                    aim = room_um[index], feed_share[index]
-                    room = self._room(size, blocks + kept_moves)
-                    tell = partial(_tell, on_progress, begun, shaped_moves)
-                    shaped = self._shape(index, region, aim, room, tell)
+                    shaped = self._shaped_region(index, aims[index], ahead)
+                    self._room(size, blocks + kept_moves).require(len(shaped.text), shaped.blocks)
                 except NoRoomError as error:
+                    shaped = None
                     written.no_room[index] = str(error)
             if shaped is None:
                 if index not in untold:
@@ -143,9 +148,6 @@ class TextWriter:
                     written.planned_um[index] = shaped.planned_um
                 bits = self._machine.controller.dnc_bits_per_character
                 written.loads[index] = measure_load(region, shaped, self.grid, bits)
-            if not reason:
-                begun += len(region.path)
-                on_progress(begun, shaped_moves)
             line += text.count(b"\n")
             parts += [between, text]
         parts.append(core.slice(position, core.size))
@@ -159,25 +161,37 @@ class TextWriter:
         controller = self._machine.controller
         return Room(controller.max_program_bytes - size, controller.max_program_moves - moves, self._machine)
 
-    def _shape(
-        self, index: int, region: _core.Region, aim: tuple[float, float], room: Room, on_move: OnMove
-    ) -> EmittedRegion:
-        """The region's text; one whose tolerance and feed are as they were in the text before is not shaped again."""
-        if index not in self._shaped or self._shaped[index][0] != aim:
-            self._shaped[index] = (aim, self._shaped_anew(region, *aim, room, on_move))
-        shaped = self._shaped[index][1]
-        room.require(len(shaped.text), shaped.blocks)
-        return shaped
+    def _ahead(self, aims: Mapping[int, Aim], on_moves: Callable[[float], None]) -> Ahead[EmittedRegion]:
+        """Regions under way in the pool; one whose tolerance and feed are as in the text before is not shaped again."""
+        regions = self._program.regions
+        # None may have more than the whole program; beside the others it may turn out to be too much all the same.
+        room = self._room(0, 0)
+
+        def shaping(index: int, region: _core.Region, aim: Aim) -> Callable[[OnShare], EmittedRegion]:
+            return lambda on_share: self._shaped_anew(region, *aim, room, on_share)
+
+        tasks = {index: shaping(index, regions[index], aim) for index, aim in aims.items() if self._is_new(index, aim)}
+        weights = {index: float(len(regions[index].path)) for index in aims}
+        return Ahead(self._pool, tasks, weights, on_moves)
+
+    def _is_new(self, index: int, aim: Aim) -> bool:
+        return index not in self._shaped or self._shaped[index][0] != aim
+
+    def _shaped_region(self, index: int, aim: Aim, ahead: Ahead[EmittedRegion]) -> EmittedRegion:
+        if self._is_new(index, aim):
+            self._shaped[index] = aim, ahead.result(index)
+        else:
+            ahead.skip(index)
+        return self._shaped[index][1]
 
     def _shaped_anew(
-        self, region: _core.Region, room_um: float, feed_share: float, room: Room, on_move: OnMove
+        self, region: _core.Region, room_um: float, feed_share: float, room: Room, on_share: OnShare
     ) -> EmittedRegion:
         limits = self._model.limits(arc_feed_ratio=self._machine.shaping.arc_feed_ratio)
         limits.feed_override = feed_share
         try:
             return self._regions.write(
-                self._program, region, limits, self._regions.tolerance(room_um), room,
-                lambda share: on_move(share * len(region.path)),
+                self._program, region, limits, self._regions.tolerance(room_um), room, on_share
             )  # fmt: skip
         except _core.ArgumentError as error:
             raise self._program.region_error(region, str(error)) from error
@@ -213,7 +227,3 @@ class TextWriter:
             notes=tuple(notes),
         )
         return stamp.lines()
-
-
-def _tell(on_progress: Step, begun: int, total: int, moves: float) -> None:
-    on_progress(begun + moves, total)

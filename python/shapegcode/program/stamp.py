@@ -46,6 +46,8 @@ _COMMENT = re.compile(rb"\(([^()\r\n]*)\)[ \t]*[\r\n]*")
 # What a control or an editor may change without changing the program: comments, blanks, %; then N and O words.
 _ANY_COMMENT = re.compile(rb"\([^()\r\n]*\)")
 _BLANKS = b" \t%"
+_CAPITALS = bytes(range(256)).upper()
+_CHUNK = 1 << 20  # bytes looked at in one go: no second text of a long program
 _LINE_HEAD = re.compile(rb"(\n(?:/\d?)?)(?:N\d+(?:[O:]\d+)?|[O:]\d+)")
 
 
@@ -179,14 +181,33 @@ def text_mark(text: bytes) -> str:
     Returns:
         The CRC-32 of the rest.
     """
-    kept = _one_end(b"\n" + _ANY_COMMENT.sub(b"", text).translate(None, _BLANKS).upper())
-    kept = _one_end(_LINE_HEAD.sub(rb"\1", kept)).strip()
-    return f"{zlib.crc32(kept):08X}"
+    mark, end, is_first = 0, 0, True
+    while end < len(text):
+        # Whole lines: what does not count never reaches over a line's end.
+        begin, end = end, 1 + text.find(b"\n", end + _CHUNK) or len(text)
+        kept = _what_counts(text[begin:end])
+        if kept:
+            mark = zlib.crc32(kept if is_first else b"\n" + kept, mark)
+            is_first = False
+    return f"{mark:08X}"
+
+
+def _what_counts(lines: bytes) -> bytes:
+    """Of whole lines; they end with LF, but for the last, and none of them is empty.
+
+    By plain replacing, as a program may have a million lines, and only where there is something to replace.
+    """
+    if b"(" in lines:
+        lines = _ANY_COMMENT.sub(b"", lines)
+    kept = _one_end(b"\n" + lines.translate(_CAPITALS, _BLANKS))
+    if b"N" in kept or b"O" in kept or b":" in kept:
+        kept = _one_end(_LINE_HEAD.sub(rb"\1", kept))
+    return kept.strip()
 
 
 def _one_end(text: bytes) -> bytes:
-    """Lines with LF, none of them empty; by plain replacing, as a program may have a million lines."""
-    text = text.replace(b"\r", b"\n")
+    if b"\r" in text:
+        text = text.replace(b"\r", b"\n")
     while b"\n\n" in text:
         text = text.replace(b"\n\n", b"\n")
     return text
@@ -203,7 +224,12 @@ def judged(text: bytes, *, good: bool) -> bytes:
         The text, as long as it was.
     """
     for before in (_PENDING, _GOOD):
-        text = text.replace(before, _GOOD if good else _BAD, 1)
+        text = _replaced(text, before, _GOOD if good else _BAD)
         if good:
             break
-    return text.replace(_MARK_PENDING, f"(TEXT {text_mark(text)})".encode(), 1)
+    return _replaced(text, _MARK_PENDING, f"(TEXT {text_mark(text)})".encode())
+
+
+def _replaced(text: bytes, before: bytes, after: bytes) -> bytes:
+    """The first of `before` replaced; a long text without it is not copied."""
+    return text.replace(before, after, 1) if before in text else text
