@@ -27,7 +27,7 @@ from shapegcode.batching.process import end_hosts, run_packed
 from shapegcode.batching.result import Batch, BatchRow
 from shapegcode.batching.row import row_of, row_read
 from shapegcode.errors import ArgumentError
-from shapegcode.io.atomic import write_bytes, write_text
+from shapegcode.io.atomic import is_temporary, write_bytes, write_text
 from shapegcode.results.json import plain
 
 __all__ = ["Cluster", "batch"]
@@ -118,8 +118,10 @@ def batch(
         remote = None if cluster is None else stack.enter_context(_remote_executor(processes, cluster))
         manifest = Manifest(Path(output), resume=resume)
         stack.callback(manifest.close)
+        if html is not None:
+            Path(html).mkdir(parents=True, exist_ok=True)
         scratch = Path(output) / _SCRATCH
-        shutil.rmtree(scratch, ignore_errors=True)  # of a batch that was killed
+        _sweep(scratch, [Path(output), *([Path(html)] if html else [])])
         scratch.mkdir()
         stack.callback(shutil.rmtree, scratch, ignore_errors=True)
         executor, slots = remote or stack.enter_context(_local_executor(processes))
@@ -136,6 +138,15 @@ def batch(
         command, str(output), rows, str(summary), len(planned.jobs) - len(rows), stopped,
         _warnings(stopped, called), time.monotonic() - begin, slots,
     )  # fmt: skip
+
+
+def _sweep(scratch: Path, folders: Sequence[Path]) -> None:
+    """Remove what a batch that was killed has left, before this one writes."""
+    shutil.rmtree(scratch, ignore_errors=True)
+    for folder in folders:
+        for file in folder.rglob(".*.tmp"):
+            if is_temporary(file):
+                file.unlink(missing_ok=True)
 
 
 def _warnings(stopped: str, called: Sequence[str]) -> tuple[str, ...]:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import stat
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-__all__ = ["named_errors", "replaced_file", "write_bytes", "write_lines", "write_text"]
+__all__ = ["is_temporary", "named_errors", "replaced_file", "write_bytes", "write_lines", "write_text"]
+
+_TEMPORARY = re.compile(r"\..+\.\d+\.tmp")
 
 
 @contextlib.contextmanager
@@ -54,7 +57,7 @@ def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
             yield stream
         return
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")  # see is_temporary
     try:
         with open(temporary, "xb") as stream:
             yield stream
@@ -66,6 +69,18 @@ def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def is_temporary(path: str | Path) -> bool:
+    """Whether a file has the name of one that was being written and never took its place: its process was killed.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        True for such a name.
+    """
+    return _TEMPORARY.fullmatch(Path(path).name) is not None
 
 
 def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:
