@@ -9,6 +9,7 @@ command with it.
 from __future__ import annotations
 
 import ctypes
+import gc
 import importlib
 import json
 import os
@@ -26,15 +27,23 @@ from shapegcode.batching.job import FAILED_CODES
 
 __all__ = ["main"]
 
-_LOADED = ("shapegcode.cli", "shapegcode.results.made", "shapegcode.results.table", "rich.console", "rich.table")
+_LOADED = (
+    "shapegcode.cli.runner", "shapegcode.cli.options", "shapegcode.cli.made", "shapegcode.cli.typed",
+    "shapegcode.results.table", "rich.console", "rich.table", "rich._emoji_codes", "importlib.metadata",
+    "importlib.readers", "email.parser", "shlex",
+)  # fmt: skip
 _OF_COMMAND = {
-    "convert": ("shapegcode.conversion.convert", "shapegcode.shaping"),
+    "convert": (
+        "shapegcode.conversion.convert", "shapegcode.shaping", "shapegcode.cli.feed", "shapegcode.cli.overrides",
+        "shapegcode.model.signatures",
+    ),
     "time": ("shapegcode.timing.cycle_time",),
     "check": ("shapegcode.checking.check",),
     "feed": ("shapegcode.feed.schedule",),
     "measure": ("shapegcode.metrology.measure",),
     "simulate": ("shapegcode.simulation.simulate",),
-}
+}  # fmt: skip
+"""What a run imports when it gets there: each would do so anew."""
 _CODES = {name: code for code, name in FAILED_CODES.items()}
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl
 
@@ -45,8 +54,10 @@ def main() -> int:
     Returns:
         The exit code.
     """
-    for name in (*_LOADED, *(name for command in sys.argv[1:] for name in _OF_COMMAND[command])):
-        importlib.import_module(name)
+    for command in sys.argv[1:]:
+        for name in (*_LOADED, f"shapegcode.cli.{command}", *_OF_COMMAND[command]):
+            importlib.import_module(name)
+    gc.freeze()  # what is loaded stays shared: a collection in a run would copy it
     answers = os.dup(1)
     while line := sys.stdin.buffer.readline():
         reply = _run(json.loads(line))

@@ -1,0 +1,144 @@
+"""What a batch costs beside the conversions: `python tests/benchmarks/batch.py [--repeat N] [--growth]`.
+
+200 programs of several sizes (random polygons of 5 to 600 moves, four samples among them) are converted four ways in
+turn: one after the other within one process (the conversions themselves, with JSON as a batch writes it), as a batch
+with one process, with two, and on a Dask cluster of this machine with two workers. `--growth` checks 100, 1 000 and
+10 000 small programs and tells the client's memory.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from processes import ROOT, launched
+from table import Sample
+
+COMMAND = Path(sys.executable).with_name("shapegcode")
+SAMPLES = ("TEST_G90.NC", "G83.NC", "VINT_360arc.NC", "helical_bore.nc")
+SIZES = (5, 10, 20, 40, 80, 150, 300, 600)
+LOOP = """
+import contextlib, os, sys, time
+from shapegcode.cli import main
+names = sorted(os.listdir("parts"))
+os.makedirs("loop")
+with open(os.devnull, "w") as nothing, contextlib.redirect_stdout(nothing):
+    main(["convert", "parts/" + names[0], "-m", "vx500", "-o", "loop/first", "-q"])
+    begin = time.perf_counter()
+    for name in names:
+        main(["convert", "parts/" + name, "-m", "vx500", "-o", "loop/" + name, "--json", f"loop/{name}.json", "-q"])
+    spent = time.perf_counter() - begin
+print(spent)
+"""
+
+
+def polygon(draw: random.Random, moves: int) -> str:
+    """A program of random feeds along random lines."""
+    lines = ["%", "O0001", "G90 G21 G17 G54", "G0 X0 Y0 Z5.", "G1 Z0. F2000."]
+    for _ in range(moves):
+        lines.append(f"X{draw.uniform(0, 120):.3f} Y{draw.uniform(0, 80):.3f} F{draw.randrange(500, 4000, 100)}")
+    return "\n".join([*lines, "G0 Z5.", "M30", "%", ""])
+
+
+def make(folder: Path, count: int, sizes: tuple[int, ...]) -> None:
+    """The programs."""
+    draw = random.Random(5)
+    parts = folder / "parts"
+    shutil.rmtree(parts, ignore_errors=True)
+    parts.mkdir()
+    for rank in range(count):
+        (parts / f"p{rank:05d}.nc").write_text(polygon(draw, draw.choice(sizes)))
+    if len(sizes) > 1:
+        for rank, name in enumerate(SAMPLES):
+            shutil.copy(ROOT / "tests" / "golden" / "programs" / name, parts / f"p{rank:05d}.nc")
+
+
+def loop(folder: Path) -> float:
+    """The conversions one after the other in one process, which has loaded everything."""
+    shutil.rmtree(folder / "loop", ignore_errors=True)
+    done = subprocess.run([sys.executable, "-c", LOOP], cwd=folder, capture_output=True, text=True, check=True)
+    return float(done.stdout)
+
+
+def batch(folder: Path, *words: str) -> float:
+    """The batch as the command says how long it took, its own start and end within."""
+    shutil.rmtree(folder / "out", ignore_errors=True)
+    begin = time.perf_counter()
+    done = subprocess.run(
+        [COMMAND, "batch", "parts", "-m", "vx500", "-o", "out", "-q", *words],
+        cwd=folder,
+        capture_output=True,
+        check=False,
+    )
+    spent = time.perf_counter() - begin
+    if done.returncode not in (0, 1):
+        raise RuntimeError(done.stderr.decode())
+    return spent
+
+
+def compare(folder: Path, count: int, repeat: int) -> None:
+    """The four ways."""
+    make(folder, count, SIZES)
+    ways: dict[str, Callable[[], float]] = {
+        "conversions alone": lambda: loop(folder),
+        "one process": lambda: batch(folder, "--jobs", "1"),
+        "two processes": lambda: batch(folder, "--jobs", "2"),
+        "Dask, two workers": lambda: batch(folder, "--jobs", "2", "--scheduler", "local"),
+    }
+    found: dict[str, list[float]] = {name: [] for name in ways}
+    for _ in range(repeat):
+        for name, run in ways.items():
+            found[name].append(run())
+    samples = {name: Sample.of(values) for name, values in found.items()}
+    print(f"{count} programs, {os.cpu_count()} processors; wall clock in s, median (least – largest) of {repeat}\n")
+    for name, sample in samples.items():
+        print(f"| {name} | {sample} |")
+    alone, one, two, dask = samples.values()
+    over = Sample.of([1e3 * (a - b) / count for a, b in zip(one.values, alone.values, strict=True)])
+    print(f"\none process / two processes: {one / two}")
+    print(f"overhead per program beside the conversion: {over} ms")
+    print(f"Dask / pool, two each: {dask / two}")
+
+
+def growth(folder: Path) -> None:
+    """Time per program and the client's memory for ten and a hundred times as many."""
+    print("\n| programs | time per program | client's largest memory |\n|--:|--:|--:|")
+    for count in (100, 1_000, 10_000):
+        make(folder, count, (4,))
+        shutil.rmtree(folder / "out", ignore_errors=True)
+        os.chdir(folder)
+        run = launched(
+            [COMMAND, "batch", "parts", "-m", "vx500", "-o", "out", "-q", "--command", "check", "--json", "all.json"],
+            os.environ, accepted=(0, 1),
+        )  # fmt: skip
+        rows = json.loads((folder / "all.json").read_text())["rows"]
+        assert len(rows) == count
+        print(f"| {count} | {1e3 * run.wall_s / count:.1f} ms | {run.peak_mb:.0f} MB |", flush=True)
+
+
+def main() -> None:
+    """Print the figures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--repeat", type=int, default=3, help="how often each way (default: %(default)d)")
+    parser.add_argument("--count", type=int, default=200, help="programs (default: %(default)d)")
+    parser.add_argument("--growth", action="store_true", help="100, 1 000 and 10 000 programs as well")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        compare(Path(name), given.count, given.repeat)
+        if given.growth:
+            growth(Path(name))
+    print(f"\nlargest memory of a process: {resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024:.0f} MB")
+
+
+if __name__ == "__main__":
+    main()
