@@ -113,6 +113,7 @@ def _be_the_command(job: Mapping[str, Any], parent: int) -> None:
         for descriptor, name in ((1, "out"), (2, "err")):
             os.dup2(os.open(logs / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), descriptor)
         os.chdir(job["cwd"])
+        os.environ["SHAPEGCODE_THREADS"] = "1"  # other runs have the other cores
         if job["memory_bytes"]:
             _limit_memory(job["memory_bytes"])
         code = importlib.import_module("shapegcode.cli").main(job["words"])

@@ -20,7 +20,10 @@ _WAITING = 2  # parts per core that are under way or done and not yet taken: wha
 
 
 def cores() -> int:
-    """Cores that this process may use."""
+    """Cores that this process may use; SHAPEGCODE_THREADS says less."""
+    said = os.environ.get("SHAPEGCODE_THREADS", "")
+    if said.isdecimal() and int(said) > 0:
+        return int(said)
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
