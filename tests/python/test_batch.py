@@ -16,7 +16,7 @@ import pytest
 
 import shapegcode as sg
 from command import COMMAND, run
-from shapegcode.batching import batch as batching
+from shapegcode.batching import runs as batching
 from shapegcode.batching.inputs import called_files, find_programs
 
 HEAD = "%\nO0001\nG90 G21 G17 G54\nG0 X0 Y0 Z5.\nG1 Z0. F3000.\n"
