@@ -82,8 +82,12 @@ def _checked_slots(client: Client, scheduler: str) -> int:
         ) from None
     if not versions:
         raise ArgumentError(f"--scheduler {scheduler}: the scheduler has no workers; start some with `dask worker`")
-    mine = this_version()
+    mine = _own_version()
     for worker, version in sorted(versions.items()):
         if version != mine:
             raise ArgumentError(f"worker {worker} has {version}, this is {mine}: install the same everywhere")
     return sum(client.nthreads().values())  # type: ignore[no-untyped-call]
+
+
+def _own_version() -> str:
+    return this_version()
