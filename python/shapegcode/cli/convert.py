@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import importlib
-import threading
 from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli.arguments import add_alias
@@ -124,8 +122,6 @@ def run(args: argparse.Namespace) -> int:
     if args.feed_schedule != bool(args.tool and args.stock) or bool(args.tool) != bool(args.stock):
         raise ArgumentError("--feed-schedule, --tool and --stock belong together: give all three or none")
     runner.check_files(args, also_written=[failed])
-    # The solvers load while the program is read.
-    threading.Thread(target=importlib.import_module, args=("shapegcode.shaping",), daemon=True).start()
     with runner.progress(f"converting {args.input}", args) as bar:
         program = read_for_conversion(args.input, machine, program_number=args.program)
         result = (_scheduled if args.feed_schedule else _converted)(args, program, machine, bar)

@@ -35,6 +35,9 @@ class Ahead(Generic[T]):
         tasks: by number, in the order in which they are asked for; each is given what it tells its share to.
         weights: of each part of the progress, those without a task among them.
         on_progress: told the sum of the weights done, in the thread that asks for results.
+
+    Attributes:
+        on_progress: as given; may be set anew.
     """
 
     def __init__(
@@ -44,13 +47,21 @@ class Ahead(Generic[T]):
         weights: Mapping[int, float],
         on_progress: Callable[[float], None],
     ) -> None:
-        self._pool, self._weights, self._on_progress = pool, weights, on_progress
+        self._pool, self._weights, self.on_progress = pool, weights, on_progress
         self._waiting = list(tasks.items())[::-1]
         self._running: dict[int, Future[T]] = {}
         # Number of a part and its share; None: a part has ended.
         self._news: SimpleQueue[tuple[int, float] | None] = SimpleQueue()
         self._shares = dict.fromkeys(weights, 0.0)
         self._done = 0.0
+
+    def begin(self) -> None:
+        """Start the first tasks before a result is asked for."""
+        while self._waiting and len(self._running) < _WAITING * cores():
+            number, task = self._waiting.pop()
+            future = self._pool.submit(task, partial(self._hear, number))
+            future.add_done_callback(lambda _future: self._news.put(None))
+            self._running[number] = future
 
     def result(self, number: int) -> T:
         """The result of the next task.
@@ -61,7 +72,7 @@ class Ahead(Generic[T]):
         Returns:
             What it returned; what it raised is raised.
         """
-        self._start()
+        self.begin()
         future = self._running.pop(number)
         while not future.done():
             self._tell(self._news.get())
@@ -76,13 +87,6 @@ class Ahead(Generic[T]):
         """
         self._tell((number, 1.0))
 
-    def _start(self) -> None:
-        while self._waiting and len(self._running) < _WAITING * cores():
-            number, task = self._waiting.pop()
-            future = self._pool.submit(task, partial(self._hear, number))
-            future.add_done_callback(lambda _future: self._news.put(None))
-            self._running[number] = future
-
     def _hear(self, number: int, share: float) -> None:
         self._news.put((number, share))
 
@@ -92,4 +96,4 @@ class Ahead(Generic[T]):
             if share > self._shares[number]:
                 self._done += (share - self._shares[number]) * self._weights[number]
                 self._shares[number] = share
-            self._on_progress(self._done)
+            self.on_progress(self._done)

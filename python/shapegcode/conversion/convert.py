@@ -187,6 +187,8 @@ class _Run:
             pool.submit(self.model.play_original, region.path, offset=self.model.offset(region))
             for region in program.regions
         ]
+        if budget is None:
+            self.writer.begin(self.reasons, self.room_um, self.feed_share)
 
     def conversion(self, *, shape_all: bool) -> Conversion:
         """Shape, write, read back and judge."""

@@ -120,8 +120,8 @@ class Judge:
                 self._model.offset(place.region), _core.ContourTracker(place.region.path),
                 least_increment_mm(self._machine, place.region.exit.units),
             )  # fmt: skip
+            planned = pool.submit(player.planned)  # takes longest
             runs = [pool.submit(player.nominal, rule) for rule in BLOCK_ENDS]
-            planned = pool.submit(player.planned)
             rest = [pool.submit(player.others, group) for group in player.groups()]
             slowed = pool.submit(
                 _core.count_slowed_blocks, player.blocks, limits.corner_speed_difference_mm_per_s,

@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 from shapegcode import _core
-from shapegcode.conversion.ahead import Ahead, OnShare
+from shapegcode.conversion.ahead import Ahead, OnShare, cores
 from shapegcode.conversion.budget import TransferLoad, measure_load
 from shapegcode.conversion.readback import Placed
 from shapegcode.conversion.spending import keepable
@@ -84,6 +84,20 @@ class TextWriter:
         self._pool = pool
         # By region: tolerance and feed for which it was shaped, and what it came to.
         self._shaped: dict[int, tuple[Aim, EmittedRegion]] = {}
+        self._begun: tuple[dict[int, Aim], Ahead[EmittedRegion]] | None = None
+
+    def begin(self, reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> None:
+        """Begin to shape a few long regions on cores that would wait else, before anything is known of their gain.
+
+        Args:
+            reasons: as `write` takes them; likewise the others.
+            room_um: of each region.
+            feed_share: of each region.
+        """
+        aims = _aims(reasons, room_um, feed_share)
+        if len(aims) < cores():
+            self._begun = aims, self._ahead(aims, lambda _done: None)
+            self._begun[1].begin()
 
     def write(
         self,
@@ -114,7 +128,7 @@ class TextWriter:
         position = core.header_offset
         written = Written(b"", [], 0, [], {}, {}, {})
         blocks, size = 0, core.size
-        aims = {index: (room_um[index], feed_share[index]) for index, why in enumerate(reasons) if not why}
+        aims = _aims(reasons, room_um, feed_share)
         # Moves that stay as they are: all, less those of the regions that are shaped.
         shaped_moves = sum(len(regions[index].path) for index in aims)
         kept_moves = core.move_count - shaped_moves
@@ -163,6 +177,11 @@ class TextWriter:
 
     def _ahead(self, aims: Mapping[int, Aim], on_moves: Callable[[float], None]) -> Ahead[EmittedRegion]:
         """Regions under way in the pool; one whose tolerance and feed are as in the text before is not shaped again."""
+        if self._begun is not None and aims.items() <= self._begun[0].items():
+            begun = self._begun[1]
+            begun.on_progress = on_moves
+            self._begun = None
+            return begun
         regions = self._program.regions
         # None may have more than the whole program; beside the others it may turn out to be too much all the same.
         room = self._room(0, 0)
@@ -227,3 +246,8 @@ class TextWriter:
             notes=tuple(notes),
         )
         return stamp.lines()
+
+
+def _aims(reasons: Sequence[str], room_um: Sequence[float], feed_share: Sequence[float]) -> dict[int, Aim]:
+    """For what each region that does not keep its text is shaped."""
+    return {index: (room_um[index], feed_share[index]) for index, why in enumerate(reasons) if not why}

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -229,16 +230,13 @@ class RegionWriter:
         texts: list[bytes] = []
         periods: list[npt.NDArray[np.uint32]] = []
         starts: list[list[int]] = []  # of the pieces, in increments
-        piece = shaper.next(_PIECE_PERIODS)
-        assert piece is not None  # the first one always exists
-        while piece is not None:
-            following = shaper.next(_PIECE_PERIODS)
-            if following is None:
+        for piece, share, is_last in _pieces(shaper):
+            if is_last:
                 state.exact_stop_at_end = region.exact_stop_at_end
                 last = region.path[-1]
                 if region.exit.motion in (2, 3) and last.kind == _core.SegmentKind.arc:
                     fit.end_with_arc(region.exit.motion == 2, last.normal, last.radius_mm)
-            here, breaks = marks.within(piece, last=following is None)
+            here, breaks = marks.within(piece, last=is_last)
             fitted = _core.fit_blocks(piece, sorted({*piece.run_ends, *breaks}), fit)
             fit.lent_periods = fitted.left_periods
             starts.append([round(float(x) / fit.increment_mm) for x in piece.grid_mm[0]])
@@ -247,8 +245,7 @@ class RegionWriter:
             periods.append(fitted.periods)
             if room is not None:
                 room.require(sum(map(len, texts)), sum(map(len, periods)))
-            on_progress(shaper.share)
-            piece = following
+            on_progress(share)
         # A search for the region's N word must not skip the prologue.
         number = marks.first_word
         before = self._head(region, number, starts[0], state)
@@ -310,6 +307,30 @@ class RegionWriter:
         if emission.prefill_dwell_s > 0.0:
             lines.append(f"G04P{round(emission.prefill_dwell_s * 1e3)}")
         return _lines(lines, writer)
+
+
+def _pieces(shaper: _core.RegionShaper) -> Iterator[tuple[_core.ShapedCommand, float, bool]]:
+    """The pieces of a region, how much of it they come to, and whether one is the last.
+
+    The next one is shaped while one is written: of a region of several pieces in a thread of its own.
+    """
+
+    def shaped() -> tuple[_core.ShapedCommand | None, float]:
+        piece = shaper.next(_PIECE_PERIODS)
+        return piece, shaper.share
+
+    piece, share = shaped()
+    assert piece is not None  # the first one always exists
+    following, following_share = shaped()
+    if following is None:
+        yield piece, share, True
+        return
+    with ThreadPoolExecutor(max_workers=1) as other:
+        while piece is not None:
+            under_way = other.submit(shaped) if following is not None else None
+            yield piece, share, following is None
+            piece, share = following, following_share
+            following, following_share = under_way.result() if under_way is not None else (None, 1.0)
 
 
 def _lines(lines: Sequence[str], writer: _core.WriterOptions) -> bytes:
