@@ -217,6 +217,19 @@ from shapegcode.simulation.simulate import (
     play_motion as play_motion,
     simulate as simulate,
 )
+from shapegcode.studies.distributions import (
+    listed as listed,
+    lognormal as lognormal,
+    normal as normal,
+    uniform as uniform,
+)
+from shapegcode.studies.plots import (
+    plot_bands as plot_bands,
+    plot_tornado as plot_tornado,
+)
+from shapegcode.studies.result import MachineStudy as MachineStudy
+from shapegcode.studies.study import study as study
+from shapegcode.studies.study_file import load_study as load_study
 from shapegcode.testcut.conditions import (
     CornerShape as CornerShape,
     CutConditions as CutConditions,

@@ -32,6 +32,7 @@ FILES = {
     "COVER.NC": DATA / "measured" / "nist" / "programs" / "COVER.NC",
     "COVER-run1.txt.gz": DATA / "measured" / "nist" / "logs" / "COVER-run1.txt.gz",
     "COVER-run2.txt.gz": DATA / "measured" / "nist" / "logs" / "COVER-run2.txt.gz",
+    "STUDY.toml": ROOT / "tests" / "golden" / "study" / "STUDY.toml",
     "capture.json.gz": DATA / "measured" / "sinumerik" / "capture.json.gz",
 }
 
@@ -131,6 +132,13 @@ ENTRIES = (
         "Test cuts: which interval the control follows",
         "testcut fit interval0.csv interval1.csv interval2.csv --cut interval/CUT.json",
         {"testcut-interval": "Force over time for each interval, and with the lag that fits best."}, "interval",
+    ),
+    Entry(
+        "Machines that are drawn", "study STUDY.toml",
+        {
+            "study-tornado": "Which value decides whether the part is good?",
+            "study-bands": "What is left over the value that decides, and within which band.",
+        }, "studies",
     ),
     Entry(
         "Position loops from a log", "characterize --servo capture.json.gz -m vx500",

@@ -41,6 +41,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "shapegcode batch parts -m mine.toml -o shaped --html pages",
         "shapegcode batch 'parts/**/*.nc' -m a.toml -m b.toml -o times --command time --resume",
     ),
+    "study": (
+        "shapegcode study STUDY.toml --plots plots",
+        "shapegcode study STUDY.toml -m mine.toml -n 10000 --html study.html --csv draws.csv",
+    ),
     "setup": (
         "shapegcode setup -o mine.toml",
         "shapegcode setup --answers answers.toml -o mine.toml --force",

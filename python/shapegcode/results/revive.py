@@ -50,6 +50,7 @@ MODULES: Mapping[str, str] = {
     "MachineDifference": "machine.difference_result",
     "MachineSetup": "setup.result",
     "MachineDescription": "machine.description_result",
+    "MachineStudy": "studies.result",
     "Measurement": "metrology.result",
     "MetrologyDemo": "demos.metrology",
     "ParameterImport": "machine.result",

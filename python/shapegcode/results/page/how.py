@@ -34,6 +34,8 @@ HOW: Mapping[str, str] = {
     "testcut-coefficients": "Each coefficient with its interval: one that reaches zero is not determined by the cut.",
     "testcut-corner": "Measured load at the corner beside the predicted one.",
     "testcut-interval": "Measured times between feeds beside the fitted ones.",
+    "study-tornado": "The longest bar is the value that decides: its ends say where the verdict is best and worst.",
+    "study-bands": "Where the band reaches the dashed line, one machine in twenty or more is out of tolerance.",
     "servo": "Position minus command over time, measured and of the fitted loop.",
     "clock": "Each point is a run: on the diagonal the predicted time is the measured one.",
     "evidence-nist": "Each point is a program: on the diagonal the predicted time is the measured one.",

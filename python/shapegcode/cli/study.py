@@ -1,0 +1,72 @@
+"""``shapegcode study``: a program on many machines that are drawn."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
+from shapegcode.cli.typed import count
+
+__all__ = ["add_arguments", "run"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.description = (
+        "Converts a program once and plays it on machines whose values are drawn as the file says: how likely it stays "
+        "within tolerance, quantiles, and which value decides. Exit code 1 if that is less likely than at_least."
+    )
+    parser.add_argument("input", metavar="STUDY.toml", help="program, machine, and what is varied")
+    add_machine_argument(parser, required=False)
+    parser.add_argument(
+        "-n", "--draws", type=count, default=None, metavar="N", help="how many draws (default: the file's)"
+    )
+    parser.add_argument("--csv", metavar="FILE", default=None, help="write one line per draw; - for standard output")
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        default=None,
+        help="play on Dask: tcp://host:port or tls://host:port; local: a cluster on this machine",
+    )
+    for name, what in (("ca", "the authority's certificate"), ("cert", "own certificate"), ("key", "own key")):
+        parser.add_argument(f"--tls-{name}", metavar="FILE", default="", help=f"{what}, for tls:// schedulers")
+    add_plots_argument(
+        parser, "write what decides, and the quantiles over it, as pictures (PNG and SVG) into this folder"
+    )
+    add_result_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the study.
+
+    Raises:
+        StudyFileError, MachineError, ProgramError, ArgumentError: bad input.
+        OSError: a file cannot be read or written.
+    """
+    from shapegcode.batching.batch import Cluster
+    from shapegcode.cli import runner
+    from shapegcode.errors import ArgumentError
+    from shapegcode.io.atomic import write_lines
+    from shapegcode.studies.study import study
+    from shapegcode.studies.study_file import load_study
+
+    file = load_study(args.input)
+    args.machine = args.machine or file.machine
+    if args.machine is None:
+        raise ArgumentError(f"{args.input}: no machine: name one there, or with -m")
+    args.inputs = [file.program]
+    machine = load_machine(args)
+    runner.check_files(args)
+    cluster = None if args.scheduler is None else Cluster(args.scheduler, args.tls_ca, args.tls_cert, args.tls_key)
+    options: dict[str, Any] = file.options() | ({} if args.draws is None else {"n": args.draws})
+    with runner.progress(f"{args.input}: converting", args) as bar:
+
+        def tell(stage: str, share: float) -> None:
+            bar.update(share)
+            bar.say(f"{args.input}: {stage}")
+
+        result = study(file.program, machine, **options, scheduler=cluster, on_progress=tell)
+    if args.csv is not None:
+        write_lines(args.csv, result.csv_lines())
+    return runner.finish(result, args)

@@ -1,0 +1,112 @@
+"""Draws played on processors: threads of this process, or the workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass
+
+from shapegcode.studies.replay import PackedText, Replay
+from shapegcode.studies.varied import drawn_machine
+
+__all__ = ["DrawsJob", "play_all"]
+
+OVERRIDE = "times.feed_override_percent"
+"""Where it is varied, the blocks are played at it."""
+
+_AT_ONCE = 64  # draws of a task: long enough to be worth one, short enough to tell how far it is
+_KEPT_TEXTS = 4
+
+
+@dataclass(frozen=True)
+class DrawsJob:
+    """Some draws of one text.
+
+    Attributes:
+        name: of the machine, in messages.
+        rows: values of the machine that plays, by key, a row for each draw.
+        draws: their numbers.
+        wanted: what is measured.
+        times: see `Replay.play`.
+    """
+
+    name: str
+    rows: tuple[Mapping[str, object], ...]
+    draws: tuple[int, ...]
+    wanted: tuple[str, ...]
+    times: bool
+
+    def play(self, replay: Replay) -> list[list[float]]:
+        """Play them.
+
+        Args:
+            replay: the text.
+
+        Returns:
+            What was measured, in the order of `wanted`, for each draw.
+
+        Raises:
+            MachineError: a draw that no machine file could have.
+        """
+        found = []
+        for row, draw in zip(self.rows, self.draws, strict=True):
+            machine = drawn_machine(replay.machine, row, f"{self.name}, draw {draw}")
+            override = machine.times.feed_override_percent / 100.0 if OVERRIDE in row else 1.0
+            measured = replay.play(machine, self.wanted, override=override, times=self.times)
+            found.append([measured[name] for name in self.wanted])
+        return found
+
+    def parts(self) -> Iterator[DrawsJob]:
+        """The same in tasks."""
+        for at in range(0, len(self.rows), _AT_ONCE):
+            rows, draws = self.rows[at : at + _AT_ONCE], self.draws[at : at + _AT_ONCE]
+            yield DrawsJob(self.name, rows, draws, self.wanted, self.times)
+
+
+def play_all(
+    replay: Replay, job: DrawsJob, pool: Executor | None, on_done: Callable[[int], None] = lambda _count: None
+) -> list[list[float]]:
+    """Play the draws of one text.
+
+    Args:
+        replay: the text.
+        job: the draws.
+        pool: of a cluster, to which the text goes as bytes; None: threads of this process.
+        on_done: called with how many more are done.
+
+    Returns:
+        What was measured, in the order of the draws.
+
+    Raises:
+        MachineError: a draw that no machine file could have.
+    """
+    parts = list(job.parts())
+    found: list[list[float]] = []
+    if pool is not None:
+        packed = replay.packed()
+        running = [pool.submit(_play_packed, packed, part) for part in parts]
+    else:
+        own = ThreadPoolExecutor(os.cpu_count() or 1)
+        running = [own.submit(part.play, replay) for part in parts]
+    try:
+        for future, part in zip(running, parts, strict=True):
+            found += future.result()
+            on_done(len(part.rows))
+    finally:
+        for future in running:
+            future.cancel()
+        if pool is None:
+            own.shutdown()
+    return found
+
+
+@functools.lru_cache(maxsize=_KEPT_TEXTS)
+def _unpacked(packed: PackedText) -> Replay:
+    return Replay.unpacked(packed)
+
+
+def _play_packed(packed: PackedText, job: DrawsJob) -> list[list[float]]:
+    """On a worker: a text is read once for all its draws."""
+    return job.play(_unpacked(packed))

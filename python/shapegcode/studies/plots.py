@@ -1,0 +1,110 @@
+"""The pictures of ``shapegcode study``: what decides (tornado), and measures over the value that decides (bands)."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shapegcode.results import plot
+from shapegcode.results.result import Plot
+from shapegcode.studies.replay import MEASURES, SHARE
+from shapegcode.studies.result import Bins, MachineStudy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["plot_bands", "plot_tornado", "plots_of"]
+
+_BARS = 12
+_PANELS = 3
+
+
+def plots_of(study: MachineStudy) -> dict[str, Plot]:
+    """Its pictures by name."""
+    return {"study-tornado": partial(plot_tornado, study), "study-bands": partial(plot_bands, study)}
+
+
+def plot_tornado(study: MachineStudy, ax: Axes | None = None) -> Axes:
+    """Which value decides? A bar for each, from the least to the largest median share of the limit over it.
+
+    Args:
+        study: what was found.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The panel.
+    """
+    rows = study.decides[:_BARS]
+    panel = plot.axes(
+        ax, size_inch=(9.0, 1.6 + 0.4 * len(rows)),
+        title=f"What decides the verdict: {Path(study.program).name} on {study.machine}",
+    )  # fmt: skip
+    whole = study.quantity(SHARE)
+    for place, row in enumerate(rows):
+        panel.barh(place, row.high - row.low, left=row.low, height=0.6, color=plot.COLOURS[1])
+        for at, name, side, shift in ((row.low, row.low_at, "right", -4), (row.high, row.high_at, "left", 4)):
+            panel.annotate(
+                name, (at, place), xytext=(shift, 0), textcoords="offset points", ha=side, va="center", fontsize=8
+            )
+    panel.axvline(whole.p50, color=plot.GREY, linewidth=1.0)
+    panel.axvline(1.0, color=plot.COLOURS[0], linewidth=1.0, linestyle="--")
+    panel.annotate(
+        "limit", (1.0, 1.0), xycoords=("data", "axes fraction"), xytext=(-3, -3), textcoords="offset points",
+        fontsize=8, color=plot.COLOURS[0], va="top", ha="right",
+    )  # fmt: skip
+    panel.set_yticks(range(len(rows)), [row.key for row in rows], fontsize=8)
+    panel.set_ylim(len(rows) - 0.4, -0.6)
+    low, high = min(row.low for row in rows), max(1.0, *(row.high for row in rows))
+    panel.set_xlim(low - 0.15 * (high - low), high + 0.15 * (high - low))
+    panel.set_xlabel("share of the limit, median (grey: of all draws)")
+    return panel
+
+
+def plot_bands(study: MachineStudy, ax: Axes | None = None) -> Axes:
+    """What is measured over the value that decides: median, and the band that holds 90 % of the draws.
+
+    Args:
+        study: what was found.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The uppermost panel.
+    """
+    key = study.decides[0].key
+    curves = [bins for bins in study.curves if bins.key == key and bins.measure != SHARE][:_PANELS]
+    curves = curves or [bins for bins in study.curves if bins.key == key]
+    panels = [
+        row[0]
+        for row in plot.grid(
+            ax, len(curves), 1, size_inch=(8.0, 1.0 + 2.1 * len(curves)), sharex=True,
+            title=f"{study.n} machines: {Path(study.program).name} on {study.machine}",
+            part="median, and the band that holds 90 %",
+        )
+    ]  # fmt: skip
+    for panel, bins in zip(panels, curves, strict=True):
+        _band(panel, bins)
+        if (limit := study.limits_um.get(bins.measure)) is not None and limit < 3.0 * max(
+            each.high for each in bins.bins
+        ):
+            panel.axhline(limit, color=plot.COLOURS[0], linewidth=1.0, linestyle="--")
+        unit = study.quantity(bins.measure).unit
+        panel.set_title(f"{MEASURES[bins.measure]}, {unit}".rstrip(", "), loc="left", fontsize=10)
+    unit = next(each.unit for each in study.varied if each.key == key)
+    panels[-1].set_xlabel(f"{key}{f' in {unit}' if unit not in ('', '1') else ''}")
+    return plot.aligned(panels)
+
+
+def _band(panel: Axes, bins: Bins) -> None:
+    places = [each.at for each in bins.bins]
+    low, middle, high = ([getattr(each, name) for each in bins.bins] for name in ("low", "median", "high"))
+    if bins.numbers and len(places) > 1:
+        panel.fill_between(places, low, high, color=plot.COLOURS[5], alpha=0.5, linewidth=0.0)
+        panel.plot(places, middle, color=plot.COLOURS[1])
+        return
+    for place, bottom, at, top in zip(places, low, middle, high, strict=True):
+        panel.plot([place, place], [bottom, top], color=plot.COLOURS[5], linewidth=8.0, solid_capstyle="butt")
+        panel.plot([place], [at], color=plot.COLOURS[1], marker="o")
+    if not bins.numbers:
+        panel.set_xticks(places, [each.name for each in bins.bins])
+        panel.margins(x=0.25)

@@ -1,0 +1,252 @@
+"""A converted text played on other machines: converted once, played as often as one likes."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shapegcode import _core
+from shapegcode.conversion.cases import CaseFigures, RegionLimits, judge_region
+from shapegcode.conversion.convert import convert
+from shapegcode.conversion.judge import Judge, RegionFigures
+from shapegcode.errors import ArgumentError
+from shapegcode.machine import Machine
+from shapegcode.model.machine_model import MachineModel
+from shapegcode.program import Program
+from shapegcode.program.compensation import read_for_conversion
+from shapegcode.results.figures import Deviation
+
+__all__ = ["DEFAULT_MEASURES", "MEASURES", "SHARE", "Replay", "checked_measures"]
+
+SHARE = "share_of_limit"
+MEASURES: Mapping[str, str] = {
+    "residual_um": "residual vibration, worst axis",
+    "residual_x_um": "residual vibration X",
+    "residual_y_um": "residual vibration Y",
+    "residual_z_um": "residual vibration Z",
+    "peak_um": "vibration on the way, worst axis",
+    "contour_um": "contour error that is judged",
+    "command_um": "contour error of the command",
+    "response_um": "contour error of the table",
+    "cutting_time_s": "time of the shaped cuts",
+    "time_s": "cycle time",
+    "original_residual_um": "residual vibration of the original",
+    "original_contour_um": "contour error of the original's table",
+    SHARE: "largest share of a limit",
+}
+"""What can be measured of each draw, in words."""
+DEFAULT_MEASURES = ("residual_um", "contour_um", "time_s")
+
+_FULL = 1.0
+
+
+def checked_measures(measure: Sequence[str]) -> tuple[str, ...]:
+    """What is measured; the share of the limit is always among it.
+
+    Args:
+        measure: names.
+
+    Returns:
+        Each once.
+
+    Raises:
+        ArgumentError: there is no such measure.
+    """
+    for name in measure:
+        if name not in MEASURES:
+            raise ArgumentError(f"measure = {name!r}: must be one of {', '.join(MEASURES)}")
+    return tuple(dict.fromkeys((*measure, SHARE)))
+
+
+@dataclass(frozen=True)
+class _PlayedPart:
+    """A shaped region: what was programmed, what was emitted, what it is judged by."""
+
+    region: _core.Region
+    blocks: _core.Path
+    tracker: _core.ContourTracker
+    limits: RegionLimits
+
+
+@dataclass(frozen=True)
+class PackedText:
+    """A replay as bytes and numbers, for another process."""
+
+    machine: str
+    source: str
+    original: bytes
+    emitted: bytes
+    places: tuple[tuple[int, int, int], ...]
+    limits: tuple[tuple[tuple[float, ...], float, str], ...]
+    time_s: float
+
+
+class Replay:
+    """A text that was converted for a machine, ready to be played on others.
+
+    Args:
+        machine: for which it was converted.
+        original: the program.
+        emitted: the text, read back.
+        parts: of each shaped region its rank in the original, and its first and last line in the text.
+        limits: of each.
+        time_s: cycle time of the text on that machine.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        original: Program,
+        emitted: Program,
+        parts: Sequence[tuple[int, int, int]],
+        limits: Sequence[RegionLimits],
+        time_s: float,
+    ) -> None:
+        self.machine, self._original, self._emitted, self._places = machine, original, emitted, tuple(parts)
+        self.time_s = time_s
+        regions = [original.regions[index] for index, _, _ in parts]
+        self._parts = [
+            _PlayedPart(region, emitted.core.cutting_path(first, last), _core.ContourTracker(region.path), limit)
+            for region, (_, first, last), limit in zip(regions, parts, limits, strict=True)
+        ]
+        # What the text takes beyond what its own blocks say, such as where no header marks them.
+        self._beyond_s = time_s - MachineModel(machine).cycle_time_s(emitted.core)
+
+    @classmethod
+    def of(
+        cls, program: Program | str, machine: Machine, judged_by: Machine | None = None, *, shape_all: bool = False
+    ) -> Replay:
+        """Convert a program.
+
+        Args:
+            program: or its file.
+            machine: for which.
+            judged_by: whose tolerances count; None: those of the same machine.
+            shape_all: see `shapegcode.convert`.
+
+        Returns:
+            The text, ready to be played.
+
+        Raises:
+            ArgumentError: nothing of it was shaped.
+            ShapegcodeError: it cannot be converted.
+            OSError: its file cannot be read.
+        """
+        original = program if isinstance(program, Program) else read_for_conversion(program, machine)
+        found = convert(original, machine, shape_all=shape_all)
+        if not found.placed:
+            raise ArgumentError(
+                f"{found.program} on {machine.name}: nothing was shaped that could be played: {found.answer}"
+            )
+        judging = MachineModel(judged_by or machine)
+        judge, ranks = Judge(judging), {id(region): index for index, region in enumerate(original.regions)}
+        limits = [
+            judge.limits(
+                RegionFigures(judging.play_original(place.region.path, offset=judging.offset(place.region)), (), (), 0),
+                place,
+            )
+            for place in found.placed
+        ]
+        places = [(ranks[id(place.region)], place.first_line, place.last_line) for place in found.placed]
+        return cls(machine, original, found.emitted, places, limits, found.cycle_time_s.emitted)
+
+    def packed(self) -> PackedText:
+        """The same as bytes and numbers, without anything that only this process has."""
+        return PackedText(
+            self.machine.to_toml(short=True), self._original.source, self._original.expanded_text,
+            self._emitted.text, self._places,
+            tuple((tuple(part.limits.residual_um.tolist()), part.limits.contour_um, part.limits.target)
+                  for part in self._parts),
+            self.time_s,
+        )  # fmt: skip
+
+    @classmethod
+    def unpacked(cls, packed: PackedText) -> Replay:
+        """A replay that was packed.
+
+        Args:
+            packed: by `packed`.
+
+        Returns:
+            The replay.
+        """
+        machine = Machine.from_toml(packed.machine)
+        limits: list[Any] = [
+            RegionLimits(np.array(residual), contour, target)  # type: ignore[arg-type]
+            for residual, contour, target in packed.limits
+        ]
+        return cls(
+            machine, Program.from_text(packed.original, machine, source=packed.source),
+            Program.from_text(packed.emitted, machine, source=packed.source, emitted=True),
+            packed.places, limits, packed.time_s,
+        )  # fmt: skip
+
+    @property
+    def contour_limit_um(self) -> float:
+        """The smallest that is allowed."""
+        return min(part.limits.contour_um for part in self._parts)
+
+    @property
+    def residual_limit_um(self) -> float:
+        """The smallest that is allowed of any axis that may vibrate."""
+        return min(float(part.limits.residual_um.min()) for part in self._parts)
+
+    def play(
+        self, machine: Machine, wanted: Collection[str], *, override: float = _FULL, times: bool = True
+    ) -> dict[str, float]:
+        """Play the text.
+
+        Args:
+            machine: that plays it.
+            wanted: names of `MEASURES`.
+            override: feed override, 1 = 100 %.
+            times: the machine may take another time than the one for which the text was converted.
+
+        Returns:
+            The worst of all regions, times in all.
+        """
+        model = MachineModel(machine)
+        found = dict.fromkeys(wanted, 0.0)
+        for part in self._parts:
+            for name, value in self._of_region(part, model, wanted, override).items():
+                found[name] = found[name] + value if name == "cutting_time_s" else max(found[name], value)
+        if "time_s" in found:
+            changed = times or override != _FULL
+            found["time_s"] = self._cycle_time_s(model, override) if changed else self.time_s
+        return found
+
+    def _cycle_time_s(self, model: MachineModel, override: float) -> float:
+        controller = model.ordinary.model
+        controller.feed_override = override
+        return float(_core.time_program(self._emitted.core, controller).total_s) + self._beyond_s
+
+    def _of_region(
+        self, part: _PlayedPart, model: MachineModel, wanted: Collection[str], override: float
+    ) -> dict[str, float]:
+        path, offset = part.region.path, model.offset(part.region)
+        command = part.limits.target == "command" or "command_um" in wanted
+        run = model.play_emitted(
+            part.blocks, path, override=override, offset=offset, tracker=part.tracker, command_contour=command
+        )
+        followed = Deviation.of([run.command]) if command else None
+        figures = CaseFigures(run.residual_mm, followed, Deviation.of([run.response]), run.duration_s)
+        judged = judge_region(figures, part.limits)
+        axes = (run.residual_mm * 1e3).tolist()
+        measured = {
+            "residual_um": max(axes),
+            **dict(zip(("residual_x_um", "residual_y_um", "residual_z_um"), axes, strict=True)),
+            "peak_um": float(run.peak_mm.max()) * 1e3,
+            "contour_um": judged[-1].value_um,
+            "command_um": run.command.max_abs_mm * 1e3 if command else 0.0,
+            "response_um": run.response.max_abs_mm * 1e3,
+            "cutting_time_s": run.duration_s,
+            SHARE: max(each.share for each in judged),
+        }
+        if "original_residual_um" in wanted or "original_contour_um" in wanted:
+            was = model.play_original(path, offset=offset)
+            measured["original_residual_um"] = float(was.residual_mm.max()) * 1e3
+            measured["original_contour_um"] = was.response.max_abs_mm * 1e3
+        return {name: value for name, value in measured.items() if name in wanted}

@@ -1,0 +1,342 @@
+"""What a study found: quantiles, how likely the program stays within tolerance, which value decides."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from shapegcode.results.json import hidden
+from shapegcode.results.outcome import NotKeptError
+from shapegcode.results.page.model import Figure
+from shapegcode.results.result import Plot, Result
+from shapegcode.results.table import Column, Table
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["BinQuantiles", "Bins", "Decides", "MachineStudy", "Quantity", "RefusedDraws", "VariedKey"]
+
+_UNITS = {"_um": "µm", "_s": "s"}
+
+
+@dataclass(frozen=True)
+class VariedKey:
+    """What was varied.
+
+    Attributes:
+        key: dotted name in the machine file.
+        value: what the file says.
+        unit: of its values.
+        drawn_from: in words.
+        known: the text was converted for each value.
+    """
+
+    key: str
+    value: str
+    unit: str
+    drawn_from: str
+    known: bool
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A measure over all draws.
+
+    Attributes:
+        name: of the measure, with its unit.
+        nominal: on the machine as the file has it.
+        mean: of all draws.
+        p5: below it lie 5 %; and so the others.
+        p25: likewise.
+        p50: the median.
+        p75: likewise.
+        p95: likewise.
+        p99: likewise.
+        largest: of all draws.
+    """
+
+    name: str
+    nominal: float
+    mean: float
+    p5: float
+    p25: float
+    p50: float
+    p75: float
+    p95: float
+    p99: float
+    largest: float
+
+    @property
+    def unit(self) -> str:
+        """As the name ends."""
+        return next((unit for ending, unit in _UNITS.items() if self.name.endswith(ending)), "")
+
+
+@dataclass(frozen=True)
+class Decides:
+    """What a value does to the verdict.
+
+    Attributes:
+        key: of the value.
+        low: least share of the limit, median of the draws in one bin of the value.
+        high: largest.
+        low_at: value at which it is least.
+        high_at: value at which it is largest.
+        first: Sobol index of first order of the share; None: not asked for.
+        total: total Sobol index.
+    """
+
+    key: str
+    low: float
+    high: float
+    low_at: str
+    high_at: str
+    first: float | None = None
+    total: float | None = None
+
+
+@dataclass(frozen=True)
+class RefusedDraws:
+    """Draws that could not be played, because there is no text for them.
+
+    Attributes:
+        values: that the converter was given, in words.
+        draws: how many.
+        why: in words.
+    """
+
+    values: str
+    draws: int
+    why: str
+
+
+@dataclass(frozen=True)
+class BinQuantiles:
+    """A measure over the draws in one bin of a value.
+
+    Attributes:
+        at: median of the value; of a list the rank.
+        name: of the bin.
+        low: 5 % of the measure lie below it.
+        median: half of it.
+        high: 95 %.
+    """
+
+    at: float
+    name: str
+    low: float
+    median: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Bins:
+    """A measure over one value, bin by bin.
+
+    Attributes:
+        key: of the value.
+        measure: of which.
+        bins: in the order of the values.
+        numbers: the values are numbers; else choices.
+    """
+
+    key: str
+    measure: str
+    bins: tuple[BinQuantiles, ...]
+    numbers: bool
+
+
+@dataclass(frozen=True, repr=False)
+class MachineStudy(Result):
+    """A program played on many machines that are drawn.
+
+    Attributes:
+        program: its name.
+        machine: that was varied.
+        sampling: "sobol", "lhs" or "grid".
+        seed: of the draws.
+        n: draws that were played.
+        conversions: texts that were made for them.
+        varied: what was varied.
+        within: share of the draws that stay within every limit.
+        within_interval: of the probability that this estimates, 95 %; of a grid it means nothing.
+        at_least: what the probability should be.
+        quantities: measures over all draws.
+        decides: values by what they do to the verdict, the one that decides first.
+        curves: measures over each value, for pictures.
+        refused: draws without a text.
+        warnings: what to heed.
+        limits_um: smallest limit of each measure that has one.
+        draws: values by key and measures by name, one row for each draw.
+    """
+
+    json_extra: ClassVar[dict[str, Any]] = dict(Result.json_extra)
+
+    program: str
+    machine: str
+    sampling: str
+    seed: int
+    n: int
+    conversions: int
+    varied: tuple[VariedKey, ...]
+    within: float
+    within_interval: tuple[float, float]
+    at_least: float
+    quantities: tuple[Quantity, ...]
+    decides: tuple[Decides, ...]
+    curves: tuple[Bins, ...]
+    refused: tuple[RefusedDraws, ...] = ()
+    warnings: tuple[str, ...] = ()
+    limits_um: Mapping[str, float] = field(default_factory=dict)
+    draws: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict, metadata=hidden())
+
+    @property
+    def ok(self) -> bool:
+        """Whether as many draws as should stay within tolerance."""
+        return self.within >= self.at_least
+
+    @property
+    def answer(self) -> str:
+        """How likely it stays within tolerance, and what decides that."""
+        low, high = self.within_interval
+        sure = "" if self.sampling == "grid" else f" (95 % interval {low * 100:.1f} to {high * 100:.1f} %)"
+        what = "of the grid stays" if self.sampling == "grid" else "of the machines stay"
+        most = f"; {self.decides[0].key} decides" if self.decides else ""
+        return f"{self.within * 100:.1f} % {what} within tolerance{sure}, asked for {self.at_least * 100:g} %{most}"
+
+    @property
+    def next_step(self) -> str:
+        """To measure what decides, or to convert."""
+        if self.ok:
+            return f"convert {self.program} for {self.machine}: its tolerance bears what is not known."
+        if not self.decides:
+            return "look at why draws were refused."
+        key = self.decides[0].key
+        known = next(each.known for each in self.varied if each.key == key)
+        if known:
+            return f"choose {key} where the share of the limit is least ({self.decides[0].low_at}), or let sg.optimize."
+        return f"measure {key} more closely, or let sg.optimize choose a shaper that bears it."
+
+    def quantity(self, name: str) -> Quantity:
+        """A measure.
+
+        Args:
+            name: of it.
+
+        Returns:
+            Its quantiles.
+
+        Raises:
+            KeyError: it was not measured.
+        """
+        for each in self.quantities:
+            if each.name == name:
+                return each
+        raise KeyError(name)
+
+    def key_figures(self) -> tuple[Figure, ...]:
+        """How likely, and the 95 % quantile of each measure beside the machine as it stands in its file."""
+        first = Figure("stay within tolerance", "%", None, self.within * 100, 1, None, "", "within", 100.0)
+        return (
+            first,
+            *(
+                Figure(
+                    f"{each.name}, 95 %", each.unit, each.nominal, each.p95, 2, self.limits_um.get(each.name),
+                    f"quantities.{rank}.nominal", f"quantities.{rank}.p95",
+                )
+                for rank, each in enumerate(self.quantities)
+            ),
+        )  # fmt: skip
+
+    def tables(self) -> list[Table]:
+        """Quantiles, what decides, what was refused."""
+        measures = (
+            Column("measure", value="name", left=True, priority=0),
+            Column("file", value="nominal", digits=3),
+            *(
+                Column(name, value=value, digits=3, priority=priority)
+                for name, value, priority in (
+                    ("5 %", "p5", 1), ("25 %", "p25", 3), ("median", "p50", 1), ("75 %", "p75", 3), ("95 %", "p95", 0),
+                    ("99 %", "p99", 2), ("largest", "largest", 2),
+                )
+            ),
+            Column("limit", value=lambda row: self.limits_um.get(row.name), digits=3),
+        )  # fmt: skip
+        deciding = (
+            Column("value", value="key", left=True, priority=0),
+            Column("share of limit", value=lambda row: f"{row.low:.2f} to {row.high:.2f}"),
+            Column("least at", value="low_at", priority=2),
+            Column("largest at", value="high_at"),
+            Column("first order", value="first", digits=2, priority=2),
+            Column("total", value="total", digits=2),
+        )
+        tables = [
+            Table(f"{self.n} draws, {self.conversions} conversion{'s' * (self.conversions != 1)}", measures,
+                  self.quantities),
+            Table("what decides the verdict: median share of the limit over each value", deciding, self.decides),
+        ]  # fmt: skip
+        if self.refused:
+            why = (Column("values", text=True), Column("draws"), Column("why", text=True))
+            tables.append(Table("not played", why, self.refused))
+        return tables
+
+    def plots(self) -> Mapping[str, Plot]:
+        """Tornado and quantile bands."""
+        return self._drawn_beside()
+
+    def to_xarray(self, what: str = "") -> xr.Dataset:
+        """Every draw: its values as coordinates, its measures as variables; needs `shapegcode[study]`.
+
+        Args:
+            what: for other results; here there is one Dataset.
+
+        Returns:
+            The Dataset, with units; `draw` is its dimension.
+
+        Raises:
+            NotKeptError: the study was read back from its JSON, which has no draws.
+            ModuleNotFoundError: xarray is not installed.
+        """
+        import xarray as xr
+
+        if not self.draws:
+            raise NotKeptError("the draws of a study are not in its JSON: run it again, or keep --csv")
+        keys = {each.key: each for each in self.varied}
+        found = {
+            name: xr.DataArray(values, dims=["draw"], attrs={"units": self._unit(name)})
+            for name, values in self.draws.items()
+        }
+        variables = {name: array for name, array in found.items() if name not in keys}
+        variables["quantile"] = xr.DataArray(
+            [[each.p5, each.p25, each.p50, each.p75, each.p95, each.p99] for each in self.quantities],
+            dims=["measure", "percent"],
+        )
+        return xr.Dataset(
+            variables,
+            coords={name: array for name, array in found.items() if name in keys}
+            | {
+                "draw": np.arange(1, self.n + 1),
+                "measure": [each.name for each in self.quantities],
+                "percent": [5.0, 25.0, 50.0, 75.0, 95.0, 99.0],
+            },
+            attrs={"program": self.program, "machine": self.machine, "sampling": self.sampling, "seed": self.seed,
+                   "within": self.within},
+        )  # fmt: skip
+
+    def _unit(self, name: str) -> str:
+        known = {each.key: each.unit for each in self.varied} | {each.name: each.unit for each in self.quantities}
+        return known.get(name, "")
+
+    def csv_lines(self) -> Iterator[str]:
+        """One line for each draw.
+
+        Yields:
+            Header and lines.
+        """
+        yield ",".join(self.draws) + "\n"
+        for row in zip(*self.draws.values(), strict=True):
+            yield ",".join(f"{value:.9g}" if isinstance(value, float) else str(value) for value in row) + "\n"

@@ -1,0 +1,119 @@
+"""Which values are varied: what each is drawn from, and whether the converter knows of it.
+
+A text is converted for the machine file. What is varied then is the machine that plays it: its modes, drives, filters,
+times. A value that only the converter reads, such as `shaping.family`, needs another text.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from shapegcode.errors import ArgumentError, MachineError, Problem
+from shapegcode.machine import Machine
+from shapegcode.studies.distributions import Distribution, listed
+
+__all__ = ["Varied", "Vary", "drawn_machine", "varied_values"]
+
+Vary = Mapping[str, Distribution | Sequence[object]]
+"""What each key is drawn from."""
+
+# A machine may differ from its file in these, and they are read when blocks are played.
+_PLAYED = re.compile(
+    r"axes\.[xyz]\.(modes|rigid|drive\..+|rapid_mm_per_min)"
+    r"|axes\.[xyz]\.modes\.\d+\.(frequency_hz|damping_ratio|participation|frequency_over(\..+)?)"
+    r"|controller\.(interpolation_period_s|block_end|shaped_\w+|(position_gain_per_s|feed_forward_ratio)(\.[xyz])?)"
+    r"|controller\.(in_position|rapid)\w*(\.[xyz])?"
+    r"|shaping\.part_mass_kg|times\..+"
+)
+_SWINGS = re.compile(r"axes\.[xyz]\.(modes|rigid|drive)\b.*|shaping\.part_mass_kg")
+_TICK = "controller.interpolation_period_s"
+_FROM_ZERO = re.compile(r"\.0(\.|$)")
+
+
+@dataclass(frozen=True)
+class Varied:
+    """A key of the machine file and what its values are drawn from.
+
+    Attributes:
+        key: dotted name.
+        distribution: of the values.
+        known: the converter knows each value; else only the machine that plays the text has it.
+        value: what the file says, as TOML.
+        unit: of the values.
+    """
+
+    key: str
+    distribution: Distribution
+    known: bool
+    value: str
+    unit: str
+
+    @property
+    def changes_times(self) -> bool:
+        """Whether a program may take another time with it."""
+        return not _SWINGS.fullmatch(self.key)
+
+
+def varied_values(machine: Machine, vary: Vary) -> tuple[Varied, ...]:
+    """What is varied, checked against the keys that there are.
+
+    Args:
+        machine: whose values.
+        vary: what each key is drawn from; a list: one of its values.
+
+    Returns:
+        One for each key, in the same order.
+
+    Raises:
+        ArgumentError: nothing is varied; a value that is neither a distribution nor a list; a key that only the
+            converter reads and that it shall not know.
+        MachineError: no such key.
+    """
+    if not vary:
+        raise ArgumentError("vary: nothing is varied: name at least one key of the machine file")
+    held = {value.key: value for value in machine.values()}
+    found = []
+    for key, given in vary.items():
+        if _FROM_ZERO.search(key):
+            raise MachineError(machine.name, (Problem(key, "", "no such key: modes count from 1"),))
+        if isinstance(given, str) or not isinstance(given, Distribution | Sequence):
+            raise ArgumentError(f"vary: {key} = {given!r}: must be a distribution or a list of values")
+        drawn = given if isinstance(given, Distribution) else listed(given)
+        # Tables such as controller.in_position_s can be varied axis by axis.
+        at = held.get(key) or held.get(key.rpartition(".")[0])
+        if at is None and key not in _optional_keys(machine, key):
+            raise MachineError(machine.name, (Problem(key, "", "no such key"),))
+        played = _PLAYED.fullmatch(key) is not None
+        if drawn.known is False and not played:
+            raise ArgumentError(f"vary: {key}: known = false: only the converter reads it, so that it must be known")
+        known = not played if drawn.known is None else drawn.known
+        found.append(Varied(key, drawn, known, at.value if at else "not set", at.unit if at else ""))
+    return tuple(found)
+
+
+def _optional_keys(machine: Machine, key: str) -> tuple[str, ...]:
+    """The key, where the file leaves out the table that holds it; `with_values` has the last word."""
+    return (key,) if re.match(r"axes\.[xyz]\.(modes|drive)\b", key) else ()
+
+
+def drawn_machine(machine: Machine, values: Mapping[str, object], source: str) -> Machine:
+    """A machine with drawn values.
+
+    Args:
+        machine: as its file has it.
+        values: by key.
+        source: names it in messages.
+
+    Returns:
+        The machine.
+
+    Raises:
+        MachineError: a value that a machine file could not have; it has the key, the value and the limit.
+    """
+    if not values:
+        return machine
+    # A control that ticks otherwise plays the same blocks; whether their period is a multiple is the converter's care.
+    freed = {"emission.block_period_s": None} if _TICK in values and "emission.block_period_s" not in values else {}
+    return machine.with_values({**freed, **values}, source=source)

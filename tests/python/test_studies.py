@@ -1,0 +1,275 @@
+"""Studies: against closed forms, SciPy, and the interpreter, player and plant of the tests."""
+
+from __future__ import annotations
+
+import json
+import math
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.stats import qmc
+
+import shapegcode as sg
+from command import run
+from judge import Mode, contour_error_um, interpret, play, residual_um, response
+from shapegcode.demos.path import path_program
+from shapegcode.errors import ArgumentError, MachineError
+from shapegcode.studies import replay as replays
+from shapegcode.studies.sampling import drawn
+from shapegcode.studies.study_file import StudyFileError
+from shapegcode.studies.summary import decides, interval_of
+from shapegcode.studies.varied import varied_values
+
+X_HZ, Y_HZ = "axes.x.modes.1.frequency_hz", "axes.y.modes.1.frequency_hz"
+X_DAMPING = "axes.x.modes.1.damping_ratio"
+VX500 = sg.Machine.load("vx500")
+SHORT = "%\nO0001\nG21 G90 G17\nG00 X0 Y0 Z0\nG01 X4.5 F6000.\nM30\n%\n"
+
+
+@cache
+def paper_study() -> sg.MachineStudy:
+    vary = {X_HZ: sg.normal(46, 2), Y_HZ: sg.uniform(124, 138), X_DAMPING: sg.lognormal(0.02, 40)}
+    return sg.study(path_program(200, VX500), VX500, vary, n=50, sampling="lhs")
+
+
+def test_quantiles_are_those_of_fifty_machines_played_one_by_one() -> None:
+    """The text is read, played and shaken by code that shares nothing with the package."""
+    conversion = sg.convert(path_program(200, VX500), VX500)
+    (place,) = conversion.placed
+    emitted = interpret(conversion.text.decode()).lines[place.first_line - 1 : place.last_line]
+    written = interpret(path_program(200, VX500).text.decode()).lines
+    cuts = [move for line in emitted for move in line.moves if move.length > 0.0]
+    first, last = place.original_lines
+    path = [move for line in written[first - 1 : last] for move in line.moves]
+    tick = VX500.controller.interpolation_period_s
+    command = play(cuts, period_s=tick)
+    draws = paper_study().draws
+    residuals, contours = [], []
+    for x_hz, y_hz, x_damping in zip(draws[X_HZ], draws[Y_HZ], draws[X_DAMPING], strict=True):
+        modes = [[Mode(x_hz, x_damping)], [Mode(y_hz, 0.02)], []]
+        residuals.append(residual_um(command, modes, tick, still_mm=1e-9).max())
+        contours.append(contour_error_um(response(command, modes, tick)[2][::10], path).max_um)
+    for name, brute in (("residual_um", residuals), ("contour_um", contours)):
+        found = paper_study().quantity(name)
+        expected = np.percentile(brute, (5, 25, 50, 75, 95, 99))
+        assert [found.p5, found.p25, found.p50, found.p75, found.p95, found.p99] == pytest.approx(expected, rel=0.02)
+
+
+def test_one_mode_behind_zv_leaves_what_the_closed_form_says() -> None:
+    """A line at feed v, time T: (2 v / w) |sin(w T / 2)| of swing; ZV leaves |cos(pi w / 2 w0)| of it.
+
+    The ramps of one block of 5 ms come to half the speed in the first and in the last block: |cos(w 5 ms / 2)|. All in
+    all it rises with the frequency here, so that its quantiles are those of the frequency.
+    """
+    known_hz, speed, time_s = 50.0, 100.0, 0.045
+    machine = VX500.with_values(
+        {
+            "axes.x.modes": [{"frequency_hz": known_hz, "damping_ratio": 1e-6}],
+            "axes.y.modes": [], "axes.y.rigid": True, "emission.block_period_s": 0.005,
+            "shaping.family": "zv", "shaping.contour": "off", "controller.block_end": "ceil",
+            "controller.time_constant_s": 0.005, "axes.x.max_acceleration_mm_s2": 1e6,
+        }
+    )  # fmt: skip
+    program = sg.Program.from_text(SHORT, machine)
+    low, high = 51.0, 55.0
+    found = sg.study(
+        program, machine, {X_HZ: sg.uniform(low, high)}, n=256, measure=["residual_x_um"], shape_all=True
+    ).quantity("residual_x_um")
+
+    def left_um(hz: float) -> float:
+        omega = 2.0 * math.pi * hz
+        swing = 2e3 * speed / omega * abs(math.sin(omega * time_s / 2.0) * math.cos(omega * 0.0025))
+        return swing * abs(math.cos(math.pi * hz / (2.0 * known_hz)))
+
+    for share, value in ((0.05, found.p5), (0.25, found.p25), (0.5, found.p50), (0.75, found.p75), (0.95, found.p95)):
+        assert value == pytest.approx(left_um(low + share * (high - low)), rel=0.02)
+    assert found.nominal < 0.01 * found.p50
+
+
+def test_distributions_have_the_quantiles_of_scipy() -> None:
+    shares = np.linspace(0.01, 0.99, 33)
+    for mine, theirs in (
+        (sg.normal(46, 2), stats.norm(46, 2)),
+        (sg.normal(-40, percent=5), stats.norm(-40, 2)),
+        (sg.lognormal(0.02, 50), stats.lognorm(math.log(1.5), scale=0.02)),
+        (sg.uniform(-1, 3), stats.uniform(-1, 4)),
+    ):
+        assert mine.at(shares) == pytest.approx(theirs.ppf(shares), rel=1e-9)
+    assert sg.listed(["a", "b", "c", "d"]).at(np.array([0.0, 0.3, 0.74, 0.76, 1.0])) == ["a", "b", "c", "d", "d"]
+
+
+@pytest.mark.parametrize("sampling", ["sobol", "lhs"])
+def test_draws_fill_the_cube_as_the_sequences_do(sampling: str) -> None:
+    varied = varied_values(VX500, {X_HZ: sg.uniform(40, 50), Y_HZ: sg.uniform(120, 140)})
+    columns = drawn(varied, 256, sampling, 3, indices=False)
+    points = np.column_stack([(np.array(columns[0], float) - 40) / 10, (np.array(columns[1], float) - 120) / 20])
+    random = np.random.default_rng(0).random((256, 2))
+    assert qmc.discrepancy(points) < 0.5 * qmc.discrepancy(random)
+    # One draw in each of 256 slices of each value.
+    assert all(sorted((column * 256).astype(int)) == list(range(256)) for column in points.T)
+
+
+def test_a_grid_has_every_combination_once() -> None:
+    varied = varied_values(VX500, {X_HZ: sg.uniform(40, 50), "controller.block_end": ["ceil", "carry"]})
+    columns = drawn(varied, 11, "grid", 0, indices=False)
+    rows = list(zip(*columns, strict=True))
+    assert rows == [(hz, rule) for hz in (41.0, 43.0, 45.0, 47.0, 49.0) for rule in ("ceil", "carry")]
+    with pytest.raises(ArgumentError, match="n = 1: the lists alone have 2 combinations"):
+        drawn(varied, 1, "grid", 0, indices=False)
+
+
+def test_sobol_indices_of_a_sum_are_its_shares_of_the_variance() -> None:
+    keys = {X_HZ: sg.uniform(40, 50), Y_HZ: sg.uniform(120, 140), X_DAMPING: sg.uniform(0.01, 0.02)}
+    varied = varied_values(VX500, keys)
+    columns = drawn(varied, 10_000, "sobol", 0, indices=True)
+    x, y = np.array(columns[0], float) - 40.0, np.array(columns[1], float) - 120.0
+    found = decides(varied, columns, {"share_of_limit": 3.0 * x + y / 2.0}, indices=True, seed=0)
+    # Variances 9 · 100 / 12 and 100 / 12.
+    assert [each.key for each in found] == [X_HZ, Y_HZ, X_DAMPING]
+    assert [each.first for each in found] == pytest.approx([0.9, 0.1, 0.0], abs=0.02)
+    assert [each.total for each in found] == pytest.approx([0.9, 0.1, 0.0], abs=0.02)
+
+
+def test_the_interval_of_a_probability_is_that_of_the_binomial_test() -> None:
+    for good, count in ((0, 20), (17, 20), (20, 20)):
+        expected = stats.binomtest(good, count).proportion_ci(0.95, method="exact")
+        assert interval_of(good, count) == pytest.approx((expected.low, expected.high))
+
+
+@pytest.mark.parametrize(
+    ("vary", "texts"),
+    [
+        ({X_HZ: sg.normal(46, 1), "controller.shaped_time_constant_s": [0.0, 0.008]}, 1),
+        ({X_HZ: sg.normal(46, 1), "controller.block_time_s": [0.004, 0.005, 0.006]}, 3),
+        ({X_HZ: sg.listed([45.0, 47.0], known=True), Y_HZ: sg.normal(131, 2)}, 2),
+    ],
+)
+def test_a_text_is_made_for_what_the_converter_knows_and_for_nothing_else(
+    vary: dict[str, Any], texts: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = []
+    original = replays.convert
+    monkeypatch.setattr(replays, "convert", lambda *args, **options: made.append(1) or original(*args, **options))
+    found = sg.study(path_program(200, VX500), VX500, vary, n=12)
+    # One more for the machine file, where none of them is for it.
+    assert len(made) - texts in (0, 1)
+    assert found.conversions == texts
+
+
+def test_a_known_value_is_converted_for() -> None:
+    """The same as `convert` says of the machine with that value."""
+    hz = 52.0
+    found = sg.study(path_program(200, VX500), VX500, {X_HZ: sg.listed([hz], known=True)}, n=1)
+    machine = VX500.with_values(X_HZ, hz)
+    conversion = sg.convert(path_program(200, machine), machine)
+    ceil = next(case for case in conversion.cases if case.name == "nominal, ceil")
+    assert found.quantity("residual_um").p50 == pytest.approx(max(ceil.residual_um))
+    assert found.quantity("contour_um").p50 == pytest.approx(ceil.contour_error_um.response)
+    assert found.quantity("time_s").p50 == pytest.approx(conversion.cycle_time_s.emitted)
+
+
+def test_the_dataset_has_every_draw_with_units() -> None:
+    data = paper_study().to_xarray()
+    assert data.sizes["draw"] == 50
+    assert data[X_HZ].attrs["units"] == "Hz" and data["residual_um"].attrs["units"] == "µm"
+    assert float(data["residual_um"].quantile(0.95)) == pytest.approx(paper_study().quantity("residual_um").p95)
+    assert float(data["quantile"].sel(measure="contour_um", percent=50)) == paper_study().quantity("contour_um").p50
+
+
+def test_a_time_that_differs_comes_from_the_machine_that_plays() -> None:
+    found = sg.study(path_program(200, VX500), VX500, {"times.feed_override_percent": [50.0, 100.0]}, n=2)
+    half, full = sorted(found.draws["time_s"], reverse=True)
+    assert full == pytest.approx(found.quantity("time_s").nominal)
+    assert half > full + 0.3
+
+
+STUDY = """program = "part.nc"
+machine = "vx500"
+n = 40
+[vary]
+axes.x.modes.1.frequency_hz = { mean = 46.0, sd = 2.0 }
+"axes.y.modes.1.damping_ratio" = { median = 0.02, percent = 40.0 }
+controller.shaped_time_constant_s = [0.0, 0.008]
+"""
+
+
+def written(folder: Path, text: str = STUDY) -> Path:
+    (folder / "part.nc").write_bytes(path_program(200, VX500).text)
+    (folder / "STUDY.toml").write_text(text)
+    return folder
+
+
+def test_the_command_says_what_python_says(tmp_path: Path) -> None:
+    done = run(written(tmp_path), "study", "STUDY.toml", "--json", "s.json", "--csv", "s.csv", "--html", "s.html",
+               "--plots", "plots")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    report = json.loads((tmp_path / "s.json").read_text())
+    options = sg.load_study(tmp_path / "STUDY.toml").options()
+    found = sg.study(tmp_path / "part.nc", VX500, **options)
+    assert report["quantities"][0]["p95"] == pytest.approx(found.quantities[0].p95, rel=1e-6)
+    assert report["within"] == found.within
+    assert len((tmp_path / "s.csv").read_text().splitlines()) == 41
+    assert {file.name for file in (tmp_path / "plots").iterdir()} >= {"study-tornado.png", "study-bands.svg"}
+    assert sg.load_result(tmp_path / "s.json").answer == found.answer.replace(str(tmp_path), "")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("n = 40", "n = 0", "n = 0: must be 1 or more"),
+        ("sd = 2.0", "sd = -2.0", 'vary."axes.x.modes.1.frequency_hz".sd = -2.0: must be greater than 0'),
+        ("sd = 2.0", "sd = 30.0", "axes.x.modes.1.frequency_hz = -"),
+        ("x.modes.1", "x.modes.0", "no such key: modes count from 1"),
+        ("x.modes.1", "x.modes.2", "axes.x.modes.2.frequency_hz"),
+        ("frequency_hz", "frequenzy_hz", "did you mean frequency_hz?"),
+        (
+            "controller.shaped_time_constant_s = [0.0, 0.008]",
+            "shaping.family = { low = 1, high = 2 }",
+            'must be "auto"',
+        ),
+        ("[0.0, 0.008]", "[0.0, -0.008]", "controller.shaped_time_constant_s = -0.008: must be"),
+        ("[0.0, 0.008]", "[]", "= []: must have 1 or more values"),
+        ("[vary]", 'measure = ["shake_um"]\n[vary]', 'measure = "shake_um": must be one of residual_um'),
+        ("median = 0.02, ", "", "give mean and sd (or percent)"),
+        ("part.nc", "nothing.nc", "no such file"),
+    ],
+)
+def test_bad_files_name_key_value_and_limit(tmp_path: Path, old: str, new: str, said: str) -> None:
+    done = run(written(tmp_path, STUDY.replace(old, new)), "study", "STUDY.toml", "--csv", "s.csv")
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert not (tmp_path / "s.csv").exists()
+
+
+def test_bad_arguments_name_key_value_and_limit() -> None:
+    ask = partial(sg.study, path_program(200, VX500), VX500)
+    with pytest.raises(ArgumentError, match="nothing is varied"):
+        ask({})
+    with pytest.raises(ArgumentError, match="n = 0: must be a whole number of draws, 1 or more"):
+        ask({X_HZ: [45.0]}, n=0)
+    with pytest.raises(ArgumentError, match="46: must be a distribution or a list of values"):
+        ask({X_HZ: 46})
+    with pytest.raises(ArgumentError, match=r"shaping\.family: known = false: only the converter reads it"):
+        ask({"shaping.family": sg.listed(["zv"], known=False)})
+    with pytest.raises(ArgumentError, match="'monte carlo': must be one of sobol, lhs, grid"):
+        ask({X_HZ: [45.0]}, sampling="monte carlo")
+    with pytest.raises(MachineError, match=r"axes\.x\.mode: no such key"):
+        ask({"axes.x.mode": [45.0]})
+    with pytest.raises(ArgumentError, match="mean = nan: must be a finite number"):
+        sg.normal(math.nan, 1)
+    with pytest.raises(ArgumentError, match="high = 2: must be above low = 3"):
+        sg.uniform(3, 2)
+    with pytest.raises(StudyFileError):
+        sg.load_study(Path(__file__))
+
+
+@pytest.mark.slow
+def test_a_cluster_finds_the_same_to_the_bit() -> None:
+    vary = {X_HZ: sg.normal(46, 2), Y_HZ: sg.normal(131, 5)}
+    here = sg.study(path_program(200, VX500), VX500, vary, n=200)
+    there = sg.study(path_program(200, VX500), VX500, vary, n=200, scheduler="local")
+    assert all(np.array_equal(here.draws[name], there.draws[name]) for name in here.draws)
