@@ -55,7 +55,9 @@ class CasePlayer:
     def planned(self) -> _core.PlaybackFigures | None:
         """The look-ahead left on; None where no case asks."""
         wanted = any(case.look_ahead for case in self.cases)
-        return self.model.play_planned(self.blocks, self.path, offset=self.offset) if wanted else None
+        if not wanted:
+            return None
+        return self.model.play_planned(self.blocks, self.path, offset=self.offset, tracker=self.tracker)
 
     def groups(self) -> list[list[Case]]:
         """Overrides and shifted modes: those played in full each by itself, the short ones in one task."""

@@ -6,6 +6,7 @@ uncertainty, or by what is usual where none is stated. That takes no more playba
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -103,13 +104,18 @@ class _Region:
         reach = np.ptp(np.asarray(self.place.region.path.polyline()), axis=0)
         return "".join(axis for axis, way in zip("xyz", reach, strict=True) if way > 0.0)
 
+    @functools.cached_property
+    def tracker(self) -> _core.ContourTracker:
+        """Of the programmed path, for all runs that measure the contour."""
+        return _core.ContourTracker(self.place.region.path)
+
     def play(self, trial: _Trial, *, contour: bool) -> CaseFigures:
         """The figures with a value moved; without the contour they come from the end of the region alone."""
         model, path = MachineModel(trial.machine), self.place.region.path
         run = model.play_emitted(
             self.place.blocks(self.emitted), path, shift=trial.shift, only=trial.only,
             offset=model.offset(self.place.region), contour=contour,
-            last_seconds=0.0 if contour else model.vibration_memory_s,
+            last_seconds=0.0 if contour else model.vibration_memory_s, tracker=self.tracker if contour else None,
         )  # fmt: skip
         return case_figures(run, contour=contour)
 

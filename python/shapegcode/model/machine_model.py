@@ -355,7 +355,12 @@ class MachineModel:
         return _core.play_blocks(blocks, path, block_end or self.own_rule, override, options)
 
     def play_planned(
-        self, blocks: _core.Path, path: _core.Path, *, offset: Offset = NO_OFFSET
+        self,
+        blocks: _core.Path,
+        path: _core.Path,
+        *,
+        offset: Offset = NO_OFFSET,
+        tracker: _core.ContourTracker | None = None,
     ) -> _core.PlaybackFigures:
         """Emitted blocks as the look-ahead plans them anew if it is left on, against the programmed path.
 
@@ -363,6 +368,7 @@ class MachineModel:
             blocks: what was emitted.
             path: what was programmed.
             offset: see `options`.
+            tracker: of the programmed path, shared by several runs; None: one of its own.
 
         Returns:
             The figures, positions in mm.
@@ -370,6 +376,8 @@ class MachineModel:
         ticks = round(self.machine.controller.look_ahead_filter_time_constant_s / self.period_s)
         filters = [_core.Fir.moving_average(ticks)] if ticks > 1 else []
         options = self.verdict_options(filters=filters, offset=offset)
+        if tracker is not None:
+            options.tracker = tracker
         return _core.play_path(blocks, _core.plan_speed(blocks, self.limits()), options, path)
 
     def cycle_time_s(self, program: _core.ProgramText) -> float:

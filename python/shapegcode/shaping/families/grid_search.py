@@ -69,13 +69,27 @@ class GridSearch:
         return None
 
     def _smallest_feasible(self, most: int) -> int | None:
-        """A solution stays one with further taps at zero, so doubling and then halving finds the smallest."""
-        too_few, enough = -1, 0
-        while enough < most and self._feasible(enough) is None:
-            too_few, enough = enough, 2 * enough + 1
-        enough = min(enough, most)
-        if enough <= too_few or self._feasible(enough) is None:
-            return None
+        """A solution stays one with further taps at zero: from a first guess in growing steps, then by halving."""
+        at, step = min(self._usual_periods(), most), 1
+        too_few, enough = -1, most + 1
+        if self._feasible(at) is None:
+            too_few = at
+            while too_few < most and enough > most:
+                at, step = min(at + step, most), 2 * step
+                if self._feasible(at) is None:
+                    too_few = at
+                else:
+                    enough = at
+            if enough > most:
+                return None
+        else:
+            enough = at
+            while enough > 0 and too_few < 0:
+                at, step = max(at - step, 0), 2 * step
+                if self._feasible(at) is None:
+                    too_few = at
+                else:
+                    enough = at
         while enough - too_few > 1:
             middle = (too_few + enough) // 2
             if self._feasible(middle) is None:
@@ -83,6 +97,13 @@ class GridSearch:
             else:
                 enough = middle
         return enough
+
+    def _usual_periods(self) -> int:
+        """About where the search ends: half a swing for each zero, a whole one for each limit without a zero in it."""
+        swings_s = sum(0.5 * zero.multiplicity / zero.mode.frequency_hz for zero in self._conditions.zeros)
+        if not self._conditions.zeros:
+            swings_s = sum(1.0 / limit.mode.frequency_hz for limit in self._conditions.limits)
+        return max(1, math.ceil(swings_s / self._period_s))
 
     def _candidates(self, last: int) -> list[FloatArray]:
         """Taps of that many periods, the best first."""
