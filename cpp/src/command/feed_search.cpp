@@ -22,6 +22,8 @@ constexpr double creep_mm_per_s = 0.5;
 constexpr double creep_share = 0.02;
 // Curves and lines are never slowed below this share of their speed: what then still deviates is not the feed's doing.
 constexpr double slowest_share = 0.05;
+// A longer run is shaped once more when it is given out: so much memory (100 MB) is not spent on it.
+constexpr std::size_t most_rows_kept = std::size_t{1} << 22U;
 constexpr float none = std::numeric_limits<float>::infinity();
 
 // Speed at which the next round may pass a place that was passed at `speed` with `deviation`. Deviation grows with the
@@ -47,10 +49,13 @@ class FeedSearch {
     PlannedRun best;
     PlannedRun last;
     for (int round = 0; round < rounds; ++round) {
+      last.rows = {};
       last = measured();
       const bool within = last.largest_deviation_mm <= tolerance_;
       if (within && (!best.profile || last.profile->duration_s() < best.profile->duration_s())) {
+        RunRows rows = std::move(last.rows);
         best = last;
+        best.rows = std::move(rows);
       }
       bool changed = adjust(round < raising_rounds);
       if (!stops_.empty()) {
@@ -79,14 +84,23 @@ class FeedSearch {
 
  private:
   PlannedRun measured() {
-    PlannedRun plan{path_, std::make_shared<const SpeedProfile>(plan_speed(*path_, limits_, {}, &caps_)), 0.0, {}};
+    PlannedRun plan{path_, std::make_shared<const SpeedProfile>(plan_speed(*path_, limits_, {}, &caps_)), 0.0, {}, {}};
     deviation_.at_junction.assign(path_->size(), 0.0F);
     deviation_.on_segment.assign(path_->size(), -1.0F);
     deviation_.near_corner.assign(path_->size(), 0.0F);
     RunShaper shaper(path_, plan.profile, filter_, run_limits(limits_), steps_per_half_, &deviation_);
+    const std::size_t rows = 2 * static_cast<std::size_t>(shaper.periods()) + 1;
+    const bool keeps = rows <= most_rows_kept;
+    if (keeps) {
+      plan.rows.positions.reserve(rows);
+      plan.rows.arc_normals.reserve(rows / 2);
+    }
     Vector3 position;
-    for (std::size_t row = 0; row < 2 * static_cast<std::size_t>(shaper.periods()) + 1; ++row) {
+    for (std::size_t row = 0; row < rows; ++row) {
       shaper.next(position);
+      if (!keeps) continue;
+      plan.rows.positions.push_back(position);
+      if (row % 2 == 0 && row + 1 < rows) plan.rows.arc_normals.push_back(shaper.arc_normal());
     }
     plan.largest_deviation_mm = std::max(
         {0.0F, *std::ranges::max_element(deviation_.on_segment), *std::ranges::max_element(deviation_.near_corner)});

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -14,6 +15,12 @@ namespace shapegcode {
 /// What the axes may do while the contour is corrected.
 [[nodiscard]] RunLimits run_limits(const MotionLimits& limits);
 
+/// A shaped run as `RunShaper` gives it out.
+struct RunRows {
+  std::vector<Vector3> positions;        ///< one per row
+  std::vector<std::int8_t> arc_normals;  ///< one per block period
+};
+
 /// A run with the speed at which it keeps the contour tolerance.
 struct PlannedRun {
   std::shared_ptr<const Path> path;
@@ -22,6 +29,8 @@ struct PlannedRun {
   /// Segments before which the run must come to rest, because no speed into them keeps the tolerance. The profile is
   /// then of no use: plan the pieces between.
   std::vector<std::size_t> stops;
+  /// The run itself, shaped while it was measured; empty where it is longer than what is kept.
+  RunRows rows;
 };
 
 /// The highest feed at which a run keeps the contour tolerance: planned at full speed, shaped, measured, and slowed

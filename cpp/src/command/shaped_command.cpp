@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "command/feed_search.hpp"
@@ -39,6 +40,40 @@ void put(const std::vector<Vector3>& grid, const std::vector<Vector3>& middle, c
   }
 }
 
+// A planned run given out row by row: as it was kept when it was planned, or shaped anew.
+class Run {
+ public:
+  // `filter` stays the caller's.
+  Run(PlannedRun plan, const RunFilter& filter, const RunLimits& limits, std::size_t steps_per_half)
+      : plan_(std::move(plan)) {
+    if (plan_.rows.positions.empty()) shaper_.emplace(plan_.path, plan_.profile, filter, limits, steps_per_half);
+  }
+
+  [[nodiscard]] const PlannedRun& plan() const noexcept { return plan_; }
+
+  [[nodiscard]] std::uint32_t periods() const noexcept {
+    return shaper_ ? shaper_->periods() : static_cast<std::uint32_t>(plan_.rows.arc_normals.size());
+  }
+
+  void next(Vector3& position) {
+    if (shaper_) {
+      shaper_->next(position);
+    } else {
+      position = plan_.rows.positions[row_++];
+    }
+  }
+
+  // Of the period that begins at the row last given.
+  [[nodiscard]] std::int8_t arc_normal() {
+    return shaper_ ? shaper_->arc_normal() : plan_.rows.arc_normals[(row_ - 1) / 2];
+  }
+
+ private:
+  PlannedRun plan_;
+  std::optional<RunShaper> shaper_;
+  std::size_t row_ = 0;  // rows given out of those kept
+};
+
 }  // namespace
 
 struct RegionShaper::State {
@@ -63,11 +98,11 @@ struct RegionShaper::State {
   std::uint32_t rest_periods_ = 0;
 
   Piece now_{0, 0};
-  std::unique_ptr<RunShaper> run_;  // refers to the filter above
-  std::uint32_t given_ = 0;         // periods of the run given out
-  std::uint32_t resting_ = 0;       // periods of rest still to come
-  std::uint32_t period_ = 0;        // of the region
-  Vector3 at_ = Vector3::Zero();    // last grid row
+  std::unique_ptr<Run> run_;      // refers to the filter above
+  std::uint32_t given_ = 0;       // periods of the run given out
+  std::uint32_t resting_ = 0;     // periods of rest still to come
+  std::uint32_t period_ = 0;      // of the region
+  Vector3 at_ = Vector3::Zero();  // last grid row
   std::vector<std::uint32_t> segment_periods_;
   double largest_deviation_mm_ = 0.0;
   std::uint32_t stops_ = 0;
@@ -123,8 +158,11 @@ bool RegionShaper::State::begin_run() {
     pieces_.pop_back();
     const auto part = sub_path(path_, now_.first, now_.last);
     if (options_.target == ContourTarget::none) {
-      plan = {
-          part, std::make_shared<const SpeedProfile>(plan_speed(*part, options_.limits, options_.tolerance)), 0.0, {}};
+      plan = {part,
+              std::make_shared<const SpeedProfile>(plan_speed(*part, options_.limits, options_.tolerance)),
+              0.0,
+              {},
+              {}};
       break;
     }
     plan = plan_within_tolerance(part, options_.limits, filter_, steps_per_half_,
@@ -141,10 +179,10 @@ bool RegionShaper::State::begin_run() {
     pieces_.push_back({now_.first, last});
   }
   largest_deviation_mm_ = std::max(largest_deviation_mm_, plan.largest_deviation_mm);
-  run_ = std::make_unique<RunShaper>(plan.path, plan.profile, filter_, run_limits(options_.limits), steps_per_half_);
+  run_ = std::make_unique<Run>(std::move(plan), filter_, run_limits(options_.limits), steps_per_half_);
   given_ = 0;
   run_->next(at_);
-  note_marks(plan);
+  note_marks(run_->plan());
   return true;
 }
 
