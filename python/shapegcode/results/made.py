@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 
 __all__ = ["FORMAT", "Made", "MadeFile", "file_hash", "this_version"]
@@ -104,6 +103,8 @@ def file_hash(name: str | Path) -> tuple[str, int]:
 
 def this_version() -> str:
     """ "shapegcode" and its version."""
+    from importlib import metadata  # slow to load, and wanted where a file is written only
+
     try:
         return f"shapegcode {metadata.version('shapegcode')}"
     except metadata.PackageNotFoundError:

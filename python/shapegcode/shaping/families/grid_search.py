@@ -53,7 +53,7 @@ class GridSearch:
         self._planes = [
             _plane(each, float(frequency_hz), float(direction))
             for each in conditions.limits
-            for frequency_hz in np.unique(np.linspace(each.lowest_hz, each.highest_hz, _FIRST_FREQUENCIES))
+            for frequency_hz in _frequencies(each, _FIRST_FREQUENCIES)
             for direction in 2.0 * np.pi * np.arange(_FIRST_DIRECTIONS) / _FIRST_DIRECTIONS
         ]
 
@@ -246,7 +246,7 @@ class GridSearch:
             worst, frequency_hz = each.worst(shaper)
             if worst <= each.limit:
                 continue
-            sweep = np.unique(np.linspace(each.lowest_hz, each.highest_hz, _SWEEP))
+            sweep = _frequencies(each, _SWEEP)
             curve = np.array(sensitivity_curve(shaper, each.mode.damping_ratio, sweep.tolist()))
             padded = np.concatenate([[-1.0], curve, [-1.0]])
             peaks = sweep[(curve >= padded[:-2]) & (curve >= padded[2:]) & (curve > each.limit)]
@@ -289,3 +289,10 @@ class GridSearch:
 
 def _plane(limit: ResidualLimit, frequency_hz: float, direction: float) -> _Plane:
     return _Plane(Mode(frequency_hz, limit.mode.damping_ratio).pole, direction, limit.limit)
+
+
+def _frequencies(limit: ResidualLimit, count: int) -> FloatArray:
+    """Over the band of a limit, its ends among them."""
+    if limit.lowest_hz == limit.highest_hz:
+        return np.array([limit.lowest_hz])
+    return np.linspace(limit.lowest_hz, limit.highest_hz, count)
