@@ -223,6 +223,11 @@ from shapegcode.studies.distributions import (
     normal as normal,
     uniform as uniform,
 )
+from shapegcode.studies.optimize import optimize as optimize
+from shapegcode.studies.optimum_result import (
+    Candidate as Candidate,
+    Optimum as Optimum,
+)
 from shapegcode.studies.plots import (
     plot_bands as plot_bands,
     plot_tornado as plot_tornado,

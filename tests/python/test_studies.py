@@ -273,3 +273,64 @@ def test_a_cluster_finds_the_same_to_the_bit() -> None:
     here = sg.study(path_program(200, VX500), VX500, vary, n=200)
     there = sg.study(path_program(200, VX500), VX500, vary, n=200, scheduler="local")
     assert all(np.array_equal(here.draws[name], there.draws[name]) for name in here.draws)
+
+
+def share_within(text: bytes, lines: tuple[int, int], draws: list[tuple[float, float]], limit_um: float) -> float:
+    """Of machines, by the tests' own interpreter, player and plant: those whose residual vibration is small enough."""
+    emitted = interpret(text.decode()).lines[lines[0] - 1 : lines[1]]
+    command = play([move for line in emitted for move in line.moves if move.length > 0.0])
+    left = [
+        residual_um(command, [[Mode(x_hz, 0.02)], [Mode(y_hz, 0.02)], []], 0.001, still_mm=1e-9).max()
+        for x_hz, y_hz in draws
+    ]
+    return float(np.mean(np.array(left) <= limit_um))
+
+
+def test_the_optimum_is_the_shortest_that_is_likely_enough() -> None:
+    """ZV is shorter than ZVD, and leaves too much on too many of machines that are known badly."""
+    machine = VX500.with_values(
+        {
+            "tolerance.contour_um": 500.0, "tolerance.residual_ratio": 0.001, "tolerance.residual_floor_um": 1.2,
+            "tolerance.residual_floor_increments": 0.5,
+        }
+    )  # fmt: skip
+    program = path_program(200, machine)
+    vary = {X_HZ: sg.normal(46, percent=6), Y_HZ: sg.normal(131, percent=6)}
+    choose = {"shaping.family": ["zvd", "zv", "mzv"], "emission.block_period_s": [0.006, 0.005]}
+    found = sg.optimize(program, machine, vary, choose=choose, probability=0.9, n=64)
+    random = np.random.default_rng(5)
+    draws = [(46.0 * (1 + 0.06 * x), 131.0 * (1 + 0.06 * y)) for x, y in random.standard_normal((150, 2))]
+    good = []
+    for family in choose["shaping.family"]:
+        for period in choose["emission.block_period_s"]:
+            values = {"shaping.family": family, "emission.block_period_s": period}
+            conversion = sg.convert(program, machine.with_values(values))
+            (region,) = conversion.regions
+            share = share_within(conversion.text, region.emitted_lines, draws, max(region.residual_limit_um))
+            if share >= 0.9:
+                good.append((conversion.cycle_time_s.emitted, values))
+    assert found.values == min(good, key=lambda pair: pair[0])[1]
+    assert found.best is not None and found.best.checked == pytest.approx(1.0, abs=0.02)
+    assert [each.within is None for each in found.candidates] == [False, False, False, True, True, True]
+
+
+def test_more_choices_than_conversions_are_searched() -> None:
+    choose = {
+        "shaping.family": ["zv", "mzv", "zvd", "ei"], "emission.block_period_s": [0.005, 0.006, 0.007],
+        "shaping.arc_feed_ratio": [1.0, 0.9, 0.8],
+    }  # fmt: skip
+    ask = partial(sg.optimize, path_program(200, VX500), VX500, {X_HZ: sg.normal(46, 1)}, n=8)
+    found = ask(choose=choose, most=10)
+    assert (len(found.candidates), found.combinations) == (10, 36)
+    assert found.best is not None and found.best.time_s == min(each.time_s for each in found.candidates if each.time_s)
+    assert ask(choose=choose, most=10).values == found.values
+    with pytest.raises(ArgumentError, match=r"probability = 1\.5: must be above 0 and at most 1"):
+        ask(probability=1.5)
+    with pytest.raises(ArgumentError, match="most = 0: must be 1 conversion or more"):
+        ask(most=0)
+    with pytest.raises(ArgumentError, match="give one value or more for each key"):
+        ask(choose={"shaping.family": []})
+    with pytest.raises(MachineError, match=r"shaping\.family = \"soft\": must be"):
+        ask(choose={"shaping.family": ["soft"]})
+    with pytest.raises(ArgumentError, match=r"controller\.block_time_s: the converter would know it"):
+        sg.optimize(path_program(200, VX500), VX500, {"controller.block_time_s": [0.005]})

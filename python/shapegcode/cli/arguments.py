@@ -35,7 +35,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "quantity", "force_scale", "response_scale", "force_sensitivity", "response_sensitivity", "response_first",
     ),
     "runs": (
-        "batch_command", "resume", "jobs", "time_limit", "memory_limit", "scheduler", "tls_ca", "tls_cert", "tls_key",
+        "draws", "batch_command", "resume", "jobs", "time_limit", "memory_limit", "scheduler", "tls_ca", "tls_cert",
+        "tls_key",
     ),
     "output": (
         "output", "update", "force", "full", "csv", "npz", "every", "blocks", "plots", "json", "html", "html_script",

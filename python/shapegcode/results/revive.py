@@ -53,6 +53,7 @@ MODULES: Mapping[str, str] = {
     "MachineStudy": "studies.result",
     "Measurement": "metrology.result",
     "MetrologyDemo": "demos.metrology",
+    "Optimum": "studies.optimum_result",
     "ParameterImport": "machine.result",
     "PathDemo": "demos.path",
     "Recommendation": "shaping.result",

@@ -26,7 +26,7 @@ from shapegcode.studies.sampling import Columns, drawn
 from shapegcode.studies.summary import bins_of, decides, interval_of, quantity, within
 from shapegcode.studies.varied import Varied, Vary, drawn_machine, varied_values
 
-__all__ = ["study"]
+__all__ = ["check_ends", "study"]
 
 Progress = Callable[[str, float], None]
 
@@ -81,7 +81,7 @@ def study(
     wanted = checked_measures(measure)
     varied = varied_values(machine, vary)
     columns = drawn(varied, n, sampling, seed, indices=indices)
-    _check_ends(machine, varied, columns)
+    check_ends(machine, varied, columns)
     source = str(program) if isinstance(program, Path) else program
     with _pool(scheduler) as pool:
         run = _StudyRun(source, machine, varied, columns, wanted, pool, shape_all, on_progress)
@@ -89,8 +89,17 @@ def study(
     return _result(run, texts, sampling, seed, at_least, indices=indices)
 
 
-def _check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> None:
-    """The draws with the lowest and the highest value of each key, before anything is converted."""
+def check_ends(machine: Machine, varied: Sequence[Varied], columns: Columns) -> None:
+    """Make the machines with the lowest and the highest value of each key, before anything is converted.
+
+    Args:
+        machine: as its file has it.
+        varied: what is varied.
+        columns: its values.
+
+    Raises:
+        MachineError: a value that a machine file could not have; it has the key, the value and the limit.
+    """
     for each, column in zip(varied, columns, strict=True):
         if isinstance(each.distribution, Listed):
             ends = {toml(value): index for index, value in enumerate(column)}.values()

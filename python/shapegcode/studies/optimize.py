@@ -1,0 +1,188 @@
+"""The shortest program that stays within tolerance as likely as asked: block period, family, tolerance, feed on arcs.
+
+SciPy is there anyway, and the choices are few and discrete. So all of them are converted where they are not too many,
+and the shortest is taken that is likely enough: that is exact, and the same every time. Where there are more, SciPy's
+differential evolution over their ranks says which ones are converted. Optuna would be one more package, to save
+conversions that take a tenth of a second each.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shapegcode.errors import ArgumentError, DesignError, MachineError
+from shapegcode.machine import Machine
+from shapegcode.program import Program
+from shapegcode.settings.keys import toml
+from shapegcode.studies.choices import Choices, Ranks, search, usual_choices
+from shapegcode.studies.optimum_result import Candidate, ChosenValue, Optimum
+from shapegcode.studies.play import DrawsJob, play_all
+from shapegcode.studies.replay import SHARE, Replay
+from shapegcode.studies.sampling import Columns, drawn
+from shapegcode.studies.study import check_ends
+from shapegcode.studies.summary import within
+from shapegcode.studies.varied import Vary, drawn_machine, varied_values
+
+__all__ = ["optimize"]
+
+_FRESH = 4  # times as many draws confirm a choice: the best of many has had luck
+_UNLIKELY_S = 1e6  # a candidate that is not likely enough costs more than any program takes
+_NO_TEXT_S = 1e9
+
+
+def optimize(
+    program: Program | str | Path,
+    machine: Machine,
+    vary: Vary,
+    *,
+    choose: Choices | None = None,
+    probability: float = 0.95,
+    n: int = 256,
+    most: int = 300,
+    seed: int = 0,
+    on_progress: Callable[[float], None] = lambda _share: None,
+) -> Optimum:
+    """Choose block period, family, tolerance and feed on arcs for the shortest time that is likely enough to be good.
+
+    >>> found = sg.optimize("part.nc", machine, {"axes.x.modes.1.frequency_hz": sg.normal(46, 2)}, probability=0.99)
+    >>> sg.convert("part.nc", machine.with_values(found.values))
+
+    Args:
+        program: what is converted, or its file.
+        machine: as its file has it; its tolerances are those that count, whatever tolerance is aimed at.
+        vary: what the machine that plays may differ in, as for `study`.
+        choose: values to choose from, by key; None: see `shapegcode.studies.choices.usual_choices`.
+        probability: of staying within tolerance.
+        n: machines on which a choice is played; four times as many fresh ones confirm it.
+        most: conversions at most.
+        seed: the same one gives the same result.
+        on_progress: called with the share of the conversions that is done.
+
+    Returns:
+        What to set, and the choices that were converted.
+
+    Raises:
+        ArgumentError: a probability outside 0 to 1, nothing to vary or to choose, or a value that the converter would
+            know.
+        MachineError: a key that there is none, or a draw that a machine file could not have.
+        ProgramError: the program cannot be read.
+        OSError: its file cannot be read.
+    """
+    if not 0.0 < probability <= 1.0:
+        raise ArgumentError(f"probability = {probability:g}: must be above 0 and at most 1")
+    varied = varied_values(machine, vary)
+    for each in varied:
+        if each.known:
+            raise ArgumentError(f"vary: {each.key}: the converter would know it: it belongs into choose")
+    samples = [drawn(varied, count, "sobol", seed + rank, indices=False) for rank, count in enumerate((n, _FRESH * n))]
+    for columns in samples:
+        check_ends(machine, varied, columns)
+    rows = [_rows([each.key for each in varied], columns) for columns in samples]
+    choices = usual_choices(machine) if choose is None else choose
+    _check_keys(machine, choices)
+    run = _Choosing(str(program) if isinstance(program, Path) else program, machine, choices, rows, probability)
+    total = min(most, math.prod(len(values) for values in choices.values()))
+    for ranks in search(choices, most, seed, run.cost):
+        run.converted(ranks)
+        on_progress(min(1.0, len(run.candidates) / total))
+    best = run.best()
+    name = program.source if isinstance(program, Program) else str(program)
+    listed = sorted(run.candidates.values(), key=lambda each: math.inf if each.time_s is None else each.time_s)
+    return Optimum(
+        name, machine.name, probability, n, best, run.as_it_is(), tuple(listed),
+        math.prod(len(values) for values in choices.values()),
+    )  # fmt: skip
+
+
+def _rows(keys: list[str], columns: Columns) -> tuple[Mapping[str, object], ...]:
+    return tuple(dict(zip(keys, values, strict=True)) for values in zip(*columns, strict=True))
+
+
+def _check_keys(machine: Machine, choices: Choices) -> None:
+    """Every value by itself; two that do not go together are only no candidate."""
+    for key, values in choices.items():
+        problems = []
+        for value in values:
+            try:
+                drawn_machine(machine, {key: value}, "choose")
+            except MachineError as wrong:
+                problems.append(wrong)
+        if problems and len(problems) == len(values):
+            raise problems[0]
+
+
+class _Choosing:
+    """A search under way."""
+
+    def __init__(
+        self, program: Program | str, machine: Machine, choices: Choices,
+        rows: list[tuple[Mapping[str, object], ...]], probability: float,
+    ) -> None:  # fmt: skip
+        self._program, self._machine, self._choices, self._rows = program, machine, choices, rows
+        self._probability = probability
+        self._replays: dict[Ranks, Replay] = {}
+        self.candidates: dict[Ranks, Candidate] = {}
+
+    def _values(self, ranks: Ranks) -> dict[str, object]:
+        return {key: values[rank] for (key, values), rank in zip(self._choices.items(), ranks, strict=True)}
+
+    def converted(self, ranks: Ranks) -> Candidate:
+        """A candidate with its time."""
+        if ranks not in self.candidates:
+            values = self._values(ranks)
+            chosen = tuple(ChosenValue(key, toml(value)) for key, value in values.items())
+            try:
+                machine = drawn_machine(self._machine, values, "choose")
+                replay = Replay.of(self._program, machine, self._machine)
+                self._replays[ranks] = replay
+                self.candidates[ranks] = Candidate(chosen, replay.time_s)
+            except (ArgumentError, DesignError, MachineError) as no_text:
+                self.candidates[ranks] = Candidate(chosen, None, why=str(no_text))
+        return self.candidates[ranks]
+
+    def _share(self, replay: Replay, which: int) -> float:
+        rows = self._rows[which]
+        numbers = tuple(range(1, len(rows) + 1))
+        shares = np.array(play_all(replay, DrawsJob(self._machine.name, rows, numbers, (SHARE,), times=False), None))
+        return float(within(shares).mean())
+
+    def played(self, ranks: Ranks) -> Candidate:
+        """A candidate with its probability; it is confirmed where that is enough."""
+        found = self.converted(ranks)
+        if found.time_s is not None and found.within is None:
+            share = self._share(self._replays[ranks], 0)
+            checked = self._share(self._replays[ranks], 1) if share >= self._probability else None
+            self.candidates[ranks] = found = replace(found, within=share, checked=checked)
+        return found
+
+    def cost(self, ranks: Ranks) -> float:
+        """For the evolution: time, and much more where it is not likely enough."""
+        found = self.converted(ranks)
+        if found.time_s is None:
+            return _NO_TEXT_S
+        share = self._share(self._replays[ranks], 0)
+        return found.time_s if share >= self._probability else _UNLIKELY_S * (1.0 + self._probability - share)
+
+    def _is_good(self, found: Candidate) -> bool:
+        return found.checked is not None and found.checked >= self._probability
+
+    def best(self) -> Candidate | None:
+        """The shortest that is likely enough; of the others only those are played that are shorter."""
+        order = sorted(
+            (ranks for ranks, each in self.candidates.items() if each.time_s is not None),
+            key=lambda ranks: (self.candidates[ranks].time_s, ranks),
+        )
+        return next((found for ranks in order if self._is_good(found := self.played(ranks))), None)
+
+    def as_it_is(self) -> Candidate | None:
+        """The machine file without a choice."""
+        try:
+            replay = Replay.of(self._program, self._machine)
+        except (ArgumentError, DesignError):
+            return None
+        return Candidate((), replay.time_s, self._share(replay, 0), self._share(replay, 1))
