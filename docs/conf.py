@@ -3,7 +3,7 @@
 import os
 import re
 import shutil
-import tomllib
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[1]
 project = "shapegcode"
 author = "shapegcode developers"
 copyright = "shapegcode developers, MIT licence"
-release = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+release = metadata.version("shapegcode")
 
 extensions = [
     "breathe",

@@ -42,7 +42,7 @@ std::string repr(const std::vector<double>& values) { return py::repr(py::cast(v
 
 /// Read-only view on memory that `owner` keeps alive.
 py::array_t<double> read_only_view(const std::vector<double>& values, const py::object& owner) {
-  py::array_t<double> view({static_cast<py::ssize_t>(values.size())}, values.data(), owner);
+  py::array_t<double> view(static_cast<py::ssize_t>(values.size()), values.data(), owner);
   view.attr("flags").attr("writeable") = false;
   return view;
 }

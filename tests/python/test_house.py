@@ -6,13 +6,14 @@ import ast
 import importlib.metadata
 import inspect
 import re
+import shutil
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import shapegcode_version
 import write_docs
 
 from shapegcode.program.stamp import REGION_MARK
@@ -317,11 +318,41 @@ def test_generated_pages_are_up_to_date(page: str) -> None:
 
 
 def test_versions_agree() -> None:
-    pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
-    cmake = re.search(r"project\(shapegcode VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))
-    assert cmake is not None
-    assert cmake[1] == pyproject
-    assert importlib.metadata.version("shapegcode") == pyproject, "installed package is stale"
+    """Of the tag, or of an archive: CMake and pip read it by the same rules."""
+    said = subprocess.run(["cmake", "-P", ROOT / "cmake/version.cmake"], capture_output=True, text=True, check=True)
+    assert said.stdout.strip() == shapegcode_version.version()
+    assert importlib.metadata.version("shapegcode") == said.stdout.strip(), "installed package is stale"
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"version: {said.stdout.strip()}" in citation
+
+
+def test_the_version_is_that_of_the_last_tag(tmp_path: Path) -> None:
+    """Without tags, and in an archive, it is the one that the sources name."""
+    clone = tmp_path / "clone"
+    (clone / "cmake").mkdir(parents=True)
+    script = clone / "cmake" / "version.cmake"
+    script.write_bytes((ROOT / "cmake/version.cmake").read_bytes())
+
+    def both() -> set[str]:
+        said = subprocess.run(["cmake", "-P", script], capture_output=True, text=True, check=True)
+        return {said.stdout.strip(), shapegcode_version.version(clone)}
+
+    def git(*words: str) -> None:
+        name = ["-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false"]
+        subprocess.run(["git", *name, *words], cwd=clone, check=True, capture_output=True)
+
+    (fallback,) = both()
+    assert re.fullmatch(r"\d+\.\d+\.\d+", fallback)
+    git("init", "-q")
+    git("commit", "-q", "--allow-empty", "-m", "a")
+    assert both() == {fallback}
+    git("tag", "v3.4.5")
+    git("commit", "-q", "--allow-empty", "-m", "b")
+    git("tag", "other-9.9.9")
+    assert both() == {"3.4.5"}
+    (clone / "PKG-INFO").write_text("Metadata-Version: 2.1\nName: shapegcode\nVersion: 7.0.1\n")
+    shutil.rmtree(clone / ".git")
+    assert shapegcode_version.version(clone) == "7.0.1"
 
 
 def test_no_test_skips_silently() -> None:
