@@ -17,7 +17,7 @@ from shapegcode.batching.inputs import find_programs
 from shapegcode.batching.job import pack
 from shapegcode.batching.manifest import Manifest
 from shapegcode.batching.plan import COMMANDS, plan
-from shapegcode.batching.process import end_hosts
+from shapegcode.batching.process import Hosts, run_packed
 from shapegcode.batching.result import Batch
 from shapegcode.batching.runs import OnBatch, Runs
 from shapegcode.batching.summary import summary_lines
@@ -113,13 +113,14 @@ def batch(
         _sweep(scratch, [Path(output), *([Path(html)] if html else [])])
         scratch.mkdir()
         stack.callback(shutil.rmtree, scratch, ignore_errors=True)
-        executor, slots = remote or stack.enter_context(_local_executor(processes))
+        hosts = Hosts()
+        executor, slots = remote or stack.enter_context(_local_executor(processes, hosts))
         prepare = functools.partial(
             pack, seconds=time_limit_s, memory_bytes=memory_limit_bytes, scratch="" if cluster else str(scratch),
             kept=planned.shared,
         )  # fmt: skip
         run = Runs(planned.jobs, manifest, [Path(output), *([Path(html)] if html else [])], resume, on_progress)
-        stopped = run.all(executor, slots, prepare)
+        stopped = run.all(executor, slots, prepare, run_packed if cluster else hosts.run)
     rows = tuple(run.rows[job.key] for job in planned.jobs if job.key in run.rows)
     summary = Path(output) / _SUMMARY
     write_text(summary, "".join(summary_lines(rows)))
@@ -154,11 +155,11 @@ def _remote_executor(processes: int, cluster: Cluster) -> AbstractContextManager
 
 
 @contextlib.contextmanager
-def _local_executor(processes: int) -> Iterator[tuple[Executor, int]]:
+def _local_executor(processes: int, hosts: Hosts) -> Iterator[tuple[Executor, int]]:
     executor = ThreadPoolExecutor(max_workers=processes)
     try:
         yield executor, processes
     finally:
         executor.shutdown(wait=False, cancel_futures=True)
-        end_hosts()
+        hosts.end()
         executor.shutdown()

@@ -14,7 +14,6 @@ import subprocess
 import sys
 import tempfile
 import threading
-import weakref
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -22,11 +21,7 @@ from typing import Any
 from shapegcode.batching.job import FAILED_CODES, Ending, JobOutcome, Packed
 from shapegcode.results.made import this_version
 
-__all__ = ["end_hosts", "run_packed"]
-
-_own = threading.local()
-_hosts: weakref.WeakSet[_Host] = weakref.WeakSet()
-_stopped = threading.Event()
+__all__ = ["Hosts", "run_packed"]
 
 
 class _Host:
@@ -40,7 +35,6 @@ class _Host:
             # Ctrl-C of a terminal is for the batch alone, which ends its hosts itself.
             start_new_session=True,
         )
-        _hosts.add(self)
 
     def ask(self, request: Mapping[str, Any]) -> dict[str, Any] | None:
         """The host's answer; None: it is gone."""
@@ -70,65 +64,105 @@ class _Host:
                 self._process.stdout.close()
 
 
-def end_hosts() -> None:
-    """End all hosts of this process with what they run; jobs that are asked for later start new ones."""
-    for host in list(_hosts):
-        host.end()
-        _hosts.discard(host)
+class Hosts:
+    """Hosts of the threads of one batch, or of one Dask worker."""
+
+    def __init__(self) -> None:
+        self._own = threading.local()
+        self._lock = threading.Lock()
+        self._all: set[_Host] = set()
+        self._ended = False
+
+    def run(self, packed: Packed) -> JobOutcome:
+        """Run a job in a process of its own, in a folder that is gone afterwards.
+
+        Args:
+            packed: the job.
+
+        Returns:
+            What it wrote and how it ended; a crash is an outcome, not an error.
+
+        Raises:
+            OSError: there is no room for its folder.
+        """
+        if packed.version != (mine := this_version()):
+            return JobOutcome("other version", 0, "", f"this worker has {mine}, the batch needs {packed.version}", {})
+        folder = Path(tempfile.mkdtemp(prefix="job-", dir=packed.scratch or None))
+        try:
+            return self._run_in(folder, packed)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def end(self) -> None:
+        """End all of them with what they run; whoever asks later is told that his job was killed."""
+        with self._lock:
+            self._ended = True
+            hosts = list(self._all)
+            self._all.clear()
+        for host in hosts:
+            host.end()
+
+    def _host(self, command: str) -> _Host | None:
+        """That of this thread; None: there shall be none any more."""
+        host: _Host | None = getattr(self._own, "host", None)
+        with self._lock:
+            if self._ended:
+                return None
+            if host is None or host not in self._all:
+                host = self._own.host = _Host(command)
+                self._all.add(host)
+            return host
+
+    def _run_in(self, folder: Path, packed: Packed) -> JobOutcome:
+        names = [*packed.files]
+        # Names may lead upwards: the run's folder lies so deep that they end within what is removed.
+        depth = max(_ups(word) for word in (*names, *packed.words))
+        cwd = folder.joinpath("files", *("d" for _ in range(depth)))
+        cwd.mkdir(parents=True)
+        for name, content in packed.files.items():
+            target = Path(os.path.normpath(cwd / name))
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(content)
+        for word in packed.words:
+            _make_parent(cwd, word)
+        host = self._host(packed.words[0])
+        answer = None
+        if host is not None:
+            answer = host.ask(
+                {"cwd": str(cwd), "logs": str(folder), "words": packed.words, "seconds": packed.seconds,
+                 "memory_bytes": packed.memory_bytes}
+            )  # fmt: skip
+            if answer is None:
+                host.end()
+                with self._lock:
+                    self._all.discard(host)
+        if answer is None:
+            return JobOutcome("killed", 0, "", "the process that ran it was killed", {})
+        said, complained = (_text(folder / name) for name in ("out", "err"))
+        ending, why = _ending(answer, packed, complained)
+        files = dict(_written(folder / "files", cwd, names)) if ending == "ended" else {}
+        return JobOutcome(
+            ending, answer["code"] if ending == "ended" else 0, said, why, files, answer["wall_s"], answer["cpu_s"],
+            answer["peak_bytes"],
+        )  # fmt: skip
+
+
+_of_worker = Hosts()
 
 
 def run_packed(packed: Packed) -> JobOutcome:
-    """Run a job in a process of its own, in a folder that is gone afterwards.
+    """`Hosts.run` on a Dask worker, whose hosts last as long as it does.
 
     Args:
         packed: the job.
 
     Returns:
-        What it wrote and how it ended; a crash is an outcome, not an error.
+        What it wrote and how it ended.
 
     Raises:
         OSError: there is no room for its folder.
     """
-    if packed.version != (mine := this_version()):
-        return JobOutcome("other version", 0, "", f"this worker has {mine}, the batch needs {packed.version}", {})
-    folder = Path(tempfile.mkdtemp(prefix="job-", dir=packed.scratch or None))
-    try:
-        return _run_in(folder, packed)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def _run_in(folder: Path, packed: Packed) -> JobOutcome:
-    names = [*packed.files]
-    # Names may lead upwards: the run's folder lies so deep that they end within what is removed.
-    depth = max(_ups(word) for word in (*names, *packed.words))
-    cwd = folder.joinpath("files", *("d" for _ in range(depth)))
-    cwd.mkdir(parents=True)
-    for name, content in packed.files.items():
-        target = Path(os.path.normpath(cwd / name))
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(content)
-    for word in packed.words:
-        _make_parent(cwd, word)
-    host = getattr(_own, "host", None)
-    if host is None or host not in _hosts:
-        host = _own.host = _Host(packed.words[0])
-    answer = host.ask(
-        {"cwd": str(cwd), "logs": str(folder), "words": packed.words, "seconds": packed.seconds,
-         "memory_bytes": packed.memory_bytes}
-    )  # fmt: skip
-    if answer is None:
-        host.end()
-        _hosts.discard(host)
-        _own.host = None
-        return JobOutcome("killed", 0, "", "the process that ran it was killed", {})
-    said, complained = (_text(folder / name) for name in ("out", "err"))
-    ending, why = _ending(answer, packed, complained)
-    files = dict(_written(folder / "files", cwd, names)) if ending == "ended" else {}
-    return JobOutcome(
-        ending, answer["code"] if ending == "ended" else 0, said, why, files, answer["wall_s"], answer["cpu_s"],
-        answer["peak_bytes"],
-    )  # fmt: skip
+    return _of_worker.run(packed)
 
 
 def _ups(word: str) -> int:

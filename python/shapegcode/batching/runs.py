@@ -17,7 +17,6 @@ from typing import Any
 
 from shapegcode.batching.job import BatchJob, JobOutcome, Packed
 from shapegcode.batching.manifest import Manifest
-from shapegcode.batching.process import run_packed
 from shapegcode.batching.result import BatchRow
 from shapegcode.batching.row import row_of, row_read
 from shapegcode.errors import ArgumentError
@@ -78,7 +77,13 @@ class Runs:
         self._done_bytes, self._told = 0, 0.0
         self._ctrl_c = _CtrlC()
 
-    def all(self, executor: Executor, slots: int, prepare: Callable[[BatchJob], Packed]) -> str:
+    def all(
+        self,
+        executor: Executor,
+        slots: int,
+        prepare: Callable[[BatchJob], Packed],
+        run: Callable[[Packed], JobOutcome],
+    ) -> str:
         """Do them; gives why it stopped before the end, or nothing."""
         waiting: dict[Future[JobOutcome], tuple[BatchJob, str]] = {}
         self._ctrl_c.begin()
@@ -92,7 +97,7 @@ class Runs:
                     continue
                 if self._is_done(job, packed.fingerprint):
                     continue
-                waiting[executor.submit(run_packed, packed)] = (job, packed.fingerprint)
+                waiting[executor.submit(run, packed)] = (job, packed.fingerprint)
                 if len(waiting) >= slots * _AHEAD:
                     self._collect(waiting, slots)
             while waiting:
