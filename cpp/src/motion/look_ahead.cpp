@@ -332,6 +332,8 @@ class PhaseList {
   double length = 0.0;
 };
 
+constexpr std::size_t most_phases = 3;  // of a piece: up, steady, down
+
 void piece_phases(const Piece& piece, double end_speed, PhaseList& list) {
   const double v0 = piece.start_speed;
   const double v1 = end_speed;
@@ -456,16 +458,12 @@ double corner_speed_limit(const Segment& before, const Segment& after, const Mot
   return speed;
 }
 
-SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const FilterTolerance& filter,
-                        const SpeedCaps* caps) {
-  check_limits(limits, filter);
+namespace {
+
+// Ramps as steep as the limits let them be, of a path with a length; and the jerk time.
+std::pair<PhaseList, double> shortest_ramps(const Path& path, const MotionLimits& limits, const FilterTolerance& filter,
+                                            const SpeedCaps* caps) {
   const std::size_t n = path.size();
-  if (caps != nullptr && (caps->on_segment.size() != n || caps->at_junction.size() != n)) {
-    throw Error(ErrorKind::argument, fmt::format("speed caps of a path of {} segments: one per segment", n));
-  }
-  if (n == 0 || path.length_mm() <= 0.0) {
-    return SpeedProfile({}, path.length_mm(), 0.0);
-  }
   std::vector<double> speed(n);
   std::vector<double> corner(n + 1, MotionLimits::none);
   double fastest_acceleration = 0.0;
@@ -489,9 +487,27 @@ SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const Filt
   const std::vector<double> boundary = piece_boundaries(path, pieces, corner, zones);
   pass_speeds(pieces, boundary);
   PhaseList list;
+  // Room that is not used is no memory; a list that grows is copied while both stand.
+  list.phases.reserve(most_phases * pieces.size());
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     piece_phases(pieces[i], i + 1 < pieces.size() ? pieces[i + 1].start_speed : 0.0, list);
   }
+  return {std::move(list), jerk_s};
+}
+
+}  // namespace
+
+SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const FilterTolerance& filter,
+                        const SpeedCaps* caps) {
+  check_limits(limits, filter);
+  const std::size_t n = path.size();
+  if (caps != nullptr && (caps->on_segment.size() != n || caps->at_junction.size() != n)) {
+    throw Error(ErrorKind::argument, fmt::format("speed caps of a path of {} segments: one per segment", n));
+  }
+  if (n == 0 || path.length_mm() <= 0.0) {
+    return SpeedProfile({}, path.length_mm(), 0.0);
+  }
+  auto [list, jerk_s] = shortest_ramps(path, limits, filter, caps);
   if (limits.law == AccelerationLaw::constant_time) {
     list.phases = stretch_ramps(list.phases, list.length, limits.time_constant_s);
   }

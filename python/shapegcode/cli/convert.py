@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 __all__ = ["MACHINE_KEYS", "add_arguments", "run"]
 
+_MMAP_THRESHOLD = -3  # M_MMAP_THRESHOLD of glibc's malloc.h
+_LARGE_BYTES = 1 << 20
+
 MACHINE_KEYS = {
     "--contour-tolerance": "tolerance.contour_um",
     "--contour": "shaping.contour",
@@ -122,6 +125,7 @@ def run(args: argparse.Namespace) -> int:
     if args.feed_schedule != bool(args.tool and args.stock) or bool(args.tool) != bool(args.stock):
         raise ArgumentError("--feed-schedule, --tool and --stock belong together: give all three or none")
     runner.check_files(args, also_written=[failed])
+    _give_memory_back()
     with runner.progress(f"converting {args.input}", args) as bar:
         program = read_for_conversion(args.input, machine, program_number=args.program)
         result = (_scheduled if args.feed_schedule else _converted)(args, program, machine, bar)
@@ -148,6 +152,19 @@ def _options(args: argparse.Namespace) -> dict[str, Any]:
         "block_period_s": args.block_period,
         "budget": None if limits == (None, None, None) else Budget(*limits),
     }
+
+
+def _give_memory_back() -> None:
+    """Let glibc give large pieces of memory back as soon as they are free.
+
+    By itself it keeps them for later from the second time on; a path, a plan and a text of a million blocks then stand
+    in memory one beside the other.
+    """
+    import ctypes
+    import sys
+
+    if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
+        libc.mallopt(_MMAP_THRESHOLD, _LARGE_BYTES)
 
 
 def _converted(args: argparse.Namespace, program: Program, machine: Machine, bar: ProgressBar) -> Conversion:
