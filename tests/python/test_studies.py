@@ -177,7 +177,10 @@ def test_the_dataset_has_every_draw_with_units() -> None:
     assert data.sizes["draw"] == 50
     assert data[X_HZ].attrs["units"] == "Hz" and data["residual_um"].attrs["units"] == "µm"
     assert float(data["residual_um"].quantile(0.95)) == pytest.approx(paper_study().quantity("residual_um").p95)
-    assert float(data["quantile"].sel(measure="contour_um", percent=50)) == paper_study().quantity("contour_um").p50
+    quantiles = paper_study().to_xarray("quantities")
+    assert float(quantiles["contour_um"].sel(percent=50)) == paper_study().quantity("contour_um").p50
+    with pytest.raises(ArgumentError, match="modes: must be draws or quantities"):
+        paper_study().to_xarray("modes")
 
 
 def test_a_time_that_differs_comes_from_the_machine_that_plays() -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from shapegcode._core import ArgumentError
 from shapegcode.results.json import hidden
 from shapegcode.results.outcome import NotKeptError
 from shapegcode.results.page.model import Figure
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["BinQuantiles", "Bins", "Decides", "MachineStudy", "Quantity", "RefusedDraws", "VariedKey"]
 
+_PERCENT = (5, 25, 50, 75, 95, 99)
 _UNITS = {"_um": "µm", "_s": "s"}
 
 
@@ -292,40 +294,44 @@ class MachineStudy(Result):
         """Every draw: its values as coordinates, its measures as variables; needs `shapegcode[study]`.
 
         Args:
-            what: for other results; here there is one Dataset.
+            what: "draws", or "quantities" for the quantiles; empty: the draws.
 
         Returns:
-            The Dataset, with units; `draw` is its dimension.
+            The Dataset, with units; its dimension is `draw`, or `percent`.
 
         Raises:
+            ArgumentError: another word.
             NotKeptError: the study was read back from its JSON, which has no draws.
             ModuleNotFoundError: xarray is not installed.
         """
         import xarray as xr
 
+        about = {
+            "program": self.program, "machine": self.machine, "sampling": self.sampling, "seed": self.seed,
+            "within": self.within,
+        }  # fmt: skip
+        if what == "quantities":
+            rows = {
+                each.name: xr.DataArray(
+                    [getattr(each, f"p{percent}") for percent in _PERCENT], dims=["percent"], attrs={"units": each.unit}
+                )
+                for each in self.quantities
+            }
+            return xr.Dataset(rows, coords={"percent": [float(percent) for percent in _PERCENT]}, attrs=about)
+        if what not in ("", "draws"):
+            raise ArgumentError(f"{what}: must be draws or quantities")
         if not self.draws:
             raise NotKeptError("the draws of a study are not in its JSON: run it again, or keep --csv")
-        keys = {each.key: each for each in self.varied}
+        keys = {each.key for each in self.varied}
         found = {
             name: xr.DataArray(values, dims=["draw"], attrs={"units": self._unit(name)})
             for name, values in self.draws.items()
         }
-        variables = {name: array for name, array in found.items() if name not in keys}
-        variables["quantile"] = xr.DataArray(
-            [[each.p5, each.p25, each.p50, each.p75, each.p95, each.p99] for each in self.quantities],
-            dims=["measure", "percent"],
-        )
         return xr.Dataset(
-            variables,
-            coords={name: array for name, array in found.items() if name in keys}
-            | {
-                "draw": np.arange(1, self.n + 1),
-                "measure": [each.name for each in self.quantities],
-                "percent": [5.0, 25.0, 50.0, 75.0, 95.0, 99.0],
-            },
-            attrs={"program": self.program, "machine": self.machine, "sampling": self.sampling, "seed": self.seed,
-                   "within": self.within},
-        )  # fmt: skip
+            {name: array for name, array in found.items() if name not in keys},
+            coords={name: array for name, array in found.items() if name in keys} | {"draw": np.arange(1, self.n + 1)},
+            attrs=about,
+        )
 
     def _unit(self, name: str) -> str:
         known = {each.key: each.unit for each in self.varied} | {each.name: each.unit for each in self.quantities}
