@@ -43,7 +43,7 @@ CONFIGURE_RELEASE = cmake --preset release -D SHAPEGCODE_BUILD_PYTHON=ON -D Pyth
 SPHINX := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going -n -q -c docs
 PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
-.PHONY: help demo test test-all lint bench coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
+.PHONY: help demo test test-all lint bench bench-full coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
         build-packages test-packages package dev tidy tidy-all release plain sanitize clang wheel stub-check \
         test-all-core test-all-python fuzz-parameters fuzz-merge
 
@@ -53,7 +53,7 @@ help:
 	@echo 'make test-all  slow tests, sanitizers, the plain build, clang-tidy of everything and the book as well'
 	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy of what changed since the last test-all'
 	@echo 'make coverage  lines of C++ and Python that `make test` runs'
-	@echo 'make bench   measure, with LinuxCNC rs274 as the independent interpreter'
+	@echo 'make bench   measure, with LinuxCNC rs274 as the independent interpreter; bench-full: with all repetitions'
 	@echo 'make fuzz    FUZZ_SECONDS (600) of coverage-guided fuzzing of the program reader; findings in build/fuzz/findings/'
 	@echo 'make stubs   write python/shapegcode/_core.pyi anew from the built module'
 	@echo 'make schemas  write docs/schema/ anew from the classes of the results'
@@ -108,19 +108,18 @@ lint: test-packages dev
 	$(MAKE) tidy
 	@echo 'lint: nothing to complain about'
 
-bench: test-packages package dev
+# Every benchmark; `bench` repeats less and takes smaller inputs: what it takes is some minutes, not twenty.
+BENCH := run.py --repetitions 2; linear_plants.py; feed_drives.py --repetitions 1; identification.py --draws 8; \
+  engagement.py --repetitions 1; simulate_program.py --quick; feed_schedule.py --quick; milling_force.py; \
+  run_logs.py --lines 1000000; report_page.py --repetitions 1; pictures.py --repeat 1
+BENCH_FULL := run.py; linear_plants.py; feed_drives.py; identification.py; engagement.py; simulate_program.py; \
+  feed_schedule.py; milling_force.py; run_logs.py; report_page.py; pictures.py
+
+bench: RUNS := $(BENCH)
+bench-full: RUNS := $(BENCH_FULL)
+bench bench-full: test-packages package dev
 	tests/tools/fetch_rs274.sh
-	$(BIN)/python tests/benchmarks/run.py
-	$(BIN)/python tests/benchmarks/linear_plants.py
-	$(BIN)/python tests/benchmarks/feed_drives.py
-	$(BIN)/python tests/benchmarks/identification.py
-	$(BIN)/python tests/benchmarks/engagement.py
-	$(BIN)/python tests/benchmarks/simulate_program.py
-	$(BIN)/python tests/benchmarks/feed_schedule.py
-	$(BIN)/python tests/benchmarks/milling_force.py
-	$(BIN)/python tests/benchmarks/run_logs.py
-	$(BIN)/python tests/benchmarks/report_page.py
-	$(BIN)/python tests/benchmarks/pictures.py
+	IFS=';'; for run in $$(tr -s ' ' <<<'$(RUNS)'); do IFS=' '; $(BIN)/python tests/benchmarks/$${run# }; done
 
 coverage: test-packages dev
 	tests/tools/fetch_rs274.sh
