@@ -16,7 +16,8 @@ __all__ = ["DrawsJob", "play_all"]
 OVERRIDE = "times.feed_override_percent"
 """Where it is varied, the blocks are played at it."""
 
-_AT_ONCE = 64  # draws of a task: long enough to be worth one, short enough to tell how far it is
+_AT_ONCE = 64  # draws of a task at most: long enough to be worth one
+_PLAYED_S = 900.0  # of motion in a task: short enough to tell how far it is, and to be stopped
 _KEPT_TEXTS = 4
 
 
@@ -58,10 +59,18 @@ class DrawsJob:
             found.append([measured[name] for name in self.wanted])
         return found
 
-    def parts(self) -> Iterator[DrawsJob]:
-        """The same in tasks."""
-        for at in range(0, len(self.rows), _AT_ONCE):
-            rows, draws = self.rows[at : at + _AT_ONCE], self.draws[at : at + _AT_ONCE]
+    def parts(self, motion_s: float) -> Iterator[DrawsJob]:
+        """The same in tasks.
+
+        Args:
+            motion_s: how long the program takes.
+
+        Yields:
+            Some draws each.
+        """
+        size = max(1, min(_AT_ONCE, int(_PLAYED_S / max(motion_s, 1e-3))))
+        for at in range(0, len(self.rows), size):
+            rows, draws = self.rows[at : at + size], self.draws[at : at + size]
             yield DrawsJob(self.name, rows, draws, self.wanted, self.times)
 
 
@@ -82,7 +91,7 @@ def play_all(
     Raises:
         MachineError: a draw that no machine file could have.
     """
-    parts = list(job.parts())
+    parts = list(job.parts(replay.time_s))
     found: list[list[float]] = []
     if pool is not None:
         packed = replay.packed()

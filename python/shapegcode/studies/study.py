@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -118,7 +119,11 @@ def _pool(scheduler: Cluster | str | None) -> Iterator[Executor | None]:
         return
     where = Cluster(scheduler) if isinstance(scheduler, str) else scheduler
     with cluster_executor(
-        where.scheduler, processes=2, tls_ca=where.tls_ca, tls_cert=where.tls_cert, tls_key=where.tls_key
+        where.scheduler,
+        processes=os.cpu_count() or 1,
+        tls_ca=where.tls_ca,
+        tls_cert=where.tls_cert,
+        tls_key=where.tls_key,
     ) as (pool, _):
         yield pool
 
@@ -225,8 +230,9 @@ def _result(
     shares = measured[SHARE]
     # A draw without a text is none that stays within tolerance.
     good = int(within(shares).sum())
+    whole = indices and not refused
     warnings = [f"{run.count - len(kept)} of {run.count} draws have no text: they count as out of tolerance"]
-    whole = indices and len(kept) == run.count
+    warnings += ["no Sobol indices: they need every draw"] if indices else []
     replays = [text.replay for text in texts if text.replay is not None]
     return MachineStudy(
         program=run.name,

@@ -13,6 +13,7 @@ controller.block_time_s = [0.005, 0.008]
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -31,6 +32,7 @@ __all__ = ["DrawnValue", "StudyFile", "StudyFileError", "load_study"]
 
 _KINDS = "give mean and sd (or percent), median and percent, low and high, or one_of"
 _MOST = 10_000_000
+_DOTTED = re.compile(r"^(\s*)([\w-]+(?:\.[\w-]+)+)(\s*=)", re.MULTILINE)
 
 
 class StudyFileError(FileError):
@@ -149,7 +151,9 @@ def load_study(path: str | Path) -> StudyFile:
     data = parsed(text, str(path), StudyFileError)
     if isinstance(data.get("vary"), dict):
         data["vary"] = _flat(data["vary"])
-    found = validated(StudyFile, data, str(path), text, StudyFileError)
+    # In quotes, as they are said in messages, so that these find their lines.
+    quoted = _DOTTED.sub(r'\1"\2"\3', text)
+    found = validated(StudyFile, data, str(path), quoted, StudyFileError)
     beside = Path(path).parent
     machine = found.machine
     if machine is not None and machine not in Machine.builtin_names():
