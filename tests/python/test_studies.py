@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from judge import Mode, contour_error_um, interpret, play, residual_um, response
 from shapegcode.demos.path import path_program
 from shapegcode.errors import ArgumentError, MachineError
 from shapegcode.studies import replay as replays
+from shapegcode.studies.play import DrawsJob, play_all
 from shapegcode.studies.sampling import drawn
 from shapegcode.studies.study_file import StudyFileError
 from shapegcode.studies.summary import decides, interval_of
@@ -298,6 +300,17 @@ def test_bad_arguments_name_key_value_and_limit() -> None:
         sg.uniform(3, 2)
     with pytest.raises(StudyFileError):
         sg.load_study(Path(__file__))
+
+
+def test_a_text_that_travels_as_bytes_is_played_to_the_bit() -> None:
+    """With `frequency_over` and remarks: nothing of the machine is lost on the way."""
+    over = {"axis": "x", "position_mm": [0.0, 60.0], "frequency_hz": [44.0, 48.0]}
+    machine = VX500.with_values("axes.x.modes.1.frequency_over", over)
+    replay = replays.Replay.of(path_program(200, machine), machine)
+    rows = tuple({Y_HZ: 120.0 + draw} for draw in range(70))
+    job = DrawsJob("vx500", rows, tuple(range(70)), ("residual_um", "contour_um", "time_s"), times=True)
+    with ThreadPoolExecutor(2) as pool:
+        assert play_all(replay, job, pool) == play_all(replay, job, None)
 
 
 @pytest.mark.slow
