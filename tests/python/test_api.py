@@ -105,7 +105,8 @@ def test_every_function_that_takes_a_program_takes_its_file() -> None:
     for name in sg.__all__:
         if inspect.isfunction(function := getattr(sg, name)):
             for parameter in inspect.signature(function).parameters.values():
-                if parameter.name in {"program", "programs", "against"}:
+                # A batch takes folders and patterns as well, each program in a process of its own.
+                if parameter.name in {"program", "programs", "against"} and name != "batch":
                     takers += 1
                     assert "Program | str | Path" in str(parameter.annotation), name
     assert takers > 7

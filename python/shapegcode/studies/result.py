@@ -90,6 +90,8 @@ class Decides:
         high_at: value at which it is largest.
         first: Sobol index of first order of the share; None: not asked for.
         total: total Sobol index.
+        first_error: half of the 95 % interval of the first, by resampling.
+        total_error: likewise.
     """
 
     key: str
@@ -99,6 +101,12 @@ class Decides:
     high_at: str
     first: float | None = None
     total: float | None = None
+    first_error: float | None = None
+    total_error: float | None = None
+
+
+def _with_error(value: float | None, error: float | None) -> str:
+    return "" if value is None or error is None else f"{value:.2f} ± {error:.2f}"
 
 
 @dataclass(frozen=True)
@@ -273,8 +281,8 @@ class MachineStudy(Result):
             Column("share of limit", value=lambda row: f"{row.low:.2f} to {row.high:.2f}"),
             Column("least at", value="low_at", priority=2),
             Column("largest at", value="high_at"),
-            Column("first order", value="first", digits=2, priority=2),
-            Column("total", value="total", digits=2),
+            Column("first order", value=lambda row: _with_error(row.first, row.first_error), priority=2),
+            Column("total", value=lambda row: _with_error(row.total, row.total_error)),
         )
         tables = [
             Table(f"{self.n} draws, {self.conversions} conversion{'s' * (self.conversions != 1)}", measures,

@@ -120,13 +120,13 @@ def decides(
     for each, column in zip(varied, columns, strict=True):
         bins = bins_of(each, column, shares)
         low, high = min(bins, key=lambda one: one.median), max(bins, key=lambda one: one.median)
-        rows.append(Decides(each.key, low.median, high.median, low.name, high.name, *found.get(each.key, (None, None))))
+        rows.append(Decides(each.key, low.median, high.median, low.name, high.name, *found.get(each.key, ())))
     rank = (lambda row: row.total or 0.0) if found else (lambda row: row.high - row.low)
     return tuple(sorted(rows, key=rank, reverse=True))
 
 
-def _indices(varied: Sequence[Varied], shares: FloatArray, seed: int) -> dict[str, tuple[float, float]]:
-    """First-order and total index of each value by SALib; none where nothing changes the share."""
+def _indices(varied: Sequence[Varied], shares: FloatArray, seed: int) -> dict[str, tuple[float, ...]]:
+    """First-order and total index of each value by SALib, and their errors; none where nothing changes the share."""
     try:
         from SALib.analyze import sobol
     except ModuleNotFoundError as error:
@@ -137,6 +137,6 @@ def _indices(varied: Sequence[Varied], shares: FloatArray, seed: int) -> dict[st
         warnings.simplefilter("ignore")
         found: Any = sobol.analyze(index_problem(varied), shares, calc_second_order=False, seed=seed)
     return {
-        each.key: (float(first), float(total))
-        for each, first, total in zip(varied, found["S1"], found["ST"], strict=True)
+        each.key: tuple(float(found[name][rank]) for name in ("S1", "ST", "S1_conf", "ST_conf"))
+        for rank, each in enumerate(varied)
     }
