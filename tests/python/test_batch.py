@@ -286,6 +286,25 @@ def test_programs_are_found(folder: Path) -> None:
     assert len(find_programs(["parts", "parts/a.nc", str(folder / "parts" / "a.nc")], "parts/out")) == 5
 
 
+def test_results_of_another_batch_are_no_programs(folder: Path) -> None:
+    """Though they stand below the programs."""
+    told(folder, "parts/a.nc", "-m", "vx500", "-o", "parts/done", code=0)
+    assert len(find_programs(["parts"], "out")) == 5
+    with pytest.raises(sg.ArgumentError, match="no program in it"):
+        find_programs(["parts/done"], "out")
+
+
+def test_a_file_of_several_programs(folder: Path) -> None:
+    """Its JSON is a list; the row says how it ended."""
+    (folder / "memory.nc").write_text(
+        part(30).replace("%\n", "") + part(20).replace("%\n", "").replace("O0001", "O0002")
+    )
+    (row,) = told(folder, "memory.nc", *ONE, "--", "--program", "all", code=0)["rows"]
+    assert (row["ended"], row["output"]) == ("ok", "out/memory.nc")
+    assert row["residual_um"] is None
+    assert len(json.loads((folder / row["report"]).read_text())) == 2
+
+
 def test_what_a_program_may_call_travels_with_it(folder: Path) -> None:
     """Beside it, through several, in the machine's folders; computed numbers take all that are there."""
     machine = sg.Machine.load("vx500").with_values({"input.program_folders": ["parts/lib"]})

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from shapegcode.batching.manifest import MANIFEST
 from shapegcode.errors import ArgumentError
 from shapegcode.program.reading import PROGRAM_SUFFIXES, program_loader
 from shapegcode.program.several import is_subprogram
@@ -103,6 +104,9 @@ def _fixed_part(pattern: str) -> str:
 def _in_folder(folder: Path, avoid: Path) -> Iterator[Source]:
     count = 0
     for where, folders, names in os.walk(folder):
+        if MANIFEST in names:  # the results of a batch
+            folders.clear()
+            continue
         folders[:] = sorted(
             name for name in folders if not name.startswith(".") and Path(where, name).absolute() != avoid
         )

@@ -35,13 +35,15 @@ def row_of(job: BatchJob, outcome: JobOutcome) -> tuple[BatchRow, Mapping[str, b
         ended = "failed"  # not the program's fault
     written = {} if ended in ("failed", "refused") else outcome.files
     report = json.loads(written[job.report]) if job.report in written else {}
-    output = str(report.get("output", ""))
+    # Of a file with several programs (--program all) there is one of each: they have no figures in common.
+    several = report if isinstance(report, list) else [report]
+    output = next((str(each["output"]) for each in several if "output" in each), "")
     row = {
         "program": job.program,
         "machine": job.machine,
         "ended": ended,
         "said": _said(outcome, ended),
-        **figures_of(report),
+        **figures_of(several[0] if len(several) == 1 else {}),
         "output": output,
         "report": job.report if job.report in written else "",
         "page": next((name for name in written if name.endswith(".html")), ""),
