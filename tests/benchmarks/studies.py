@@ -45,6 +45,10 @@ def main() -> int:
             "one text, the test piece of ISO 10791-7",
             *_timed(sg.Program.read(_part(), machine), machine, options, 200),
         ],
+        [
+            "residual vibration alone, the same piece",
+            *_timed(sg.Program.read(_part(), machine), machine, {**options, "measure": ["residual_um"]}, 2000),
+        ],
     ]
     print(markdown(["study", "draws", "s", "ms per draw", "conversions"], rows))
     print(markdown(["50 draws", *(f"{share} %" for share in _PERCENT)], _fifty(machine, options)))

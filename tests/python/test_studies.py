@@ -178,6 +178,18 @@ def test_a_known_value_is_converted_for() -> None:
     assert found.quantity("cutting_time_s").p50 == pytest.approx(ceil.time_s)
 
 
+def test_residuals_alone_come_from_the_end_of_a_cut() -> None:
+    """Nothing else changes them, and the verdict says that it is about them alone."""
+    vary = {X_HZ: sg.normal(46, 2), X_DAMPING: sg.lognormal(0.02, 20)}
+    program = sg.Program.from_text(path_program(200, VX500).text.replace(b"Y40.", b"Y400."), VX500)
+    ask = partial(sg.study, program, VX500, vary, n=20, shape_all=True)
+    whole, end = ask(measure=["residual_um", "contour_um"]), ask(measure=["residual_um"])
+    assert end.draws["residual_um"] == pytest.approx(whole.draws["residual_um"], rel=1e-3)
+    assert "residual vibration alone" in end.warnings[0] and not whole.warnings
+    # Where nothing is asked for but residuals, they are all that is held against a limit.
+    assert max(end.draws["share_of_limit"]) < max(whole.draws["share_of_limit"])
+
+
 def test_draws_without_a_text_are_out_of_tolerance_and_listed() -> None:
     """A shaper must not last longer than it may: ten microseconds are too little for any."""
     vary = {"shaping.max_duration_s": [1e-5, 0.05], X_HZ: sg.normal(46, 0.1)}

@@ -19,7 +19,7 @@ from shapegcode.program import Program
 from shapegcode.program.compensation import read_for_conversion
 from shapegcode.results.figures import Deviation
 
-__all__ = ["DEFAULT_MEASURES", "MEASURES", "SHARE", "Replay", "checked_measures"]
+__all__ = ["CONTOURS", "DEFAULT_MEASURES", "MEASURES", "SHARE", "Replay", "checked_measures"]
 
 SHARE = "share_of_limit"
 MEASURES: Mapping[str, str] = {
@@ -40,6 +40,9 @@ MEASURES: Mapping[str, str] = {
 """What can be measured of each draw, in words."""
 DEFAULT_MEASURES = ("residual_um", "contour_um", "time_s")
 
+CONTOURS = frozenset({"contour_um", "command_um", "response_um"})
+"""Where none of these is wanted, the share of the limit is that of the residual vibration alone."""
+_WHOLE_RUN = frozenset({*CONTOURS, "peak_um", "cutting_time_s"})
 _FULL = 1.0
 
 
@@ -227,21 +230,26 @@ class Replay:
         self, part: _PlayedPart, model: MachineModel, wanted: Collection[str], override: float
     ) -> dict[str, float]:
         path, offset = part.region.path, model.offset(part.region)
-        command = part.limits.target == "command" or "command_um" in wanted
+        contour = not CONTOURS.isdisjoint(wanted)
+        command = contour and (part.limits.target == "command" or "command_um" in wanted)
+        # What swings at the end was excited shortly before.
+        last_s = model.vibration_memory_s if _WHOLE_RUN.isdisjoint(wanted) else 0.0
         run = model.play_emitted(
-            part.blocks, path, override=override, offset=offset, tracker=part.tracker, command_contour=command
-        )
+            part.blocks, path, override=override, offset=offset, tracker=part.tracker, contour=contour,
+            command_contour=command, last_seconds=last_s,
+        )  # fmt: skip
         followed = Deviation.of([run.command]) if command else None
-        figures = CaseFigures(run.residual_mm, followed, Deviation.of([run.response]), run.duration_s)
+        answered = Deviation.of([run.response]) if contour else None
+        figures = CaseFigures(run.residual_mm, followed, answered, run.duration_s)
         judged = judge_region(figures, part.limits)
         axes = (run.residual_mm * 1e3).tolist()
         measured = {
             "residual_um": max(axes),
             **dict(zip(("residual_x_um", "residual_y_um", "residual_z_um"), axes, strict=True)),
             "peak_um": float(run.peak_mm.max()) * 1e3,
-            "contour_um": judged[-1].value_um,
+            "contour_um": judged[-1].value_um if contour else 0.0,
             "command_um": run.command.max_abs_mm * 1e3 if command else 0.0,
-            "response_um": run.response.max_abs_mm * 1e3,
+            "response_um": run.response.max_abs_mm * 1e3 if contour else 0.0,
             "cutting_time_s": run.duration_s,
             SHARE: max(each.share for each in judged),
         }

@@ -21,7 +21,7 @@ from shapegcode.program import Program
 from shapegcode.settings.keys import toml
 from shapegcode.studies.distributions import Listed
 from shapegcode.studies.play import DrawsJob, play_all
-from shapegcode.studies.replay import DEFAULT_MEASURES, SHARE, Replay, checked_measures
+from shapegcode.studies.replay import CONTOURS, DEFAULT_MEASURES, SHARE, Replay, checked_measures
 from shapegcode.studies.result import Bins, MachineStudy, RefusedDraws, VariedKey
 from shapegcode.studies.sampling import Columns, drawn
 from shapegcode.studies.summary import bins_of, decides, interval_of, quantity, within
@@ -233,6 +233,8 @@ def _result(
     whole = indices and not refused
     warnings = [f"{run.count - len(kept)} of {run.count} draws have no text: they count as out of tolerance"]
     warnings += ["no Sobol indices: they need every draw"] if indices else []
+    alone = CONTOURS.isdisjoint(run.wanted)
+    said = ["no contour is measured: within tolerance means its residual vibration alone"] if alone else []
     replays = [text.replay for text in texts if text.replay is not None]
     return MachineStudy(
         program=run.name,
@@ -255,7 +257,7 @@ def _result(
             for name, values in measured.items()
         ),
         refused=tuple(RefusedDraws(toml(dict(text.values)), len(text.draws), text.why) for text in refused),
-        warnings=tuple(warnings if refused else ()),
+        warnings=(*said, *(warnings if refused else ())),
         limits_um={
             "residual_um": min(replay.residual_limit_um for replay in replays),
             "contour_um": min(replay.contour_limit_um for replay in replays),
