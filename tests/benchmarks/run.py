@@ -65,10 +65,10 @@ def main() -> int:
         rows = _program_rows(folder, program, arguments.lines, arguments.repetitions)
         rows += _timing_rows(program, arguments.repetitions)
         rows += _filter_rows()
+        print(comparison_table(rows), end="\n\n", flush=True)
         steps = _step_times(program)
     cores_taken = others.cores_taken()
 
-    print(comparison_table(rows), end="\n\n")
     print(_step_table(steps), end="\n\n")
     print("{date}, {cpu}, {cores} cores, {memory_gb:.0f} GB, Python {python}, NumPy {numpy}".format(**machine))
     print(f"other processes took {cores_taken:.2f} cores during the run", end="")
