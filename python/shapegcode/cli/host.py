@@ -24,6 +24,8 @@ from pathlib import Path
 from typing import Any
 
 from shapegcode.batching.job import FAILED_CODES
+from shapegcode.io.atomic import write_in_passing
+from shapegcode.results.made import this_version
 
 __all__ = ["main"]
 
@@ -57,6 +59,7 @@ def main() -> int:
     for command in sys.argv[1:]:
         for name in (*_LOADED, f"shapegcode.cli.{command}", *_OF_COMMAND[command]):
             importlib.import_module(name)
+    this_version()  # looked up once
     gc.freeze()  # what is loaded stays shared: a collection in a run would copy it
     answers = os.dup(1)
     while line := sys.stdin.buffer.readline():
@@ -113,6 +116,7 @@ def _be_the_command(job: Mapping[str, Any], parent: int) -> None:
         for descriptor, name in ((1, "out"), (2, "err")):
             os.dup2(os.open(logs / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), descriptor)
         os.chdir(job["cwd"])
+        write_in_passing()
         os.environ["SHAPEGCODE_THREADS"] = "1"  # other runs have the other cores
         if job["memory_bytes"]:
             _limit_memory(job["memory_bytes"])

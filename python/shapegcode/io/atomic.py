@@ -12,7 +12,24 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-__all__ = ["is_temporary", "named_errors", "replaced_file", "write_bytes", "write_lines", "write_text"]
+__all__ = [
+    "is_temporary",
+    "named_errors",
+    "replaced_file",
+    "write_bytes",
+    "write_in_passing",
+    "write_lines",
+    "write_text",
+]
+
+_passing = False
+
+
+def write_in_passing() -> None:
+    """From now on, what this process writes need not outlast a power cut: somebody reads it at once and keeps it."""
+    global _passing  # noqa: PLW0603 - of the whole process, which has no other use
+    _passing = True
+
 
 _TEMPORARY = re.compile(r"\..+\.\d+\.tmp")
 
@@ -62,7 +79,8 @@ def replaced_file(path: str | Path) -> Iterator[BinaryIO]:
         with open(temporary, "xb") as stream:
             yield stream
             stream.flush()
-            os.fsync(stream.fileno())
+            if not _passing:
+                os.fsync(stream.fileno())
         if mode is not None:
             temporary.chmod(mode)
         os.replace(temporary, target)

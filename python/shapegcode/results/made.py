@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 __all__ = ["FORMAT", "Made", "MadeFile", "file_hash", "this_version"]
@@ -101,6 +102,7 @@ def file_hash(name: str | Path) -> tuple[str, int]:
     return digest.hexdigest(), size
 
 
+@cache
 def this_version() -> str:
     """ "shapegcode" and its version."""
     from importlib import metadata  # slow to load, and wanted where a file is written only
