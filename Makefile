@@ -160,7 +160,7 @@ wheel: .venv/.runtime
 	for python in $(WHEEL_PYTHONS); do \
 	  rm -rf build/wheels; \
 	  $$python -m pip --disable-pip-version-check -q wheel --no-deps --wheel-dir build/wheels dist/shapegcode-*.tar.gz; \
-	  $(BIN)/auditwheel repair --plat auto --wheel-dir dist build/wheels/*.whl; \
+	  PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/auditwheel repair --plat auto --wheel-dir dist build/wheels/*.whl; \
 	  tests/tools/check_wheel.sh $$python "$$(ls -t dist/*.whl | head -n 1)"; \
 	done
 	@ls -l dist
