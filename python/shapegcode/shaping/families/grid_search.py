@@ -31,6 +31,7 @@ _SWEEP = 65  # frequencies of a band at which new planes are looked for
 _MOST_ROUNDS = 60
 _CENTRES = (0.0, 0.5, 1.0)  # of the duration: starts on the way to the least second central moment
 _CENTRINGS = 4  # steps of that way
+_SAME_CENTRE = 1e-6  # of the duration
 
 
 @dataclass(frozen=True)
@@ -117,20 +118,25 @@ class GridSearch:
             steps = np.arange(last + 1)
             return float(taps @ (steps - taps @ steps) ** 2)
 
-        centred = [taps for share in _CENTRES for taps in self._centred(last, share * last)]
+        seen: list[float] = []
+        centred = [taps for share in _CENTRES for taps in self._centred(last, share * last, seen)]
         return [*sorted(centred, key=variance), *rest]
 
-    def _centred(self, last: int, centre: float) -> list[FloatArray]:
-        """Taps on the way from a centre (periods) to a local minimum of the second central moment."""
+    def _centred(self, last: int, centre: float, seen: list[float]) -> list[FloatArray]:
+        """Taps on the way from a centre (periods) to a local minimum of the second central moment.
+
+        From a centre that another way has seen it goes on as that one did.
+        """
         found: list[FloatArray] = []
         for _ in range(_CENTRINGS):
+            if any(abs(centre - other) < _SAME_CENTRE * (last + 1) for other in seen):
+                break
+            seen.append(centre)
             taps = self._best(last, centre)
             if taps is None:
                 break
             found.append(taps)
             mean = float(taps @ np.arange(last + 1))
-            if abs(mean - centre) < 1e-6 * (last + 1):
-                break
             centre = mean  # the second central moment is concave in the taps: each step lowers it
         return found
 
