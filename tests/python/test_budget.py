@@ -383,7 +383,7 @@ def test_command_with_an_impossible_budget_writes_nothing(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    "words", [("--max-bytes", w) for w in ("0", "-1", "1G", "k", "nan")] + [("--baud", w) for w in ("0", "x", "inf")]
+    "words", [("--max-bytes", w) for w in ("0", "-1", "1T", "k", "nan")] + [("--baud", w) for w in ("0", "x", "inf")]
 )
 def test_command_refuses_limits_that_are_none(tmp_path: Path, words: tuple[str, str]) -> None:
     done = run(tmp_path, f"{words[0]}={words[1]}")

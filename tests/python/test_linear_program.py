@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -65,3 +69,12 @@ def test_least_squares_without_negative_unknowns(seed: int) -> None:
     assert found is not None
     assert found.min() >= 0.0
     assert float(np.linalg.norm(matrix @ found - right)) == pytest.approx(nnls(matrix, right)[1], abs=1e-12)
+
+
+def test_the_solver_prints_nothing(tmp_path: Path) -> None:
+    """HiGHS 1.16 greets on the standard output, where a command's answer or its JSON belongs."""
+    program = ["shaper", "--mode", "46:0.02+-5%", "--block-period", "5ms", "--family", "robust", "--json", "-"]
+    done = subprocess.run(
+        [sys.executable, "-m", "shapegcode", *program], capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    assert json.loads(done.stdout)

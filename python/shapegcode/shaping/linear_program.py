@@ -24,6 +24,17 @@ _MOST_PIVOTS = 20  # per unknown and condition; some 1 is usual
 _MOST_ROUNDS = 3  # per unknown, of the least squares
 
 
+class _Quiet(highspy.Highs):
+    """HiGHS without its callbacks, which the constructor turns on: from 1.16 it prints a notice as it does."""
+
+    def __init__(self) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]
+        self.setOptionValue("output_flag", False)
+
+    def enableCallbacks(self) -> None:
+        """Nothing: nobody listens."""
+
+
 class LinearProgram:
     """Least ``cost @ x`` over x between two bounds, under linear conditions that may be added to.
 
@@ -35,8 +46,8 @@ class LinearProgram:
 
     def __init__(self, lower: FloatArray, upper: FloatArray, equal: tuple[FloatArray, FloatArray]) -> None:
         self._columns = np.arange(len(lower), dtype=np.int32)
-        self._solver = highspy.Highs()  # type: ignore[no-untyped-call]
-        self._set(output_flag=False, threads=1, solver="simplex", presolve="off")
+        self._solver = _Quiet()
+        self._set(threads=1, solver="simplex", presolve="off")
         nothing = np.zeros(0)
         no_index = np.zeros(0, dtype=np.int32)
         self._solver.addCols(len(lower), np.zeros(len(lower)), lower, upper, 0, no_index, no_index, nothing)

@@ -187,7 +187,7 @@ class TapProblem:
             found = self._solve(cost, limit)
             if found is None:
                 return None
-            if self._add_cuts(found[0], limit) <= (1.0 + SAME_RESIDUAL) * limit:
+            if self._add_cuts(found[0], limit) <= (1.0 + 0.2 * SAME_RESIDUAL) * limit:
                 return found[0]
         return None
 

@@ -253,7 +253,7 @@ def _within(task: Task, last: int, limit: float, least_cost: bool) -> RobustDesi
             break
     else:
         return None
-    inner = (1.0 - 2.0 * SAME_RESIDUAL) * limit  # room for the gap of the planes and for the proof
+    inner = (1.0 - 0.4 * SAME_RESIDUAL) * limit  # room for the gap of the planes and for the proof
     candidates = []
     if least_cost and task.max_abs_sum is None:
         candidates = lower_hull(lambda cost: problem.cheapest(cost, inner), last, _SAME_VARIANCE)
