@@ -70,6 +70,7 @@ def contents(*folders: Path) -> dict[str, bytes]:
     }
 
 
+@pytest.mark.slow
 def test_the_bytes_are_those_of_the_single_command(folder: Path) -> None:
     """Program, JSON and page; what was refused has its reason and leaves nothing."""
     report = told(folder, "parts", *ONE, "--html", "pages", "--", "--shaper", "zvd")

@@ -130,6 +130,7 @@ def test_the_wall_is_better(demo: CornerDemo) -> None:
     assert wall.scheduled < wall.equation7 < 0.6 * wall.programmed
 
 
+@pytest.mark.slow
 def test_the_command(
     demo: CornerDemo, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

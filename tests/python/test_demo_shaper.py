@@ -103,6 +103,7 @@ def test_what_the_remark_says_does_not_depend_on_the_assumptions(
     assert [row.agreement for row in rows] == ["open", "open", "agrees", "agrees", "agrees"]
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(canvas, "FORMATS", (".svg",))  # PNG takes three times as long
     assert main(["demo", "shaper", "--json", str(tmp_path / "demo.json"), "--plots", str(tmp_path / "plots")]) == 0

@@ -89,6 +89,7 @@ def test_walls_are_those_of_the_core(pocket: FeedSchedule) -> None:
     assert np.nanmax(np.abs(after)) <= traces.load.emitted.peak_deflection_um.max() * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 def test_the_files(pocket: FeedSchedule, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plot, "FORMATS", (".svg",))
     files = [Path(name) for name in pocket.save_plots(tmp_path / "plots")]

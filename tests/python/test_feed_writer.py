@@ -78,6 +78,7 @@ def points_at(run: list[Move], s_mm: npt.NDArray[np.float64]) -> npt.NDArray[np.
     return out
 
 
+@pytest.mark.slow
 @settings(
     max_examples=15, deadline=None, phases=(Phase.explicit, Phase.generate), suppress_health_check=list(HealthCheck)
 )

@@ -107,6 +107,7 @@ def test_universal_file_of_uneven_spacing(tmp_path: Path) -> None:
     check(identify(path), "x", 5e-3)
 
 
+@pytest.mark.slow
 def test_the_driving_point_of_several_is_taken_and_coherence_is_read(tmp_path: Path) -> None:
     path = write_uff(tmp_path / "frf.uff", rsp_node=7, data=-noisy(HZ))
     write_uff(path)

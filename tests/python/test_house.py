@@ -29,6 +29,7 @@ FOLDERS = [
     "path",
     "filter",
     "motion",
+    "controller",
     "program",
     "shaper",
     "plant",
@@ -39,7 +40,10 @@ FOLDERS = [
     "write",
     "play",
 ]
-NOT_FROM = {"program": {"filter", "motion"}, "measure": {"filter", "motion", "program", "shaper", "plant"}}
+NOT_FROM = {
+    "program": {"filter", "motion", "controller"},
+    "measure": {"filter", "motion", "controller", "program", "shaper", "plant"},
+}
 # Public headers whose folder of sources has another name; one that is named like a folder, or lies in it, is its own.
 HEADER_FOLDERS = {
     "control.hpp": "motion",

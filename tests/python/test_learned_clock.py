@@ -82,6 +82,7 @@ def test_the_machine_file_times_as_the_result_says(
     assert abs(timed.difference_percent or 0.0) < 0.5
 
 
+@pytest.mark.slow
 def test_overrides_and_units_are_read_off_the_feed(tmp_path: Path) -> None:
     control = HiddenControl(override=0.8, feed_factor=60.0 / 25.4)
     clock = sg.learn_clock(shop(tmp_path, control, [1, 2], [3]), sg.Machine.load("vx500"), families=ONE)
@@ -92,6 +93,7 @@ def test_overrides_and_units_are_read_off_the_feed(tmp_path: Path) -> None:
     assert abs(test.error_percent or 99.0) < 2.0
 
 
+@pytest.mark.slow
 def test_a_hold_is_found_and_left_out(tmp_path: Path) -> None:
     control = HiddenControl()
     file = shop(tmp_path, control, [1, 2], [])
@@ -166,6 +168,7 @@ def test_what_does_not_belong_together_is_refused(spoil: Callable[[Path], None],
         sg.learn_clock(file, sg.Machine.load("vx500"), families=ONE)
 
 
+@pytest.mark.slow
 def test_a_log_that_begins_in_the_middle_is_no_whole_run(tmp_path: Path) -> None:
     file = shop(tmp_path, HiddenControl(), [1, 2], [])
     log = tmp_path / "p2-0.txt"
@@ -180,6 +183,7 @@ def test_a_log_that_begins_in_the_middle_is_no_whole_run(tmp_path: Path) -> None
     assert abs(other.error_percent or 99.0) < 2.0
 
 
+@pytest.mark.slow
 def test_the_kind_of_look_ahead_is_chosen_by_runs_left_out(tmp_path: Path) -> None:
     control = HiddenControl()
     file = shop(tmp_path, control, [1, 2], [])

@@ -232,6 +232,7 @@ def test_a_tool_is_needed(folder: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert "--tool-diameter" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "240")
     folder = tmp_path / "pictures"

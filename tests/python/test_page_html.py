@@ -122,6 +122,7 @@ def test_the_shared_script_is_written_once(tmp_path: Path) -> None:
     assert not [file for file in tmp_path.iterdir() if file.suffix == ".tmp"]
 
 
+@pytest.mark.slow
 def test_pictures_of_many_points_stay_small() -> None:
     """What is dense is drawn as pixels; letters and axes stay lines."""
 

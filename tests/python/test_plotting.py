@@ -180,6 +180,7 @@ def test_a_part_keeps_time_and_says_whether_it_stops() -> None:
 LONG = "%\nO1\nG21G90G94G17\nG00X0Y0Z0\nG01X20.F200\nG03X40.Y20.I0.J20.\nG01Y40.\nX0.F100\nM30\n%\n"
 
 
+@pytest.mark.slow
 def test_a_long_region_shows_its_worst_place_and_its_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     machine = Machine.load("vx500")
     conversion = convert(Program.from_text(LONG.encode(), machine, source="long"), machine, shape_all=True)
@@ -277,6 +278,7 @@ def test_feet_far_from_the_origin_keep_a_hundredth_of_a_micrometre() -> None:
     assert np.abs(np.linalg.norm(points + shift - feet, axis=1) - 0.001).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_long_programs_take_little_more_to_draw(tmp_path: Path) -> None:
     def draw(samples: int) -> None:
         long = traces(samples)

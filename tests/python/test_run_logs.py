@@ -200,6 +200,7 @@ def test_a_day_holds_several_runs_in_bounded_memory(tmp_path: Path) -> None:
         sg.read_run_logs(path, max_values=5)
 
 
+@pytest.mark.slow
 def test_the_memory_is_that_of_a_run_however_long_the_log(tmp_path: Path) -> None:
     def peak(runs: int) -> int:
         lines = "".join(f"2026-03-02T08:10:04.{k:03}Z|Feed_Rate|{k}\n" for k in range(1000))

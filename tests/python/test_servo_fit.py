@@ -243,6 +243,7 @@ def test_a_command_that_jumps_is_divided_there(tmp_path: Path) -> None:
     assert any("its command jumps, first at" in warning for warning in found.warnings)
 
 
+@pytest.mark.slow
 def test_of_a_long_log_the_liveliest_windows_are_taken(tmp_path: Path) -> None:
     way = np.concatenate([np.zeros(400_000), moves(6, 200.0, 1500.0), np.full(500_000, moves(6, 200.0, 1500.0)[-1])])
     found = sg.fit_servo(capture(tmp_path / "a.json", {1: (way, simulated(way, 0.006, 40.0, 0.5))}, noise=2e-4))

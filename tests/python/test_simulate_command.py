@@ -442,6 +442,7 @@ def most_memory_mb(folder: Path, turns: int) -> float:
     return float(done.stdout.splitlines()[-1])
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_length(folder: Path) -> None:
     short = most_memory_mb(folder, 10)
     size = (folder / "m.npz").stat().st_size

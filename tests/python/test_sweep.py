@@ -74,6 +74,7 @@ def test_frequency_and_damping_of_a_sweep(tmp_path: Path, modes: list[tuple[floa
     assert {Path(each).stem for each in found.save_plots(tmp_path)} == {"identify-sweep"}
 
 
+@pytest.mark.slow
 def test_the_axis_that_moved_most_is_taken_and_said(tmp_path: Path) -> None:
     path = save(tmp_path / "log.csv", *shaken([(1.0, 48.0, 0.06)]))
     found = identify(path)

@@ -75,6 +75,7 @@ def test_the_file_is_what_its_writer_writes() -> None:
     assert run.stdout == TEXT
 
 
+@pytest.mark.slow
 def test_milled_out_of_a_block_it_is_the_piece_and_no_rapid_touches_material(tmp_path: Path) -> None:
     block = Block()
     for cut in cuts(canonical(tmp_path)):

@@ -9,10 +9,11 @@
 //     control.motion = shapegcode::MotionKind::after_interpolation;
 //     const double total_s = shapegcode::time_program(program, control).parts.total_s();
 //
-// A controller prototype needs less: "shapegcode/prototype.hpp".
+// A control needs less: "shapegcode/controller.hpp", or "shapegcode/prototype.hpp" for a path that is known as a whole.
 
 #include "shapegcode/command.hpp"
 #include "shapegcode/control.hpp"
+#include "shapegcode/controller.hpp"
 #include "shapegcode/error.hpp"
 #include "shapegcode/filter.hpp"
 #include "shapegcode/identify/arma.hpp"

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "filter/dense.hpp"
 #include "shapegcode/plant/modal.hpp"
 
 namespace shapegcode {
@@ -12,19 +13,11 @@ namespace {
 constexpr double tail_share = 1e-4;
 constexpr std::size_t tail_shapers = 4;
 
-std::vector<double> dense(const Fir& fir) {
-  std::vector<double> taps(static_cast<std::size_t>(fir.duration_samples()) + 1, 0.0);
-  for (std::size_t k = 0; k < fir.taps().size(); ++k) {
-    taps[static_cast<std::size_t>(fir.delays()[k])] += fir.taps()[k];
-  }
-  return taps;
-}
-
 }  // namespace
 
 std::vector<double> contour_kernel(const Fir& shaper, std::span<const Mode> modes, double period_s,
                                    ContourTarget target) {
-  std::vector<double> kernel = dense(shaper);
+  std::vector<double> kernel = dense_taps(shaper);
   if (target != ContourTarget::response || modes.empty()) {
     return kernel;
   }

@@ -6,260 +6,121 @@
 
 #include <fmt/format.h>
 
-#include "base/checks.hpp"
+#include "motion/pieces.hpp"
+#include "motion/speed_limits.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
 
-// A stretch of path with one speed limit and one acceleration.
-struct Piece {
-  double length = 0.0;
-  double limit = 0.0;
-  double acceleration = 0.0;
-  double start_speed = 0.0;
+// What the junctions and segments of a path allow.
+struct PathSpeeds {
+  std::vector<double> on_segment;
+  std::vector<double> corner;   // [i]: where segment i is entered
+  std::vector<Jump> jump;       // the same
+  std::vector<double> fastest;  // of each segment, ever; this and the one before are empty if nobody looks at jumps
+  double jerk_s = 0.0;
 };
 
-// The planner wants a speed at every junction; this one is a stop to every purpose.
-constexpr double standstill_mm_per_s = 1e-3;
-
-// Infinity switches a limit off.
-void require_limit(double value, const char* name, const char* unit) { require(value > 0.0, name, value, unit, "> 0"); }
-
-void check_limits(const MotionLimits& limits, const FilterTolerance& filter) {
-  require_limit(limits.time_constant_s, "acceleration time constant", "s");
-  require_limit(limits.feed_override, "feed override", "");
-  require_limit(limits.arc_feed_ratio, "arc feed ratio", "");
-  require_not_below_zero(limits.jerk_time_s, "jerk time", "s");
-  require_not_below_zero(limits.feed_spread_s, "spread of feeds", "s");
-  require_not_below_zero(limits.feed_excess_ratio, "excess of feeds", "");
-  require_limit(filter.contour_tolerance_mm, "contour tolerance", "mm");
-  require_limit(limits.centripetal_acceleration_mm_per_s2, "centripetal acceleration", "mm/s2");
-  require_limit(limits.polyline_acceleration_mm_per_s2, "acceleration along polylines", "mm/s2");
-  require_limit(limits.junction_deviation_mm, "junction deviation", "mm");
-  require_not_below_zero(limits.block_time_s, "block time", "s");
-  require_limit(limits.corner_stop_angle_rad, "angle of corners that are stops", "rad");
-  for (int i = 0; i < axis_count; ++i) {
-    require_limit(limits.max_feed_mm_per_s[i], "axis feed limit", "mm/s");
-    require_limit(limits.max_acceleration_mm_per_s2[i], "axis acceleration limit", "mm/s2");
-    require_limit(limits.max_jerk_mm_per_s3[i], "axis jerk limit", "mm/s3");
-    require_limit(limits.corner_speed_difference_mm_per_s[i], "corner speed difference", "mm/s");
-    require_limit(limits.contour_acceleration_mm_per_s2[i], "contour acceleration", "mm/s2");
-  }
-}
-
-// Largest share of each axis in the tangent; an arc may point along any direction of its plane.
-Vector3 axis_share(const Segment& segment) noexcept {
-  if (segment.kind != SegmentKind::arc) {
-    return tangent_at(segment, 0.0).cwiseAbs();
-  }
-  Vector3 share = Vector3::Ones();
-  share[segment.normal] =
-      segment.length_mm > 0.0
-          ? std::abs(segment.end_mm[segment.normal] - segment.start_mm[segment.normal]) / segment.length_mm
-          : 0.0;
-  return share;
-}
-
-double tangential_limit(const Vector3& share, const Vector3& limit) noexcept {
-  double result = MotionLimits::none;
-  for (int i = 0; i < axis_count; ++i) {
-    if (share[i] > 0.0) {
-      result = std::min(result, limit[i] / share[i]);
-    }
-  }
-  return result;
-}
-
-// In-plane axes of an arc share their acceleration between the turn and the change of speed.
-double arc_centripetal_limit(const Segment& segment, const MotionLimits& limits) noexcept {
-  double limit = limits.centripetal_acceleration_mm_per_s2;
-  for (int i = 0; i < axis_count; ++i) {
-    if (i != segment.normal) {
-      limit = std::min({limit, 0.9 * limits.max_acceleration_mm_per_s2[i], limits.contour_acceleration_mm_per_s2[i]});
-    }
-  }
-  return limit;
-}
-
-// The acceleration of a circle turns with it: jerk v^3 / r^2.
-double arc_jerk_speed(const Segment& segment, const MotionLimits& limits) noexcept {
-  double jerk = MotionLimits::none;
-  for (int i = 0; i < axis_count; ++i) {
-    if (i != segment.normal) {
-      jerk = std::min(jerk, limits.max_jerk_mm_per_s3[i]);
-    }
-  }
-  const double bend = curvature(segment);
-  return std::isfinite(jerk) && bend > 0.0 ? std::cbrt(jerk / (bend * bend)) : MotionLimits::none;
-}
-
-double segment_acceleration(const Segment& segment, double speed_limit, const MotionLimits& limits) noexcept {
-  double axes = tangential_limit(axis_share(segment), limits.max_acceleration_mm_per_s2);
-  if (segment.kind == SegmentKind::arc && std::isfinite(axes)) {
-    const double turning = speed_limit * speed_limit * curvature(segment);
-    axes = std::sqrt(std::max(0.19 * axes * axes, axes * axes - turning * turning));
-  }
-  if (limits.law == AccelerationLaw::constant_time) {
-    return std::min(axes, segment.feed_mm_per_s * limits.feed_override / limits.time_constant_s);
-  }
-  return axes;
-}
-
-double polyline_reach(const Segment& before, const Segment& after) noexcept {
-  return 0.5 * (before.length_mm + after.length_mm);
-}
-
-double polyline_curvature(const Segment& before, const Segment& after, double angle) noexcept {
-  const double reach = polyline_reach(before, after);
-  return reach > 0.0 ? angle / reach : 0.0;
-}
-
-// Speed at which the turn of the direction by `change`, spread over the way between the middles of both blocks, costs
-// no axis more than its contour acceleration: a = |change| v^2 / reach.
-double contour_speed(const Vector3& change, double reach, const MotionLimits& limits) noexcept {
-  return std::sqrt(tangential_limit(change.cwiseAbs(), limits.contour_acceleration_mm_per_s2) * reach);
-}
-
-// Speed on the arc that is tangent to both sides of a corner and cuts it by the deviation: a d c / (1 - c), c the
-// cosine of half the turn. (Sonny Jeon's rule of grbl, 2011.)
-double junction_deviation_speed(double angle, double acceleration, double deviation_mm) noexcept {
-  const double cosine = std::cos(0.5 * angle);
-  return std::sqrt(acceleration * deviation_mm * cosine / (1.0 - cosine));
-}
-
-double curvature_speed(double curvature_per_mm, double centripetal, const FilterTolerance& filter,
-                       double tolerance_mm) noexcept {
-  if (curvature_per_mm <= 0.0) {
-    return MotionLimits::none;
-  }
-  double speed = std::sqrt(centripetal / curvature_per_mm);
-  if (filter.variance_s2 > 0.0) {
-    // Radial error of a filter on an arc: variance * v^2 * curvature / 2.
-    speed = std::min(speed, std::sqrt(2.0 * tolerance_mm / (filter.variance_s2 * curvature_per_mm)));
-  }
-  return speed;
-}
-
-double jerk_time(const MotionLimits& limits, double acceleration) {
-  const double jerk = limits.max_jerk_mm_per_s3.minCoeff();
-  // Twice, because acceleration may turn into deceleration at once.
-  const double from_jerk = std::isfinite(jerk) && std::isfinite(acceleration) ? 2.0 * acceleration / jerk : 0.0;
-  return std::max(limits.jerk_time_s, from_jerk);
-}
-
-// A slow stretch that reaches over a junction into the faster neighbour.
-struct Zone {
-  double limit = MotionLimits::none;
-  double reach = 0.0;
-};
-
-void extend(Zone& zone, double limit, double reach) {
-  if (zone.reach <= 0.0) {
-    zone = {limit, reach};
-  } else {
-    zone = {std::min(zone.limit, limit), std::max(zone.reach, reach)};
-  }
-}
-
-// Zones on both sides of every junction: `limits(from, into)` is the speed that reaches over it and the way it reaches.
-template <class Limit>
-void sweep_zones(const Path& path, Limit&& limit, std::vector<Zone>& at_start, std::vector<Zone>& at_end) {
+PathSpeeds path_speeds(const Path& path, const MotionLimits& limits, const FilterTolerance& filter,
+                       const SpeedCaps* caps) {
   const std::size_t n = path.size();
-  const auto sweep = [&](std::size_t from, std::size_t into, Zone carry, std::vector<Zone>& zones) {
-    const Zone own = limit(from, into);
-    if (own.limit < MotionLimits::none) {
-      extend(carry, own.limit, own.reach);
+  PathSpeeds speeds;
+  speeds.on_segment.resize(n);
+  speeds.corner.assign(n + 1, MotionLimits::none);
+  if (looks_at_jumps(limits)) {
+    speeds.jump.assign(n, Jump::none);
+    speeds.fastest.resize(n);
+  }
+  double steepest = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    double& speed = speeds.on_segment[i];
+    double& corner = speeds.corner[i];
+    speed = segment_speed_limit(path[i], limits, filter);
+    if (!(speed > 0.0) || !std::isfinite(speed)) {
+      throw Error(ErrorKind::argument, "segment without a feed greater than zero", path[i].line);
     }
-    zones[into] = carry;
-    const double left = carry.reach - path[into].length_mm;
-    return left > 0.0 ? Zone{carry.limit, left} : Zone{};
-  };
-  Zone carry;
-  for (std::size_t i = 1; i < n; ++i) {
-    carry = sweep(i - 1, i, carry, at_start);
+    if (i > 0) {
+      corner = corner_speed_limit(path[i - 1], path[i], limits, filter);
+    }
+    if (looks_at_jumps(limits)) {
+      speeds.fastest[i] = fastest_speed(path[i], limits, filter);
+    }
+    if (i > 0 && looks_at_jumps(limits)) {
+      const JunctionJumps jumps = junction_jumps(path[i - 1], path[i]);
+      speeds.jump[i] = jumps.kind;
+      corner = std::min(corner, junction_jump_speed(path[i - 1], path[i], limits, jumps,
+                                                    std::min(speeds.fastest[i - 1], speeds.fastest[i])));
+    }
+    if (caps != nullptr) {
+      speed = std::min(speed, static_cast<double>(caps->on_segment[i]));
+      corner = std::min(corner, static_cast<double>(caps->at_junction[i]));
+    }
+    steepest = std::max(steepest, segment_acceleration(path[i], speed, limits));
   }
-  carry = Zone{};
-  for (std::size_t i = n - 1; i > 0; --i) {
-    carry = sweep(i, i - 1, carry, at_end);
-  }
+  speeds.jerk_s = jerk_time(limits, steepest);
+  return speeds;
 }
 
-// Slow stretches that reach over junctions: corners for the jerk time, programmed feeds for what a filter mixes.
+// The zones of every segment: they carry over those that are shorter than they reach.
 class Zones {
  public:
-  Zones(const Path& path, const MotionLimits& limits, const std::vector<double>& speed,
-        const std::vector<double>& corner, double jerk_s)
-      : n_(path.size()) {
-    if (jerk_s > 0.0) {
-      add(path, [&](std::size_t from, std::size_t into) {
-        const double least = std::min(corner[std::max(from, into)], speed[from]);
-        return least < speed[into] ? Zone{least, 0.5 * least * jerk_s} : Zone{};
-      });
+  Zones(const Path& path, const MotionLimits& limits, const PathSpeeds& speeds) {
+    if (speeds.jerk_s <= 0.0 && limits.feed_spread_s <= 0.0 && speeds.jump.empty()) {
+      return;
     }
-    if (limits.feed_spread_s > 0.0) {
-      add(path, [&](std::size_t from, std::size_t into) {
-        const double feed = path[from].feed_mm_per_s * limits.feed_override;
-        return feed * (1.0 + limits.feed_excess_ratio) < speed[into]
-                   ? Zone{feed, feed * (limits.feed_spread_s + 0.5 * jerk_s)}
-                   : Zone{};
-      });
+    const std::size_t n = path.size();
+    at_start_.resize(n);
+    at_end_.resize(n);
+    const auto sweep = [&](std::size_t from, std::size_t into, ZoneSet carry, std::vector<ZoneSet>& zones) {
+      const std::size_t junction = std::max(from, into);
+      const bool looks = !speeds.jump.empty();
+      extend(carry, junction_zones(
+                        {speeds.on_segment[from], path[from].feed_mm_per_s * limits.feed_override,
+                         speeds.on_segment[into], speeds.corner[junction], looks ? speeds.jump[junction] : Jump::none,
+                         looks ? std::min(speeds.fastest[from], speeds.fastest[into]) : 0.0},
+                        limits, speeds.jerk_s));
+      if (looks) {
+        cut_to(carry, speeds.fastest[into], jump_time_s(limits, speeds.jerk_s));
+      }
+      zones[into] = carry;
+      return beyond(carry, path[into].length_mm);
+    };
+    ZoneSet carry;
+    for (std::size_t i = 1; i < n; ++i) {
+      carry = sweep(i - 1, i, carry, at_start_);
+    }
+    carry = ZoneSet{};
+    for (std::size_t i = n - 1; i > 0; --i) {
+      carry = sweep(i, i - 1, carry, at_end_);
     }
   }
 
-  [[nodiscard]] bool empty() const noexcept { return sides_.empty(); }
-
-  // The borders of a segment's stretches, and the limit between two of them.
-  void split(std::size_t i, double length, double limit, std::vector<std::pair<double, double>>& stretches) const {
-    std::vector<double> marks{0.0, length};
-    for (const auto& [at_start, at_end] : sides_) {
-      marks.push_back(std::min(at_start[i].reach, length));
-      marks.push_back(std::max(length - at_end[i].reach, 0.0));
-    }
-    std::ranges::sort(marks);
-    for (std::size_t k = 0; k + 1 < marks.size(); ++k) {
-      const double middle = 0.5 * (marks[k] + marks[k + 1]);
-      if (marks[k + 1] <= marks[k]) {
-        continue;
-      }
-      double least = limit;
-      for (const auto& [at_start, at_end] : sides_) {
-        if (middle < at_start[i].reach) {
-          least = std::min(least, at_start[i].limit);
-        }
-        if (middle > length - at_end[i].reach) {
-          least = std::min(least, at_end[i].limit);
-        }
-      }
-      stretches.emplace_back(marks[k + 1] - marks[k], least);
-    }
+  [[nodiscard]] bool empty() const noexcept { return at_start_.empty(); }
+  std::size_t split(std::size_t i, const Segment& segment, double limit, double beside_turn,
+                    std::array<Stretch, most_pieces>& out) const noexcept {
+    return split_segment(at_start_[i], at_end_[i], segment.length_mm, limit, beside_turn, out);
   }
 
  private:
-  template <class Limit>
-  void add(const Path& path, Limit&& limit) {
-    auto& [at_start, at_end] = sides_.emplace_back(std::vector<Zone>(n_), std::vector<Zone>(n_));
-    sweep_zones(path, limit, at_start, at_end);
-  }
-
-  std::size_t n_;
-  std::vector<std::pair<std::vector<Zone>, std::vector<Zone>>> sides_;  // at the start and at the end of each segment
+  std::vector<ZoneSet> at_start_, at_end_;
 };
 
-std::vector<Piece> make_pieces(const Path& path, const MotionLimits& limits, const std::vector<double>& speed,
+std::vector<Piece> make_pieces(const Path& path, const MotionLimits& limits, const PathSpeeds& speeds,
                                const Zones& zones) {
   std::vector<Piece> pieces;
   pieces.reserve(path.size());
-  std::vector<std::pair<double, double>> stretches;
+  std::array<Stretch, most_pieces> stretches;
   for (std::size_t i = 0; i < path.size(); ++i) {
-    stretches.clear();
-    if (zones.empty()) {
-      stretches.emplace_back(path[i].length_mm, speed[i]);
-    } else {
-      zones.split(i, path[i].length_mm, speed[i], stretches);
+    std::size_t count = 1;
+    stretches[0] = {path[i].length_mm, speeds.on_segment[i], false};
+    if (!zones.empty()) {
+      const double beside_turn = speeds.jump.empty() ? MotionLimits::none : limit_beside_turn(path[i], limits);
+      count = zones.split(i, path[i], speeds.on_segment[i], beside_turn, stretches);
     }
-    for (const auto& [length, limit] : stretches) {
-      pieces.push_back({length, limit, segment_acceleration(path[i], limit, limits), 0.0});
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto& [length, limit, eased] = stretches[k];
+      pieces.push_back({length, limit, segment_acceleration(path[i], limit, limits, eased), 0.0});
     }
   }
   return pieces;
@@ -294,71 +155,33 @@ void pass_speeds(std::vector<Piece>& pieces, const std::vector<double>& boundary
   for (std::size_t i = 0; i < n; ++i) {
     speed = std::min({speed, boundary[i], pieces[i].limit});
     pieces[i].start_speed = speed;
-    speed = std::min(pieces[i].limit, std::sqrt(speed * speed + 2.0 * pieces[i].acceleration * pieces[i].length));
+    speed = speed_beyond(pieces[i], speed);
   }
   speed = 0.0;
   for (std::size_t i = n; i-- > 0;) {
-    speed = std::min(pieces[i].limit, std::sqrt(speed * speed + 2.0 * pieces[i].acceleration * pieces[i].length));
-    pieces[i].start_speed = std::min(pieces[i].start_speed, speed);
+    pieces[i].start_speed = std::min(pieces[i].start_speed, speed_beyond(pieces[i], speed));
     speed = pieces[i].start_speed;
   }
 }
 
 class PhaseList {
  public:
-  // A ramp or a steady stretch from v0 to v1 over `distance`; joined to its predecessor where nothing changes.
-  void add(double v0, double v1, double distance) {
-    if (distance <= 0.0 || v0 + v1 <= 0.0) {
+  void add(const Ramp& ramp) {
+    if (ramp.distance <= 0.0 || ramp.v0 + ramp.v1 <= 0.0) {
       return;
     }
-    const double duration = 2.0 * distance / (v0 + v1);
-    const double acceleration = (v1 - v0) / duration;
-    if (!phases.empty()) {
-      SpeedPhase& last = phases.back();
-      const double scale = std::max(std::abs(last.acceleration_mm_per_s2), std::abs(acceleration));
-      const double end_speed = last.speed_mm_per_s + last.acceleration_mm_per_s2 * last.duration_s;
-      // Without an acceleration limit the speed jumps from one steady stretch to the next.
-      const bool joins = std::abs(end_speed - v0) <= 1e-6 * (end_speed + v0);
-      if (joins && (std::abs(last.acceleration_mm_per_s2 - acceleration) <= 1e-9 * scale || scale == 0.0)) {
-        last.duration_s += duration;
-        length += distance;
-        return;
-      }
+    const double duration = PhaseJoin::duration_s(ramp.v0, ramp.v1, ramp.distance);
+    const double acceleration = (ramp.v1 - ramp.v0) / duration;
+    if (!phases.empty() && PhaseJoin::joins(phases.back(), ramp.v0, acceleration)) {
+      phases.back().duration_s += duration;
+    } else {
+      phases.push_back({0.0, duration, length, ramp.v0, acceleration});
     }
-    phases.push_back({0.0, duration, length, v0, acceleration});
-    length += distance;
+    length += ramp.distance;
   }
   std::vector<SpeedPhase> phases;
   double length = 0.0;
 };
-
-constexpr std::size_t most_phases = 3;  // of a piece: up, steady, down
-
-void piece_phases(const Piece& piece, double end_speed, PhaseList& list) {
-  const double v0 = piece.start_speed;
-  const double v1 = end_speed;
-  const double a = piece.acceleration;
-  if (!std::isfinite(a)) {
-    list.add(piece.limit, piece.limit, piece.length);
-    return;
-  }
-  const double peak_squared = a * piece.length + 0.5 * (v0 * v0 + v1 * v1);
-  const double peak = std::max({v0, v1, std::min(piece.limit, std::sqrt(peak_squared))});
-  double up = (peak * peak - v0 * v0) / (2.0 * a);
-  double down = (peak * peak - v1 * v1) / (2.0 * a);
-  if (up + down > piece.length) {  // rounding only
-    const double scale = piece.length / (up + down);
-    up *= scale;
-    down *= scale;
-  }
-  list.add(v0, peak, up);
-  const double steady = piece.length - up - down;
-  // Dust of rounding would become a phase of its own.
-  if (steady > 1e-12 * (1.0 + list.length)) {
-    list.add(peak, peak, steady);
-  }
-  list.add(peak, v1, down);
-}
 
 // Constant-time law: a ramp that is shorter than the time constant is stretched into the steady stretch at its fast
 // end.
@@ -398,101 +221,29 @@ std::vector<SpeedPhase> stretch_ramps(const std::vector<SpeedPhase>& phases, dou
   }
   for (std::size_t i = 0; i < n; ++i) {
     const double d = steady(i) ? distance(i) - granted[i] : distance(i) + extra[i];
-    list.add(phases[i].speed_mm_per_s, steady(i) ? phases[i].speed_mm_per_s : end_speed(i), d);
+    list.add({phases[i].speed_mm_per_s, steady(i) ? phases[i].speed_mm_per_s : end_speed(i), d});
   }
   return std::move(list.phases);
 }
 
-}  // namespace
-
-double axis_feed_limit(const Segment& segment, const MotionLimits& limits) noexcept {
-  return tangential_limit(axis_share(segment), limits.max_feed_mm_per_s);
-}
-
-double segment_speed_limit(const Segment& segment, const MotionLimits& limits, const FilterTolerance& filter) noexcept {
-  double speed = segment.feed_mm_per_s * limits.feed_override;
-  if (segment.kind == SegmentKind::arc) {
-    speed *= limits.arc_feed_ratio;
-    speed = std::min(speed, curvature_speed(curvature(segment), arc_centripetal_limit(segment, limits), filter,
-                                            filter.contour_tolerance_mm));
-    speed = std::min(speed, arc_jerk_speed(segment, limits));
-  }
-  if (limits.block_time_s > 0.0 && segment.length_mm > 0.0) {
-    speed = std::min(speed, segment.length_mm / limits.block_time_s);
-  }
-  return std::min(speed, axis_feed_limit(segment, limits));
-}
-
-double corner_speed_limit(const Segment& before, const Segment& after, const MotionLimits& limits,
-                          const FilterTolerance& filter) noexcept {
-  const Vector3 change = tangent_at(after, 0.0) - tangent_at(before, before.length_mm);
-  const double size = change.norm();
-  // A tangent junction to within what the least increment lets a program say (1 um over 1 mm).
-  if (size < 1e-6) {
-    return MotionLimits::none;
-  }
-  double speed = tangential_limit(change.cwiseAbs(), limits.corner_speed_difference_mm_per_s);
-  const double angle = 2.0 * std::asin(std::min(1.0, 0.5 * size));
-  const double tolerance = filter.corner_share * filter.contour_tolerance_mm;
-  speed = std::min(speed, curvature_speed(polyline_curvature(before, after, angle),
-                                          limits.polyline_acceleration_mm_per_s2, filter, tolerance));
-  if (angle >= limits.corner_stop_angle_rad) {
-    speed = std::min(speed, standstill_mm_per_s);
-  }
-  if (limits.junction_deviation_mm < MotionLimits::none) {
-    const double acceleration = tangential_limit(change.cwiseAbs() / size, limits.max_acceleration_mm_per_s2);
-    speed = std::min(speed, std::max(standstill_mm_per_s,
-                                     junction_deviation_speed(angle, acceleration, limits.junction_deviation_mm)));
-  }
-  speed = std::min(speed, contour_speed(change, polyline_reach(before, after), limits));
-  if (filter.mean_deviation_s > 0.0) {
-    // A filter of symmetric spread passes the corner at |change| * (v*E|t| + a*E[t^2]/2) / 2: what the speed at the
-    // corner and the ramps on both sides of it cost.
-    const double acceleration =
-        std::max(segment_acceleration(before, segment_speed_limit(before, limits, filter), limits),
-                 segment_acceleration(after, segment_speed_limit(after, limits, filter), limits));
-    const double ramps = std::isfinite(acceleration) ? 0.5 * acceleration * filter.variance_s2 : 0.0;
-    const double room = 2.0 * tolerance / size - ramps;
-    speed = std::min(speed, std::max(0.0, room / filter.mean_deviation_s));
-  }
-  return speed;
-}
-
-namespace {
-
-// Ramps as steep as the limits let them be, of a path with a length; and the jerk time.
-std::pair<PhaseList, double> shortest_ramps(const Path& path, const MotionLimits& limits, const FilterTolerance& filter,
-                                            const SpeedCaps* caps) {
-  const std::size_t n = path.size();
-  std::vector<double> speed(n);
-  std::vector<double> corner(n + 1, MotionLimits::none);
-  double fastest_acceleration = 0.0;
-  for (std::size_t i = 0; i < n; ++i) {
-    speed[i] = segment_speed_limit(path[i], limits, filter);
-    if (!(speed[i] > 0.0) || !std::isfinite(speed[i])) {
-      throw Error(ErrorKind::argument, "segment without a feed greater than zero", path[i].line);
-    }
-    if (i > 0) {
-      corner[i] = corner_speed_limit(path[i - 1], path[i], limits, filter);
-    }
-    if (caps != nullptr) {
-      speed[i] = std::min(speed[i], static_cast<double>(caps->on_segment[i]));
-      corner[i] = std::min(corner[i], static_cast<double>(caps->at_junction[i]));
-    }
-    fastest_acceleration = std::max(fastest_acceleration, segment_acceleration(path[i], speed[i], limits));
-  }
-  const double jerk_s = jerk_time(limits, fastest_acceleration);
-  const Zones zones(path, limits, speed, corner, jerk_s);
-  std::vector<Piece> pieces = make_pieces(path, limits, speed, zones);
-  const std::vector<double> boundary = piece_boundaries(path, pieces, corner, zones);
+// Ramps as steep as the limits let them be, of a path with a length.
+PhaseList shortest_ramps(const Path& path, const MotionLimits& limits, const PathSpeeds& speeds) {
+  const Zones zones(path, limits, speeds);
+  std::vector<Piece> pieces = make_pieces(path, limits, speeds, zones);
+  const std::vector<double> boundary = piece_boundaries(path, pieces, speeds.corner, zones);
   pass_speeds(pieces, boundary);
   PhaseList list;
   // Room that is not used is no memory; a list that grows is copied while both stand.
   list.phases.reserve(most_phases * pieces.size());
+  std::array<Ramp, most_phases> ramps;
   for (std::size_t i = 0; i < pieces.size(); ++i) {
-    piece_phases(pieces[i], i + 1 < pieces.size() ? pieces[i + 1].start_speed : 0.0, list);
+    const double end_speed = i + 1 < pieces.size() ? pieces[i + 1].start_speed : 0.0;
+    const std::size_t count = ramps_of(pieces[i], pieces[i].start_speed, end_speed, list.length, ramps);
+    for (std::size_t k = 0; k < count; ++k) {
+      list.add(ramps[k]);
+    }
   }
-  return {std::move(list), jerk_s};
+  return list;
 }
 
 }  // namespace
@@ -507,29 +258,12 @@ SpeedProfile plan_speed(const Path& path, const MotionLimits& limits, const Filt
   if (n == 0 || path.length_mm() <= 0.0) {
     return SpeedProfile({}, path.length_mm(), 0.0);
   }
-  auto [list, jerk_s] = shortest_ramps(path, limits, filter, caps);
+  const PathSpeeds speeds = path_speeds(path, limits, filter, caps);
+  PhaseList list = shortest_ramps(path, limits, speeds);
   if (limits.law == AccelerationLaw::constant_time) {
     list.phases = stretch_ramps(list.phases, list.length, limits.time_constant_s);
   }
-  return SpeedProfile(std::move(list.phases), path.length_mm(), jerk_s);
-}
-
-std::vector<std::size_t> forced_stops(const std::vector<Segment>& segments, double axis_angle_rad,
-                                      double corner_angle_rad, const MotionLimits& limits,
-                                      const FilterTolerance& filter) {
-  const double along = std::cos(axis_angle_rad);
-  const double turned = std::cos(corner_angle_rad);
-  std::vector<std::size_t> stops;
-  for (std::size_t i = 1; i < segments.size(); ++i) {
-    const Vector3 before = tangent_at(segments[i - 1], segments[i - 1].length_mm);
-    const Vector3 after = tangent_at(segments[i], 0.0);
-    const bool plunges = std::abs(before[2]) >= along || std::abs(after[2]) >= along;
-    if (segments[i - 1].stop_at_end || (plunges && before.dot(after) <= turned) ||
-        corner_speed_limit(segments[i - 1], segments[i], limits, filter) <= 0.0) {
-      stops.push_back(i);
-    }
-  }
-  return stops;
+  return SpeedProfile(std::move(list.phases), path.length_mm(), speeds.jerk_s);
 }
 
 }  // namespace shapegcode

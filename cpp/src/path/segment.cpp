@@ -132,11 +132,14 @@ Vector3 point_at(const Segment& segment, double s_mm) noexcept {
   if (segment.length_mm <= 0.0) {
     return segment.start_mm;
   }
-  // The end is returned to the last bit: no rounding of cosines may move a programmed point.
+  // Both ends are returned to the last bit: no rounding of cosines may move a programmed point.
   if (s_mm >= segment.length_mm) {
     return segment.end_mm;
   }
-  const double fraction = std::max(s_mm, 0.0) / segment.length_mm;
+  if (s_mm <= 0.0) {
+    return segment.start_mm;
+  }
+  const double fraction = s_mm / segment.length_mm;
   if (segment.kind == SegmentKind::arc) {
     return arc_point(segment, fraction);
   }

@@ -1,0 +1,157 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "shapegcode/filter.hpp"
+#include "shapegcode/motion.hpp"
+#include "shapegcode/path.hpp"
+
+// What the author of a control needs: blocks come while the machine moves, the operator turns the override and presses
+// feed hold, and one set-point leaves per period. The one header to include.
+//
+//     using namespace shapegcode;
+//     ControllerSettings settings;
+//     settings.limits.law = AccelerationLaw::jerk_limited;
+//     settings.limits.max_acceleration_mm_per_s2.setConstant(1000.0);
+//     settings.limits.max_jerk_mm_per_s3.setConstant(50000.0);
+//     settings.shaper = Fir({0, 11}, {0.516, 0.484});           // ZV of 46 Hz on a grid of 1 ms
+//     MotionController control(settings);
+//     control.push(make_line({0, 0, 0}, {40, 0, 0}, 100.0));     // planning thread
+//     control.push(make_line({40, 0, 0}, {40, 40, 0}, 100.0));
+//     std::array<double, 3> set_point;
+//     while (control.step(set_point) != Activity::idle) drive(set_point);   // every millisecond
+
+namespace shapegcode {
+
+inline constexpr std::size_t most_following_axes = 6;
+inline constexpr std::size_t most_controller_axes = axis_count + most_following_axes;
+
+/// Limits of an axis that follows the path, in its own unit (mm or degrees) and seconds.
+struct FollowingLimits {
+  double max_feed = MotionLimits::none;
+  double max_acceleration = MotionLimits::none;
+  double max_jerk = MotionLimits::none;
+};
+
+/// Shapers of a control: one for all axes, one for each, or a set followed along an axis (of X, Y, Z).
+using ControllerShaper = std::variant<Fir, std::vector<Fir>, FollowingFir>;
+
+/// What a control is made of. Speeds, accelerations and jerks that are finite are kept by the set-points that leave it.
+struct ControllerSettings {
+  double period_s = 0.001;
+  /// Of X, Y and Z, with the rules for corners. A finite jerk wants a finite acceleration. Under the constant-time law
+  /// ramps are as steep as its time constant lets them be, but short ones are not stretched to it.
+  MotionLimits limits;
+  /// One for each axis behind X, Y and Z, at most six.
+  std::vector<FollowingLimits> following;
+  /// What smoothing and shaper may cut off corners and arcs; none: as much as the limits let them.
+  double contour_tolerance_mm = MotionLimits::none;
+  /// Length of each of two moving averages over every axis, which spread what a corner or the begin of an arc asks for
+  /// at once. 0 = none: then such a place is passed at a crawl where acceleration or jerk are limited.
+  double smoothing_time_s = 0.01;
+  ControllerShaper shaper = Fir({0}, {1.0});
+  /// Take back, to the second order, what smoothing and shaper cut off arcs. Costs `correction_delay()` periods and a
+  /// third of every limit, which the correction may need for itself.
+  bool contour_correction = false;
+  /// Segments that the look-ahead sees (8 at least), and those that may wait in all; the second is rounded up to a
+  /// power of two, and holds the window.
+  std::size_t window = 128;
+  std::size_t queue = 1024;
+};
+
+/// Answer to a segment that was pushed.
+enum class PushResult : std::uint8_t {
+  accepted,
+  queue_full,     ///< nothing was taken: push it again later
+  not_connected,  ///< it does not start where the one before ended (1e-6 mm)
+  no_length,
+  no_feed,  ///< a feed that is not above zero, or not finite
+  not_finite,
+  wrong_axes,  ///< not as many following axes as the settings have
+  aborted,     ///< after abort() nothing is taken until restart()
+};
+[[nodiscard]] const char* text_of(PushResult result) noexcept;
+
+/// What a control does in a period.
+enum class Activity : std::uint8_t {
+  idle,      ///< at rest, nothing left to do
+  moving,    ///< along the path, or the shaper is still giving out what it holds
+  stopping,  ///< decelerating for hold() or abort()
+  held,      ///< at rest after hold()
+  starved,   ///< coming to rest: the segments ran out before one with `stop_at_end`. At rest it is idle
+  aborted,   ///< at rest after abort(); the path is gone
+};
+[[nodiscard]] const char* text_of(Activity activity) noexcept;
+
+/// A snapshot for a user interface.
+struct ControllerState {
+  Activity activity = Activity::idle;
+  std::array<double, most_controller_axes> set_point{};  ///< last one given; mm, or the unit of a following axis
+  double speed_mm_per_s = 0.0;                           ///< along the path, before smoothing and shaper
+  double distance_mm = 0.0;                              ///< since the last rest
+  double feed_override = 1.0;
+  std::uint32_t line = 0;           ///< of the segment that is being run
+  std::uint64_t segments_done = 0;  ///< run to their ends
+  std::uint64_t segments_waiting = 0;
+  std::uint64_t steps = 0;
+  std::uint64_t starvations = 0;  ///< how often the segments ran out
+};
+
+/// A path that grows while it is run: look-ahead over a window of segments, a jerk-limited profile, one set-point per
+/// period through contour correction, smoothing and shaper. One thread may push, one may step, any may call the rest.
+///
+/// The profile is that of plan_speed, bit for bit, where the window holds the path and its last segment has
+/// `stop_at_end`; without that the end is approached gently, as what comes may turn. Override, hold and abort act on
+/// the profile, before smoothing and shaper: what these keep they keep at any instant.
+class MotionController {
+ public:
+  /// Throws Error(argument) on settings that are none, with value and limit.
+  explicit MotionController(const ControllerSettings& settings);
+  ~MotionController();
+  MotionController(MotionController&&) noexcept;
+  MotionController& operator=(MotionController&&) noexcept;
+  MotionController(const MotionController&) = delete;
+  MotionController& operator=(const MotionController&) = delete;
+
+  /// The next segment, from the planning thread: never blocks, does not allocate. `following_end`: where the following
+  /// axes are at its end; they follow in proportion to the way. A segment of no length in X, Y and Z is one of the
+  /// following axes alone if they move: its length is then the largest of their ways, its feed that axis'.
+  PushResult push(const Segment& segment, std::span<const double> following_end = {}) noexcept;
+
+  /// The next set-point into `out` (axes() values), from the real-time thread: no allocation, no lock, no exception;
+  /// work bounded by the window.
+  Activity step(std::span<double> out) noexcept;
+
+  /// Ratio of the programmed feeds, 0 to 2; what is outside of that, or no number, is taken as the nearer end (no
+  /// number: as it was). Acts from the next step on.
+  void feed_override(double ratio) noexcept;
+  /// Come to rest along the path; resume() goes on.
+  void hold() noexcept;
+  void resume() noexcept;
+  /// Come to rest along the path and forget the rest of it.
+  void abort() noexcept;
+  /// At rest at a position (axes() values), the queue empty. Not while another thread pushes or steps.
+  void restart(std::span<const double> position) noexcept;
+
+  [[nodiscard]] ControllerState state() const noexcept;
+  [[nodiscard]] int axes() const noexcept;
+  /// Periods by which set-points lag behind the profile: mean delay of jerk time, correction, smoothing and shaper.
+  [[nodiscard]] double delay_periods() const noexcept;
+  /// Periods of that which are the correction's.
+  [[nodiscard]] int correction_delay() const noexcept;
+  /// What plan_speed takes for the same profile of a whole path.
+  [[nodiscard]] const MotionLimits& planning_limits() const noexcept;
+  [[nodiscard]] const FilterTolerance& planning_tolerance() const noexcept;
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace shapegcode

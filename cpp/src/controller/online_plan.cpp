@@ -1,0 +1,201 @@
+// The look-ahead of a control: limits, zones, pieces and speeds of the segments that it sees.
+#include "controller/online_profile.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "motion/speed_limits.hpp"
+
+namespace shapegcode {
+
+// ---------------------------------------------------------------------------------------------------------
+
+double OnlineProfile::limit_of(const QueuedSegment& entry) const noexcept {
+  return std::min(entry.feed * ratio_, entry.hard_limit);
+}
+
+ZoneSet OnlineProfile::zones_between(std::uint64_t from, std::uint64_t into) noexcept {
+  const QueuedSegment& source = (*ring_)[from];
+  const QueuedSegment& junction = (*ring_)[std::max(from, into)];
+  return junction_zones({source.limit, source.segment.feed_mm_per_s * ratio_, (*ring_)[into].limit, junction.corner,
+                         junction.jump, std::min(source.fastest, (*ring_)[into].fastest)},
+                        limits_, jerk_s_);
+}
+
+void OnlineProfile::split(QueuedSegment& entry) noexcept {
+  std::array<Stretch, most_pieces> stretches;
+  entry.piece_count =
+      split_segment(entry.at_start, entry.at_end, entry.segment.length_mm, entry.limit, entry.beside_turn, stretches);
+  for (std::size_t k = 0; k < entry.piece_count; ++k) {
+    const auto& [length, limit, eased] = stretches[k];
+    entry.pieces[k] = {length, limit, acceleration_of(entry, limit, eased), 0.0};
+    entry.eased[k] = eased;
+  }
+}
+
+double OnlineProfile::acceleration_of(const QueuedSegment& entry, double speed, bool eased) const noexcept {
+  return std::min(eased ? 0.5 * entry.following_acceleration : entry.following_acceleration,
+                  segment_acceleration(entry.segment, speed, limits_, eased));
+}
+
+// Forward speeds of `first` and all after it; that of `first` itself stands.
+void OnlineProfile::pass_forward(std::uint64_t first) noexcept {
+  for (std::uint64_t i = first; i < absorbed_; ++i) {
+    QueuedSegment& entry = (*ring_)[i];
+    double speed = entry.forward;
+    for (std::size_t k = 0; k < entry.piece_count; ++k) {
+      speed = std::min(speed, entry.pieces[k].limit);
+      entry.pieces[k].start_speed = speed;
+      if (k == 0) entry.forward = speed;
+      speed = speed_beyond(entry.pieces[k], speed);
+    }
+    if (i + 1 < absorbed_) {
+      QueuedSegment& next = (*ring_)[i + 1];
+      next.forward = std::min({speed, next.corner, next.pieces[0].limit});
+    }
+  }
+}
+
+// Start speeds from the newest segment back to where nothing changes any more, but those of `first_changed` and all
+// after it in any case. True if the segment after the one that is being run has another one than before.
+bool OnlineProfile::pass_backward(std::uint64_t first_changed) noexcept {
+  double speed = 0.0;
+  const std::uint64_t last = within_segment() ? running_ + 1 : running_;
+  for (std::uint64_t i = absorbed_; i-- > last;) {
+    QueuedSegment& entry = (*ring_)[i];
+    for (std::size_t k = entry.piece_count; k-- > 0;) {
+      speed = std::min(entry.pieces[k].start_speed, speed_beyond(entry.pieces[k], speed));
+    }
+    if (i < first_changed && speed == entry.start) return false;
+    const bool same = speed == entry.start;
+    entry.start = speed;
+    if (i == last) return !same || i == absorbed_ - 1;
+  }
+  return true;
+}
+
+// Zones that reach back from the junctions, from that of `newest` to where nothing changes (`all`: to the segment that
+// is being run). First segment that changed.
+std::uint64_t OnlineProfile::zones_backward(std::uint64_t newest, bool all) noexcept {
+  QueuedSegment& last = (*ring_)[newest];
+  last.at_end = ZoneSet{};
+  // What comes next may jump: so far the end is approached as if it did.
+  if (looks_at_jumps(limits_) && !last.segment.stop_at_end) {
+    last.at_end[jump_zone] = zone_of_jump(Jump::turn, last.fastest, limits_, jerk_s_);
+    cut_to(last.at_end, last.fastest, jump_time_s(limits_, jerk_s_));
+  }
+  ZoneSet carry = beyond(last.at_end, last.segment.length_mm);
+  std::uint64_t changed = newest;
+  for (std::uint64_t i = newest; i-- > running_;) {
+    QueuedSegment& entry = (*ring_)[i];
+    extend(carry, zones_between(i + 1, i));
+    cut_to(carry, entry.fastest, jump_time_s(limits_, jerk_s_));
+    if (!all && carry == entry.at_end) break;
+    entry.at_end = carry;
+    changed = i;
+    carry = beyond(carry, entry.segment.length_mm);
+  }
+  return changed;
+}
+
+void OnlineProfile::absorb() noexcept {
+  const std::uint64_t i = absorbed_;
+  QueuedSegment& entry = (*ring_)[i];
+  entry.limit = limit_of(entry);
+  const bool first = i == running_;  // a motion begins with it: nothing is before it
+  if (first) {
+    entry.distance = distance_;
+    entry.at_start = ZoneSet{};
+    entry.forward = 0.0;
+  } else {
+    const QueuedSegment& before = (*ring_)[i - 1];
+    entry.distance = before.distance + before.segment.length_mm;
+    entry.at_start = carry_;
+    extend(entry.at_start, zones_between(i - 1, i));
+    cut_to(entry.at_start, entry.fastest, jump_time_s(limits_, jerk_s_));
+  }
+  ++absorbed_;
+  if (first) {
+    carry_ = beyond(entry.at_start, entry.segment.length_mm);
+    static_cast<void>(zones_backward(i, false));
+    split(entry);
+    pass_forward(i);
+    pass_backward(i);
+    return;
+  }
+  if (entry.corner <= 0.0) stop_before(i);
+  connect(i);
+  if (state_ == State::running && changed_ && !slow_down_ && !stop_ && !fits()) {
+    // Too late for the speed of that corner: the machine stops there, as it was about to.
+    stop_before(i);
+    connect(i);
+  }
+}
+
+// Come to rest before segment `index`, until everything has settled.
+void OnlineProfile::stop_before(std::uint64_t index) noexcept {
+  QueuedSegment& before = (*ring_)[index - 1];
+  QueuedSegment& entry = (*ring_)[index];
+  before.segment.stop_at_end = true;
+  entry.corner = 0.0;
+  entry.jump = Jump::none;
+  entry.at_start = ZoneSet{};
+}
+
+// Zones, pieces and speeds that the newest segment changes.
+void OnlineProfile::connect(std::uint64_t newest) noexcept {
+  const QueuedSegment& entry = (*ring_)[newest];
+  carry_ = beyond(entry.at_start, entry.segment.length_mm);
+  const std::uint64_t changed = zones_backward(newest, false);
+  for (std::uint64_t k = changed; k <= newest; ++k) split((*ring_)[k]);
+  // The speed at which a segment is entered stands, if those before it do.
+  pass_forward(std::min(changed > running_ ? changed - 1 : running_, newest - 1));
+  const bool next_differs = pass_backward(changed);
+  if (state_ == State::running && (next_differs || changed <= running_)) changed_ = true;
+}
+
+// Whether the machine can still keep the plan where it is.
+bool OnlineProfile::fits() noexcept {
+  const std::array<Piece, most_pieces> pieces = remaining_;
+  const std::array<bool, most_pieces> eased = remaining_eased_;
+  const std::size_t count = remaining_count_;
+  const std::size_t piece = piece_;
+  remain_from(distance_ - (*ring_)[running_].distance);
+  const bool fit = speed_now_ <= remaining_[0].start_speed * (1.0 + rounding);
+  remaining_ = pieces;
+  remaining_eased_ = eased;
+  remaining_count_ = count;
+  piece_ = piece;
+  return fit;
+}
+
+void OnlineProfile::override_feeds(double ratio) noexcept {
+  if (ratio == ratio_) return;
+  ratio_ = ratio;
+  changed_ = state_ == State::running;
+  if (ratio <= 0.0 || running_ == absorbed_) return;
+  for (std::uint64_t i = running_; i < absorbed_; ++i) (*ring_)[i].limit = limit_of((*ring_)[i]);
+  for (std::uint64_t i = running_ + 1; i < absorbed_; ++i) {
+    QueuedSegment& entry = (*ring_)[i];
+    const QueuedSegment& before = (*ring_)[i - 1];
+    entry.at_start = beyond(before.at_start, before.segment.length_mm);
+    extend(entry.at_start, zones_between(i - 1, i));
+    cut_to(entry.at_start, entry.fastest, jump_time_s(limits_, jerk_s_));
+  }
+  const QueuedSegment& newest = (*ring_)[absorbed_ - 1];
+  carry_ = beyond(newest.at_start, newest.segment.length_mm);
+  zones_backward(absorbed_ - 1, true);
+  for (std::uint64_t i = running_; i < absorbed_; ++i) split((*ring_)[i]);
+  // How fast the machine can be there is not known from here: what is generated looks at it.
+  (*ring_)[running_].forward = within_segment() ? MotionLimits::none : 0.0;
+  pass_forward(running_);
+  pass_backward(running_);
+}
+
+void OnlineProfile::stop(bool stopped) noexcept {
+  if (stopped == stop_) return;
+  stop_ = stopped;
+  changed_ = changed_ || state_ == State::running;
+}
+
+}  // namespace shapegcode

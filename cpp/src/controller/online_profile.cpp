@@ -1,0 +1,218 @@
+// The motion of a control: phases out of the plan, one distance a period.
+#include "controller/online_profile.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "motion/speed_limits.hpp"
+
+namespace shapegcode {
+namespace {
+
+constexpr double longest_time_s = 32768.0;  // after which times are counted anew
+
+}  // namespace
+
+void OnlineProfile::restart(std::uint64_t next) noexcept {
+  absorbed_ = running_ = next;
+  state_ = State::rest;
+  stop_ = slow_down_ = changed_ = has_phase_ = false;
+  ramp_ = ramp_count_ = remaining_count_ = piece_ = 0;
+  distance_ = speed_now_ = length_ = speed_ = 0.0;
+  tick_ = 0;
+  phase_ = {};
+  began_anew_ = true;
+}
+
+bool OnlineProfile::began_anew() noexcept {
+  const bool anew = began_anew_;
+  began_anew_ = false;
+  return anew;
+}
+
+// -------------------------------------------------------------------------------------------------------
+
+// What of the running segment lies beyond `offset`.
+void OnlineProfile::take_remaining(double offset) noexcept {
+  const QueuedSegment& entry = (*ring_)[running_];
+  remaining_count_ = 0;
+  double begin = 0.0;
+  for (std::size_t k = 0; k < entry.piece_count; ++k) {
+    const double end = begin + entry.pieces[k].length;
+    if (end > offset || k + 1 == entry.piece_count) {
+      remaining_[remaining_count_] = entry.pieces[k];
+      remaining_eased_[remaining_count_] = entry.eased[k];
+      if (begin < offset) remaining_[remaining_count_].length = std::max(end - offset, 0.0);
+      ++remaining_count_;
+    }
+    begin = end;
+  }
+  piece_ = 0;
+}
+
+double OnlineProfile::start_after(std::size_t piece) noexcept {
+  if (piece + 1 < remaining_count_) return remaining_[piece + 1].start_speed;
+  return running_ + 1 < absorbed_ && !(*ring_)[running_].segment.stop_at_end ? (*ring_)[running_ + 1].start : 0.0;
+}
+
+void OnlineProfile::pass_remaining() noexcept {
+  for (std::size_t k = remaining_count_; k-- > 0;) {
+    Piece& piece = remaining_[k];
+    piece.start_speed = std::min(piece.start_speed, speed_beyond(piece, start_after(k)));
+  }
+}
+
+void OnlineProfile::enter(std::uint64_t index) noexcept {
+  running_ = index;
+  take_remaining(0.0);
+  pass_remaining();
+}
+
+// Whether the plan allows a speed where the machine is.
+bool OnlineProfile::may_run(double distance, double speed) noexcept {
+  if (piece_ == 0) return true;
+  Piece piece = remaining_[piece_ - 1];
+  piece.length = std::max(piece_end_ - distance, 0.0);
+  return speed <= speed_beyond(piece, start_after(piece_ - 1)) * (1.0 + rounding);
+}
+
+// What of the running segment lies beyond `offset`, to be run as fast as what follows lets it be.
+void OnlineProfile::remain_from(double offset) noexcept {
+  take_remaining(offset);
+  for (std::size_t k = 0; k < remaining_count_; ++k) remaining_[k].start_speed = MotionLimits::none;
+  pass_remaining();
+}
+
+// The phases to come begin at the last set-point's distance and speed.
+void OnlineProfile::generate_anew() noexcept {
+  changed_ = false;
+  const double time_s = static_cast<double>(tick_ - 2) * period_s_;  // of the last set-point
+  phase_ = {time_s, 0.0, distance_, speed_now_, 0.0};
+  has_phase_ = false;
+  length_ = distance_;
+  speed_ = speed_now_;
+  ramp_ = ramp_count_ = 0;
+  remain_from(distance_ - (*ring_)[running_].distance);
+  state_ = State::running;
+  slow_down_ = speed_ > remaining_[0].start_speed * (1.0 + rounding);
+}
+
+// The ramp down within a piece, as steep as its present speed lets it be.
+bool OnlineProfile::next_ramps_down(std::size_t piece) noexcept {
+  const double length = remaining_[piece].length;
+  const double acceleration = acceleration_of((*ring_)[running_], speed_, remaining_eased_[piece]);
+  const double way = speed_ * speed_ / (2.0 * acceleration);
+  const double end = way < length ? 0.0 : std::sqrt(std::max(0.0, speed_ * speed_ - 2.0 * acceleration * length));
+  ramp_ = 0;
+  ramp_count_ = 1;
+  ramps_[0] = {speed_, end, std::min(way, length)};
+  speed_ = end;
+  return true;
+}
+
+// Ramps of the next piece; false where the motion ends.
+bool OnlineProfile::next_ramps() noexcept {
+  const bool down = stop_ || slow_down_ || ratio_ <= 0.0;
+  if (down && speed_ <= 0.0) return false;
+  while (piece_ == remaining_count_) {
+    if (running_ + 1 == absorbed_ || (*ring_)[running_].segment.stop_at_end) return false;
+    enter(running_ + 1);
+  }
+  const Piece& piece = remaining_[piece_++];
+  piece_end_ = length_ + piece.length;
+  if (down) return next_ramps_down(piece_ - 1);
+  const double end = std::min(start_after(piece_ - 1), speed_beyond(piece, speed_));
+  ramp_ = 0;
+  ramp_count_ = ramps_of(piece, speed_, end, length_, ramps_);
+  speed_ = end;
+  return true;
+}
+
+// The phase after the present one, or more of it; false where the motion ends.
+bool OnlineProfile::next_phase() noexcept {
+  while (ramp_ == ramp_count_) {
+    if (!next_ramps()) return false;
+  }
+  const Ramp ramp = ramps_[ramp_++];
+  if (ramp.distance <= 0.0 || ramp.v0 + ramp.v1 <= 0.0) return true;
+  const double duration = PhaseJoin::duration_s(ramp.v0, ramp.v1, ramp.distance);
+  const double acceleration = (ramp.v1 - ramp.v0) / duration;
+  if (has_phase_ && PhaseJoin::joins(phase_, ramp.v0, acceleration)) {
+    phase_.duration_s += duration;
+  } else {
+    phase_ = {phase_.start_s + phase_.duration_s, duration, length_, ramp.v0, acceleration};
+    has_phase_ = true;
+  }
+  length_ += ramp.distance;
+  return true;
+}
+
+// A motion begins with segment running_.
+void OnlineProfile::begin(bool settled) noexcept {
+  if (settled) {
+    for (std::uint64_t i = running_; i < absorbed_; ++i) {
+      QueuedSegment& entry = (*ring_)[i];
+      entry.distance = i == running_ ? 0.0 : (*ring_)[i - 1].distance + (*ring_)[i - 1].segment.length_mm;
+    }
+    tick_ = 0;
+    began_anew_ = true;
+  }
+  distance_ = (*ring_)[running_].distance;
+  const double time_s = settled ? 0.0 : static_cast<double>(tick_ - 1) * period_s_;
+  phase_ = {time_s, 0.0, distance_, 0.0, 0.0};
+  has_phase_ = changed_ = slow_down_ = false;
+  length_ = distance_;
+  speed_ = 0.0;
+  ramp_ = ramp_count_ = 0;
+  enter(running_);
+  state_ = State::running;
+}
+
+void OnlineProfile::come_to_rest() noexcept {
+  speed_now_ = 0.0;
+  const QueuedSegment& entry = (*ring_)[running_];
+  if (piece_ == remaining_count_ && ramp_ == ramp_count_ &&
+      length_ >= entry.distance + entry.segment.length_mm * (1.0 - 1e-12)) {
+    distance_ = entry.distance + entry.segment.length_mm;
+    ++running_;
+    state_ = entry.segment.stop_at_end ? State::pause : State::rest;
+    if (running_ < absorbed_) (*ring_)[running_].forward = 0.0;
+  } else {
+    distance_ = length_;
+    state_ = State::stopped;
+  }
+}
+
+void OnlineProfile::advance(bool settled) noexcept {
+  ++tick_;
+  if (state_ == State::pause && settled) state_ = State::rest;
+  if (state_ == State::rest && running_ < absorbed_ && !waiting_ && !stop_ && ratio_ > 0.0) {
+    begin(settled);
+    if (settled) tick_ = 1;
+  }
+  if ((state_ == State::running && (changed_ || (slow_down_ && may_run(distance_, speed_now_)))) ||
+      (state_ == State::stopped && !stop_ && ratio_ > 0.0)) {
+    generate_anew();
+  }
+  if (state_ != State::running) {
+    changed_ = false;
+    return;
+  }
+  if (phase_.start_s > longest_time_s) {
+    const auto periods = static_cast<std::int64_t>(phase_.start_s / period_s_);
+    tick_ -= periods;
+    phase_.start_s -= static_cast<double>(periods) * period_s_;
+  }
+  const double time_s = static_cast<double>(tick_ - 1) * period_s_;
+  while (time_s >= phase_.start_s + phase_.duration_s) {
+    if (!next_phase()) {
+      come_to_rest();
+      return;
+    }
+  }
+  const double t = time_s - phase_.start_s;
+  distance_ = phase_.distance_mm + t * (phase_.speed_mm_per_s + 0.5 * phase_.acceleration_mm_per_s2 * t);
+  speed_now_ = std::max(0.0, phase_.speed_mm_per_s + phase_.acceleration_mm_per_s2 * t);
+}
+
+}  // namespace shapegcode

@@ -1,0 +1,150 @@
+// The profile of a path that grows while it is run: look-ahead over a window of segments, and the distance at each
+// period. Of plan_speed it has the limits, zones, pieces and phases; where the window holds the path it gives the same
+// distances, bit for bit.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "motion/pieces.hpp"
+#include "shapegcode/controller.hpp"
+
+namespace shapegcode {
+
+/// A segment in the queue: first what the planning thread finds out, then what belongs to the look-ahead.
+struct QueuedSegment {
+  Segment segment;
+  std::array<double, most_following_axes> following_start{};
+  std::array<double, most_following_axes> following_rate{};  ///< per mm of the way
+  double feed = 0.0;                                         ///< programmed, with the ratio of arcs
+  double hard_limit = 0.0;                                   ///< speed whatever the override
+  double following_acceleration = MotionLimits::none;        ///< of the way
+  double corner = MotionLimits::none;                        ///< speed at which it is entered
+  Jump jump = Jump::none;                                    ///< what jumps there
+  double fastest = 0.0;                                      ///< speed at which it can ever be run
+  double beside_turn = MotionLimits::none;                   ///< its speed beside a jump of direction
+
+  double distance = 0.0;  ///< of its start
+  double limit = 0.0;
+  ZoneSet at_start{}, at_end{};
+  std::array<Piece, most_pieces> pieces{};  ///< their start_speed: of the forward pass
+  std::array<bool, most_pieces> eased{};
+  std::size_t piece_count = 0;
+  double forward = 0.0;  ///< speed at its start, of the forward pass
+  double start = 0.0;    ///< of both
+};
+
+/// A ring of segments: `index & mask` is the place of segment `index`, counted from the first ever pushed.
+class SegmentRing {
+ public:
+  explicit SegmentRing(std::size_t capacity) : places_(capacity) {}
+  [[nodiscard]] QueuedSegment& operator[](std::uint64_t index) noexcept {
+    return places_[index & (places_.size() - 1)];
+  }
+  [[nodiscard]] std::size_t capacity() const noexcept { return places_.size(); }
+
+ private:
+  std::vector<QueuedSegment> places_;
+};
+
+class OnlineProfile {
+ public:
+  OnlineProfile(SegmentRing& ring, const MotionLimits& limits, double jerk_s, double period_s)
+      : ring_(&ring), limits_(limits), jerk_s_(jerk_s), period_s_(period_s) {}
+
+  /// At rest before segment `next`, the first one of a motion to come. Nothing is known of any.
+  void restart(std::uint64_t next) noexcept;
+  /// Sees segment `absorbed()`, which is in the ring. Work bounded by the window.
+  void absorb() noexcept;
+  /// One period on. `settled`: what follows the profile is at rest as well, so that a motion may begin anew.
+  void advance(bool settled) noexcept;
+
+  /// Ratio of the programmed feeds; 0 stops as `stop` does. Work bounded by the window.
+  void override_feeds(double ratio) noexcept;
+  /// Come to rest along the path, or go on.
+  void stop(bool stopped) noexcept;
+  /// While true, a motion at rest does not begin.
+  void wait(bool waiting) noexcept { waiting_ = waiting; }
+
+  [[nodiscard]] std::uint64_t absorbed() const noexcept { return absorbed_; }
+  /// Segment that is being run, or that comes next.
+  [[nodiscard]] std::uint64_t running() const noexcept { return running_; }
+  [[nodiscard]] double distance() const noexcept { return distance_; }
+  [[nodiscard]] double speed() const noexcept { return speed_now_; }
+  [[nodiscard]] bool at_rest() const noexcept { return speed_now_ == 0.0 && state_ != State::running; }
+  /// At rest with nothing left to run.
+  [[nodiscard]] bool ran_out() const noexcept { return !within_segment() && running_ == absorbed_; }
+  /// True once after a motion began with its distances counted anew: whoever smooths them begins anew too.
+  [[nodiscard]] bool began_anew() noexcept;
+
+ private:
+  enum class State : std::uint8_t {
+    rest,     // before running_, which is at its start; nothing is generated
+    pause,    // at an exact stop, until everything has settled
+    stopped,  // within a segment
+    running,
+  };
+
+  [[nodiscard]] bool within_segment() const noexcept { return state_ == State::running || state_ == State::stopped; }
+  [[nodiscard]] double limit_of(const QueuedSegment& entry) const noexcept;
+  [[nodiscard]] ZoneSet zones_between(std::uint64_t from, std::uint64_t into) noexcept;
+  void split(QueuedSegment& entry) noexcept;
+  [[nodiscard]] double acceleration_of(const QueuedSegment& entry, double speed, bool eased) const noexcept;
+  void pass_forward(std::uint64_t first) noexcept;
+  bool pass_backward(std::uint64_t first_changed) noexcept;
+  std::uint64_t zones_backward(std::uint64_t newest, bool all) noexcept;
+  void take_remaining(double offset) noexcept;
+  void remain_from(double offset) noexcept;
+  void pass_remaining() noexcept;
+  [[nodiscard]] double start_after(std::size_t piece) noexcept;
+  void begin(bool settled) noexcept;
+  void enter(std::uint64_t index) noexcept;
+  void generate_anew() noexcept;
+  bool next_phase() noexcept;
+  bool next_ramps() noexcept;
+  bool next_ramps_down(std::size_t piece) noexcept;
+  void stop_before(std::uint64_t index) noexcept;
+  void connect(std::uint64_t newest) noexcept;
+  [[nodiscard]] bool fits() noexcept;
+  void come_to_rest() noexcept;
+  [[nodiscard]] bool may_run(double distance, double speed) noexcept;
+
+  static constexpr double rounding = 1e-9;  // relative, of a speed that the plan allows
+
+  SegmentRing* ring_;
+  MotionLimits limits_;
+  double jerk_s_;
+  double period_s_;
+  double ratio_ = 1.0;
+
+  std::uint64_t absorbed_ = 0;
+  std::uint64_t running_ = 0;
+  ZoneSet carry_{};  // what of the zones reaches beyond the newest segment
+
+  State state_ = State::rest;
+  bool stop_ = false;       // on request
+  bool slow_down_ = false;  // faster than the path now allows
+  bool waiting_ = false;
+  bool began_anew_ = false;
+  bool changed_ = false;  // the phases to come are not those of the plan
+
+  std::int64_t tick_ = 0;
+  double distance_ = 0.0;
+  double speed_now_ = 0.0;
+  SpeedPhase phase_{};
+  bool has_phase_ = false;
+  double length_ = 0.0;  // of all ramps so far
+  double speed_ = 0.0;   // at their end
+  std::array<Ramp, most_phases> ramps_{};
+  std::size_t ramp_ = 0;
+  std::size_t ramp_count_ = 0;
+  std::array<Piece, most_pieces> remaining_{};  // of the segment that is being run; start_speed: of both passes
+  std::array<bool, most_pieces> remaining_eased_{};
+  std::size_t remaining_count_ = 0;
+  std::size_t piece_ = 0;   // the next one to be made ramps of
+  double piece_end_ = 0.0;  // distance at which the one before it ends
+};
+
+}  // namespace shapegcode

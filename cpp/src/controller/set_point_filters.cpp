@@ -1,0 +1,164 @@
+#include "controller/set_point_filters.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "base/checks.hpp"
+#include "filter/dense.hpp"
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+namespace {
+
+using Taps = std::vector<double>;
+
+// Sums of taps that are 1 to the last bits only would move the machine when it is at rest.
+Fir scaled_to_one(const Fir& fir) {
+  if (fir.is_moving_average() || fir.decay() != 0.0) return fir;
+  const double sum = std::accumulate(fir.taps().begin(), fir.taps().end(), 0.0);
+  Taps taps = fir.taps();
+  for (double& tap : taps) tap /= sum;
+  return Fir(fir.delays(), std::move(taps));
+}
+
+double mean_of(const Taps& taps) {
+  double mean = 0.0;
+  for (std::size_t k = 0; k < taps.size(); ++k) mean += taps[k] * static_cast<double>(k);
+  return mean;
+}
+
+double variance_of(const Taps& taps) {
+  const double mean = mean_of(taps);
+  double variance = 0.0;
+  for (std::size_t k = 0; k < taps.size(); ++k) {
+    variance += taps[k] * (static_cast<double>(k) - mean) * (static_cast<double>(k) - mean);
+  }
+  return variance;
+}
+
+// The shapers that may act on any axis.
+std::vector<Fir> shapers_of(const ControllerSettings& settings, int n_axes) {
+  if (const auto* one = std::get_if<Fir>(&settings.shaper)) return {scaled_to_one(*one)};
+  if (const auto* following = std::get_if<FollowingFir>(&settings.shaper)) return following->fir().set();
+  std::vector<Fir> each = std::get<std::vector<Fir>>(settings.shaper);
+  if (each.size() != static_cast<std::size_t>(n_axes)) {
+    throw Error(ErrorKind::argument,
+                fmt::format("{} shapers for {} axes: one for all, or one for each", each.size(), n_axes));
+  }
+  for (Fir& fir : each) fir = scaled_to_one(fir);
+  return each;
+}
+
+// The second difference over `delay` samples, scaled so that an arc comes out of both with its own radius.
+Fir correction(double variance, int delay) {
+  const double share = variance / (2.0 * delay * delay);
+  return Fir({0, delay, 2 * delay}, {-share, 1.0 + 2.0 * share, -share});
+}
+
+}  // namespace
+
+SetPointFilters::Stage::Stage(const std::vector<Fir>& filters, int n_axes) {
+  const int axes_of_each = filters.size() == 1 ? n_axes : 1;
+  for (const Fir& fir : filters) streams_.emplace_back(fir, axes_of_each);
+}
+
+void SetPointFilters::Stage::reset(std::span<const double> position) noexcept {
+  const std::size_t width = position.size() / streams_.size();
+  for (std::size_t i = 0; i < streams_.size(); ++i) streams_[i].reset(position.subspan(i * width, width));
+}
+
+void SetPointFilters::Stage::step(std::span<double> position) noexcept {
+  const std::size_t width = position.size() / streams_.size();
+  for (std::size_t i = 0; i < streams_.size(); ++i) {
+    const std::span<double> part = position.subspan(i * width, width);
+    streams_[i].step(part, part);
+  }
+}
+
+SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes) {
+  require_not_below_zero(settings.smoothing_time_s, "smoothing time", "s");
+  const double periods = std::round(settings.smoothing_time_s / settings.period_s);
+  const auto length =
+      std::max<std::int64_t>(1, require_count(periods, most_filter_samples, "the smoothing time", "periods"));
+  const Fir average = Fir::moving_average(static_cast<int>(length));
+  const Taps smoothing = convolved(dense_taps(average), dense_taps(average));
+  const std::vector<Fir> shapers = shapers_of(settings, n_axes);
+  std::vector<Taps> chains;
+  double variance = 0.0;
+  for (const Fir& shaper : shapers) {
+    chains.push_back(convolved(smoothing, dense_taps(shaper)));
+    variance = std::max(variance, variance_of(chains.back()));
+  }
+  following_ = std::holds_alternative<FollowingFir>(settings.shaper)
+                   ? std::optional(std::get<FollowingFir>(settings.shaper))
+                   : std::nullopt;
+  if (settings.contour_correction && variance > 0.0) {
+    correction_delay_ = std::max(1, static_cast<int>(std::ceil(2.0 * std::sqrt(variance))));
+    std::vector<Fir> corrections;
+    for (Taps& chain : chains) {
+      // A set that is followed has one correction: that of the filter which cuts most.
+      const Fir fir = correction(following_ ? variance : variance_of(chain), correction_delay_);
+      chain = convolved(dense_taps(fir), chain);
+      if (!following_ || corrections.empty()) corrections.push_back(fir);
+    }
+    stages_.emplace_back(corrections, n_axes);
+  }
+  tolerance_.contour_tolerance_mm = settings.contour_tolerance_mm;
+  for (const Taps& chain : chains) measure(chain, settings.period_s);
+  if (length > 1) {
+    stages_.emplace_back(std::vector{average}, n_axes);
+    stages_.emplace_back(std::vector{average}, n_axes);
+  }
+  if (following_) {
+    varying_.emplace_back(following_->fir(), n_axes);
+  } else {
+    stages_.emplace_back(shapers, n_axes);
+  }
+}
+
+void SetPointFilters::measure(const Taps& taps, double period_s) {
+  double gain = 0.0;
+  double highest = 0.0;
+  double steepest = 0.0;
+  double deviation = 0.0;
+  double before = 0.0;
+  const double mean = mean_of(taps);
+  for (std::size_t k = 0; k <= taps.size(); ++k) {
+    const double tap = k < taps.size() ? taps[k] : 0.0;
+    gain += std::abs(tap);
+    highest = std::max(highest, std::abs(tap));
+    steepest = std::max(steepest, std::abs(tap - before));
+    deviation += std::abs(tap) * std::abs(static_cast<double>(k) - mean);
+    before = tap;
+  }
+  duration_ = std::max(duration_, static_cast<int>(taps.size()) - 1);
+  mean_ = std::max(mean_, mean);
+  gain_ = std::max(gain_, gain);
+  jumps_.duration_s = std::max(jumps_.duration_s, static_cast<double>(taps.size()) * period_s);
+  jumps_.acceleration_per_s = std::max(jumps_.acceleration_per_s, highest / period_s);
+  jumps_.jerk_per_s2 = std::max(jumps_.jerk_per_s2, steepest / (period_s * period_s));
+  // After the correction rounding may leave less than nothing.
+  const double variance = correction_delay_ > 0 ? 0.0 : variance_of(taps);
+  tolerance_.variance_s2 = std::max(tolerance_.variance_s2, variance * period_s * period_s);
+  tolerance_.mean_deviation_s = std::max(tolerance_.mean_deviation_s, deviation * period_s);
+}
+
+void SetPointFilters::reset(std::span<const double> position) noexcept {
+  for (Stage& stage : stages_) stage.reset(position);
+  for (VaryingFirStream& varying : varying_) varying.reset(position);
+  if (following_) followed_mm_ = position[static_cast<std::size_t>(following_->axis())];
+}
+
+void SetPointFilters::step(std::span<double> position) noexcept {
+  for (Stage& stage : stages_) stage.step(position);
+  if (following_) {
+    const double now_mm = position[static_cast<std::size_t>(following_->axis())];
+    varying_.front().step(position, position, following_->place(0.5 * (followed_mm_ + now_mm)));
+    followed_mm_ = now_mm;
+  }
+}
+
+}  // namespace shapegcode

@@ -1,0 +1,58 @@
+// What follows the path in a control: contour correction, smoothing and shaper of every axis.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "shapegcode/controller.hpp"
+
+namespace shapegcode {
+
+class SetPointFilters {
+ public:
+  /// Throws Error(argument) on times that are none, or as many shapers as there are not axes.
+  SetPointFilters(const ControllerSettings& settings, int n_axes);
+
+  void reset(std::span<const double> position) noexcept;
+  /// In place.
+  void step(std::span<double> position) noexcept;
+
+  /// Of the whole chain: samples that it lasts, its largest mean delay, the correction's share of that.
+  [[nodiscard]] int duration_samples() const noexcept { return duration_; }
+  [[nodiscard]] double mean_samples() const noexcept { return mean_; }
+  [[nodiscard]] int correction_samples() const noexcept { return correction_delay_; }
+  /// Largest response of any axis to a jump.
+  [[nodiscard]] const JumpResponse& jumps() const noexcept { return jumps_; }
+  /// Largest sum of the magnitudes of an axis' taps: by how much it may exceed what comes in.
+  [[nodiscard]] double gain() const noexcept { return gain_; }
+  /// What it may cut off, and the moments that look-ahead wants for that.
+  [[nodiscard]] const FilterTolerance& tolerance() const noexcept { return tolerance_; }
+
+ private:
+  // One filter for all axes, or one for each.
+  class Stage {
+   public:
+    Stage(const std::vector<Fir>& filters, int n_axes);
+    void reset(std::span<const double> position) noexcept;
+    void step(std::span<double> position) noexcept;
+
+   private:
+    std::vector<FirStream> streams_;
+  };
+
+  void measure(const std::vector<double>& taps, double period_s);
+
+  std::vector<Stage> stages_;
+  std::optional<FollowingFir> following_;
+  std::vector<VaryingFirStream> varying_;  // one where the shaper follows an axis
+  double followed_mm_ = 0.0;
+  int duration_ = 0;
+  double mean_ = 0.0;
+  int correction_delay_ = 0;
+  JumpResponse jumps_;
+  double gain_ = 1.0;
+  FilterTolerance tolerance_;
+};
+
+}  // namespace shapegcode

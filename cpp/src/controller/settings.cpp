@@ -1,0 +1,82 @@
+#include "controller/settings.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "base/checks.hpp"
+#include "motion/speed_limits.hpp"
+#include "shapegcode/error.hpp"
+
+namespace shapegcode {
+namespace {
+
+constexpr std::size_t least_window = 8;
+constexpr std::size_t most_segments = std::size_t{1} << 24;
+
+}  // namespace
+
+int jerk_periods(const ControllerSettings& settings) {
+  double longest_s = jerk_time(settings.limits, MotionLimits::none);
+  for (const FollowingLimits& axis : settings.following) {
+    if (std::isfinite(axis.max_jerk)) longest_s = std::max(longest_s, 2.0 * axis.max_acceleration / axis.max_jerk);
+  }
+  const double periods = std::ceil(longest_s / settings.period_s - 1e-9);
+  return std::max(1, static_cast<int>(require_count(periods, most_filter_samples, "the jerk time", "periods")));
+}
+
+void check_settings(const ControllerSettings& settings) {
+  require_period(settings.period_s);
+  check_limits(settings.limits, {settings.contour_tolerance_mm, 1.0, 0.0, 0.0});
+  if (settings.following.size() > most_following_axes) {
+    throw Error(ErrorKind::argument, fmt::format("{} following axes, at most {} are possible",
+                                                 settings.following.size(), most_following_axes));
+  }
+  const auto jerk_has_acceleration = [](double jerk, double acceleration, std::size_t axis) {
+    if (std::isfinite(jerk) && !std::isfinite(acceleration)) {
+      throw Error(ErrorKind::argument,
+                  fmt::format("axis {}: a jerk limit of {} needs an acceleration limit", axis, jerk));
+    }
+  };
+  for (int i = 0; i < axis_count; ++i) {
+    jerk_has_acceleration(settings.limits.max_jerk_mm_per_s3[i], settings.limits.max_acceleration_mm_per_s2[i],
+                          static_cast<std::size_t>(i));
+  }
+  for (std::size_t i = 0; i < settings.following.size(); ++i) {
+    const FollowingLimits& axis = settings.following[i];
+    require(axis.max_feed > 0.0, "feed limit of a following axis", axis.max_feed, "", "> 0");
+    require(axis.max_acceleration > 0.0, "acceleration limit of a following axis", axis.max_acceleration, "", "> 0");
+    require(axis.max_jerk > 0.0, "jerk limit of a following axis", axis.max_jerk, "", "> 0");
+    jerk_has_acceleration(axis.max_jerk, axis.max_acceleration, axis_count + i);
+  }
+  require(settings.window >= least_window && settings.window <= most_segments, "window",
+          static_cast<double>(settings.window), "segments", "8 ... 16777216");
+  require(settings.queue <= most_segments, "queue", static_cast<double>(settings.queue), "segments", "0 ... 16777216");
+}
+
+MotionLimits planning_limits_of(const ControllerSettings& settings, const SetPointFilters& filters) {
+  MotionLimits limits = settings.limits;
+  limits.jerk_time_s = jerk_periods(settings) > 1 ? jerk_periods(settings) * settings.period_s : limits.jerk_time_s;
+  limits.max_feed_mm_per_s /= filters.gain();
+  limits.max_acceleration_mm_per_s2 /= filters.gain();
+  limits.max_jerk_mm_per_s3 /= filters.gain();
+  const bool limited = limits.max_acceleration_mm_per_s2.minCoeff() < MotionLimits::none ||
+                       std::ranges::any_of(settings.following, [](const FollowingLimits& axis) {
+                         return axis.max_acceleration < MotionLimits::none;
+                       });
+  if (limited) limits.jumps = filters.jumps();
+  return limits;
+}
+
+std::vector<FollowingLimits> following_limits_of(const ControllerSettings& settings, double gain) {
+  std::vector<FollowingLimits> limits = settings.following;
+  for (FollowingLimits& axis : limits) {
+    axis.max_feed /= gain;
+    axis.max_acceleration /= gain;
+    axis.max_jerk /= gain;
+  }
+  return limits;
+}
+
+}  // namespace shapegcode

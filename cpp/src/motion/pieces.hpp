@@ -1,0 +1,208 @@
+// Stretches of path with one limit each, the speeds where they meet, and the phases of constant acceleration within
+// them. Used by both forms of the look-ahead: over a whole path, and over a window of it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "motion/speed_limits.hpp"
+#include "shapegcode/motion.hpp"
+
+namespace shapegcode {
+
+/// A stretch of path with one speed limit and one acceleration.
+struct Piece {
+  double length = 0.0;
+  double limit = 0.0;
+  double acceleration = 0.0;
+  double start_speed = 0.0;
+};
+
+/// A slow or eased stretch that reaches over a junction into a neighbour.
+struct Zone {
+  double limit = MotionLimits::none;
+  double reach = 0.0;
+
+  friend bool operator==(const Zone&, const Zone&) = default;
+};
+
+inline void extend(Zone& zone, const Zone& other) noexcept {
+  if (zone.reach <= 0.0) {
+    zone = other;
+  } else {
+    zone = {std::min(zone.limit, other.limit), std::max(zone.reach, other.reach)};
+  }
+}
+
+/// What of a zone reaches beyond a segment.
+inline Zone beyond(const Zone& zone, double length) noexcept {
+  const double left = zone.reach - length;
+  return left > 0.0 ? Zone{zone.limit, left} : Zone{};
+}
+
+/// One side of a junction, seen from the other.
+struct JunctionSpeeds {
+  double from = 0.0;       ///< limit of the segment that the zone comes from
+  double from_feed = 0.0;  ///< its programmed feed
+  double into = 0.0;       ///< limit of the segment that it reaches into
+  double corner = MotionLimits::none;
+  Jump jump = Jump::none;
+  double fastest = 0.0;  ///< speed at which both can ever be run, whatever the override
+};
+
+/// The zones of a junction: of its speed, which the smoothing by the jerk time mixes; of a lower programmed feed, for
+/// what a filter mixes; and of a jump, beside which the path is accelerated gently. The last has no speed, but the kind
+/// of the jump in its place, the greatest being the least.
+enum ZoneKind : std::size_t { corner_zone, feed_zone, jump_zone, zone_kinds };
+using ZoneSet = std::array<Zone, zone_kinds>;
+
+/// The zone of a jump that is passed at most at `speed`: as far as the path goes within the time that counts. It is the
+/// same whatever the override is, so that what the machine is told to do stays possible when it is turned.
+inline Zone zone_of_jump(Jump jump, double speed, const MotionLimits& limits, double jerk_s) noexcept {
+  const double time_s = jump_time_s(limits, jerk_s);
+  return {static_cast<double>(jump), time_s * (speed + 0.5 * limits.max_acceleration_mm_per_s2.norm() * time_s)};
+}
+
+inline ZoneSet junction_zones(const JunctionSpeeds& at, const MotionLimits& limits, double jerk_s) noexcept {
+  ZoneSet zones;
+  const double least = std::min(at.corner, at.from);
+  if (jerk_s > 0.0 && least < at.into) {
+    zones[corner_zone] = {least, 0.5 * least * jerk_s};
+  }
+  if (limits.feed_spread_s > 0.0 && at.from_feed * (1.0 + limits.feed_excess_ratio) < at.into) {
+    zones[feed_zone] = {at.from_feed, at.from_feed * (limits.feed_spread_s + 0.5 * jerk_s)};
+  }
+  if (at.jump != Jump::none) {
+    zones[jump_zone] = zone_of_jump(at.jump, std::min(at.corner, at.fastest), limits, jerk_s);
+  }
+  return zones;
+}
+
+inline void extend(ZoneSet& zones, const ZoneSet& others) noexcept {
+  for (std::size_t kind = 0; kind < zone_kinds; ++kind) {
+    if (others[kind].limit < MotionLimits::none) {
+      extend(zones[kind], others[kind]);
+    }
+  }
+}
+
+inline ZoneSet beyond(const ZoneSet& zones, double length) noexcept {
+  return {beyond(zones[corner_zone], length), beyond(zones[feed_zone], length), beyond(zones[jump_zone], length)};
+}
+
+/// A zone as far as it reaches into a segment that is never run faster than `fastest`: no farther than the time that
+/// counts lets it.
+inline void cut_to(ZoneSet& zones, double fastest, double time_s) noexcept {
+  zones[jump_zone].reach = std::min(zones[jump_zone].reach, fastest * time_s);
+}
+
+/// Of a segment: a border on each side of each zone, at most.
+inline constexpr std::size_t most_pieces = 2 * zone_kinds + 1;
+
+struct Stretch {
+  double length = 0.0;
+  double limit = 0.0;
+  bool eased = false;
+};
+
+/// The stretches between the borders of a segment's zones; their number is returned.
+/// `beside_turn`: limit beside a jump of direction.
+inline std::size_t split_segment(const ZoneSet& at_start, const ZoneSet& at_end, double length, double limit,
+                                 double beside_turn, std::array<Stretch, most_pieces>& stretches) noexcept {
+  std::array<double, most_pieces + 1> marks;
+  std::size_t count = 0;
+  marks[count++] = 0.0;
+  marks[count++] = length;
+  for (std::size_t kind = 0; kind < zone_kinds; ++kind) {
+    if (at_start[kind].reach > 0.0) {
+      marks[count++] = std::min(at_start[kind].reach, length);
+    }
+    if (at_end[kind].reach > 0.0) {
+      marks[count++] = std::max(length - at_end[kind].reach, 0.0);
+    }
+  }
+  std::sort(marks.begin(), marks.begin() + count);
+  std::size_t made = 0;
+  for (std::size_t k = 0; k + 1 < count; ++k) {
+    if (marks[k + 1] <= marks[k]) {
+      continue;
+    }
+    const double middle = 0.5 * (marks[k] + marks[k + 1]);
+    Stretch stretch{marks[k + 1] - marks[k], limit, false};
+    for (std::size_t kind = 0; kind < zone_kinds; ++kind) {
+      for (const auto& [zone, is_in] : {std::pair{at_start[kind], middle < at_start[kind].reach},
+                                        std::pair{at_end[kind], middle > length - at_end[kind].reach}}) {
+        if (!is_in) continue;
+        if (kind == jump_zone) {
+          stretch.eased = true;
+          if (zone.limit == static_cast<double>(Jump::turn)) stretch.limit = std::min(stretch.limit, beside_turn);
+        } else {
+          stretch.limit = std::min(stretch.limit, zone.limit);
+        }
+      }
+    }
+    stretches[made++] = stretch;
+  }
+  return made;
+}
+
+/// Speed at the end of a piece that is entered at a speed and accelerated as much as it may be; the same backwards.
+inline double speed_beyond(const Piece& piece, double speed) noexcept {
+  return std::min(piece.limit, std::sqrt(speed * speed + 2.0 * piece.acceleration * piece.length));
+}
+
+/// Phases of a profile in a row; one that goes on as its predecessor did is joined to it.
+struct PhaseJoin {
+  /// Time of a ramp or a steady stretch from v0 to v1 over `distance`.
+  static double duration_s(double v0, double v1, double distance) noexcept { return 2.0 * distance / (v0 + v1); }
+  static bool joins(const SpeedPhase& last, double v0, double acceleration) noexcept {
+    const double scale = std::max(std::abs(last.acceleration_mm_per_s2), std::abs(acceleration));
+    const double end_speed = last.speed_mm_per_s + last.acceleration_mm_per_s2 * last.duration_s;
+    // Without an acceleration limit the speed jumps from one steady stretch to the next.
+    const bool goes_on = std::abs(end_speed - v0) <= 1e-6 * (end_speed + v0);
+    return goes_on && (std::abs(last.acceleration_mm_per_s2 - acceleration) <= 1e-9 * scale || scale == 0.0);
+  }
+};
+
+inline constexpr std::size_t most_phases = 3;  // of a piece: up, steady, down
+
+/// A ramp or a steady stretch from v0 to v1.
+struct Ramp {
+  double v0 = 0.0;
+  double v1 = 0.0;
+  double distance = 0.0;
+};
+
+/// The ramps of a piece between two speeds, as short in time as its limits let them be. `behind`: length of all before
+/// it, beside which dust of rounding is no stretch of its own. Their number is returned.
+inline std::size_t ramps_of(const Piece& piece, double v0, double v1, double behind,
+                            std::array<Ramp, most_phases>& ramps) noexcept {
+  const double a = piece.acceleration;
+  if (!std::isfinite(a)) {
+    ramps[0] = {piece.limit, piece.limit, piece.length};
+    return 1;
+  }
+  const double peak_squared = a * piece.length + 0.5 * (v0 * v0 + v1 * v1);
+  const double peak = std::max({v0, v1, std::min(piece.limit, std::sqrt(peak_squared))});
+  double up = (peak * peak - v0 * v0) / (2.0 * a);
+  double down = (peak * peak - v1 * v1) / (2.0 * a);
+  if (up + down > piece.length) {  // rounding only
+    const double scale = piece.length / (up + down);
+    up *= scale;
+    down *= scale;
+  }
+  std::size_t count = 0;
+  ramps[count++] = {v0, peak, up};
+  const double steady = piece.length - up - down;
+  if (steady > 1e-12 * (1.0 + behind + up)) {
+    ramps[count++] = {peak, peak, steady};
+  }
+  ramps[count++] = {peak, v1, down};
+  return count;
+}
+
+}  // namespace shapegcode

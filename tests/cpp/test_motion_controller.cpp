@@ -1,0 +1,337 @@
+// A control in motion: against the planner of whole paths, finite differences of the set-points, closed forms.
+
+#include <array>
+#include <cmath>
+#include <complex>
+#include <memory>
+#include <numbers>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "random_motion.hpp"
+#include "shapegcode/controller.hpp"
+#include "shapegcode/error.hpp"
+
+using namespace shapegcode;
+using namespace shapegcode::tests;
+
+namespace {
+
+constexpr double period_s = 0.001;
+constexpr double most_speed = 200.0;
+constexpr double most_acceleration = 1000.0;
+constexpr double most_jerk = 50000.0;
+
+ControllerSettings limited() {
+  ControllerSettings settings;
+  settings.limits.law = AccelerationLaw::jerk_limited;
+  settings.limits.max_feed_mm_per_s.setConstant(most_speed);
+  settings.limits.max_acceleration_mm_per_s2.setConstant(most_acceleration);
+  settings.limits.max_jerk_mm_per_s3.setConstant(most_jerk);
+  return settings;
+}
+
+struct Run {
+  std::vector<Vector3> set_points;
+  Activity last = Activity::idle;
+};
+
+Run run_until_idle(MotionController& control, std::size_t most = 1'000'000) {
+  Run run;
+  Vector3 point;
+  do {
+    run.last = control.step(values_of(point));
+    run.set_points.push_back(point);
+  } while (run.last != Activity::idle && run.set_points.size() < most);
+  return run;
+}
+
+// What a mode of the machine keeps of a motion: |sum of accelerations times the impulse response|.
+double residual(const std::vector<Vector3>& points, int axis, double frequency_hz, double damping) {
+  const double omega = 2.0 * std::numbers::pi * frequency_hz;
+  const std::complex<double> pole(-damping * omega, omega * std::sqrt(1.0 - damping * damping));
+  std::complex<double> sum = 0.0;
+  const auto n = points.size();
+  for (std::size_t k = 2; k < n; ++k) {
+    const double change = points[k][axis] - 2.0 * points[k - 1][axis] + points[k - 2][axis];
+    sum = sum * std::exp(pole * period_s) + change;
+  }
+  return std::abs(sum);
+}
+
+}  // namespace
+
+TEST_CASE("a path within the window is run as the planner of whole paths runs it, bit for bit") {
+  for (const bool smooth : {false, true}) {
+    for (const double smoothing_s : {0.0, 0.01}) {
+      for (unsigned seed = 0; seed < 60; ++seed) {
+        CAPTURE(seed);
+        CAPTURE(smooth);
+        CAPTURE(smoothing_s);
+        std::mt19937 random(seed);
+        std::vector<Segment> segments = random_segments(random, 1 + seed % 40, 120.0, smooth);
+        ControllerSettings settings = limited();
+        settings.smoothing_time_s = smoothing_s;
+        MotionController control(settings);
+        for (const Segment& segment : segments) REQUIRE(control.push(segment) == PushResult::accepted);
+        const Run online = run_until_idle(control);
+
+        const auto path = std::make_shared<const Path>(segments);
+        const auto profile = std::make_shared<const SpeedProfile>(
+            plan_speed(*path, control.planning_limits(), control.planning_tolerance()));
+        Interpolator interpolator(path, profile, period_s);
+        const Fir average = Fir::moving_average(smoothing_s > 0.0 ? 10 : 1);
+        FirStream first(average, axis_count);
+        FirStream second(average, axis_count);
+        // It begins when it has seen all, four segments a period.
+        const std::size_t begin = (segments.size() - 1) / 4;
+        REQUIRE(online.set_points.size() >= begin + interpolator.sample_count());
+        std::size_t different = 0;
+        Vector3 point;
+        for (std::size_t k = 0; k < interpolator.sample_count(); ++k) {
+          interpolator.step(point);
+          if (smoothing_s > 0.0) {
+            first.step(values_of(point), values_of(point));
+            second.step(values_of(point), values_of(point));
+          }
+          if (point != online.set_points[begin + k]) ++different;
+        }
+        CHECK(different == 0);
+      }
+    }
+  }
+}
+
+TEST_CASE("limits are kept at every set-point, whatever the operator does") {
+  for (unsigned seed = 0; seed < 400; ++seed) {
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> uniform(0.0, 1.0);
+    ControllerSettings settings = limited();
+    settings.window = 8 + seed % 60;
+    if (seed % 3 == 1) settings.shaper = Fir({0, 11}, {0.516, 0.484});
+    settings.contour_correction = seed % 4 == 3;
+    MotionController control(settings);
+    std::vector<Segment> segments = random_segments(random, 30, 300.0, seed % 2 == 0);
+    Differences differences(axis_count, period_s);
+    Vector3 point;
+    std::size_t pushed = 0;
+    for (std::size_t step = 0; step < 200'000; ++step) {
+      while (pushed < segments.size() && uniform(random) < 0.3) {
+        if (control.push(segments[pushed]) == PushResult::accepted) ++pushed;
+      }
+      const double what = uniform(random);
+      if (what < 0.002) control.feed_override(2.0 * uniform(random));
+      if (what > 0.997) control.hold();
+      if (uniform(random) < 0.01) control.resume();
+      const Activity activity = control.step(values_of(point));
+      differences.add(values_of(point));
+      if (activity == Activity::idle && pushed == segments.size()) break;
+      if (step == 150'000) {
+        control.feed_override(1.0);
+        control.resume();
+      }
+    }
+    CHECK((point - segments.back().end_mm).norm() < 1e-9);
+    CHECK(differences.speed() <= 1.001 * most_speed);
+    CHECK(differences.acceleration() <= 1.001 * most_acceleration);
+    CHECK(differences.jerk() <= 1.001 * most_jerk + 100.0);  // a coordinate of 100 mm is rounded to 1.4e-14
+  }
+}
+
+TEST_CASE("after a hold anywhere the mode is at rest") {
+  // Half a swing of the mode is ten periods: two taps cancel it.
+  constexpr double damping = 0.05;
+  const double frequency_hz = 50.0 / std::sqrt(1.0 - damping * damping);
+  const double decay = std::exp(-damping * std::numbers::pi / std::sqrt(1.0 - damping * damping));
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    const std::vector<Segment> segments = random_segments(random, 20, 150.0, true);
+    std::array<double, 2> left{};
+    for (const bool shaped : {false, true}) {
+      ControllerSettings settings = limited();
+      settings.limits.max_jerk_mm_per_s3.setConstant(1e6);
+      settings.smoothing_time_s = 0.0;
+      settings.limits.corner_speed_difference_mm_per_s.setConstant(20.0);
+      if (shaped) settings.shaper = Fir({0, 10}, {1.0 / (1.0 + decay), decay / (1.0 + decay)});
+      MotionController control(settings);
+      for (const Segment& segment : segments) REQUIRE(control.push(segment) == PushResult::accepted);
+      Run run;
+      Vector3 point;
+      Activity activity = Activity::moving;
+      for (std::size_t k = 0; k < 60 + 40 * seed; ++k) {
+        activity = control.step(values_of(point));
+        run.set_points.push_back(point);
+      }
+      control.hold();
+      while (activity != Activity::held && activity != Activity::idle) {
+        activity = control.step(values_of(point));
+        run.set_points.push_back(point);
+      }
+      run.set_points.insert(run.set_points.end(), 2, point);  // it stays there
+      for (int axis = 0; axis < 2; ++axis) {
+        const double part = residual(run.set_points, axis, frequency_hz, damping);
+        left[shaped ? 1 : 0] = std::max(left[shaped ? 1 : 0], part);
+      }
+    }
+    CHECK(left[1] <= 0.01 * left[0] + 1e-12);
+  }
+}
+
+TEST_CASE("a single move takes the time of its closed form") {
+  ControllerSettings settings = limited();
+  settings.smoothing_time_s = 0.0;
+  MotionController control(settings);
+  Segment move = make_line({0, 0, 0}, {100, 0, 0}, 100.0);
+  move.stop_at_end = true;
+  REQUIRE(control.push(move) == PushResult::accepted);
+  const Run run = run_until_idle(control);
+  // 100 mm at 100 mm/s and 1000 mm/s2: 1 s and a ramp of .1 s, and 2a/J = 40 ms of jerk.
+  std::size_t moving = 0;
+  for (const Vector3& point : run.set_points) moving += point[0] > 0.0 && point[0] < 100.0 ? 1 : 0;
+  CHECK(moving == doctest::Approx(1140.0).epsilon(0.002));
+  CHECK(run.set_points.back() == Vector3(100.0, 0.0, 0.0));
+}
+
+TEST_CASE("what cannot be run is refused, and says why") {
+  ControllerSettings settings = limited();
+  settings.queue = 16;
+  settings.window = 8;
+  MotionController control(settings);
+  const double nan = std::nan("");
+  CHECK(control.push(make_line({1, 0, 0}, {2, 0, 0}, 10.0)) == PushResult::not_connected);
+  CHECK(control.push(make_line({0, 0, 0}, {0, 0, 0}, 10.0)) == PushResult::no_length);
+  CHECK(control.push(make_line({0, 0, 0}, {1, 0, 0}, 0.0)) == PushResult::no_feed);
+  CHECK(control.push(make_line({0, 0, 0}, {1, 0, 0}, nan)) == PushResult::no_feed);
+  CHECK(control.push(make_line({0, 0, 0}, {nan, 0, 0}, 10.0)) == PushResult::not_finite);
+  const std::array<double, 1> angle{3.0};
+  CHECK(control.push(make_line({0, 0, 0}, {1, 0, 0}, 10.0), angle) == PushResult::wrong_axes);
+  for (int k = 0; k < 16; ++k) {
+    CHECK(control.push(make_line({1.0 * k, 0, 0}, {1.0 * k + 1.0, 0, 0}, 10.0)) == PushResult::accepted);
+  }
+  CHECK(control.push(make_line({16, 0, 0}, {17, 0, 0}, 10.0)) == PushResult::queue_full);
+  Vector3 point;
+  for (int k = 0; k < 100; ++k) control.step(values_of(point));
+  control.abort();
+  Differences differences(axis_count, period_s);
+  Activity activity = Activity::stopping;
+  for (int k = 0; k < 1000 && activity != Activity::aborted; ++k) {
+    activity = control.step(values_of(point));
+    differences.add(values_of(point));
+  }
+  CHECK(activity == Activity::aborted);
+  CHECK(differences.acceleration() <= 1.001 * most_acceleration);
+  CHECK(control.push(make_line({4, 0, 0}, {5, 0, 0}, 10.0)) == PushResult::aborted);
+  CHECK(control.step(values_of(point)) == Activity::aborted);
+  control.restart(values_of(point));
+  CHECK(control.push(make_line(point, {9, 0, 0}, 10.0)) == PushResult::accepted);
+  CHECK(run_until_idle(control).set_points.back() == Vector3(9, 0, 0));
+  for (int result = 0; result <= static_cast<int>(PushResult::aborted); ++result) {
+    CHECK(std::string(text_of(static_cast<PushResult>(result))).size() > 4);
+  }
+  settings.window = 7;
+  CHECK_THROWS_AS(MotionController{settings}, Error);
+  settings.window = 8;
+  settings.limits.max_acceleration_mm_per_s2.setZero();
+  CHECK_THROWS_AS(MotionController{settings}, Error);
+  settings = limited();
+  settings.limits.max_acceleration_mm_per_s2.setConstant(MotionLimits::none);
+  CHECK_THROWS_AS(MotionController{settings}, Error);
+}
+
+TEST_CASE("segments that run out stop the motion and are counted; it goes on with the next") {
+  MotionController control(limited());
+  REQUIRE(control.push(make_line({0, 0, 0}, {10, 0, 0}, 50.0)) == PushResult::accepted);
+  Vector3 point;
+  Activity activity = Activity::moving;
+  bool starved = false;
+  while (activity != Activity::idle) {
+    activity = control.step(values_of(point));
+    starved = starved || activity == Activity::starved;
+  }
+  CHECK(starved);
+  CHECK(control.state().starvations == 1);
+  Segment last = make_line({10, 0, 0}, {10, 10, 0}, 50.0);
+  last.stop_at_end = true;
+  REQUIRE(control.push(last) == PushResult::accepted);
+  CHECK(run_until_idle(control).set_points.back() == Vector3(10, 10, 0));
+  CHECK(control.state().starvations == 1);
+  CHECK(control.state().segments_done == 2);
+}
+
+TEST_CASE("axes that follow end where they are told to, within their limits") {
+  ControllerSettings settings = limited();
+  settings.following = {{30.0, 100.0, 5000.0}, {MotionLimits::none, MotionLimits::none, MotionLimits::none}};
+  MotionController control(settings);
+  CHECK(control.axes() == 5);
+  const std::array<double, 2> first{20.0, 1.0};
+  const std::array<double, 2> second{-20.0, 2.0};
+  const std::array<double, 2> third{70.0, 2.0};
+  REQUIRE(control.push(make_line({0, 0, 0}, {50, 0, 0}, 100.0), first) == PushResult::accepted);
+  REQUIRE(control.push(make_line({50, 0, 0}, {50, 40, 0}, 100.0), second) == PushResult::accepted);
+  REQUIRE(control.push(make_line({50, 40, 0}, {50, 40, 0}, 90.0), third) == PushResult::accepted);
+  std::array<double, 5> point{};
+  Differences differences(5, period_s);
+  Differences turning(1, period_s);
+  Activity activity = Activity::moving;
+  while (activity != Activity::idle) {
+    activity = control.step(point);
+    differences.add(point);
+    turning.add(std::span(point).subspan(3, 1));
+  }
+  CHECK(point[0] == doctest::Approx(50.0));
+  CHECK(point[1] == doctest::Approx(40.0));
+  CHECK(point[3] == doctest::Approx(70.0));
+  CHECK(point[4] == doctest::Approx(2.0));
+  CHECK(differences.jerk() <= 1.001 * most_jerk);
+  CHECK(turning.speed() <= 1.001 * 30.0);
+  CHECK(turning.acceleration() <= 1.001 * 100.0);
+  CHECK(turning.jerk() <= 1.001 * 5000.0);
+}
+
+TEST_CASE("one thread pushes while another steps") {
+  ControllerSettings settings = limited();
+  settings.queue = 32;
+  settings.window = 16;
+  MotionController control(settings);
+  std::mt19937 random(7);
+  const std::vector<Segment> segments = random_segments(random, 400, 200.0, true);
+  std::thread planner([&] {
+    for (const Segment& segment : segments) {
+      while (control.push(segment) == PushResult::queue_full) std::this_thread::yield();
+    }
+  });
+  Vector3 point = Vector3::Zero();
+  while (control.state().segments_done < segments.size()) control.step(values_of(point));
+  planner.join();
+  CHECK((run_until_idle(control).set_points.back() - segments.back().end_mm).norm() < 1e-9);
+}
+
+TEST_CASE("the correction brings an arc back to its radius") {
+  const auto short_of_radius = [](bool corrected) {
+    ControllerSettings settings = limited();
+    settings.limits.max_jerk_mm_per_s3.setConstant(MotionLimits::none);
+    settings.shaper = Fir({0, 11}, {0.5, 0.5});
+    settings.contour_correction = corrected;
+    MotionController control(settings);
+    const Vector3 start(10, 0, 0);
+    control.restart(values_of(start));
+    CHECK((control.correction_delay() > 0) == corrected);
+    REQUIRE(control.push(make_arc(start, start, {0, 0, 0}, 8.0 * std::numbers::pi, 2, 60.0)) == PushResult::accepted);
+    const Run run = run_until_idle(control);
+    double mean = 0.0;
+    std::size_t count = 0;
+    for (std::size_t k = run.set_points.size() / 3; k < run.set_points.size() / 2; ++k, ++count) {
+      mean += run.set_points[k].norm();
+    }
+    return 10.0 - mean / static_cast<double>(count);
+  };
+  // Two averages over 10 ms and two taps 11 ms apart: a second moment of 46.75 ms2, v^2 m / 2 r.
+  const double cut = short_of_radius(false);
+  CHECK(cut == doctest::Approx(60.0 * 60.0 * 46.75e-6 / 20.0).epsilon(0.01));
+  CHECK(std::abs(short_of_radius(true)) < 0.01 * cut);
+}
