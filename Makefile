@@ -32,7 +32,7 @@ FUZZ_FLAGS := -timeout=5 -rss_limit_mb=2048 -max_len=2000 -dict=tests/fuzz/gcode
 
 CPP_HEADERS := $(shell find cpp -name '*.hpp')
 CORE_SOURCES := $(shell find cpp/src -name '*.cpp')
-CPP_FILES := $(shell find cpp bindings tests/cpp tests/fuzz tests/oracles -name '*.[ch]pp' 2>/dev/null)
+CPP_FILES := $(shell find cpp bindings integrations tests/cpp tests/fuzz tests/oracles -name '*.[ch]pp' 2>/dev/null)
 # Folders too: their time changes when a file comes or goes.
 PACKAGE_INPUTS := CMakeLists.txt cmake $(shell find cpp/include cpp/src bindings python \
                     -name __pycache__ -prune -o -print)
@@ -45,12 +45,13 @@ PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
 .PHONY: help demo test test-all lint bench bench-full coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
         build-packages test-packages package dev tidy tidy-all release plain sanitize clang wheel stub-check \
-        test-all-core test-all-python fuzz-parameters fuzz-merge
+        test-all-core test-all-python test-linuxcnc fuzz-parameters fuzz-merge
 
 help:
 	@echo 'make demo    build, convert a first program and a real one of some thousand lines; results in demo-output/'
 	@echo 'make test    what must hold, in minutes: lint, C++ tests, stubs, Python tests'
 	@echo 'make test-all  slow tests, sanitizers, the plain build, clang-tidy of everything and the book as well'
+	@echo 'make test-linuxcnc  the HAL component in LinuxCNC'"'"'s own simulation (installs linuxcnc-uspace); part of test-all'
 	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy of what changed since the last test-all'
 	@echo 'make coverage  lines of C++ and Python that `make test` runs'
 	@echo 'make bench   measure, with LinuxCNC rs274 as the independent interpreter; bench-full: with all repetitions'
@@ -86,6 +87,7 @@ test-all:
 	$(MAKE) test
 	$(MAKE) test-all-core
 	$(MAKE) test-all-python
+	$(MAKE) test-linuxcnc
 	$(MAKE) docs
 	$(BIN)/python tests/tools/full_pass.py write
 
@@ -99,6 +101,10 @@ test-all-python: package dev
 	tests/tools/fetch_rs274.sh
 	tests/tools/fetch_axe.sh
 	$(PYTEST) -m slow
+
+# LinuxCNC is installed for it, with a user that may run it where this is root, and the component into its modules.
+test-linuxcnc: dev
+	$(BIN)/python -m pytest tests/linuxcnc
 
 lint: test-packages dev
 	$(BIN)/ruff check .

@@ -18,6 +18,7 @@
 #include "shapegcode/plant/servo_lag.hpp"
 
 #include "feed_drives.hpp"
+#include "switching_filter.hpp"
 
 namespace {
 
@@ -155,6 +156,18 @@ int main() {
       varying.step(values_of(position), values_of(position), following.place(position[0]));
       sink += position.sum();
     }
+    return 5000L;
+  });
+
+  linuxcnc::SwitchingFilter switching(3);
+  switching.offer(std::make_unique<linuxcnc::Stage>(Fir({0, 3, 7}, {0.5, 0.2, 0.3}), 3, 1));
+  expect_none("SwitchingFilter::step", [&] {
+    for (int i = 0; i < 5000; ++i) {
+      position = Vector3(1.0 + i, 2.0, 3.0 - 0.5 * i);
+      switching.step(values_of(position), values_of(position), 20.0);
+      sink += position.sum();
+    }
+    if (switching.active().wish != 1) std::printf("SwitchingFilter did not switch\n"), ++failures;
     return 5000L;
   });
 
