@@ -1,5 +1,7 @@
 #include "shapegcode_hal.h"
 
+#include <pthread.h>
+
 #include <array>
 #include <atomic>
 #include <bit>
@@ -99,7 +101,9 @@ struct shapegcode_hal {
     const Fir& fir = stage.stream.fir();
     const bool impossible = refused.load(std::memory_order_relaxed) == wishes.number();
     status.possible = impossible ? 0 : 1;
-    status.waiting = stage.wish != wishes.number() && !impossible ? 1 : 0;
+    const bool designed = settled.load(std::memory_order_acquire) == wishes.number();
+    const bool at_work = designed && stage.wish == newest_stage.load(std::memory_order_relaxed);
+    status.waiting = at_work || impossible ? 0 : 1;
     if (stage.wish != described) {
       described = stage.wish;
       delay_samples = fir.mean_samples();
@@ -110,6 +114,9 @@ struct shapegcode_hal {
 
   /// The other thread: designs for a wish once it has stood for one look, as pins are set one by one.
   void run(const std::stop_token& stop) {
+    // Whatever the thread was that loaded the component.
+    const sched_param ordinary{};
+    pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
     std::mutex mutex;
     std::condition_variable_any alarm;
     std::unique_lock lock(mutex);
@@ -132,7 +139,12 @@ struct shapegcode_hal {
   void fulfil(const Words& words, std::uint64_t number) {
     try {
       Fir fir = design(wish_of(words), std::bit_cast<double>(words[2]));
-      filter.offer(std::make_unique<Stage>(std::move(fir), joints, number));
+      if (fir.taps() != newest.taps() || fir.delays() != newest.delays()) {
+        newest = fir;
+        newest_stage.store(number, std::memory_order_relaxed);
+        filter.offer(std::make_unique<Stage>(std::move(fir), joints, number));
+      }
+      settled.store(number, std::memory_order_release);
     } catch (const std::exception& error) {
       refused.store(number, std::memory_order_relaxed);
       report(error.what());
@@ -146,6 +158,9 @@ struct shapegcode_hal {
   Words last{};
   std::uint64_t described = 0;
   double delay_samples = 0.0;
+  Fir newest{{0}, {1.0}};                       // of the stage offered last; the other thread's own
+  std::atomic<std::uint64_t> newest_stage = 0;  // its wish
+  std::atomic<std::uint64_t> settled = 0;       // wish that it fulfils: a later one may ask for the same
   std::atomic<std::uint64_t> refused = 0;
   std::jthread designer;  // the last: it uses all of the above
 };
@@ -161,7 +176,10 @@ shapegcode_hal* shapegcode_hal_create(int joints, void (*report)(const char* lin
   }
 }
 
-void shapegcode_hal_destroy(shapegcode_hal* hal) { delete hal; }
+void shapegcode_hal_destroy(shapegcode_hal* hal) {
+  std::this_thread::sleep_for(2 * between_looks);  // a step takes some microseconds
+  delete hal;
+}
 
 void shapegcode_hal_step(shapegcode_hal* hal, const shapegcode_hal_settings* settings, const double* in, double* out,
                          shapegcode_hal_status* status) {

@@ -34,7 +34,8 @@ struct shapegcode_hal;
  * impossible, from the other thread. Not real-time. */
 struct shapegcode_hal* shapegcode_hal_create(int joints, void (*report)(const char* line));
 
-/* Ends the thread and frees everything; nobody may be in shapegcode_hal_step. Not real-time. */
+/* Ends the thread and frees everything. A shapegcode_hal_step that is under way may end first, none may begin. Not
+ * real-time. */
 void shapegcode_hal_destroy(struct shapegcode_hal* hal);
 
 /* One sample of every joint. Real-time: no allocation, no lock, no system call, bounded work. `in` and `out` may be the

@@ -55,6 +55,10 @@ EXTRA_SETUP() {
 }
 
 EXTRA_CLEANUP() {
+  struct __comp_state *__comp_inst; /* the name that halcompile's `shaper` stands for a member of */
+  /* The servo thread may run still: it passes commands on from here on. */
+  for (__comp_inst = __comp_first_inst; __comp_inst; __comp_inst = __comp_inst->_next)
+    __atomic_store_n(&shaper, (void *)0, __ATOMIC_RELEASE);
   while (made_count > 0) shapegcode_hal_destroy(made[--made_count]);
 }
 
@@ -62,8 +66,16 @@ FUNCTION(_) {
   double command[9], shaped[9];
   struct shapegcode_hal_settings wish;
   struct shapegcode_hal_status status;
+  struct shapegcode_hal *hal = __atomic_load_n(&shaper, __ATOMIC_ACQUIRE);
   int joints = personality ? personality : 1, i;
 
+  if (!hal) {
+    for (i = 0; i < joints; i++) {
+      out(i) = in(i);
+      lag(i) = 0.0;
+    }
+    return;
+  }
   wish.enabled = enable;
   wish.family_number = family;
   wish.fade_s = fade;
@@ -73,7 +85,7 @@ FUNCTION(_) {
     wish.damping_ratio[i] = damping(i);
   }
   for (i = 0; i < joints; i++) command[i] = in(i);
-  shapegcode_hal_step(shaper, &wish, command, shaped, &status);
+  shapegcode_hal_step(hal, &wish, command, shaped, &status);
   for (i = 0; i < joints; i++) {
     out(i) = shaped[i];
     lag(i) = command[i] - shaped[i];

@@ -168,6 +168,9 @@ TEST_CASE("linuxcnc C interface: a design comes from the other thread, one that 
     }
     return false;
   };
+  settings.enabled = 0;
+  CHECK(step_until([&] { return in[0] += 0.1, status.waiting == 0; }));  // off is what it is already
+  settings.enabled = 1;
   CHECK(step_until([&] { return status.waiting == 0; }));
   CHECK(status.possible == 1);
   CHECK(status.duration_s == doctest::Approx(0.011));
