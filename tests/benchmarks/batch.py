@@ -64,9 +64,16 @@ def make(folder: Path, count: int, sizes: tuple[int, ...]) -> None:
 
 
 def loop(folder: Path) -> float:
-    """The conversions one after the other in one process, which has loaded everything."""
+    """The conversions one after the other in one process, which has loaded everything, with one thread as in a batch."""
     shutil.rmtree(folder / "loop", ignore_errors=True)
-    done = subprocess.run([sys.executable, "-c", LOOP], cwd=folder, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", LOOP],
+        cwd=folder,
+        env={**os.environ, "SHAPEGCODE_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     return float(done.stdout)
 
 

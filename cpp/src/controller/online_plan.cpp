@@ -75,7 +75,9 @@ bool OnlineProfile::pass_backward(std::uint64_t first_changed) noexcept {
 }
 
 // Zones that reach back from the junctions, from that of `newest` to where nothing changes (`all`: to the segment that
-// is being run). First segment that changed.
+// is being run). First segment that changed. While the machine moves, no farther than the zones of the newest
+// themselves reach: what a row of zones, each going on from the last, would lower behind them has nothing to do with
+// it.
 std::uint64_t OnlineProfile::zones_backward(std::uint64_t newest, bool all) noexcept {
   QueuedSegment& last = (*ring_)[newest];
   last.at_end = ZoneSet{};
@@ -86,8 +88,15 @@ std::uint64_t OnlineProfile::zones_backward(std::uint64_t newest, bool all) noex
   }
   ZoneSet carry = beyond(last.at_end, last.segment.length_mm);
   std::uint64_t changed = newest;
-  for (std::uint64_t i = newest; i-- > running_;) {
+  double left = MotionLimits::none;
+  if (within_segment() && !all && newest > running_) {
+    const ZoneSet own = zones_between(newest, newest - 1);
+    left = 0.0;
+    for (std::size_t kind = 0; kind < zone_kinds; ++kind) left = std::max({left, own[kind].reach, carry[kind].reach});
+  }
+  for (std::uint64_t i = newest; left > 0.0 && i-- > running_;) {
     QueuedSegment& entry = (*ring_)[i];
+    left -= entry.segment.length_mm;
     extend(carry, zones_between(i + 1, i));
     cut_to(carry, entry.fastest, jump_time_s(limits_, jerk_s_));
     if (!all && carry == entry.at_end) break;
@@ -124,12 +133,29 @@ void OnlineProfile::absorb() noexcept {
     return;
   }
   if (entry.corner <= 0.0) stop_before(i);
+  const bool fitted = state_ == State::running && !slow_down_ && !stop_ && fits();
   connect(i);
-  if (state_ == State::running && changed_ && !slow_down_ && !stop_ && !fits()) {
+  if (fitted && !fits() && !slows_down_before(i)) {
     // Too late for the speed of that corner: the machine stops there, as it was about to.
     stop_before(i);
     connect(i);
   }
+}
+
+// Whether the machine, decelerating from now on, enters segment `index` at most at its corner speed.
+bool OnlineProfile::slows_down_before(std::uint64_t index) noexcept {
+  const double wanted = (*ring_)[index].corner * (*ring_)[index].corner;
+  double squared = speed_now_ * speed_now_;
+  double skipped = distance_ - (*ring_)[running_].distance;
+  for (std::uint64_t i = running_; i < index && squared > wanted; ++i) {
+    const QueuedSegment& entry = (*ring_)[i];
+    for (std::size_t k = 0; k < entry.piece_count; ++k) {
+      const Piece& piece = entry.pieces[k];
+      squared -= 2.0 * piece.acceleration * std::max(0.0, piece.length - skipped);
+      skipped = std::max(0.0, skipped - piece.length);
+    }
+  }
+  return squared <= wanted;
 }
 
 // Come to rest before segment `index`, until everything has settled.

@@ -105,6 +105,7 @@ class OnlineProfile {
   bool next_phase() noexcept;
   bool next_ramps() noexcept;
   bool next_ramps_down(std::size_t piece) noexcept;
+  [[nodiscard]] bool slows_down_before(std::uint64_t index) noexcept;
   void stop_before(std::uint64_t index) noexcept;
   void connect(std::uint64_t newest) noexcept;
   [[nodiscard]] bool fits() noexcept;

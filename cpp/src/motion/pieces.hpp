@@ -31,11 +31,8 @@ struct Zone {
 };
 
 inline void extend(Zone& zone, const Zone& other) noexcept {
-  if (zone.reach <= 0.0) {
-    zone = other;
-  } else {
-    zone = {std::min(zone.limit, other.limit), std::max(zone.reach, other.reach)};
-  }
+  if (other.reach <= 0.0) return;
+  zone = zone.reach <= 0.0 ? other : Zone{std::min(zone.limit, other.limit), std::max(zone.reach, other.reach)};
 }
 
 /// What of a zone reaches beyond a segment.
@@ -83,11 +80,7 @@ inline ZoneSet junction_zones(const JunctionSpeeds& at, const MotionLimits& limi
 }
 
 inline void extend(ZoneSet& zones, const ZoneSet& others) noexcept {
-  for (std::size_t kind = 0; kind < zone_kinds; ++kind) {
-    if (others[kind].limit < MotionLimits::none) {
-      extend(zones[kind], others[kind]);
-    }
-  }
+  for (std::size_t kind = 0; kind < zone_kinds; ++kind) extend(zones[kind], others[kind]);
 }
 
 inline ZoneSet beyond(const ZoneSet& zones, double length) noexcept {
