@@ -99,7 +99,7 @@ struct shapegcode_hal {
     filter.step({in, count}, {out, count}, settings.fade_s > 0.0 ? settings.fade_s / settings.period_s : 0.0);
     const Stage& stage = filter.active();
     const Fir& fir = stage.stream.fir();
-    const bool impossible = refused.load(std::memory_order_relaxed) == wishes.number();
+    const bool impossible = refused.load(std::memory_order_acquire) == wishes.number();
     status.possible = impossible ? 0 : 1;
     const bool designed = settled.load(std::memory_order_acquire) == wishes.number();
     const bool at_work = designed && stage.wish == newest_stage.load(std::memory_order_relaxed);
@@ -146,8 +146,8 @@ struct shapegcode_hal {
       }
       settled.store(number, std::memory_order_release);
     } catch (const std::exception& error) {
-      refused.store(number, std::memory_order_relaxed);
       report(error.what());
+      refused.store(number, std::memory_order_release);
     }
   }
 
