@@ -43,7 +43,7 @@ CONFIGURE_RELEASE = cmake --preset release -D SHAPEGCODE_BUILD_PYTHON=ON -D Pyth
 SPHINX := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m sphinx -W --keep-going -n -q -c docs
 PYTEST := $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
-.PHONY: help demo test test-all lint bench bench-full coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
+.PHONY: help demo test test-all lint bench bench-full bench-realtime coverage fuzz stubs schemas pages man docs docs-source docs-links format clean \
         build-packages test-packages package dev tidy tidy-all release plain sanitize clang wheel stub-check \
         test-all-core test-all-python test-linuxcnc fuzz-parameters fuzz-merge
 
@@ -55,6 +55,7 @@ help:
 	@echo 'make lint    style and types: ruff, mypy, clang-format, clang-tidy of what changed since the last test-all'
 	@echo 'make coverage  lines of C++ and Python that `make test` runs'
 	@echo 'make bench   measure, with LinuxCNC rs274 as the independent interpreter; bench-full: with all repetitions'
+	@echo 'make bench-realtime  MotionController: step(), push(), a loop of 1 ms, drift; options: REALTIME="--help"'
 	@echo 'make fuzz    FUZZ_SECONDS (600) of coverage-guided fuzzing of the program reader; findings in build/fuzz/findings/'
 	@echo 'make stubs   write python/shapegcode/_core.pyi anew from the built module'
 	@echo 'make schemas  write docs/schema/ anew from the classes of the results'
@@ -126,6 +127,14 @@ bench-full: RUNS := $(BENCH_FULL)
 bench bench-full: test-packages package dev
 	tests/tools/fetch_rs274.sh
 	IFS=';'; for run in $$(tr -s ' ' <<<'$(RUNS)'); do IFS=' '; $(BIN)/python tests/benchmarks/$${run# }; done
+
+# Some quarter of an hour, ten minutes of which are a loop of 1 ms. As root or with CAP_SYS_NICE and CAP_IPC_LOCK it has
+# a real-time thread and locked memory; it says what it was given.
+REALTIME ?=
+bench-realtime: build-packages
+	cmake -S tests/benchmarks -B build/bench -G Ninja
+	cmake --build build/bench --target realtime
+	build/bench/realtime $(REALTIME)
 
 coverage: test-packages dev
 	tests/tools/fetch_rs274.sh
