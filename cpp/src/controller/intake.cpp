@@ -24,9 +24,13 @@ PushResult Intake::take(const Segment& segment, std::span<const double> followin
   const PushResult result = copy(segment, following_end, entry);
   if (result != PushResult::accepted) return result;
   look_at(entry);
+  entry.open_end =
+      zone_of_jump(Jump::turn, std::min(entry.fastest, attainable(entry.passed, entry.segment.length_mm, limits_)),
+                   limits_, jerk_s_);
   last_segment_ = entry.segment;
   last_rate_ = entry.following_rate;
   last_fastest_ = entry.fastest;
+  last_passed_ = entry.passed;
   std::ranges::copy(following_end, last_following_.begin());
   has_last_ = true;
   return PushResult::accepted;
@@ -79,7 +83,12 @@ void Intake::look_at(QueuedSegment& entry) const noexcept {
   }
   entry.fastest = std::min(fastest_speed(segment, limits_, tolerance_), entry.hard_limit);
   entry.corner = MotionLimits::none;
-  entry.jump = Jump::none;
+  for (const bool eased : {false, true}) {
+    const double following = eased ? 0.5 * entry.following_acceleration : entry.following_acceleration;
+    entry.line_acceleration[eased ? 1 : 0] = std::min(following, segment_acceleration(segment, 0.0, limits_, eased));
+  }
+  entry.jump = Zone{};
+  entry.passed = 0.0;  // from rest
   entry.beside_turn = limit_beside_turn(segment, limits_);
   if (!has_last_) return;
   if (last_segment_.stop_at_end) {
@@ -93,20 +102,22 @@ void Intake::look_at(QueuedSegment& entry) const noexcept {
 void Intake::look_at_jumps(QueuedSegment& entry) const noexcept {
   const double fastest = std::min(last_fastest_, entry.fastest);
   const JunctionJumps jumps = junction_jumps(last_segment_, entry.segment);
-  entry.jump = jumps.kind;
-  if (jumps.kind != Jump::none) {
+  Jump kind = jumps.kind;
+  if (kind != Jump::none) {
     entry.corner = std::min(entry.corner, junction_jump_speed(last_segment_, entry.segment, limits_, jumps, fastest));
   }
   const JunctionShape shape{std::min(last_segment_.length_mm, entry.segment.length_mm), fastest};
   for (std::size_t i = 0; i < following_.size(); ++i) {
     const double turn = std::abs(entry.following_rate[i] - last_rate_[i]);
     if (turn > 0.0) {
-      entry.jump = Jump::turn;
+      kind = Jump::turn;
       entry.corner = std::min(
           entry.corner,
           jump_speed({turn, 0.0, following_[i].max_acceleration, following_[i].max_jerk}, shape, limits_.jumps));
     }
   }
+  entry.passed = std::min({entry.corner, fastest, attainable(last_passed_, last_segment_.length_mm, limits_)});
+  if (kind != Jump::none) entry.jump = zone_of_jump(kind, entry.passed, limits_, jerk_s_);
 }
 
 }  // namespace shapegcode

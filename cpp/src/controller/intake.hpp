@@ -12,8 +12,9 @@ namespace shapegcode {
 
 class Intake {
  public:
-  Intake(const MotionLimits& limits, const std::vector<FollowingLimits>& following, const FilterTolerance& tolerance)
-      : limits_(limits), following_(following), tolerance_(tolerance) {}
+  Intake(const MotionLimits& limits, const std::vector<FollowingLimits>& following, const FilterTolerance& tolerance,
+         double jerk_s)
+      : limits_(limits), following_(following), tolerance_(tolerance), jerk_s_(jerk_s) {}
 
   /// The next segment starts at this position, whatever came before.
   void restart(std::span<const double> position) noexcept;
@@ -28,9 +29,11 @@ class Intake {
   MotionLimits limits_;
   std::vector<FollowingLimits> following_;
   FilterTolerance tolerance_;
+  double jerk_s_;
   Segment last_segment_;
   std::array<double, most_following_axes> last_following_{}, last_rate_{};
   double last_fastest_ = MotionLimits::none;
+  double last_passed_ = 0.0;
   bool has_last_ = false;
 };
 

@@ -65,11 +65,11 @@ class MotionController::Implementation {
       : n_following_((check_settings(settings), settings.following.size())),
         filters_(settings, axis_count + static_cast<int>(n_following_)),
         limits_(planning_limits_of(settings, filters_)),
-        intake_(limits_, following_limits_of(settings, filters_.gain()), filters_.tolerance()),
         jerk_periods_(jerk_periods(settings)),
+        intake_(limits_, following_limits_of(settings, filters_.gain()), filters_.tolerance(), jerk_s(settings)),
         window_(settings.window),
         ring_(std::bit_ceil(std::max(settings.queue, settings.window + 2))),
-        profile_(ring_, limits_, jerk_periods_ > 1 ? jerk_periods_ * settings.period_s : 0.0, settings.period_s),
+        profile_(ring_, limits_, jerk_s(settings), settings.period_s),
         smoothing_(Fir::moving_average(jerk_periods_), 1) {
     override_.store(settings.limits.feed_override, std::memory_order_relaxed);
     restart(std::array<double, most_controller_axes>{});
@@ -213,8 +213,8 @@ class MotionController::Implementation {
   std::size_t n_following_;
   SetPointFilters filters_;
   MotionLimits limits_;
-  Intake intake_;  // of the planning thread
   int jerk_periods_;
+  Intake intake_;  // of the planning thread
   std::size_t window_;
   SegmentRing ring_;
   std::atomic<std::uint64_t> head_{0};  // the next segment to be pushed

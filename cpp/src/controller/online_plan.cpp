@@ -17,9 +17,9 @@ double OnlineProfile::limit_of(const QueuedSegment& entry) const noexcept {
 ZoneSet OnlineProfile::zones_between(std::uint64_t from, std::uint64_t into) noexcept {
   const QueuedSegment& source = (*ring_)[from];
   const QueuedSegment& junction = (*ring_)[std::max(from, into)];
-  return junction_zones({source.limit, source.segment.feed_mm_per_s * ratio_, (*ring_)[into].limit, junction.corner,
-                         junction.jump, std::min(source.fastest, (*ring_)[into].fastest)},
-                        limits_, jerk_s_);
+  return junction_zones(
+      {source.limit, source.segment.feed_mm_per_s * ratio_, (*ring_)[into].limit, junction.corner, junction.jump},
+      limits_, jerk_s_);
 }
 
 void OnlineProfile::split(QueuedSegment& entry) noexcept {
@@ -34,6 +34,7 @@ void OnlineProfile::split(QueuedSegment& entry) noexcept {
 }
 
 double OnlineProfile::acceleration_of(const QueuedSegment& entry, double speed, bool eased) const noexcept {
+  if (entry.segment.kind != SegmentKind::arc) return entry.line_acceleration[eased ? 1 : 0];
   return std::min(eased ? 0.5 * entry.following_acceleration : entry.following_acceleration,
                   segment_acceleration(entry.segment, speed, limits_, eased));
 }
@@ -83,7 +84,7 @@ std::uint64_t OnlineProfile::zones_backward(std::uint64_t newest, bool all) noex
   last.at_end = ZoneSet{};
   // What comes next may jump: so far the end is approached as if it did.
   if (looks_at_jumps(limits_) && !last.segment.stop_at_end) {
-    last.at_end[jump_zone] = zone_of_jump(Jump::turn, last.fastest, limits_, jerk_s_);
+    last.at_end[jump_zone] = last.open_end;
     cut_to(last.at_end, last.fastest, jump_time_s(limits_, jerk_s_));
   }
   ZoneSet carry = beyond(last.at_end, last.segment.length_mm);
@@ -164,7 +165,7 @@ void OnlineProfile::stop_before(std::uint64_t index) noexcept {
   QueuedSegment& entry = (*ring_)[index];
   before.segment.stop_at_end = true;
   entry.corner = 0.0;
-  entry.jump = Jump::none;
+  entry.jump = Zone{};
   entry.at_start = ZoneSet{};
 }
 

@@ -22,9 +22,12 @@ struct QueuedSegment {
   double hard_limit = 0.0;                                   ///< speed whatever the override
   double following_acceleration = MotionLimits::none;        ///< of the way
   double corner = MotionLimits::none;                        ///< speed at which it is entered
-  Jump jump = Jump::none;                                    ///< what jumps there
+  Zone jump;                                                 ///< what jumps there, as far as it counts
+  Zone open_end;                                             ///< the same of whatever may follow
+  double passed = 0.0;                                       ///< highest speed at which it is ever entered
   double fastest = 0.0;                                      ///< speed at which it can ever be run
   double beside_turn = MotionLimits::none;                   ///< its speed beside a jump of direction
+  std::array<double, 2> line_acceleration{};                 ///< of a line, whatever its speed; and beside a jump
 
   double distance = 0.0;  ///< of its start
   double limit = 0.0;

@@ -55,9 +55,14 @@ void check_settings(const ControllerSettings& settings) {
   require(settings.queue <= most_segments, "queue", static_cast<double>(settings.queue), "segments", "0 ... 16777216");
 }
 
+double jerk_s(const ControllerSettings& settings) {
+  const int periods = jerk_periods(settings);
+  return periods > 1 ? periods * settings.period_s : 0.0;
+}
+
 MotionLimits planning_limits_of(const ControllerSettings& settings, const SetPointFilters& filters) {
   MotionLimits limits = settings.limits;
-  limits.jerk_time_s = jerk_periods(settings) > 1 ? jerk_periods(settings) * settings.period_s : limits.jerk_time_s;
+  limits.jerk_time_s = jerk_s(settings);
   limits.max_feed_mm_per_s /= filters.gain();
   limits.max_acceleration_mm_per_s2 /= filters.gain();
   limits.max_jerk_mm_per_s3 /= filters.gain();

@@ -18,7 +18,8 @@ struct PathSpeeds {
   std::vector<double> on_segment;
   std::vector<double> corner;   // [i]: where segment i is entered
   std::vector<Jump> jump;       // the same
-  std::vector<double> fastest;  // of each segment, ever; this and the one before are empty if nobody looks at jumps
+  std::vector<double> fastest;  // of each segment, ever; these are empty if nobody looks at jumps
+  std::vector<double> passed;   // [i]: highest speed at which segment i is ever entered
   double jerk_s = 0.0;
 };
 
@@ -31,6 +32,7 @@ PathSpeeds path_speeds(const Path& path, const MotionLimits& limits, const Filte
   if (looks_at_jumps(limits)) {
     speeds.jump.assign(n, Jump::none);
     speeds.fastest.resize(n);
+    speeds.passed.resize(n);
   }
   double steepest = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -48,9 +50,10 @@ PathSpeeds path_speeds(const Path& path, const MotionLimits& limits, const Filte
     }
     if (i > 0 && looks_at_jumps(limits)) {
       const JunctionJumps jumps = junction_jumps(path[i - 1], path[i]);
+      const double fastest = std::min(speeds.fastest[i - 1], speeds.fastest[i]);
       speeds.jump[i] = jumps.kind;
-      corner = std::min(corner, junction_jump_speed(path[i - 1], path[i], limits, jumps,
-                                                    std::min(speeds.fastest[i - 1], speeds.fastest[i])));
+      corner = std::min(corner, junction_jump_speed(path[i - 1], path[i], limits, jumps, fastest));
+      speeds.passed[i] = std::min({corner, fastest, attainable(speeds.passed[i - 1], path[i - 1].length_mm, limits)});
     }
     if (caps != nullptr) {
       speed = std::min(speed, static_cast<double>(caps->on_segment[i]));
@@ -75,11 +78,13 @@ class Zones {
     const auto sweep = [&](std::size_t from, std::size_t into, ZoneSet carry, std::vector<ZoneSet>& zones) {
       const std::size_t junction = std::max(from, into);
       const bool looks = !speeds.jump.empty();
-      extend(carry, junction_zones(
-                        {speeds.on_segment[from], path[from].feed_mm_per_s * limits.feed_override,
-                         speeds.on_segment[into], speeds.corner[junction], looks ? speeds.jump[junction] : Jump::none,
-                         looks ? std::min(speeds.fastest[from], speeds.fastest[into]) : 0.0},
-                        limits, speeds.jerk_s));
+      Zone jump;
+      if (looks && speeds.jump[junction] != Jump::none) {
+        jump = zone_of_jump(speeds.jump[junction], speeds.passed[junction], limits, speeds.jerk_s);
+      }
+      extend(carry, junction_zones({speeds.on_segment[from], path[from].feed_mm_per_s * limits.feed_override,
+                                    speeds.on_segment[into], speeds.corner[junction], jump},
+                                   limits, speeds.jerk_s));
       if (looks) {
         cut_to(carry, speeds.fastest[into], jump_time_s(limits, speeds.jerk_s));
       }

@@ -47,8 +47,7 @@ struct JunctionSpeeds {
   double from_feed = 0.0;  ///< its programmed feed
   double into = 0.0;       ///< limit of the segment that it reaches into
   double corner = MotionLimits::none;
-  Jump jump = Jump::none;
-  double fastest = 0.0;  ///< speed at which both can ever be run, whatever the override
+  Zone jump;  ///< see zone_of_jump; none: nothing jumps
 };
 
 /// The zones of a junction: of its speed, which the smoothing by the jerk time mixes; of a lower programmed feed, for
@@ -73,9 +72,7 @@ inline ZoneSet junction_zones(const JunctionSpeeds& at, const MotionLimits& limi
   if (limits.feed_spread_s > 0.0 && at.from_feed * (1.0 + limits.feed_excess_ratio) < at.into) {
     zones[feed_zone] = {at.from_feed, at.from_feed * (limits.feed_spread_s + 0.5 * jerk_s)};
   }
-  if (at.jump != Jump::none) {
-    zones[jump_zone] = zone_of_jump(at.jump, std::min(at.corner, at.fastest), limits, jerk_s);
-  }
+  zones[jump_zone] = at.jump;
   return zones;
 }
 
@@ -85,6 +82,11 @@ inline void extend(ZoneSet& zones, const ZoneSet& others) noexcept {
 
 inline ZoneSet beyond(const ZoneSet& zones, double length) noexcept {
   return {beyond(zones[corner_zone], length), beyond(zones[feed_zone], length), beyond(zones[jump_zone], length)};
+}
+
+/// Speed at the end of a segment that is entered at a speed, whatever the override is.
+inline double attainable(double speed, double length, const MotionLimits& limits) noexcept {
+  return std::sqrt(speed * speed + 2.0 * limits.max_acceleration_mm_per_s2.norm() * length);
 }
 
 /// A zone as far as it reaches into a segment that is never run faster than `fastest`: no farther than the time that
