@@ -120,7 +120,7 @@ BENCH := run.py --repetitions 2; linear_plants.py; feed_drives.py --repetitions 
   engagement.py --repetitions 1; simulate_program.py --quick; feed_schedule.py --quick; milling_force.py; \
   run_logs.py --lines 1000000; report_page.py --repetitions 1; pictures.py --repeat 1
 BENCH_FULL := run.py; linear_plants.py; feed_drives.py; identification.py; engagement.py; simulate_program.py; \
-  feed_schedule.py; milling_force.py; run_logs.py; report_page.py; pictures.py
+  feed_schedule.py; milling_force.py; run_logs.py; report_page.py; pictures.py; peers.py
 
 bench: RUNS := $(BENCH)
 bench-full: RUNS := $(BENCH_FULL)

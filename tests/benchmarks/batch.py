@@ -64,7 +64,7 @@ def make(folder: Path, count: int, sizes: tuple[int, ...]) -> None:
 
 
 def loop(folder: Path) -> float:
-    """The conversions one after the other in one process, which has loaded everything, with one thread as in a batch."""
+    """The conversions one after the other in one process that has loaded all, with one thread as in a batch."""
     shutil.rmtree(folder / "loop", ignore_errors=True)
     done = subprocess.run(
         [sys.executable, "-c", LOOP],

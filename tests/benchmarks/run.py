@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
+import native
 import numpy as np
 import numpy.typing as npt
 import processes
@@ -196,19 +197,9 @@ def _filter_rows() -> list[Row]:
 
 def _step_times(program: Path) -> dict[str, dict[str, int]]:
     """One step() of each real-time form, from the C++ program that is built here."""
-    build = processes.ROOT / "build" / "bench"
-    source = Path(__file__).parent
-    generator = [] if (build / "CMakeCache.txt").exists() else ["-G", "Ninja"]
-    # Where the Makefile keeps CVODE; what is not there is looked for in the system.
-    environment = {"SUNDIALS_ROOT": str(processes.ROOT / ".cache" / "sundials" / "usr"), **os.environ}
-    for command in (
-        ["cmake", "-S", source, "-B", build, *generator],
-        ["cmake", "--build", build],
-    ):
-        made = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-        if made.returncode != 0:
-            raise RuntimeError(f"{command[0]} failed:\n{made.stdout}{made.stderr}")
-    run = subprocess.run([build / "step_time", _PAPER_PATH, program], stdout=subprocess.PIPE, text=True, check=True)
+    run = subprocess.run(
+        [native.built("step_time"), _PAPER_PATH, program], stdout=subprocess.PIPE, text=True, check=True
+    )
     figures: dict[str, dict[str, int]] = json.loads(run.stdout)
     return figures
 

@@ -1,4 +1,4 @@
-"""Prints requirements of pyproject.toml, one per line: `requirements.py [build] [runtime] [dev] [docs] [fuzz]`."""
+"""Prints requirements of pyproject.toml: `requirements.py [build] [runtime] [dev] [docs] [fuzz] [peers]`."""
 
 import sys
 import tomllib

@@ -1,0 +1,180 @@
+"""What set-points ask of a machine: time, speed, acceleration, jerk, distance from the path. For any engine's alike."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+Array = npt.NDArray[np.float64]
+PERIOD_S = 1e-3
+_POINT_MM = 0.005  # between points of a path that distances are measured from
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Of X, Y and Z; mm and s."""
+
+    feed: tuple[float, float, float]
+    acceleration: tuple[float, float, float]
+    jerk: tuple[float, float, float]
+
+    @classmethod
+    def of(cls, feed: float, acceleration: float, jerk: float) -> Limits:
+        """The same for every axis."""
+        return cls((feed,) * 3, (acceleration,) * 3, (jerk,) * 3)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A line, or an arc about an axis (0, 1, 2) through `centre`, to `end`."""
+
+    end: tuple[float, float, float]
+    feed: float  # mm/s
+    centre: tuple[float, float, float] | None = None
+    sweep: float = 0.0
+    normal: int = 2
+
+    def words(self) -> str:
+        """As peers.hpp reads it."""
+        end = " ".join(f"{value:.17g}" for value in self.end)
+        if self.centre is None:
+            return f"line {end} {self.feed:.17g}"
+        centre = " ".join(f"{value:.17g}" for value in self.centre)
+        return f"arc {end} {centre} {self.sweep:.17g} {self.normal} {self.feed:.17g}"
+
+    def points(self, start: Sequence[float]) -> Array:
+        """Along it, its start left out."""
+        begin, end = np.array(start), np.array(self.end)
+        way = end - begin
+        if self.centre is None:
+            return begin + _shares(float(np.linalg.norm(way)))[:, None] * way
+        first, second = (self.normal + 1) % 3, (self.normal + 2) % 3
+        radial = begin - np.array(self.centre)
+        radius = math.hypot(radial[first], radial[second])
+        share = _shares(radius * abs(self.sweep))
+        angle = math.atan2(radial[second], radial[first]) + self.sweep * share
+        points = begin + share[:, None] * way
+        points[:, first] = self.centre[first] + radius * np.cos(angle)
+        points[:, second] = self.centre[second] + radius * np.sin(angle)
+        return points
+
+
+def _shares(length: float) -> Array:
+    return np.linspace(0.0, 1.0, math.ceil(length / _POINT_MM) + 1)[1:]
+
+
+@dataclass(frozen=True)
+class Route:
+    """A connected path."""
+
+    pieces: list[Piece] = field(default_factory=list)
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def points(self) -> Array:
+        """Close to each other."""
+        at, points = self.start, [np.array([self.start])]
+        for piece in self.pieces:
+            points.append(piece.points(at))
+            at = piece.end
+        return np.concatenate(points)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Of a motion; shares are of the limits, of the axis that is worst off."""
+
+    time_s: float
+    speed: float
+    acceleration: float
+    jerk: float
+    off_mm: float = math.nan
+
+
+def figures(points: Array, limits: Limits, route: Route | None = None, period_s: float = PERIOD_S) -> Figures:
+    """Finite differences of set-points that begin and end at rest; how far they leave the path."""
+    still = np.flatnonzero(np.abs(np.diff(points, axis=0)).max(axis=1) > 0.0)
+    time_s = (still[-1] - still[0] + 1) * period_s if len(still) else 0.0
+    padded = np.concatenate([np.repeat(points[:1], 4, axis=0), points, np.repeat(points[-1:], 4, axis=0)])
+    shares = [
+        float((np.abs(np.diff(padded, n=order, axis=0)).max(axis=0) / period_s**order / np.array(most)).max())
+        for order, most in ((1, limits.feed), (2, limits.acceleration), (3, limits.jerk))
+    ]
+    found = Figures(time_s, *shares)
+    if route is None:
+        return found
+    return replace(found, off_mm=_distance(points, route.points()))
+
+
+def _distance(points: Array, path: Array) -> float:
+    """Largest distance of any of the points from a path, of which the chords beside its nearest point count."""
+    _, nearest = cKDTree(path).query(points)
+    away = np.full(len(points), np.inf)
+    for first, second in ((nearest - 1, nearest), (nearest, nearest + 1)):
+        begin = path[np.clip(first, 0, len(path) - 1)]
+        chord = path[np.clip(second, 0, len(path) - 1)] - begin
+        square = np.maximum((chord**2).sum(axis=1), 1e-30)
+        share = np.clip(((points - begin) * chord).sum(axis=1) / square, 0.0, 1.0)
+        away = np.minimum(away, np.linalg.norm(points - begin - share[:, None] * chord, axis=1))
+    return float(away.max())
+
+
+def ours(driver: Path, route: Route, limits: Limits, file: Path, **settings: object) -> tuple[Array, dict[str, Any]]:
+    """Set-points of `MotionController`, and what its steps took."""
+    task = [f"{name} {value}" for name, value in {"period": PERIOD_S, **settings}.items()]
+    for name in ("feed", "acceleration", "jerk"):
+        task.append(" ".join([name, *(f"{value:.17g}" for value in getattr(limits, name))]))
+    task.append(" ".join(["start", *(f"{value:.17g}" for value in route.start)]))
+    task += [piece.words() for piece in route.pieces]
+    run = subprocess.run([driver, "play", file], input="\n".join(task), capture_output=True, text=True, check=False)
+    if run.returncode != 0:
+        raise RuntimeError(run.stderr.strip())
+    return read_points(file), json.loads(run.stdout)
+
+
+def read_points(file: Path, axes: int = 3) -> Array:
+    """Rows of doubles, as the drivers write them."""
+    return np.fromfile(file).reshape(-1, axes)
+
+
+def read_program(text: str, rapid: float) -> Route:
+    """G0 to G3 in X, Y and Z of a plain program, absolute; arcs in XY with I and J, or R up to half a turn."""
+    at, feed, motion, pieces = [0.0, 0.0, 0.0], 0.0, 0, []
+    for line in text.splitlines():
+        words = dict(re.findall(r"([A-Z])\s*(-?[\d.]+)", re.sub(r"\(.*?\)", "", line.upper())))
+        feed = float(words.get("F", 60.0 * feed)) / 60.0
+        if words.get("G") in ("0", "1", "2", "3"):
+            motion = int(words["G"])
+        end = [float(words.get(axis, value)) for axis, value in zip("XYZ", at, strict=True)]
+        if end == at or ("G" in words and words["G"] not in ("0", "1", "2", "3")):
+            continue
+        if motion < 2:
+            pieces.append(Piece((end[0], end[1], end[2]), feed if motion else rapid))
+        else:
+            pieces.append(_arc(at, end, words, feed, 1.0 if motion == 3 else -1.0))
+        at = end
+    return Route(pieces)
+
+
+def _arc(at: list[float], end: list[float], words: dict[str, str], feed: float, turn: float) -> Piece:
+    begin, to = complex(at[0], at[1]), complex(end[0], end[1])
+    if "R" in words:
+        half = 0.5 * (to - begin)
+        rise = math.sqrt(max(float(words["R"]) ** 2 - abs(half) ** 2, 0.0))
+        centre = begin + half + turn * rise * 1j * half / abs(half)
+    else:
+        centre = begin + complex(float(words.get("I", 0.0)), float(words.get("J", 0.0)))
+    ratio = (to - centre) / (begin - centre)
+    sweep = math.atan2(ratio.imag, ratio.real)
+    if turn * sweep <= 1e-9:
+        sweep += turn * math.tau
+    return Piece((end[0], end[1], end[2]), feed, (centre.real, centre.imag, at[2]), sweep)

@@ -1,0 +1,29 @@
+"""The C++ programs of this folder, built where the Makefile keeps what they need."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+_ROOT = Path(__file__).resolve().parents[2]
+
+
+def built(name: str) -> Path:
+    """One of them, built anew where a source changed.
+
+    Raises:
+        RuntimeError: CMake or the compiler failed, with what they said.
+    """
+    build = _ROOT / "build" / "bench"
+    generator = [] if (build / "CMakeCache.txt").exists() else ["-G", "Ninja"]
+    # Where the Makefile keeps CVODE; what is not there is looked for in the system.
+    environment = {"SUNDIALS_ROOT": str(_ROOT / ".cache" / "sundials" / "usr"), **os.environ}
+    for command in (
+        ["cmake", "-S", Path(__file__).parent, "-B", build, *generator],
+        ["cmake", "--build", build, "--target", name],
+    ):
+        made = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+        if made.returncode != 0:
+            raise RuntimeError(f"{command[0]} failed:\n{made.stdout}{made.stderr}")
+    return build / name

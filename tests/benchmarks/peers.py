@@ -1,0 +1,309 @@
+"""The control's motion beside other engines' in one run: the tables of docs/evidence/planners.md.
+
+    .venv/bin/python tests/benchmarks/peers.py [--quick] [--json FILE]
+
+Ruckig and Klipper's host come as packages into an environment of their own; LinuxCNC was recorded
+(tests/benchmarks/data). Every engine's set-points are differenced in the same way. Exit code 1 if a limit is passed or
+the look-ahead loses more than asked.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gzip
+import json
+import subprocess
+import sys
+import tempfile
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import native
+import numpy as np
+import workload
+from motion_figures import (
+    PERIOD_S,
+    Array,
+    Figures,
+    Limits,
+    Piece,
+    Route,
+    figures,
+    ours,
+    read_points,
+    read_program,
+)
+from table import markdown
+
+import shapegcode as sg
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+PROGRAMS = ROOT / "tests" / "golden" / "programs"
+ARCS = HERE / "data" / "linuxcnc_small_arcs.ngc"
+RECORDED = HERE / "data" / "linuxcnc_small_arcs.csv.gz"
+WINDOWS = (10, 20, 50, 100, 200, 500)
+ASKED_WINDOW, ASKED_LOSS = 100, 0.01
+ALLOWED_RATIO = 1.001
+CURVE_LINES = 20_000
+
+ONE_AXIS = Limits.of(100.0, 1000.0, 50_000.0)
+THREE_AXES = Limits((200.0, 200.0, 100.0), (2000.0, 2000.0, 1000.0), (100_000.0, 100_000.0, 50_000.0))
+MOVES = (
+    ("X 1", (1.0, 0.0, 0.0), ONE_AXIS),
+    ("X 10", (10.0, 0.0, 0.0), ONE_AXIS),
+    ("X 100", (100.0, 0.0, 0.0), ONE_AXIS),
+    ("X 40 Y 20 Z 5", (40.0, 20.0, 5.0), THREE_AXES),
+    ("X 10 Y -7 Z 3", (10.0, -7.0, 3.0), THREE_AXES),
+)
+LINUXCNC = Limits.of(200.0, 1750.0, 87_500.0)  # LinuxCNC itself has no jerk limit
+JERKY = Limits.of(200.0, 1750.0, 1.7e6)
+MILL = Limits.of(250.0, 1000.0, 50_000.0)
+KLIPPER = {"velocity": 250.0, "acceleration": 1000.0, "square_corner_velocity": 5.0, "arc_mm": 0.1}
+
+
+class Peers:
+    """The environment of the other engines."""
+
+    def __init__(self) -> None:
+        fetch = subprocess.run(
+            [ROOT / "tests" / "tools" / "fetch_peers.sh"], stdout=subprocess.PIPE, text=True, check=True
+        )
+        self._python = fetch.stdout.splitlines()[-1]
+
+    def ask(self, script: str, question: dict[str, Any]) -> dict[str, Any] | None:
+        """What a script there answers; None, and why on stderr, if its package is not to be had."""
+        run = subprocess.run(
+            [self._python, "-I", HERE / script], input=json.dumps(question), capture_output=True, text=True, check=False
+        )
+        if run.returncode == 0:
+            answer: dict[str, Any] = json.loads(run.stdout)
+            return answer
+        if "ModuleNotFoundError" not in run.stderr:
+            raise RuntimeError(run.stderr)
+        print(f"{script}: {run.stderr.splitlines()[-1]}", file=sys.stderr)
+        return None
+
+
+def row(what: str, who: str, found: Figures, *more: str) -> list[str]:
+    """A line of a table about a motion."""
+    off = "" if np.isnan(found.off_mm) else f"{1e3 * found.off_mm:.1f}"
+    shares = [
+        f"{share:.3f}" if share < 10.0 else f"{share:.0f}" for share in (found.speed, found.acceleration, found.jerk)
+    ]
+    return [what, who, f"{found.time_s:.3f}", *shares, off, *more]
+
+
+HEAD = ["", "engine", "time, s", "speed / limit", "acceleration / limit", "jerk / limit", "off the path, um"]
+
+
+def single_moves(driver: Path, peers: Peers, folder: Path, passes: int) -> tuple[str, list[float]]:
+    """From rest to rest; every figure of ours that must not pass its limit."""
+    asked = [
+        {
+            "target": list(target), "feed": limits.feed, "acceleration": limits.acceleration, "jerk": limits.jerk,
+            "synchronization": how, "file": str(folder / f"{name}-{how}"),
+        }
+        for name, target, limits in MOVES
+        for how in (("Phase", "Time") if target[1] else ("Phase",))
+    ]  # fmt: skip
+    answer = peers.ask("peer_ruckig.py", {"period_s": PERIOD_S, "passes": passes, "moves": asked})
+    lines, kept = [], []
+    for name, target, limits in MOVES:
+        route = Route([Piece(target, 1e6)])
+        for question, told in zip(asked, answer["moves"] if answer else [], strict=bool(answer)):
+            if question["target"] == list(target):
+                found = figures(read_points(Path(question["file"])), limits, route)
+                who = f"Ruckig {answer['version']}" + (f", {question['synchronization']}" if target[1] else "")
+                times = (f"{told['calculation_us']:.1f}", f"{told['step_us']:.2f}", f"{told['longest_step_us']:.1f}")
+                lines.append(row(name, who, found, *times))
+        for smoothing_s in (0.0, 0.01):
+            points, told = ours(driver, route, limits, folder / "ours", smoothing=smoothing_s, passes=passes)
+            found = figures(points, limits, route)
+            kept += [found.speed, found.acceleration, found.jerk]
+            times = (f"{told['push_us']:.1f}", f"{told['step_us']:.2f}", f"{told['longest_step_us']:.1f}")
+            lines.append(row(name, f"shapegcode, smoothing {1e3 * smoothing_s:g} ms", found, *times))
+    return markdown([*HEAD, "calculation or push, us", "set-point, us", "longest, us"], lines), kept
+
+
+def klipper(
+    peers: Peers, folder: Path, routes: dict[str, Route], limits: dict[str, float]
+) -> dict[str, tuple[Array, str]]:
+    """Set-points under Klipper's look-ahead, and microseconds for a move."""
+    paths = [
+        {
+            "start": route.start, "file": str(folder / f"klipper-{number}"),
+            "pieces": [
+                {"kind": "arc" if piece.centre else "line", "end": piece.end, "feed": piece.feed,
+                 "centre": piece.centre, "sweep": piece.sweep, "normal": piece.normal}
+                for piece in route.pieces
+            ],
+        }
+        for number, route in enumerate(routes.values())
+    ]  # fmt: skip
+    answer = peers.ask("peer_klipper.py", {"period_s": PERIOD_S, "limits": limits, "paths": paths})
+    if answer is None:
+        return {}
+    return {
+        name: (read_points(Path(path["file"])), f"{told['move_us']:.1f}")
+        for name, path, told in zip(routes, paths, answer["paths"], strict=True)
+    }
+
+
+def small_arcs(driver: Path, peers: Peers, folder: Path) -> tuple[str, list[float]]:
+    """Blended small arcs as LinuxCNC commanded them, and the same path here and by Klipper's host."""
+    if not ARCS.is_file():
+        return f"{ARCS.relative_to(ROOT)} is not there: nothing of LinuxCNC to compare with", []
+    route = read_program(ARCS.read_text(encoding="ascii"), LINUXCNC.feed[0])
+    lines, kept = [], []
+    if RECORDED.is_file():
+        with gzip.open(RECORDED, "rt", encoding="ascii") as text:
+            points = np.loadtxt(text, delimiter=",", skiprows=1)
+        points = np.column_stack([points, np.zeros(len(points))])
+        lines.append(row("small arcs", "LinuxCNC, recorded", figures(points, LINUXCNC, route)))
+    else:
+        lines.append(["small arcs", f"LinuxCNC: no {RECORDED.name}", *[""] * 5])
+    settings = {**KLIPPER, "velocity": LINUXCNC.feed[0], "acceleration": LINUXCNC.acceleration[0]}
+    for points, _ in klipper(peers, folder, {"arcs": route}, settings).values():
+        lines.append(row("small arcs", "Klipper's host, chords of 0.1 mm", figures(points, LINUXCNC, route)))
+    for tolerance_mm, limits in ((0.1, LINUXCNC), (0.01, LINUXCNC), (0.1, JERKY)):
+        points, _ = ours(driver, route, limits, folder / "ours", smoothing=0.01, tolerance=tolerance_mm)
+        own = figures(points, limits)
+        kept += [own.speed, own.acceleration, own.jerk]
+        who = f"shapegcode, tolerance {tolerance_mm} mm" + (", as much jerk as LinuxCNC" if limits is JERKY else "")
+        lines.append(row("small arcs", who, figures(points, LINUXCNC, route)))
+    return markdown(HEAD, lines), kept
+
+
+def cutting_paths(folder: Path) -> dict[str, Route]:
+    """The longest cutting path of each."""
+    curve = folder / "curve.nc"
+    workload.write_program(curve, 3000)
+    routes = {}
+    for name, file in (("PARALLEL.NC", PROGRAMS / "PARALLEL.NC"), ("finishing curve, 3 000 lines", curve)):
+        path = max((region.path for region in sg.Program.read(file, sg.Machine.load("vx500")).regions), key=len)
+        start, pieces = tuple(map(float, path[0].start_mm)), []
+        for number in range(len(path)):
+            segment = path[number]
+            arc = segment.kind.name == "arc"
+            centre = tuple(map(float, segment.centre_mm)) if arc else None
+            end = tuple(map(float, segment.end_mm))
+            pieces.append(Piece(end, segment.feed_mm_per_s, centre, segment.sweep_rad, segment.normal))
+        routes[name] = Route(pieces, start)
+    return routes
+
+
+def programs(driver: Path, peers: Peers, folder: Path) -> tuple[str, list[float]]:
+    """Whole cutting paths, by Klipper's host and here."""
+    routes = cutting_paths(folder)
+    batch = klipper(peers, folder, routes, KLIPPER)
+    lines, kept = [], []
+    for name, route in routes.items():
+        if name in batch:
+            points, move_us = batch[name]
+            lines.append(row(name, "Klipper's host", figures(points, MILL, route), move_us))
+        else:
+            lines.append([name, "Klipper's host: not available as a package", *[""] * 6])
+        points, told = ours(driver, route, MILL, folder / "ours", smoothing=0.01, tolerance=0.05)
+        found = figures(points, MILL, route)
+        kept += [found.speed, found.acceleration, found.jerk]
+        spent_us = told["step_us"] * told["steps"] / len(route.pieces)
+        lines.append(row(name, "shapegcode, smoothing 10 ms", found, f"{spent_us:.1f}"))
+    return markdown([*HEAD, "us per move"], lines), kept
+
+
+def fine_blocks() -> str:
+    """Rows of 300 mm in blocks of 0.2 mm: what asks for the longest look-ahead, for nothing but a row's end is slow."""
+    lines = ["G21 G17 G90 G94", "G0 X0 Y0 Z0", "G1 F15000"]
+    for number in range(4):
+        ways = range(1, 1501) if number % 2 == 0 else range(1499, -1, -1)
+        lines += [f"X{0.2 * way:.1f} Y{number}" for way in ways]
+        lines.append(f"Y{number + 1}")
+    return "\n".join(["%", "O1", *lines, "M30", "%", ""])
+
+
+def windows(driver: Path, folder: Path, quick: bool) -> tuple[str, list[float]]:
+    """How much longer the path takes when only so many segments are seen; the losses at the window asked for."""
+    curve = folder / "long_curve.nc"
+    workload.write_program(curve, CURVE_LINES // (10 if quick else 1))
+    golden = [file for file in sorted(PROGRAMS.iterdir()) if file.suffix.upper() == ".NC"]
+    fine = folder / "fine.nc"
+    fine.write_text(fine_blocks(), encoding="ascii")
+    machines = (
+        ("as programmed", 0.0, (1000.0, 50_000.0), [*golden, curve]),
+        ("as programmed", 0.0, (5000.0, 500_000.0), [*golden, curve]),
+        ("15 m/min", 250.0, (1000.0, 50_000.0), [PROGRAMS / "PARALLEL.NC", curve, fine]),
+        ("15 m/min", 250.0, (5000.0, 500_000.0), [PROGRAMS / "PARALLEL.NC", curve, fine]),
+    )
+    lines, losses = [], []
+    for feed, feed_mm_per_s, (acceleration, jerk), files in machines:
+        task = f"feed 250 250 250\nacceleration {f'{acceleration} ' * 3}\njerk {f'{jerk} ' * 3}\ntolerance 0.05\n"
+        task += f"program_feed {feed_mm_per_s}\n"
+        for file in files:
+            run = subprocess.run(
+                [driver, "window", *map(str, WINDOWS), "--", file],
+                input=task, capture_output=True, text=True, check=False,
+            )  # fmt: skip
+            name = {curve: "finishing curve", fine: "straight rows in blocks of 0.2 mm"}.get(file, file.name)
+            if run.returncode:
+                print(f"{name} is left out: {run.stderr.strip()}", file=sys.stderr)
+                continue
+            found = json.loads(run.stdout)[0]
+            excess = [found["windows"][str(window)] / found["planned_s"] - 1.0 for window in WINDOWS]
+            if file != fine:
+                losses.append(excess[WINDOWS.index(ASKED_WINDOW)])
+            lines.append(
+                [name, feed, f"{acceleration:.0f}, {jerk:.0f}", str(found["segments"]), str(found["longest_path"]),
+                 f"{found['planned_s']:.3f}", *(f"{100.0 * loss:.2f} %" for loss in excess)]
+            )  # fmt: skip
+    head = ["program", "feed", "acceleration, jerk", "segments", "longest path", "whole path, s"]
+    return markdown([*head, *(f"window {window}" for window in WINDOWS)], lines), losses
+
+
+def random_paths(driver: Path, count: int) -> tuple[str, list[float]]:
+    """Largest of each order over every set-point of so many random paths."""
+    run = subprocess.run([driver, "random", str(count), "1"], stdout=subprocess.PIPE, text=True, check=True)
+    found = json.loads(run.stdout)
+    orders, lines, worst = ("speed", "acceleration", "jerk"), [], []
+    for key, what in (("fixed", "all others"), ("following", "a shaper that follows an axis")):
+        group = found[key]
+        lines.append([what, str(group["paths"]), str(group["lost"])])
+        for order in orders:
+            of = group[order]
+            lines[-1].append(f"{of['worst']:.6f} (seed {of['seed']}, {of['above']} above {ALLOWED_RATIO})")
+            worst.append(of["worst"])
+        worst += [np.inf] if group["lost"] else []
+    text = markdown(["paths with", "number", "not at their end", *(f"{order} / limit" for order in orders)], lines)
+    return "{set_points} set-points, {overrides} overrides, {holds} holds\n\n".format(**found) + text, worst
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="500 random paths, a shorter curve, fewer passes")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what was judged to FILE")
+    arguments = parser.parse_args()
+    driver, peers = native.built("peers"), Peers()
+    ratios: dict[str, list[float]] = {}
+    with tempfile.TemporaryDirectory(prefix="shapegcode-peers-") as name:
+        folder = Path(name)
+        parts = {
+            "Single moves": lambda: single_moves(driver, peers, folder, 3 if arguments.quick else 20),
+            "Small arcs": lambda: small_arcs(driver, peers, folder),
+            "Programs": lambda: programs(driver, peers, folder),
+            "Window of the look-ahead": lambda: windows(driver, folder, arguments.quick),
+            "Random paths": lambda: random_paths(driver, 500 if arguments.quick else 10_000),
+        }
+        for title, part in parts.items():
+            text, ratios[title] = part()
+            print(f"## {title}\n\n{text}\n", flush=True)
+    losses = ratios.pop("Window of the look-ahead")
+    worst = {title: max(values, default=0.0) for title, values in ratios.items()}
+    print(date.today().isoformat(), worst, f"largest loss at a window of {ASKED_WINDOW}: {100.0 * max(losses):.2f} %")
+    if arguments.json:
+        arguments.json.write_text(json.dumps({"worst": worst, "losses": losses}, indent=2) + "\n", encoding="utf-8")
+    return int(max(worst.values()) > ALLOWED_RATIO or max(losses) > ASKED_LOSS)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,99 @@
+#include "peers_trial.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <variant>
+
+#include "../cpp/random_motion.hpp"
+
+namespace shapegcode::peers {
+namespace {
+
+ControllerShaper random_shaper(Draw& draw) {
+  const auto two_taps = [&] {
+    const double first = draw.between(0.45, 0.6);
+    return Fir({0, static_cast<int>(draw.between(3.0, 25.0))}, {first, 1.0 - first});
+  };
+  const double kind = draw.uniform();
+  if (kind < 0.35) return Fir({0}, {1.0});
+  if (kind < 0.6) return two_taps();
+  if (kind < 0.75) {
+    const int half = static_cast<int>(draw.between(3.0, 12.0));
+    return Fir({0, half, 2 * half}, {1.0, -1.0, 1.0});  // a shaper of unity magnitude
+  }
+  if (kind < 0.9) return std::vector<Fir>{two_taps(), Fir({0}, {1.0}), Fir::moving_average(8)};
+  return FollowingFir(VaryingFir({two_taps(), two_taps()}), draw.chance(0.5) ? 0 : 1, {-30.0, 30.0});
+}
+
+ControllerSettings random_settings(Draw& draw) {
+  ControllerSettings settings;
+  settings.period_s = draw.chance(0.8) ? 0.001 : draw.chance(0.5) ? 0.0005 : 0.002;
+  MotionLimits& limits = settings.limits;
+  limits.law = AccelerationLaw::jerk_limited;
+  const double acceleration = draw.logarithmic(200.0, 5000.0);
+  const double jerk = draw.chance(0.1) ? MotionLimits::none : acceleration * draw.logarithmic(10.0, 200.0);
+  for (int axis = 0; axis < axis_count; ++axis) {
+    limits.max_feed_mm_per_s[axis] = draw.logarithmic(40.0, 400.0);
+    limits.max_acceleration_mm_per_s2[axis] = acceleration * draw.between(0.4, 1.0);
+    limits.max_jerk_mm_per_s3[axis] = jerk * draw.between(0.4, 1.0);
+  }
+  if (draw.chance(0.3)) settings.contour_tolerance_mm = draw.logarithmic(0.003, 0.1);
+  settings.smoothing_time_s = draw.chance(0.1) ? 0.0 : 0.001 * draw.between(4.0, 20.0);
+  settings.shaper = random_shaper(draw);
+  // The settings want one shaper for each axis: following axes do not go with a list of three.
+  if (!std::holds_alternative<std::vector<Fir>>(settings.shaper) && draw.chance(0.3)) {
+    settings.following.resize(draw.chance(0.5) ? 1 : 2);
+    for (FollowingLimits& axis : settings.following) {
+      axis.max_feed = draw.logarithmic(20.0, 200.0);
+      axis.max_acceleration = draw.logarithmic(200.0, 5000.0);
+      axis.max_jerk = std::isfinite(jerk) ? axis.max_acceleration * draw.logarithmic(10.0, 200.0) : jerk;
+    }
+  }
+  settings.contour_correction = draw.chance(0.25) && !std::holds_alternative<FollowingFir>(settings.shaper);
+  settings.window = static_cast<std::size_t>(draw.logarithmic(8.0, 100.0));
+  settings.queue = static_cast<std::size_t>(draw.logarithmic(4.0, 200.0));
+  return settings;
+}
+
+}  // namespace
+
+Trial random_trial(std::uint32_t seed) {
+  Draw draw{std::mt19937(seed)};
+  Trial trial;
+  trial.settings = random_settings(draw);
+  const auto count = static_cast<std::size_t>(draw.logarithmic(3.0, 60.0));
+  trial.segments = tests::random_segments(draw.engine, count, draw.logarithmic(20.0, 400.0), draw.chance(0.6));
+  std::array<double, most_following_axes> at{};
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t axis = 0; axis < trial.settings.following.size(); ++axis) {
+      if (draw.chance(0.7)) at[axis] += draw.between(-20.0, 20.0);
+    }
+    trial.following_end.push_back(at);
+    if (draw.chance(0.03)) trial.segments[i].stop_at_end = true;
+  }
+  trial.does.push = draw.chance(0.5) ? 1.0 : draw.logarithmic(0.01, 0.5);
+  trial.does.turn = draw.logarithmic(0.0005, 0.02);
+  trial.does.hold = draw.chance(0.7) ? draw.logarithmic(0.0003, 0.01) : 0.0;
+  trial.does.resume = draw.logarithmic(0.003, 0.1);
+  trial.does.abort = draw.chance(0.05) ? 0.0005 : 0.0;
+  trial.does.leaves = 20'000;
+  return trial;
+}
+
+std::string text_of(const ControllerSettings& settings) {
+  const auto list = [](const Vector3& vector) {
+    return fmt::format("{:.6g} {:.6g} {:.6g}", vector[0], vector[1], vector[2]);
+  };
+  return fmt::format(
+      "period {} window {} queue {} smoothing {:.6g} tolerance {:.6g} correction {} shaper kind {} following {}; feed "
+      "{}; "
+      "acceleration {}; jerk {}",
+      settings.period_s, settings.window, settings.queue, settings.smoothing_time_s, settings.contour_tolerance_mm,
+      settings.contour_correction, settings.shaper.index(), settings.following.size(),
+      list(settings.limits.max_feed_mm_per_s), list(settings.limits.max_acceleration_mm_per_s2),
+      list(settings.limits.max_jerk_mm_per_s3));
+}
+
+}  // namespace shapegcode::peers
