@@ -92,7 +92,7 @@ std::uint64_t OnlineProfile::zones_backward(std::uint64_t newest, bool all) noex
   double left = MotionLimits::none;
   if (within_segment() && !all && newest > running_) {
     const ZoneSet own = zones_between(newest, newest - 1);
-    left = 0.0;
+    left = (*ring_)[newest - 1].open_end.reach;  // which the newest takes back
     for (std::size_t kind = 0; kind < zone_kinds; ++kind) left = std::max({left, own[kind].reach, carry[kind].reach});
   }
   for (std::uint64_t i = newest; left > 0.0 && i-- > running_;) {
