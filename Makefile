@@ -22,7 +22,7 @@ endif
 export SUNDIALS_ROOT := $(CURDIR)/.cache/sundials/usr
 
 BUILD_PACKAGES := g++ cmake ninja-build libeigen3-dev libfmt-dev python3-dev python3-venv doctest-dev
-TEST_PACKAGES := $(BUILD_PACKAGES) clang-format clang-tidy chromium chromium-driver fish mandoc zsh
+TEST_PACKAGES := $(BUILD_PACKAGES) clang-format clang-tidy chromium chromium-driver fish mandoc pkg-config zsh
 DOCS_PACKAGES := $(BUILD_PACKAGES) doxygen
 FUZZ_PACKAGES := $(BUILD_PACKAGES) clang-14 libclang-rt-14-dev libomp-14-dev
 CLANG_PACKAGES := $(BUILD_PACKAGES) clang-14 libomp-14-dev
@@ -30,9 +30,9 @@ FUZZ_SECONDS ?= 600
 WHEEL_PYTHONS ?= $(PYTHON)
 FUZZ_FLAGS := -timeout=5 -rss_limit_mb=2048 -max_len=2000 -dict=tests/fuzz/gcode.dict
 
-CPP_HEADERS := $(shell find cpp -name '*.hpp')
+CPP_HEADERS := $(shell find cpp -name '*.hpp' -o -name '*.h')
 CORE_SOURCES := $(shell find cpp/src -name '*.cpp')
-CPP_FILES := $(shell find cpp bindings integrations tests/cpp tests/fuzz tests/oracles -name '*.[ch]pp' 2>/dev/null)
+CPP_FILES := $(shell find cpp bindings integrations tests/cpp tests/fuzz tests/oracles -name '*.[ch]pp' -o -name '*.[ch]' 2>/dev/null)
 # Folders too: their time changes when a file comes or goes.
 PACKAGE_INPUTS := CMakeLists.txt cmake $(shell find cpp/include cpp/src bindings python \
                     -name __pycache__ -prune -o -print)

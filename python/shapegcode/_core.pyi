@@ -6,7 +6,7 @@ import collections.abc
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['AccelerationLaw', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathFollower', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramEntry', 'ProgramError', 'ProgramText', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
+__all__: list[str] = ['AccelerationLaw', 'Activity', 'ArcFigures', 'ArgumentError', 'Arma', 'BlockEnd', 'BlockKind', 'BlockMark', 'ChipThickness', 'CircleFigures', 'CircleFit', 'CodeBindings', 'ContourSolver', 'ContourTarget', 'ContourTracker', 'ControllerModel', 'ControllerState', 'CornerCut', 'CornerEngagement', 'CornerSection', 'CuttingCoefficients', 'CycleTime', 'DecayFit', 'DesignError', 'DeviationStats', 'EndMill', 'EngagementTrack', 'EquivalentMass', 'ExtraInsensitive', 'FeedDrive', 'FeedDriveParameters', 'FeedDriveRealTime', 'FeedExcess', 'FeedLimit', 'FeedLimits', 'FeedStretch', 'FeedWriterOptions', 'FilterShape', 'FilterTolerance', 'Fir', 'FirStream', 'FitOptions', 'FittedBlocks', 'FollowingFir', 'FollowingLimits', 'ForceCurve', 'ForceFigures', 'FrequencyBand', 'FrictionModel', 'FrictionParameters', 'InPosition', 'InterpolatedTime', 'Interpolator', 'LimitedFeed', 'LinearPlant', 'Material', 'MetrologyOptions', 'MillingForce', 'MinimalBranches', 'MinimalShapers', 'ModalFit', 'ModalState', 'Mode', 'ModeRanking', 'ModeTable', 'MotionController', 'MotionKind', 'MotionLimits', 'NumericError', 'Path', 'PathFollower', 'PathSection', 'PlaybackFigures', 'PlaybackOptions', 'PlayedChunk', 'PlayedStream', 'PositionFeedback', 'ProgramEntry', 'ProgramError', 'ProgramText', 'PushResult', 'RapidPath', 'ReaderOptions', 'RefedRegion', 'Region', 'RegionNote', 'RegionShaper', 'RestVibration', 'Roughness', 'RunFigures', 'SectionFigures', 'SectionKind', 'SectionMetrology', 'Segment', 'SegmentKind', 'ServoLag', 'ShapedCommand', 'ShapedRegions', 'ShapegcodeError', 'Shaper', 'ShapingOptions', 'SideFigures', 'SpeedProfile', 'SpindleSense', 'StarvedFigures', 'StepKind', 'ToolBeam', 'ToolOffset', 'ToolTime', 'Travel', 'VaryingFir', 'VaryingFirStream', 'WallFigures', 'WallSide', 'WorkLimits', 'WorstResidual', 'WriterOptions', 'acceleration_filters', 'arma_decay', 'arma_driven', 'block_overlap_time_s', 'contour_kernel', 'convolve', 'convolved_zv', 'count_slowed_blocks', 'csv_rows', 'divisible_segments', 'equivalent_mass_bisection', 'equivalent_mass_closed_form', 'extra_insensitive', 'fastest_block_ends', 'feeds_per_minute', 'fit_blocks', 'fit_circle', 'fit_decay', 'fit_modes', 'for_shaped_blocks', 'gaussian_low_pass', 'grid_polynomial', 'in_position_wait_behind_s', 'in_position_wait_s', 'insensitive_band', 'insensitivity', 'interpolate', 'interpolate_program', 'largest_feed', 'largest_feeds', 'layer_borders', 'line_sections', 'linear_model', 'list_programs', 'look_ahead_on_load', 'machine_frame', 'matrix_exponential', 'measure_roughness', 'minimal_branches', 'minimal_shapers', 'minimal_two_mode', 'modal_response', 'mzv', 'mzv_second_zero', 'negative_zv', 'path_sections', 'plan_speed', 'plant_response', 'play_blocks', 'play_duration_s', 'play_path', 'play_samples', 'poles_to_modes', 'rank_modes', 'rapid_samples', 'rapid_time_s', 'read_program', 'repeated_zv', 'schedule_feed', 'sensitivity_curve', 'shape_path', 'simulate_circle', 'stabilisation_poles', 'sweep', 'thin_curves', 'time_program', 'travel_blocks', 'travel_path', 'wall_error_um', 'wall_errors_um', 'wilson_theta', 'with_feeds', 'worst_residual', 'write_blocks', 'write_feeds', 'zv']
 class ShapegcodeError(Exception):
     """
     Base of every error that shapegcode raises.
@@ -907,6 +907,398 @@ class Interpolator:
     def sample_count(self) -> int:
         """
         Set-points from start to end.
+        """
+class PushResult:
+    """
+    Answer of a MotionController to a segment that was pushed.
+    
+    Members:
+    
+      accepted : It waits for its turn.
+    
+      queue_full : Nothing was taken: push it again later.
+    
+      not_connected : It does not start where the one before ended, or an arc misses its end (1e-6 mm).
+    
+      no_length : It moves no axis.
+    
+      no_feed : A feed that is not above zero, or not finite.
+    
+      not_finite : A position that is not finite.
+    
+      wrong_axes : Not as many following axes as the control has.
+    
+      aborted : Nothing is taken between abort() and restart().
+    """
+    __members__: typing.ClassVar[dict[str, PushResult]]
+    aborted: typing.ClassVar[PushResult]
+    accepted: typing.ClassVar[PushResult]
+    no_feed: typing.ClassVar[PushResult]
+    no_length: typing.ClassVar[PushResult]
+    not_connected: typing.ClassVar[PushResult]
+    not_finite: typing.ClassVar[PushResult]
+    queue_full: typing.ClassVar[PushResult]
+    wrong_axes: typing.ClassVar[PushResult]
+    @typing.overload
+    def __eq__(self, other: PushResult) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: PushResult) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class Activity:
+    """
+    What a MotionController does in a period.
+    
+    Members:
+    
+      idle : At rest, nothing left to do.
+    
+      moving : Along the path, or the shaper is still giving out what it holds.
+    
+      stopping : Decelerating for hold() or abort().
+    
+      held : At rest after hold().
+    
+      starved : Coming to rest: the segments ran out before one that stops. At rest it is idle.
+    
+      aborted : At rest after abort(); the path is gone.
+    """
+    __members__: typing.ClassVar[dict[str, Activity]]
+    aborted: typing.ClassVar[Activity]
+    held: typing.ClassVar[Activity]
+    idle: typing.ClassVar[Activity]
+    moving: typing.ClassVar[Activity]
+    starved: typing.ClassVar[Activity]
+    stopping: typing.ClassVar[Activity]
+    @typing.overload
+    def __eq__(self, other: Activity) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: Activity) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class FollowingLimits:
+    """
+    Limits of an axis that follows the path. Immutable.
+    
+    Args:
+        max_feed: Highest speed in its own unit (mm or degrees) per s.
+        max_acceleration: Likewise per s^2.
+        max_jerk: Likewise per s^3.
+    """
+    def __init__(self, *, max_feed: typing.SupportsFloat | typing.SupportsIndex = ..., max_acceleration: typing.SupportsFloat | typing.SupportsIndex = ..., max_jerk: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
+        """
+        Checked by the control that takes them.
+        """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def max_acceleration(self) -> float:
+        """
+        Unit per s^2.
+        """
+    @property
+    def max_feed(self) -> float:
+        """
+        Unit per s.
+        """
+    @property
+    def max_jerk(self) -> float:
+        """
+        Unit per s^3.
+        """
+class ControllerState:
+    """
+    A snapshot of a MotionController. Immutable.
+    """
+    def __repr__(self) -> str:
+        ...
+    @property
+    def activity(self) -> Activity:
+        """
+        What it does.
+        """
+    @property
+    def distance_mm(self) -> float:
+        """
+        Since the last rest.
+        """
+    @property
+    def feed_override(self) -> float:
+        """
+        Ratio of the programmed feeds.
+        """
+    @property
+    def line(self) -> int:
+        """
+        Of the segment that is being run.
+        """
+    @property
+    def segments_done(self) -> int:
+        """
+        Run to their ends.
+        """
+    @property
+    def segments_waiting(self) -> int:
+        """
+        Pushed and not run to their ends.
+        """
+    @property
+    def set_point(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Set-point last given, (n_axes,), mm or the axis' unit.
+        """
+    @property
+    def speed_mm_per_s(self) -> float:
+        """
+        Along the path, before smoothing and shaper.
+        """
+    @property
+    def starvations(self) -> int:
+        """
+        How often the segments ran out.
+        """
+    @property
+    def steps(self) -> int:
+        """
+        Set-points given so far.
+        """
+class MotionController:
+    """
+    A path that grows while it is run: what a control does between blocks and drives.
+    
+    Look-ahead over a window of segments, a jerk-limited profile, one set-point per period through contour correction,
+    smoothing and shaper. Speeds, accelerations and jerks that are finite are kept by the set-points. One thread may push,
+    one may step, any may call the rest but restart(); step() and run() release the global lock. It is the C++ class of the
+    same name, which is the real-time form.
+    
+    Args:
+        period_s: Time between set-points in s.
+        limits: What look-ahead keeps, with the rules for corners. None: nothing but what the next three say, under the
+            jerk-limited law if there is an acceleration.
+        max_feed_mm_per_s: Of X, Y and Z, shape (3,), or one number for all; in place of that of `limits`.
+        max_acceleration_mm_per_s2: Likewise.
+        max_jerk_mm_per_s3: Likewise; wants an acceleration.
+        following: Limits of the axes that follow the path, at most six.
+        contour_tolerance_mm: What smoothing and shaper may cut off corners and arcs; inf: as much as the limits let them.
+        smoothing_time_s: Length of each of two moving averages over every axis in s; 0: none.
+        shaper: Shaper on the grid of the period or Fir for all axes, a list of them with one for each axis, FollowingFir;
+            None: none.
+        contour_correction: Take back, to the second order, what smoothing and shaper cut off arcs.
+        window: Segments that the look-ahead sees, 8 at least.
+        queue: Segments that may wait in all; rounded up to a power of two, and holds the window.
+    
+    Raises:
+        ArgumentError: A value outside its range.
+        DesignError: A Shaper whose times are not on the grid of the period.
+    
+    Source: this project; look-ahead as in plan_speed.
+    """
+    def __init__(self, *, period_s: typing.SupportsFloat | typing.SupportsIndex = 0.001, limits: MotionLimits | None = None, max_feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_acceleration_mm_per_s2: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, max_jerk_mm_per_s3: typing.SupportsFloat | typing.SupportsIndex | typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] | None = None, following: collections.abc.Sequence[FollowingLimits] = (), contour_tolerance_mm: typing.SupportsFloat | typing.SupportsIndex = ..., smoothing_time_s: typing.SupportsFloat | typing.SupportsIndex = 0.01, shaper: Shaper | Fir | collections.abc.Sequence[Shaper | Fir] | FollowingFir | None = None, contour_correction: bool = False, window: typing.SupportsInt | typing.SupportsIndex = 128, queue: typing.SupportsInt | typing.SupportsIndex = 1024) -> None:
+        """
+        ArgumentError if it is not what the class asks for.
+        """
+    def abort(self) -> None:
+        """
+        Come to rest along the path and forget the rest of it.
+        """
+    def feed_override(self, ratio: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. From the next step on.
+        """
+    def hold(self) -> None:
+        """
+        Come to rest along the path.
+        """
+    def push(self, segment: Segment, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None) -> PushResult:
+        """
+        Hand over the next segment; never waits.
+        
+        Args:
+            segment: It starts where the one before ended, the first at rest.
+            following: Where the following axes are at its end, (n_axes - 3,); they follow in proportion to the way. None: they
+                stay.
+        
+        Returns:
+            PushResult; nothing was taken unless it is `accepted`.
+        """
+    def push_arc(self, end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], centre_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], sweep_rad: typing.SupportsFloat | typing.SupportsIndex, feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, normal: typing.SupportsInt | typing.SupportsIndex = 2, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, *, line: typing.SupportsInt | typing.SupportsIndex = 0, stop_at_end: bool = False) -> PushResult:
+        """
+        The same along an arc or helix, as Segment.arc makes it.
+        
+        Args:
+            end_mm: Shape (3,), mm.
+            centre_mm: Shape (3,), mm; its value along `normal` has no say.
+            sweep_rad: Above zero: X towards Y about Z, Y towards Z about X, Z towards X about Y.
+            feed_mm_per_s: Along the path.
+            normal: Axis across its plane: 0 X, 1 Y, 2 Z.
+            following: As in push().
+            line: What the state shows while it is run.
+            stop_at_end: Exact stop.
+        
+        Returns:
+            PushResult; nothing was taken unless it is `accepted`.
+        
+        Raises:
+            ArgumentError: No radius, no sweep, or a number that is not finite.
+        """
+    def push_line(self, end_mm: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], feed_mm_per_s: typing.SupportsFloat | typing.SupportsIndex, following: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, *, line: typing.SupportsInt | typing.SupportsIndex = 0, stop_at_end: bool = False) -> PushResult:
+        """
+        A straight move from the end of the segment before, at first from rest.
+        
+        Args:
+            end_mm: Shape (3,), mm.
+            feed_mm_per_s: Along the path.
+            following: As in push().
+            line: What the state shows while it is run.
+            stop_at_end: Exact stop; on the last segment of a program it says that none is missing.
+        
+        Returns:
+            PushResult; nothing was taken unless it is `accepted`.
+        """
+    def push_path(self, path: Path, first: typing.SupportsInt | typing.SupportsIndex = 0) -> tuple[int, PushResult]:
+        """
+        The segments of a path, as many as are taken; the following axes stay.
+        
+        Args:
+            path: Its first segment starts where the segment before ended.
+            first: Segment to begin with.
+        
+        Returns:
+            (index of the segment to go on with, PushResult of the last one that was tried): (len(path), accepted) when all of
+            them were taken.
+        
+        Raises:
+            ArgumentError: `first` below 0.
+        """
+    def restart(self, position: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
+        """
+        At rest at a position (n_axes,), the queue empty. ArgumentError on another shape or a value that is not finite.
+        """
+    def resume(self) -> None:
+        """
+        Go on after hold().
+        """
+    def run(self, max_periods: typing.SupportsInt | typing.SupportsIndex = 1000000) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Steps until it rests: idle, held or aborted.
+        
+        Args:
+            max_periods: It stops there, at the latest.
+        
+        Returns:
+            (n, n_axes), mm or the unit of a following axis.
+        
+        Raises:
+            ArgumentError: Periods below 0.
+        """
+    def step(self, periods: typing.SupportsInt | typing.SupportsIndex = 1) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        The next set-points, one for each period.
+        
+        Args:
+            periods: How many, >= 0.
+        
+        Returns:
+            (periods, n_axes), mm or the unit of a following axis; `state.activity` says what the last one was.
+        
+        Raises:
+            ArgumentError: Periods below 0.
+        """
+    @property
+    def correction_delay(self) -> int:
+        """
+        Periods of that which are the contour correction's.
+        """
+    @property
+    def delay_periods(self) -> float:
+        """
+        Mean delay of jerk time, correction, smoothing and shaper, in periods.
+        """
+    @property
+    def end_mm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Where the next segment must start, (3,), mm.
+        """
+    @property
+    def following_end(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Where the following axes are at the end of the last segment, (n_axes - 3,).
+        """
+    @property
+    def n_axes(self) -> int:
+        """
+        Axes of a set-point.
+        """
+    @property
+    def planning_limits(self) -> MotionLimits:
+        """
+        What plan_speed takes for the same profile of a whole path: MotionLimits.
+        """
+    @property
+    def planning_tolerance(self) -> FilterTolerance:
+        """
+        Likewise: FilterTolerance.
+        """
+    @property
+    def state(self) -> ControllerState:
+        """
+        A snapshot: ControllerState.
         """
 class ModalState:
     """

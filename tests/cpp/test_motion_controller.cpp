@@ -97,9 +97,11 @@ TEST_CASE("a path within the window is run as the planner of whole paths runs it
             first.step(values_of(point), values_of(point));
             second.step(values_of(point), values_of(point));
           }
-          if (point != online.set_points[begin + k]) ++different;
+          // The last one is the programmed end, whatever distances round to.
+          if (begin + k + 1 < online.set_points.size() && point != online.set_points[begin + k]) ++different;
         }
         CHECK(different == 0);
+        CHECK((online.set_points.back() == segments.back().end_mm));
       }
     }
   }
@@ -135,7 +137,7 @@ TEST_CASE("limits are kept at every set-point, whatever the operator does") {
         control.resume();
       }
     }
-    CHECK((point - segments.back().end_mm).norm() < 1e-9);
+    CHECK((point == segments.back().end_mm));
     CHECK(differences.speed() <= 1.001 * most_speed);
     CHECK(differences.acceleration() <= 1.001 * most_acceleration);
     CHECK(differences.jerk() <= 1.001 * most_jerk + 100.0);  // a coordinate of 100 mm is rounded to 1.4e-14
@@ -204,6 +206,7 @@ TEST_CASE("what cannot be run is refused, and says why") {
   MotionController control(settings);
   const double nan = std::nan("");
   CHECK(control.push(make_line({1, 0, 0}, {2, 0, 0}, 10.0)) == PushResult::not_connected);
+  CHECK(control.push(make_arc({0, 0, 0}, {20, 20, 0}, {20, 0, 0}, -1.5, 2, 10.0)) == PushResult::not_connected);
   CHECK(control.push(make_line({0, 0, 0}, {0, 0, 0}, 10.0)) == PushResult::no_length);
   CHECK(control.push(make_line({0, 0, 0}, {1, 0, 0}, 0.0)) == PushResult::no_feed);
   CHECK(control.push(make_line({0, 0, 0}, {1, 0, 0}, nan)) == PushResult::no_feed);

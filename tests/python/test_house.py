@@ -39,6 +39,7 @@ FOLDERS = [
     "command",
     "write",
     "play",
+    "c",
 ]
 NOT_FROM = {
     "program": {"filter", "motion", "controller"},
@@ -52,6 +53,7 @@ HEADER_FOLDERS = {
     "mode.hpp": "base",
     "play_stream.hpp": "play",
     "samples.hpp": "base",
+    "shapegcode.h": "c",
     "timing.hpp": "play",
 }
 # They are for users and include what lies below; nobody in the library includes them.

@@ -127,9 +127,10 @@ def _said(name: str) -> str:
 # --- C++ --------------------------------------------------------------------------------------------------------------
 def _cpp() -> dict[str, str]:
     found, rows = {}, []
-    for header in sorted(HEADERS.rglob("*.hpp"), key=lambda file: (len(file.relative_to(HEADERS).parts), file)):
+    headers = [file for kind in ("*.hpp", "*.h") for file in HEADERS.rglob(kind)]
+    for header in sorted(headers, key=lambda file: (len(file.relative_to(HEADERS).parts), file)):
         name = header.relative_to(HEADERS).as_posix()
-        stem = name.removesuffix(".hpp").replace("/", "-")
+        stem = name.removesuffix(".hpp").replace("/", "-").replace(".", "-")
         body = f'# {name}\n\n`#include "shapegcode/{name}"`\n\n'
         said = _comment_of(header)
         if said:
@@ -138,8 +139,9 @@ def _cpp() -> dict[str, str]:
             body += f"```{{eval-rst}}\n.. doxygenfile:: {header.name}\n```\n"
         found[f"reference/cpp/{stem}.md"] = body
         rows.append(stem)
-    head = "# The C++ headers\n\nThe library is `shapegcode::core`, found with `find_package(shapegcode)`; a program\n"
-    head += "that embeds it stands under [Embed it in a controller](../../tutorials/embed.md).\n"
+    head = "# The C++ headers, and the one for C\n\nThe library is `shapegcode::core`, found with\n"
+    head += "`find_package(shapegcode)`; programs that embed it stand under [Embed it in a\n"
+    head += "controller](../../tutorials/embed.md).\n"
     found["reference/cpp/index.md"] = head + "\n```{toctree}\n" + "\n".join(rows) + "\n```\n"
     return found
 

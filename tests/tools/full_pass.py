@@ -25,7 +25,22 @@ PYTHON = (
     "tests/rejected/",
     "pyproject.toml",
 )
-SUFFIXES = {".cpp", ".hpp", ".py", ".pyi", ".in", ".txt", ".cmake", ".json", ".toml", ".nc", ".NC", ".expected"}
+SUFFIXES = {
+    ".cpp",
+    ".hpp",
+    ".c",
+    ".h",
+    ".py",
+    ".pyi",
+    ".in",
+    ".txt",
+    ".cmake",
+    ".json",
+    ".toml",
+    ".nc",
+    ".NC",
+    ".expected",
+}
 
 
 def present() -> dict[str, str]:

@@ -69,7 +69,7 @@ struct ControllerSettings {
 enum class PushResult : std::uint8_t {
   accepted,
   queue_full,     ///< nothing was taken: push it again later
-  not_connected,  ///< it does not start where the one before ended (1e-6 mm)
+  not_connected,  ///< it does not start where the one before ended, or the sweep of an arc misses its end (1e-6 mm)
   no_length,
   no_feed,  ///< a feed that is not above zero, or not finite
   not_finite,

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "motion/speed_limits.hpp"
+#include "path/arc_end.hpp"
 
 namespace shapegcode {
 namespace {
@@ -48,9 +49,14 @@ PushResult Intake::copy(const Segment& segment, std::span<const double> followin
   if (!finite) return PushResult::not_finite;
   if (!(segment.feed_mm_per_s > 0.0) || !std::isfinite(segment.feed_mm_per_s)) return PushResult::no_feed;
   if ((segment.start_mm - last_segment_.end_mm).norm() > largest_gap_mm) return PushResult::not_connected;
+  // Its last set-point is its end: a sweep that leads elsewhere would be a jump there.
+  if (arc && std::abs(missing_sweep_rad(segment)) * segment.end_radius_mm > largest_gap_mm) {
+    return PushResult::not_connected;
+  }
   entry.segment = segment;
   for (std::size_t i = 0; i < following_.size(); ++i) {
     entry.following_start[i] = last_following_[i];
+    entry.following_end[i] = following_end[i];
     entry.following_rate[i] = following_end[i] - last_following_[i];
   }
   if (!(segment.length_mm > 0.0)) {

@@ -100,8 +100,10 @@ class MotionController::Implementation {
     rest_periods_ = profile_.at_rest() ? std::min(rest_periods_ + 1, settling_periods()) : 0;
     place(smoothed_distance());
     filters_.step({position_.data(), axes()});
-    std::copy_n(position_.begin(), std::min(out.size(), axes()), out.begin());
     const Activity activity = activity_now();
+    if (activity == Activity::idle) end_exactly();
+    std::copy_n(position_.begin(), std::min(out.size(), axes()), out.begin());
+    ++state_.steps;
     publish(activity);
     return activity;
   }
@@ -184,6 +186,14 @@ class MotionController::Implementation {
     tail_.store(cursor_, std::memory_order_release);
   }
 
+  // At rest at the end of what was pushed: to the last bit, whatever distances and taps round to.
+  void end_exactly() noexcept {
+    if (!has_cursor_) return;
+    const QueuedSegment& last = ring_[cursor_];
+    std::copy_n(last.segment.end_mm.data(), axis_count, position_.begin());
+    std::copy_n(last.following_end.begin(), n_following_, position_.begin() + axis_count);
+  }
+
   Activity activity_now() noexcept {
     const bool settled = rest_periods_ >= settling_periods();
     const bool stopping = hold_.load(std::memory_order_relaxed);
@@ -206,7 +216,6 @@ class MotionController::Implementation {
     state_.line = has_cursor_ ? ring_[cursor_].segment.line : 0;
     state_.segments_done = profile_.running() - first_;
     state_.segments_waiting = head_.load(std::memory_order_relaxed) - profile_.running();
-    ++state_.steps;
     shared_.write(state_);
   }
 

@@ -16,7 +16,7 @@ namespace shapegcode {
 /// A segment in the queue: first what the planning thread finds out, then what belongs to the look-ahead.
 struct QueuedSegment {
   Segment segment;
-  std::array<double, most_following_axes> following_start{};
+  std::array<double, most_following_axes> following_start{}, following_end{};
   std::array<double, most_following_axes> following_rate{};  ///< per mm of the way
   double feed = 0.0;                                         ///< programmed, with the ratio of arcs
   double hard_limit = 0.0;                                   ///< speed whatever the override

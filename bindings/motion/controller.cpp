@@ -1,0 +1,321 @@
+#include "motion/controller.hpp"
+
+#include <pybind11/eigen.h>
+#include <pybind11/stl.h>
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "register.hpp"
+#include "shapegcode/controller.hpp"
+#include "shapegcode/filter.hpp"
+#include "shapegcode/motion.hpp"
+#include "shapegcode/path.hpp"
+#include "shapegcode/shaper.hpp"
+
+namespace py = pybind11;
+
+namespace shapegcode::bindings {
+namespace {
+
+using AxisLimit = std::optional<std::variant<double, Vector3>>;
+using AxisShaper = std::variant<Shaper, Fir>;
+using AnyShaper = std::optional<std::variant<Shaper, Fir, std::vector<AxisShaper>, FollowingFir>>;
+
+void limit_axes(Vector3& limits, const AxisLimit& given) {
+  if (!given) return;
+  limits = std::holds_alternative<double>(*given) ? Vector3(Vector3::Constant(std::get<double>(*given)))
+                                                  : std::get<Vector3>(*given);
+}
+
+Fir fir_of(const AxisShaper& shaper, double period_s) {
+  if (const auto* design = std::get_if<Shaper>(&shaper)) return to_fir(*design, period_s);
+  return std::get<Fir>(shaper);
+}
+
+ControllerShaper shaper_of(const AnyShaper& given, double period_s) {
+  if (!given) return ControllerSettings{}.shaper;
+  if (const auto* design = std::get_if<Shaper>(&*given)) return to_fir(*design, period_s);
+  if (const auto* fir = std::get_if<Fir>(&*given)) return *fir;
+  if (const auto* following = std::get_if<FollowingFir>(&*given)) return *following;
+  std::vector<Fir> each;
+  for (const AxisShaper& one : std::get<std::vector<AxisShaper>>(*given)) each.push_back(fir_of(one, period_s));
+  return each;
+}
+
+// What Python names one by one.
+PyController make_controller(double period_s, const std::optional<MotionLimits>& limits, const AxisLimit& max_feed,
+                             const AxisLimit& max_acceleration, const AxisLimit& max_jerk,
+                             std::vector<FollowingLimits> following, double contour_tolerance_mm,
+                             double smoothing_time_s, const AnyShaper& shaper, bool contour_correction,
+                             py::ssize_t window, py::ssize_t queue) {
+  ControllerSettings settings;
+  settings.period_s = period_s;
+  if (limits) {
+    settings.limits = *limits;
+  } else if (max_acceleration) {
+    settings.limits.law = AccelerationLaw::jerk_limited;
+  }
+  limit_axes(settings.limits.max_feed_mm_per_s, max_feed);
+  limit_axes(settings.limits.max_acceleration_mm_per_s2, max_acceleration);
+  limit_axes(settings.limits.max_jerk_mm_per_s3, max_jerk);
+  settings.following = std::move(following);
+  settings.contour_tolerance_mm = contour_tolerance_mm;
+  settings.smoothing_time_s = smoothing_time_s;
+  settings.shaper = shaper_of(shaper, period_s);
+  settings.contour_correction = contour_correction;
+  settings.window = count_of(window, "window");
+  settings.queue = count_of(queue, "queue");
+  return PyController(settings);
+}
+
+std::string shown(const py::handle& value) { return py::repr(value).cast<std::string>(); }
+
+std::string shown(double value) { return shown(py::float_(value)); }
+
+py::array_t<double> set_point_of(const PyState& self) {
+  return py::array_t<double>(static_cast<py::ssize_t>(self.axes), self.state.set_point.data());
+}
+
+void register_answers(py::module_& module) {
+  py::enum_<PushResult>(module, "PushResult", "Answer of a MotionController to a segment that was pushed.")
+      .value("accepted", PushResult::accepted, "It waits for its turn.")
+      .value("queue_full", PushResult::queue_full, "Nothing was taken: push it again later.")
+      .value("not_connected", PushResult::not_connected,
+             "It does not start where the one before ended, or an arc misses its end (1e-6 mm).")
+      .value("no_length", PushResult::no_length, "It moves no axis.")
+      .value("no_feed", PushResult::no_feed, "A feed that is not above zero, or not finite.")
+      .value("not_finite", PushResult::not_finite, "A position that is not finite.")
+      .value("wrong_axes", PushResult::wrong_axes, "Not as many following axes as the control has.")
+      .value("aborted", PushResult::aborted, "Nothing is taken between abort() and restart().");
+
+  py::enum_<Activity>(module, "Activity", "What a MotionController does in a period.")
+      .value("idle", Activity::idle, "At rest, nothing left to do.")
+      .value("moving", Activity::moving, "Along the path, or the shaper is still giving out what it holds.")
+      .value("stopping", Activity::stopping, "Decelerating for hold() or abort().")
+      .value("held", Activity::held, "At rest after hold().")
+      .value("starved", Activity::starved,
+             "Coming to rest: the segments ran out before one that stops. At rest it is idle.")
+      .value("aborted", Activity::aborted, "At rest after abort(); the path is gone.");
+
+  py::class_<FollowingLimits>(module, "FollowingLimits", R"(Limits of an axis that follows the path. Immutable.
+
+Args:
+    max_feed: Highest speed in its own unit (mm or degrees) per s.
+    max_acceleration: Likewise per s^2.
+    max_jerk: Likewise per s^3.)")
+      .def(py::init([](double max_feed, double max_acceleration, double max_jerk) {
+             return FollowingLimits{max_feed, max_acceleration, max_jerk};
+           }),
+           py::kw_only(), py::arg("max_feed") = MotionLimits::none, py::arg("max_acceleration") = MotionLimits::none,
+           py::arg("max_jerk") = MotionLimits::none, "Checked by the control that takes them.")
+      .def_readonly("max_feed", &FollowingLimits::max_feed, "Unit per s.")
+      .def_readonly("max_acceleration", &FollowingLimits::max_acceleration, "Unit per s^2.")
+      .def_readonly("max_jerk", &FollowingLimits::max_jerk, "Unit per s^3.")
+      .def("__repr__", [](const FollowingLimits& self) {
+        return "FollowingLimits(max_feed=" + shown(self.max_feed) +
+               ", max_acceleration=" + shown(self.max_acceleration) + ", max_jerk=" + shown(self.max_jerk) + ")";
+      });
+}
+
+void register_state(py::module_& module) {
+  py::class_<PyState>(module, "ControllerState", "A snapshot of a MotionController. Immutable.")
+      .def_property_readonly(
+          "activity", [](const PyState& self) { return self.state.activity; }, "What it does.")
+      .def_property_readonly("set_point", &set_point_of, "Set-point last given, (n_axes,), mm or the axis' unit.")
+      .def_property_readonly(
+          "speed_mm_per_s", [](const PyState& self) { return self.state.speed_mm_per_s; },
+          "Along the path, before smoothing and shaper.")
+      .def_property_readonly(
+          "distance_mm", [](const PyState& self) { return self.state.distance_mm; }, "Since the last rest.")
+      .def_property_readonly(
+          "feed_override", [](const PyState& self) { return self.state.feed_override; },
+          "Ratio of the programmed feeds.")
+      .def_property_readonly(
+          "line", [](const PyState& self) { return self.state.line; }, "Of the segment that is being run.")
+      .def_property_readonly(
+          "segments_done", [](const PyState& self) { return self.state.segments_done; }, "Run to their ends.")
+      .def_property_readonly(
+          "segments_waiting", [](const PyState& self) { return self.state.segments_waiting; },
+          "Pushed and not run to their ends.")
+      .def_property_readonly(
+          "steps", [](const PyState& self) { return self.state.steps; }, "Set-points given so far.")
+      .def_property_readonly(
+          "starvations", [](const PyState& self) { return self.state.starvations; }, "How often the segments ran out.")
+      .def("__repr__", [](const PyState& self) {
+        const ControllerState& state = self.state;
+        return "ControllerState(activity=" + std::string(text_of(state.activity)) +
+               ", set_point=" + shown(set_point_of(self).attr("tolist")()) +
+               ", speed_mm_per_s=" + shown(state.speed_mm_per_s) + ", distance_mm=" + shown(state.distance_mm) +
+               ", feed_override=" + shown(state.feed_override) + ", line=" + std::to_string(state.line) +
+               ", segments_done=" + std::to_string(state.segments_done) +
+               ", segments_waiting=" + std::to_string(state.segments_waiting) +
+               ", steps=" + std::to_string(state.steps) + ", starvations=" + std::to_string(state.starvations) + ")";
+      });
+}
+
+constexpr const char* controller_doc =
+    R"(A path that grows while it is run: what a control does between blocks and drives.
+
+Look-ahead over a window of segments, a jerk-limited profile, one set-point per period through contour correction,
+smoothing and shaper. Speeds, accelerations and jerks that are finite are kept by the set-points. One thread may push,
+one may step, any may call the rest but restart(); step() and run() release the global lock. It is the C++ class of the
+same name, which is the real-time form.
+
+Args:
+    period_s: Time between set-points in s.
+    limits: What look-ahead keeps, with the rules for corners. None: nothing but what the next three say, under the
+        jerk-limited law if there is an acceleration.
+    max_feed_mm_per_s: Of X, Y and Z, shape (3,), or one number for all; in place of that of `limits`.
+    max_acceleration_mm_per_s2: Likewise.
+    max_jerk_mm_per_s3: Likewise; wants an acceleration.
+    following: Limits of the axes that follow the path, at most six.
+    contour_tolerance_mm: What smoothing and shaper may cut off corners and arcs; inf: as much as the limits let them.
+    smoothing_time_s: Length of each of two moving averages over every axis in s; 0: none.
+    shaper: Shaper on the grid of the period or Fir for all axes, a list of them with one for each axis, FollowingFir;
+        None: none.
+    contour_correction: Take back, to the second order, what smoothing and shaper cut off arcs.
+    window: Segments that the look-ahead sees, 8 at least.
+    queue: Segments that may wait in all; rounded up to a power of two, and holds the window.
+
+Raises:
+    ArgumentError: A value outside its range.
+    DesignError: A Shaper whose times are not on the grid of the period.
+
+Source: this project; look-ahead as in plan_speed.)";
+
+void register_pushes(py::class_<PyController>& controller) {
+  controller
+      .def("push", &PyController::push, py::arg("segment"), py::arg("following") = py::none(),
+           R"(Hand over the next segment; never waits.
+
+Args:
+    segment: It starts where the one before ended, the first at rest.
+    following: Where the following axes are at its end, (n_axes - 3,); they follow in proportion to the way. None: they
+        stay.
+
+Returns:
+    PushResult; nothing was taken unless it is `accepted`.)")
+      .def("push_path", &PyController::push_path, py::arg("path"), py::arg("first") = 0,
+           R"(The segments of a path, as many as are taken; the following axes stay.
+
+Args:
+    path: Its first segment starts where the segment before ended.
+    first: Segment to begin with.
+
+Returns:
+    (index of the segment to go on with, PushResult of the last one that was tried): (len(path), accepted) when all of
+    them were taken.
+
+Raises:
+    ArgumentError: `first` below 0.)")
+      .def("push_line", &PyController::push_line, py::arg("end_mm"), py::arg("feed_mm_per_s"),
+           py::arg("following") = py::none(), py::kw_only(), py::arg("line") = 0, py::arg("stop_at_end") = false,
+           R"(A straight move from the end of the segment before, at first from rest.
+
+Args:
+    end_mm: Shape (3,), mm.
+    feed_mm_per_s: Along the path.
+    following: As in push().
+    line: What the state shows while it is run.
+    stop_at_end: Exact stop; on the last segment of a program it says that none is missing.
+
+Returns:
+    PushResult; nothing was taken unless it is `accepted`.)")
+      .def("push_arc", &PyController::push_arc, py::arg("end_mm"), py::arg("centre_mm"), py::arg("sweep_rad"),
+           py::arg("feed_mm_per_s"), py::arg("normal") = 2, py::arg("following") = py::none(), py::kw_only(),
+           py::arg("line") = 0, py::arg("stop_at_end") = false,
+           R"(The same along an arc or helix, as Segment.arc makes it.
+
+Args:
+    end_mm: Shape (3,), mm.
+    centre_mm: Shape (3,), mm; its value along `normal` has no say.
+    sweep_rad: Above zero: X towards Y about Z, Y towards Z about X, Z towards X about Y.
+    feed_mm_per_s: Along the path.
+    normal: Axis across its plane: 0 X, 1 Y, 2 Z.
+    following: As in push().
+    line: What the state shows while it is run.
+    stop_at_end: Exact stop.
+
+Returns:
+    PushResult; nothing was taken unless it is `accepted`.
+
+Raises:
+    ArgumentError: No radius, no sweep, or a number that is not finite.)");
+}
+
+}  // namespace
+
+void register_controller(py::module_& module) {
+  register_answers(module);
+  register_state(module);
+  py::class_<PyController> controller(module, "MotionController", controller_doc);
+  controller.def(py::init(&make_controller), py::kw_only(), py::arg("period_s") = 0.001, py::arg("limits") = py::none(),
+                 py::arg("max_feed_mm_per_s") = py::none(), py::arg("max_acceleration_mm_per_s2") = py::none(),
+                 py::arg("max_jerk_mm_per_s3") = py::none(), py::arg("following") = py::tuple(),
+                 py::arg("contour_tolerance_mm") = MotionLimits::none,
+                 py::arg("smoothing_time_s") = ControllerSettings{}.smoothing_time_s, py::arg("shaper") = py::none(),
+                 py::arg("contour_correction") = false, py::arg("window") = ControllerSettings{}.window,
+                 py::arg("queue") = ControllerSettings{}.queue, "ArgumentError if it is not what the class asks for.");
+  register_pushes(controller);
+  controller
+      .def("step", &PyController::step, py::arg("periods") = 1, R"(The next set-points, one for each period.
+
+Args:
+    periods: How many, >= 0.
+
+Returns:
+    (periods, n_axes), mm or the unit of a following axis; `state.activity` says what the last one was.
+
+Raises:
+    ArgumentError: Periods below 0.)")
+      .def("run", &PyController::run, py::arg("max_periods") = 1'000'000,
+           R"(Steps until it rests: idle, held or aborted.
+
+Args:
+    max_periods: It stops there, at the latest.
+
+Returns:
+    (n, n_axes), mm or the unit of a following axis.
+
+Raises:
+    ArgumentError: Periods below 0.)")
+      .def(
+          "feed_override", [](PyController& self, double ratio) { self.control().feed_override(ratio); },
+          py::arg("ratio"),
+          "Ratio of the programmed feeds, 0 to 2; what is outside is taken as the nearer end. From the next step on.")
+      .def(
+          "hold", [](PyController& self) { self.control().hold(); }, "Come to rest along the path.")
+      .def(
+          "resume", [](PyController& self) { self.control().resume(); }, "Go on after hold().")
+      .def(
+          "abort", [](PyController& self) { self.control().abort(); },
+          "Come to rest along the path and forget the rest of it.")
+      .def("restart", &PyController::restart, py::arg("position"),
+           "At rest at a position (n_axes,), the queue empty. ArgumentError on another shape or a value that is not "
+           "finite.")
+      .def_property_readonly("state", &PyController::state, "A snapshot: ControllerState.")
+      .def_property_readonly(
+          "n_axes", [](const PyController& self) { return self.control().axes(); }, "Axes of a set-point.")
+      .def_property_readonly("end_mm", &PyController::end, "Where the next segment must start, (3,), mm.")
+      .def_property_readonly("following_end", &PyController::following_end,
+                             "Where the following axes are at the end of the last segment, (n_axes - 3,).")
+      .def_property_readonly(
+          "delay_periods", [](const PyController& self) { return self.control().delay_periods(); },
+          "Mean delay of jerk time, correction, smoothing and shaper, in periods.")
+      .def_property_readonly(
+          "correction_delay", [](const PyController& self) { return self.control().correction_delay(); },
+          "Periods of that which are the contour correction's.")
+      .def_property_readonly(
+          "planning_limits", [](const PyController& self) { return self.control().planning_limits(); },
+          "What plan_speed takes for the same profile of a whole path: MotionLimits.")
+      .def_property_readonly(
+          "planning_tolerance", [](const PyController& self) { return self.control().planning_tolerance(); },
+          "Likewise: FilterTolerance.");
+}
+
+}  // namespace shapegcode::bindings

@@ -1,0 +1,144 @@
+// A motion controller as Python has it: rows of set-points at once, segments that begin where the last one ended.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "shapegcode/controller.hpp"
+#include "shapegcode/error.hpp"
+
+namespace shapegcode::bindings {
+
+/// What `run` may take and an array may hold.
+inline constexpr std::size_t most_periods = 100'000'000;
+
+/// Throws ArgumentError below zero.
+inline std::size_t count_of(pybind11::ssize_t value, const char* name) {
+  if (value >= 0) return static_cast<std::size_t>(value);
+  throw Error(ErrorKind::argument, std::string(name) + " is " + std::to_string(value) + ", must not be below 0");
+}
+
+/// A snapshot that knows how many axes there are.
+struct PyState {
+  ControllerState state;
+  std::size_t axes;
+};
+
+// One thread may push and one may step: the global lock keeps two from pushing at once, a lock of its own two that
+// step.
+class PyController {
+ public:
+  explicit PyController(const ControllerSettings& settings)
+      : control_(settings),
+        axes_(static_cast<std::size_t>(control_.axes())),
+        following_(axes_ - axis_count, 0.0),
+        stepping_(std::make_unique<std::mutex>()) {}
+
+  const MotionController& control() const noexcept { return control_; }
+  MotionController& control() noexcept { return control_; }
+  PyState state() const { return {control_.state(), axes_}; }
+  pybind11::array_t<double> following_end() const {
+    return pybind11::array_t<double>(static_cast<pybind11::ssize_t>(following_.size()), following_.data());
+  }
+  const Vector3& end() const noexcept { return end_; }
+
+  PushResult push(const Segment& segment, const std::optional<std::vector<double>>& following) {
+    const std::vector<double>& ends = following ? *following : following_;
+    const PushResult result = control_.push(segment, ends);
+    if (result == PushResult::accepted) {
+      end_ = segment.end_mm;
+      following_ = ends;
+    }
+    return result;
+  }
+
+  PushResult push_line(const Vector3& end, double feed, const std::optional<std::vector<double>>& following,
+                       std::uint32_t line, bool stop_at_end) {
+    Segment segment = make_line(end_, end, feed, line);
+    segment.stop_at_end = stop_at_end;
+    return push(segment, following);
+  }
+
+  PushResult push_arc(const Vector3& end, const Vector3& centre, double sweep, double feed, int normal,
+                      const std::optional<std::vector<double>>& following, std::uint32_t line, bool stop_at_end) {
+    Segment segment = make_arc(end_, end, centre, sweep, normal, feed, line);
+    segment.stop_at_end = stop_at_end;
+    return push(segment, following);
+  }
+
+  /// Segments from `first` on, as many as are taken: the next one, and what the last one was answered.
+  std::pair<pybind11::ssize_t, PushResult> push_path(const Path& path, pybind11::ssize_t first) {
+    std::size_t i = count_of(first, "first");
+    PushResult result = PushResult::accepted;
+    while (i < path.size() && result == PushResult::accepted) {
+      result = push(path[i], std::nullopt);
+      if (result == PushResult::accepted) ++i;
+    }
+    return {static_cast<pybind11::ssize_t>(i), result};
+  }
+
+  pybind11::array_t<double> step(pybind11::ssize_t periods) {
+    const std::size_t rows = count_of(periods, "periods");
+    pybind11::array_t<double> out({static_cast<pybind11::ssize_t>(rows), static_cast<pybind11::ssize_t>(axes_)});
+    double* to = out.mutable_data();
+    const pybind11::gil_scoped_release release;
+    const std::lock_guard lock(*stepping_);
+    for (std::size_t i = 0; i < rows; ++i) control_.step({to + i * axes_, axes_});
+    return out;
+  }
+
+  /// Steps until there is nothing more to do, at most so often.
+  pybind11::array_t<double> run(pybind11::ssize_t max_periods) {
+    const std::size_t most = std::min(count_of(max_periods, "max_periods"), most_periods);
+    std::vector<double> rows;
+    {
+      const pybind11::gil_scoped_release release;
+      const std::lock_guard lock(*stepping_);
+      for (std::size_t i = 0; i < most; ++i) {
+        rows.resize(rows.size() + axes_);
+        if (is_at_rest(control_.step(std::span(rows).last(axes_)))) break;
+      }
+    }
+    const auto count = static_cast<pybind11::ssize_t>(rows.size() / axes_);
+    return pybind11::array_t<double>({count, static_cast<pybind11::ssize_t>(axes_)}, rows.data());
+  }
+
+  void restart(const std::vector<double>& position) {
+    if (position.size() != axes_) {
+      throw Error(ErrorKind::argument, "position has " + std::to_string(position.size()) + " values, must have " +
+                                           std::to_string(axes_) + ", one for each axis");
+    }
+    if (!std::ranges::all_of(position, [](double value) { return std::isfinite(value); })) {
+      throw Error(ErrorKind::argument, "a value of the position is not finite");
+    }
+    const std::lock_guard lock(*stepping_);
+    control_.restart(position);
+    end_ = Vector3(position[0], position[1], position[2]);
+    following_.assign(position.begin() + axis_count, position.end());
+  }
+
+ private:
+  static bool is_at_rest(Activity activity) noexcept {
+    return activity == Activity::idle || activity == Activity::held || activity == Activity::aborted;
+  }
+
+  MotionController control_;
+  std::size_t axes_;
+  Vector3 end_ = Vector3::Zero();
+  std::vector<double> following_;
+  std::unique_ptr<std::mutex> stepping_;
+};
+
+}  // namespace shapegcode::bindings

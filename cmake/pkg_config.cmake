@@ -1,0 +1,42 @@
+# Writes shapegcode.pc beside the package file of CMake: what a C program, or one of another build system, links with.
+
+# What the library itself is linked with. A static library leaves that to its user, so that it is no private matter.
+set(pc_dependencies)
+if(NOT SHAPEGCODE_FMT_HEADER_ONLY)
+  string(APPEND pc_dependencies " -lfmt")
+endif()
+cmake_path(GET SUNDIALS_cvode_LIBRARY PARENT_PATH pc_folder)
+if(NOT pc_folder IN_LIST CMAKE_CXX_IMPLICIT_LINK_DIRECTORIES)
+  string(APPEND pc_dependencies " -L${pc_folder}")
+endif()
+# The order in which a linker of static libraries wants them.
+string(APPEND pc_dependencies " -lsundials_cvode -lsundials_nvecserial -lsundials_sunlinsoldense -lsundials_sunmatrixdense")
+set(pc_runtime ${CMAKE_CXX_IMPLICIT_LINK_LIBRARIES})
+list(FILTER pc_runtime INCLUDE REGEX "^(stdc\\+\\+|c\\+\\+|m)$")
+list(REMOVE_DUPLICATES pc_runtime)
+foreach(library IN LISTS pc_runtime)
+  string(APPEND pc_dependencies " -l${library}")
+endforeach()
+if(CMAKE_THREAD_LIBS_INIT)
+  string(APPEND pc_dependencies " ${CMAKE_THREAD_LIBS_INIT}")
+endif()
+if(core_type STREQUAL "STATIC_LIBRARY")
+  set(pc_libs "${pc_dependencies}")
+  set(pc_private_libs)
+else()
+  set(pc_libs)
+  set(pc_private_libs "${pc_dependencies}")
+endif()
+
+set(pc_cflags)
+get_target_property(pc_eigen Eigen3::Eigen INTERFACE_INCLUDE_DIRECTORIES)
+foreach(folder IN LISTS pc_eigen)
+  string(APPEND pc_cflags " -I${folder}")
+endforeach()
+
+# The tree may be moved: everything is found from where the file lies.
+set(pc_dir ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+file(RELATIVE_PATH pc_prefix ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
+string(REGEX REPLACE "/$" "" pc_prefix "${pc_prefix}")
+configure_file(${CMAKE_CURRENT_LIST_DIR}/shapegcode.pc.in shapegcode.pc @ONLY)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/shapegcode.pc DESTINATION ${pc_dir} COMPONENT development)

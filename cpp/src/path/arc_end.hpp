@@ -1,0 +1,18 @@
+// Private: whether the sweep of an arc leads to its end.
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+#include "path/arc_frame.hpp"
+#include "shapegcode/path.hpp"
+
+namespace shapegcode {
+
+/// What must be added to the sweep of an arc so that it leads to the end, within half a turn.
+[[nodiscard]] inline double missing_sweep_rad(const Segment& arc) noexcept {
+  const double end_rad = ArcFrame(arc.normal).angle_rad(arc.end_mm, arc.centre_mm);
+  return std::remainder(end_rad - (arc.start_angle_rad + arc.sweep_rad), 2.0 * std::numbers::pi);
+}
+
+}  // namespace shapegcode

@@ -1,0 +1,290 @@
+/* The C interface as a C99 compiler sees it: a square whose sides come while it is run, holds and override changes on
+   the way; arcs; and what is refused. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "shapegcode/shapegcode.h"
+
+static int failures = 0;
+
+#define CHECK(condition)                                                            \
+  do {                                                                              \
+    if (!(condition)) {                                                             \
+      ++failures;                                                                   \
+      fprintf(stderr, "%s:%d: %s does not hold\n", __FILE__, __LINE__, #condition); \
+    }                                                                               \
+  } while (0)
+
+static const double period_s = 0.001;
+static const double feed_mm_per_s = 100.0;
+static const double tolerance_mm = 0.05;
+
+static shapegcode_settings plain_settings(void) {
+  shapegcode_settings settings;
+  int axis;
+  CHECK(shapegcode_settings_init(&settings, sizeof settings) == SHAPEGCODE_OK);
+  settings.period_s = period_s;
+  settings.limits.law = SHAPEGCODE_JERK_LIMITED;
+  for (axis = 0; axis < 3; ++axis) {
+    settings.limits.max_acceleration_mm_per_s2[axis] = 1000.0;
+    settings.limits.max_jerk_mm_per_s3[axis] = 50000.0;
+  }
+  settings.contour_tolerance_mm = tolerance_mm;
+  return settings;
+}
+
+static shapegcode_controller* made(const shapegcode_settings* settings) {
+  shapegcode_controller* control = NULL;
+  char message[200];
+  const shapegcode_status status = shapegcode_controller_create(settings, &control, message, sizeof message);
+  if (status != SHAPEGCODE_OK) fprintf(stderr, "create: %s: %s\n", shapegcode_status_text(status), message);
+  CHECK(status == SHAPEGCODE_OK && control != NULL && message[0] == '\0');
+  return control;
+}
+
+static double distance(const double* a, const double* b) { return sqrt(pow(a[0] - b[0], 2) + pow(a[1] - b[1], 2)); }
+
+static shapegcode_state state_of(const shapegcode_controller* control) {
+  shapegcode_state state;
+  CHECK(shapegcode_controller_state(control, &state, sizeof state) == SHAPEGCODE_OK);
+  return state;
+}
+
+/* Steps until it does that, at most so often. */
+static void run(shapegcode_controller* control, double* set_point, shapegcode_activity until, int most) {
+  shapegcode_activity activity;
+  do {
+    CHECK(shapegcode_controller_step(control, set_point, &activity) == SHAPEGCODE_OK);
+  } while (activity != until && --most > 0);
+  CHECK(activity == until);
+}
+
+/* What happens to the square at which period. */
+static void operate(shapegcode_controller* control, int step) {
+  if (step == 300) CHECK(shapegcode_controller_feed_override(control, 0.5) == SHAPEGCODE_OK);
+  if (step == 600) CHECK(shapegcode_controller_hold(control) == SHAPEGCODE_OK);
+  if (step == 1000) {
+    CHECK(state_of(control).activity == SHAPEGCODE_HELD);
+    CHECK(state_of(control).speed_mm_per_s == 0.0);
+    CHECK(shapegcode_controller_resume(control) == SHAPEGCODE_OK);
+    CHECK(shapegcode_controller_feed_override(control, 1.2) == SHAPEGCODE_OK);
+  }
+}
+
+static void square(void) {
+  static const double corners[4][3] = {{40, 0, 0}, {40, 40, 0}, {0, 40, 0}, {0, 0, 0}};
+  const int32_t delays[2] = {0, 11};
+  const double taps[2] = {0.516, 0.484};
+  const shapegcode_shaper zv = {delays, taps, 2};
+  shapegcode_settings settings = plain_settings();
+  shapegcode_controller* control;
+  shapegcode_activity activity = SHAPEGCODE_MOVING;
+  double set_point[3] = {0, 0, 0};
+  double nearest[4] = {1e9, 1e9, 1e9, 1e9};
+  double fastest = 0.0;
+  int pushed = 0;
+  int step = 0;
+  settings.shapers = &zv;
+  settings.shaper_count = 1;
+  control = made(&settings);
+  while (step < 20000 && (pushed < 4 || activity != SHAPEGCODE_IDLE)) {
+    double before[3];
+    int corner;
+    /* Every tenth of a second a side, long before the one before is at its end. */
+    if (pushed < 4 && step % 100 == 0) {
+      CHECK(shapegcode_controller_push_line(control, corners[pushed], feed_mm_per_s, (uint32_t)pushed + 1,
+                                            pushed == 3) == SHAPEGCODE_OK);
+      ++pushed;
+    }
+    operate(control, step);
+    memcpy(before, set_point, sizeof before);
+    CHECK(shapegcode_controller_step(control, set_point, &activity) == SHAPEGCODE_OK);
+    fastest = fmax(fastest, distance(before, set_point) / period_s);
+    for (corner = 0; corner < 4; ++corner) {
+      if (step > 100) nearest[corner] = fmin(nearest[corner], distance(set_point, corners[corner]));
+    }
+    ++step;
+  }
+  CHECK(activity == SHAPEGCODE_IDLE);
+  CHECK(set_point[0] == 0.0 && set_point[1] == 0.0 && set_point[2] == 0.0);
+  CHECK(fastest <= 1.2 * feed_mm_per_s * (1 + 1e-9) && fastest > 1.19 * feed_mm_per_s);
+  for (step = 0; step < 4; ++step) CHECK(nearest[step] <= tolerance_mm);
+  CHECK(state_of(control).segments_done == 4 && state_of(control).segments_waiting == 0);
+  CHECK(state_of(control).starvations == 0 && state_of(control).feed_override == 1.2);
+  CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
+}
+
+static void arcs(void) {
+  const double pi = 3.14159265358979323846;
+  shapegcode_settings settings = plain_settings();
+  shapegcode_controller* control;
+  shapegcode_arc arc = {{20, 0, 0}, 0, 2};
+  const double start[3] = {0, 0, 0};
+  const double end[3] = {20, 20, 5};
+  double set_point[3];
+  double highest = -1e9;
+  double lowest = 1e9;
+  shapegcode_activity activity = SHAPEGCODE_MOVING;
+  settings.smoothing_time_s = 0.0;
+  control = made(&settings);
+  CHECK(shapegcode_controller_push_arc(control, start, &arc, feed_mm_per_s, 1, 0) == SHAPEGCODE_NO_ARC); /* no sweep */
+  arc.sweep_rad = 0.3;
+  CHECK(shapegcode_controller_push_arc(control, end, &arc, feed_mm_per_s, 1, 0) == SHAPEGCODE_NO_ARC); /* leads away */
+  arc.sweep_rad = NAN;
+  CHECK(shapegcode_controller_push_arc(control, end, &arc, feed_mm_per_s, 1, 0) == SHAPEGCODE_NOT_FINITE);
+  arc.sweep_rad = -2.0 * pi;
+  CHECK(shapegcode_controller_push_arc(control, start, &arc, -1.0, 1, 0) == SHAPEGCODE_NO_FEED);
+  CHECK(shapegcode_controller_push_arc(control, start, &arc, feed_mm_per_s, 1, 0) == SHAPEGCODE_OK); /* a circle */
+  arc.sweep_rad = -0.5 * pi + 1e-5; /* rounded: the end is met all the same */
+  CHECK(shapegcode_controller_push_arc(control, end, &arc, feed_mm_per_s, 2, 1) == SHAPEGCODE_OK);
+  while (activity != SHAPEGCODE_IDLE && state_of(control).steps < 10000) {
+    CHECK(shapegcode_controller_step(control, set_point, &activity) == SHAPEGCODE_OK);
+    highest = fmax(highest, set_point[1]);
+    lowest = fmin(lowest, set_point[1]);
+  }
+  CHECK(fabs(highest - 20.0) < 0.01 && fabs(lowest + 20.0) < 0.01);
+  CHECK(set_point[0] == end[0] && set_point[1] == end[1] && set_point[2] == end[2]);
+  CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
+}
+
+static void following_axis(void) {
+  shapegcode_settings settings = plain_settings();
+  shapegcode_controller* control;
+  const double end[4] = {10, 0, 0, 90};
+  const double turned[4] = {10, 0, 0, 45};
+  double set_point[4];
+  int32_t axes = 0;
+  settings.following_count = 1;
+  control = made(&settings);
+  CHECK(shapegcode_controller_axes(control, &axes) == SHAPEGCODE_OK && axes == 4);
+  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 1, 1) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 2, 1) == SHAPEGCODE_NO_LENGTH);
+  CHECK(shapegcode_controller_push_line(control, turned, feed_mm_per_s, 2, 1) == SHAPEGCODE_OK);
+  run(control, set_point, SHAPEGCODE_IDLE, 10000);
+  CHECK(set_point[0] == 10.0 && set_point[3] == 45.0);
+  CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
+}
+
+static void abort_and_restart(void) {
+  const shapegcode_settings settings = plain_settings();
+  shapegcode_controller* control = made(&settings);
+  const double far_away[3] = {100, 0, 0};
+  const double wrong[3] = {INFINITY, 0, 0};
+  double set_point[3];
+  CHECK(shapegcode_controller_push_line(control, far_away, feed_mm_per_s, 7, 1) == SHAPEGCODE_OK);
+  run(control, set_point, SHAPEGCODE_MOVING, 1);
+  while (set_point[0] < 30.0 && failures == 0) run(control, set_point, SHAPEGCODE_MOVING, 1);
+  CHECK(state_of(control).line == 7);
+  CHECK(shapegcode_controller_abort(control) == SHAPEGCODE_OK);
+  run(control, set_point, SHAPEGCODE_ABORTED, 1000);
+  CHECK(set_point[0] > 30.0 && set_point[0] < 60.0);
+  CHECK(shapegcode_controller_push_line(control, far_away, feed_mm_per_s, 8, 1) == SHAPEGCODE_AFTER_ABORT);
+  CHECK(shapegcode_controller_restart(control, wrong) == SHAPEGCODE_NOT_FINITE);
+  CHECK(shapegcode_controller_restart(control, set_point) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_push_line(control, far_away, feed_mm_per_s, 8, 1) == SHAPEGCODE_OK);
+  run(control, set_point, SHAPEGCODE_IDLE, 10000);
+  CHECK(set_point[0] == 100.0);
+  CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
+}
+
+static void refused_settings(void) {
+  shapegcode_settings settings = plain_settings();
+  shapegcode_controller* control = (shapegcode_controller*)&settings;
+  const int32_t delays[2] = {0, 11};
+  const double taps[2] = {0.5, 0.4};
+  const shapegcode_shaper not_one = {delays, taps, 2};
+  char message[200] = "before";
+  char short_message[8];
+  settings.period_s = -1.0;
+  CHECK(shapegcode_controller_create(&settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(control == NULL && strstr(message, "-1") != NULL);
+  CHECK(shapegcode_controller_create(&settings, &control, short_message, sizeof short_message) ==
+        SHAPEGCODE_ERROR_ARGUMENT);
+  CHECK(strlen(short_message) == 7 && strncmp(message, short_message, 7) == 0);
+  CHECK(shapegcode_controller_create(&settings, &control, NULL, 0) == SHAPEGCODE_ERROR_ARGUMENT);
+  settings = plain_settings();
+  settings.shapers = &not_one;
+  settings.shaper_count = 1;
+  CHECK(shapegcode_controller_create(&settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_ARGUMENT);
+  settings.shapers = NULL;
+  CHECK(shapegcode_controller_create(&settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_ARGUMENT);
+  settings = plain_settings();
+  settings.following_count = SHAPEGCODE_MOST_FOLLOWING_AXES + 1;
+  CHECK(shapegcode_controller_create(&settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_ARGUMENT);
+  settings = plain_settings();
+  settings.limits.law = 2;
+  CHECK(shapegcode_controller_create(&settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_ARGUMENT);
+  memset(&settings, 0, sizeof settings); /* nobody initialised it */
+  CHECK(shapegcode_controller_create(&settings, &control, message, sizeof message) == SHAPEGCODE_ERROR_STRUCT_SIZE);
+  CHECK(strcmp(message, shapegcode_status_text(SHAPEGCODE_ERROR_STRUCT_SIZE)) == 0);
+  CHECK(shapegcode_settings_init(&settings, sizeof settings + 8) == SHAPEGCODE_ERROR_STRUCT_SIZE);
+}
+
+static void refused_calls(void) {
+  const shapegcode_settings settings = plain_settings();
+  shapegcode_controller* control = NULL;
+  shapegcode_state state;
+  const double end[3] = {1, 0, 0};
+  const double nowhere[3] = {NAN, 0, 0};
+  CHECK(shapegcode_settings_init(NULL, sizeof settings) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_controller_create(NULL, &control, NULL, 0) == SHAPEGCODE_ERROR_NULL && control == NULL);
+  CHECK(shapegcode_controller_push_line(NULL, end, 1.0, 0, 0) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_controller_step(NULL, NULL, NULL) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_controller_hold(NULL) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_controller_destroy(NULL) == SHAPEGCODE_OK);
+  control = made(&settings);
+  CHECK(shapegcode_controller_push_line(control, NULL, 1.0, 0, 0) == SHAPEGCODE_ERROR_NULL);
+  CHECK(shapegcode_controller_push_line(control, nowhere, 1.0, 0, 0) == SHAPEGCODE_NOT_FINITE);
+  CHECK(shapegcode_controller_push_line(control, end, 0.0, 0, 0) == SHAPEGCODE_NO_FEED);
+  CHECK(shapegcode_controller_state(control, &state, 3) == SHAPEGCODE_ERROR_STRUCT_SIZE);
+  CHECK(shapegcode_controller_push_line(control, end, 1.0, 0, 0) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
+}
+
+static void full_queue(void) {
+  shapegcode_settings settings = plain_settings();
+  shapegcode_controller* control;
+  double end[3] = {0, 0, 0};
+  double set_point[3];
+  double periods = -1.0;
+  int taken = 0;
+  settings.window = 8;
+  settings.queue = 8;
+  control = made(&settings);
+  do {
+    end[0] = taken + 1.0;
+  } while (taken < 100 && shapegcode_controller_push_line(control, end, feed_mm_per_s, 0, 1) == SHAPEGCODE_OK &&
+           ++taken);
+  CHECK(taken >= 8 && taken < 100);
+  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 0, 1) == SHAPEGCODE_QUEUE_FULL);
+  run(control, set_point, SHAPEGCODE_IDLE, 100000);
+  CHECK(set_point[0] == taken); /* what was not taken left no trace */
+  CHECK(shapegcode_controller_push_line(control, end, feed_mm_per_s, 0, 1) == SHAPEGCODE_OK);
+  CHECK(shapegcode_controller_delay(control, &periods) == SHAPEGCODE_OK && periods >= 0.0);
+  CHECK(shapegcode_controller_destroy(control) == SHAPEGCODE_OK);
+}
+
+static void texts(void) {
+  int code;
+  CHECK(shapegcode_c_version() == SHAPEGCODE_C_VERSION);
+  for (code = SHAPEGCODE_ERROR_INTERNAL; code <= SHAPEGCODE_NO_ARC; ++code) {
+    CHECK(strcmp(shapegcode_status_text(code), shapegcode_status_text(1000)) != 0);
+  }
+  for (code = SHAPEGCODE_IDLE; code <= SHAPEGCODE_ABORTED; ++code) {
+    CHECK(strcmp(shapegcode_activity_text(code), shapegcode_activity_text(1000)) != 0);
+  }
+}
+
+int main(void) {
+  texts();
+  refused_settings();
+  refused_calls();
+  square();
+  arcs();
+  following_axis();
+  abort_and_restart();
+  full_queue();
+  if (failures == 0) printf("the C interface does what its header says\n");
+  return failures == 0 ? 0 : 1;
+}
