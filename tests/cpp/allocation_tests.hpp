@@ -26,3 +26,4 @@ inline void expect(bool holds, const char* what) {
 }
 
 void check_motion_controller();
+void check_c_interface();
