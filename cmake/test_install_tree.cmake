@@ -28,6 +28,17 @@ endfunction()
 
 run(${CMAKE_COMMAND} --install ${BUILD_DIR} --config ${BUILD_TYPE} --prefix ${WORK_DIR}/prefix)
 run_example(controller_prototype first_motion controller_prototype)
+run(${WORK_DIR}/controller_prototype/closed_loop --csv ${WORK_DIR}/closed_loop.csv)
+# Of both drives, with and without shaper, at least a second each.
+file(STRINGS ${WORK_DIR}/closed_loop.csv rows)
+foreach(case "ideal,plain" "ideal,shaped" "with friction,plain" "with friction,shaped")
+  set(of_case ${rows})
+  list(FILTER of_case INCLUDE REGEX "^${case},[0-9.]+(,-?[0-9.]+)+$")
+  list(LENGTH of_case number)
+  if(number LESS 1000)
+    message(FATAL_ERROR "closed_loop.csv has ${number} rows of ${case}")
+  endif()
+endforeach()
 run_example(motion_controller moving moving_c)
 
 file(GLOB_RECURSE pc_file ${WORK_DIR}/prefix/*/shapegcode.pc)
