@@ -129,8 +129,8 @@ void Report::repeated(const Repeated& found) {
 }
 
 void Report::periodic(const Periodic& found, double minutes) {
-  std::printf("\nloop of 1 ms for %g min beside a busy process, %s; others took %.2f cores\n%s%s%s%s", minutes,
-              found.thread.c_str(), found.others_cores, header.c_str(),
+  std::printf("\nloop of 1 ms for %g min beside a busy process, %s; others took %.2f cores, the host %.3f\n%s%s%s%s",
+              minutes, found.thread.c_str(), found.others_cores, found.stolen_cores, header.c_str(),
               row("late, with the control", found.late).c_str(),
               row("late, a loop without one", found.late_alone).c_str(), row("step()", found.step).c_str());
   std::printf("  missed periods: %zu with the control, %zu without\n", found.missed, found.missed_alone);
@@ -138,8 +138,9 @@ void Report::periodic(const Periodic& found, double minutes) {
   print_histogram("late, with", found.late, "late, without", found.late_alone);
   add("periodic", "{\"thread\": " + quoted(found.thread) + ", \"late\": " + json_of(found.late) +
                       ", \"late_alone\": " + json_of(found.late_alone) + ", \"step\": " + json_of(found.step) +
-                      format(", \"missed\": %zu, \"missed_alone\": %zu, \"minutes\": %g, \"others_cores\": %.3f}",
-                             found.missed, found.missed_alone, minutes, found.others_cores));
+                      format(", \"missed\": %zu, \"missed_alone\": %zu, \"minutes\": %g, \"others_cores\": %.3f, "
+                             "\"stolen_cores\": %.3f}",
+                             found.missed, found.missed_alone, minutes, found.others_cores, found.stolen_cores));
   std::fflush(stdout);
 }
 

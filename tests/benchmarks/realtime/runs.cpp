@@ -240,6 +240,7 @@ Periodic periodic(double minutes) {
   busy.reset();  // counted among our own from here on
   found.starvations = control.state().starvations;
   found.others_cores = load.cores();
+  found.stolen_cores = load.stolen_cores();
   for (Durations* durations : {&found.late, &found.late_alone, &found.step}) durations->sort();
   return found;
 }

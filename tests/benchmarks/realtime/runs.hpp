@@ -48,6 +48,7 @@ struct Periodic {
   std::size_t missed = 0, missed_alone = 0;  ///< periods that were over before their step was done
   std::uint64_t starvations = 0;
   double others_cores = 0.0;
+  double stolen_cores = 0.0;  ///< by the host of a virtual machine
 };
 [[nodiscard]] Periodic periodic(double minutes);
 

@@ -41,14 +41,17 @@ std::string first_line(const char* file, const std::string& key = "") {
   return "";
 }
 
-double busy_s() {
+// Of all processors: what the fields from `first` to `last` of /proc/stat count, without idle and iowait.
+double processors_s(int first, int last) {
   std::istringstream line(first_line("/proc/stat").substr(3));
   double sum = 0.0;
   double value = 0.0;
-  // user nice system idle iowait irq softirq
-  for (int i = 0; i < 7 && line >> value; ++i) sum += i == 3 || i == 4 ? 0.0 : value;
+  // user nice system idle iowait irq softirq steal
+  for (int i = 0; i <= last && line >> value; ++i) sum += i < first || i == 3 || i == 4 ? 0.0 : value;
   return sum / static_cast<double>(sysconf(_SC_CLK_TCK));
 }
+double busy_s() { return processors_s(0, 6); }
+double stolen_s() { return processors_s(7, 7); }
 
 double own_s() {
   double sum = 0.0;
@@ -137,11 +140,14 @@ BusyProcess::~BusyProcess() {
   waitpid(id_, nullptr, 0);
 }
 
-OthersLoad::OthersLoad() : busy_s_(busy_s()), own_s_(own_s()), begin_ns_(now_ns()) {}
+OthersLoad::OthersLoad() : busy_s_(busy_s()), own_s_(own_s()), stolen_s_(stolen_s()), begin_ns_(now_ns()) {}
 
-double OthersLoad::cores() const {
-  const double wall_s = static_cast<double>(now_ns() - begin_ns_) / static_cast<double>(ns_per_s);
-  return std::max(0.0, (busy_s() - busy_s_) - (own_s() - own_s_)) / std::max(wall_s, 1e-3);
+double OthersLoad::wall_s() const {
+  return std::max(static_cast<double>(now_ns() - begin_ns_) / static_cast<double>(ns_per_s), 1e-3);
 }
+
+double OthersLoad::cores() const { return std::max(0.0, (busy_s() - busy_s_) - (own_s() - own_s_)) / wall_s(); }
+
+double OthersLoad::stolen_cores() const { return (stolen_s() - stolen_s_) / wall_s(); }
 
 }  // namespace realtime

@@ -57,9 +57,13 @@ class OthersLoad {
   OthersLoad();
   /// Of other processes than this one and its children that have ended.
   [[nodiscard]] double cores() const;
+  /// What the host of a virtual machine took of its processors, in cores.
+  [[nodiscard]] double stolen_cores() const;
 
  private:
-  double busy_s_, own_s_;
+  [[nodiscard]] double wall_s() const;
+
+  double busy_s_, own_s_, stolen_s_;
   std::int64_t begin_ns_;
 };
 
