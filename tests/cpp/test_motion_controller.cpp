@@ -338,3 +338,21 @@ TEST_CASE("the correction brings an arc back to its radius") {
   CHECK(cut == doctest::Approx(60.0 * 60.0 * 46.75e-6 / 20.0).epsilon(0.01));
   CHECK(std::abs(short_of_radius(true)) < 0.01 * cut);
 }
+
+TEST_CASE("a motion of many metres ends") {
+  ControllerSettings settings = limited();
+  MotionController control(settings);
+  // Distances of 50 m have an ulp of 7e-12 mm.
+  double at = 0.0;
+  constexpr int moves = 1000;
+  for (int k = 0; k < moves; ++k) {
+    const double to = k % 2 == 0 ? 50.1 + 0.01 * k : 0.3;
+    Segment segment = make_line({at, 0, 0}, {to, 0, 0}, 200.0);
+    segment.stop_at_end = k + 1 == moves;
+    REQUIRE(control.push(segment) == PushResult::accepted);
+    at = to;
+  }
+  const Run run = run_until_idle(control);
+  CHECK(run.last == Activity::idle);
+  CHECK(run.set_points.back()[0] == at);
+}

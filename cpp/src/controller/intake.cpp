@@ -26,8 +26,8 @@ PushResult Intake::take(const Segment& segment, std::span<const double> followin
   if (result != PushResult::accepted) return result;
   look_at(entry);
   entry.open_end =
-      zone_of_jump(Jump::turn, std::min(entry.fastest, attainable(entry.passed, entry.segment.length_mm, limits_)),
-                   limits_, jerk_s_);
+      zone_of_jump(Jump::turn, std::min(entry.fastest, attainable(entry.passed, entry.segment.length_mm, steepest_)),
+                   steepest_, jump_time_s_);
   last_segment_ = entry.segment;
   last_rate_ = entry.following_rate;
   last_fastest_ = entry.fastest;
@@ -122,8 +122,8 @@ void Intake::look_at_jumps(QueuedSegment& entry) const noexcept {
           jump_speed({turn, 0.0, following_[i].max_acceleration, following_[i].max_jerk}, shape, limits_.jumps));
     }
   }
-  entry.passed = std::min({entry.corner, fastest, attainable(last_passed_, last_segment_.length_mm, limits_)});
-  if (kind != Jump::none) entry.jump = zone_of_jump(kind, entry.passed, limits_, jerk_s_);
+  entry.passed = std::min({entry.corner, fastest, attainable(last_passed_, last_segment_.length_mm, steepest_)});
+  if (kind != Jump::none) entry.jump = zone_of_jump(kind, entry.passed, steepest_, jump_time_s_);
 }
 
 }  // namespace shapegcode

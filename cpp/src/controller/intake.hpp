@@ -14,7 +14,11 @@ class Intake {
  public:
   Intake(const MotionLimits& limits, const std::vector<FollowingLimits>& following, const FilterTolerance& tolerance,
          double jerk_s)
-      : limits_(limits), following_(following), tolerance_(tolerance), jerk_s_(jerk_s) {}
+      : limits_(limits),
+        following_(following),
+        tolerance_(tolerance),  // A segment of following axes alone knows no limit of X, Y and Z.
+        steepest_(following.empty() ? steepest_of(limits) : MotionLimits::none),
+        jump_time_s_(jump_time_s(limits, jerk_s)) {}
 
   /// The next segment starts at this position, whatever came before.
   void restart(std::span<const double> position) noexcept;
@@ -29,7 +33,8 @@ class Intake {
   MotionLimits limits_;
   std::vector<FollowingLimits> following_;
   FilterTolerance tolerance_;
-  double jerk_s_;
+  double steepest_;
+  double jump_time_s_;
   Segment last_segment_;
   std::array<double, most_following_axes> last_following_{}, last_rate_{};
   double last_fastest_ = MotionLimits::none;

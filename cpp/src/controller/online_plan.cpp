@@ -136,8 +136,9 @@ void OnlineProfile::absorb() noexcept {
   if (entry.corner <= 0.0) stop_before(i);
   const bool fitted = state_ == State::running && !slow_down_ && !stop_ && fits();
   connect(i);
-  if (fitted && !fits() && !slows_down_before(i)) {
-    // Too late for the speed of that corner: the machine stops there, as it was about to.
+  if (fitted && !fits() && (jerk_s_ > 0.0 || !slows_down_before(i))) {
+    // Too late for the speed of that corner, or for the slow stretch around it that the jerk time wants: the machine
+    // stops there, as it was about to.
     stop_before(i);
     connect(i);
   }

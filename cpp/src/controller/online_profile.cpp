@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "motion/speed_limits.hpp"
 
@@ -147,21 +148,18 @@ bool OnlineProfile::next_phase() noexcept {
   return true;
 }
 
-// A motion begins with segment running_.
-void OnlineProfile::begin(bool settled) noexcept {
-  if (settled) {
-    for (std::uint64_t i = running_; i < absorbed_; ++i) {
-      QueuedSegment& entry = (*ring_)[i];
-      entry.distance = i == running_ ? 0.0 : (*ring_)[i - 1].distance + (*ring_)[i - 1].segment.length_mm;
-    }
-    tick_ = 0;
-    began_anew_ = true;
+// A motion begins with segment running_, its distances counted anew.
+void OnlineProfile::begin() noexcept {
+  for (std::uint64_t i = running_; i < absorbed_; ++i) {
+    QueuedSegment& entry = (*ring_)[i];
+    entry.distance = i == running_ ? 0.0 : (*ring_)[i - 1].distance + (*ring_)[i - 1].segment.length_mm;
   }
-  distance_ = (*ring_)[running_].distance;
-  const double time_s = settled ? 0.0 : static_cast<double>(tick_ - 1) * period_s_;
-  phase_ = {time_s, 0.0, distance_, 0.0, 0.0};
+  tick_ = 1;
+  began_anew_ = true;
+  distance_ = 0.0;
+  phase_ = {};
   has_phase_ = changed_ = slow_down_ = false;
-  length_ = distance_;
+  length_ = 0.0;
   speed_ = 0.0;
   ramp_ = ramp_count_ = 0;
   enter(running_);
@@ -172,10 +170,11 @@ void OnlineProfile::come_to_rest() noexcept {
   speed_now_ = 0.0;
   const QueuedSegment& entry = (*ring_)[running_];
   if (piece_ == remaining_count_ && ramp_ == ramp_count_ &&
-      length_ >= entry.distance + entry.segment.length_mm * (1.0 - 1e-12)) {
+      length_ >= (entry.distance + entry.segment.length_mm) * (1.0 - 8.0 * std::numeric_limits<double>::epsilon()) -
+                     1e-12 * entry.segment.length_mm) {
     distance_ = entry.distance + entry.segment.length_mm;
     ++running_;
-    state_ = entry.segment.stop_at_end ? State::pause : State::rest;
+    state_ = State::rest;
     if (running_ < absorbed_) (*ring_)[running_].forward = 0.0;
   } else {
     distance_ = length_;
@@ -185,11 +184,9 @@ void OnlineProfile::come_to_rest() noexcept {
 
 void OnlineProfile::advance(bool settled) noexcept {
   ++tick_;
-  if (state_ == State::pause && settled) state_ = State::rest;
-  if (state_ == State::rest && running_ < absorbed_ && !waiting_ && !stop_ && ratio_ > 0.0) {
-    begin(settled);
-    if (settled) tick_ = 1;
-  }
+  // Not before the set-points have come to rest: they are still on their way to the corner.
+  const bool waits = !settled || waiting_ || stop_ || ratio_ <= 0.0;
+  if (state_ == State::rest && running_ < absorbed_ && !waits) begin();
   if ((state_ == State::running && (changed_ || (slow_down_ && may_run(distance_, speed_now_)))) ||
       (state_ == State::stopped && !stop_ && ratio_ > 0.0)) {
     generate_anew();

@@ -85,7 +85,6 @@ class OnlineProfile {
  private:
   enum class State : std::uint8_t {
     rest,     // before running_, which is at its start; nothing is generated
-    pause,    // at an exact stop, until everything has settled
     stopped,  // within a segment
     running,
   };
@@ -102,7 +101,7 @@ class OnlineProfile {
   void remain_from(double offset) noexcept;
   void pass_remaining() noexcept;
   [[nodiscard]] double start_after(std::size_t piece) noexcept;
-  void begin(bool settled) noexcept;
+  void begin() noexcept;
   void enter(std::uint64_t index) noexcept;
   void generate_anew() noexcept;
   bool next_phase() noexcept;

@@ -53,7 +53,8 @@ PathSpeeds path_speeds(const Path& path, const MotionLimits& limits, const Filte
       const double fastest = std::min(speeds.fastest[i - 1], speeds.fastest[i]);
       speeds.jump[i] = jumps.kind;
       corner = std::min(corner, junction_jump_speed(path[i - 1], path[i], limits, jumps, fastest));
-      speeds.passed[i] = std::min({corner, fastest, attainable(speeds.passed[i - 1], path[i - 1].length_mm, limits)});
+      speeds.passed[i] =
+          std::min({corner, fastest, attainable(speeds.passed[i - 1], path[i - 1].length_mm, steepest_of(limits))});
     }
     if (caps != nullptr) {
       speed = std::min(speed, static_cast<double>(caps->on_segment[i]));
@@ -80,7 +81,8 @@ class Zones {
       const bool looks = !speeds.jump.empty();
       Zone jump;
       if (looks && speeds.jump[junction] != Jump::none) {
-        jump = zone_of_jump(speeds.jump[junction], speeds.passed[junction], limits, speeds.jerk_s);
+        jump = zone_of_jump(speeds.jump[junction], speeds.passed[junction], steepest_of(limits),
+                            jump_time_s(limits, speeds.jerk_s));
       }
       extend(carry, junction_zones({speeds.on_segment[from], path[from].feed_mm_per_s * limits.feed_override,
                                     speeds.on_segment[into], speeds.corner[junction], jump},

@@ -56,11 +56,11 @@ struct JunctionSpeeds {
 enum ZoneKind : std::size_t { corner_zone, feed_zone, jump_zone, zone_kinds };
 using ZoneSet = std::array<Zone, zone_kinds>;
 
-/// The zone of a jump that is passed at most at `speed`: as far as the path goes within the time that counts. It is the
-/// same whatever the override is, so that what the machine is told to do stays possible when it is turned.
-inline Zone zone_of_jump(Jump jump, double speed, const MotionLimits& limits, double jerk_s) noexcept {
-  const double time_s = jump_time_s(limits, jerk_s);
-  return {static_cast<double>(jump), time_s * (speed + 0.5 * limits.max_acceleration_mm_per_s2.norm() * time_s)};
+/// The zone of a jump that is passed at most at `speed`: as far as the path goes within the time that counts, if
+/// nothing is accelerated by more than `steepest`. It is the same whatever the override is, so that what the machine is
+/// told to do stays possible when it is turned.
+inline Zone zone_of_jump(Jump jump, double speed, double steepest, double time_s) noexcept {
+  return {static_cast<double>(jump), time_s * (speed + 0.5 * steepest * time_s)};
 }
 
 inline ZoneSet junction_zones(const JunctionSpeeds& at, const MotionLimits& limits, double jerk_s) noexcept {
@@ -84,9 +84,12 @@ inline ZoneSet beyond(const ZoneSet& zones, double length) noexcept {
   return {beyond(zones[corner_zone], length), beyond(zones[feed_zone], length), beyond(zones[jump_zone], length)};
 }
 
+/// Largest acceleration along any path of X, Y and Z.
+inline double steepest_of(const MotionLimits& limits) noexcept { return limits.max_acceleration_mm_per_s2.norm(); }
+
 /// Speed at the end of a segment that is entered at a speed, whatever the override is.
-inline double attainable(double speed, double length, const MotionLimits& limits) noexcept {
-  return std::sqrt(speed * speed + 2.0 * limits.max_acceleration_mm_per_s2.norm() * length);
+inline double attainable(double speed, double length, double steepest) noexcept {
+  return std::sqrt(speed * speed + 2.0 * steepest * length);
 }
 
 /// A zone as far as it reaches into a segment that is never run faster than `fastest`: no farther than the time that
