@@ -90,8 +90,7 @@ void Intake::look_at(QueuedSegment& entry) const noexcept {
   entry.fastest = std::min(fastest_speed(segment, limits_, tolerance_), entry.hard_limit);
   entry.corner = MotionLimits::none;
   for (const bool eased : {false, true}) {
-    const double following = eased ? 0.5 * entry.following_acceleration : entry.following_acceleration;
-    entry.line_acceleration[eased ? 1 : 0] = std::min(following, segment_acceleration(segment, 0.0, limits_, eased));
+    entry.line_acceleration[eased ? 1 : 0] = acceleration_along(entry, 0.0, limits_, eased);
   }
   entry.jump = Zone{};
   entry.passed = 0.0;  // from rest

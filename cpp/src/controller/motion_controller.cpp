@@ -124,7 +124,6 @@ class MotionController::Implementation {
     position_ = rest_;
     intake_.restart({rest_.data(), axes()});
     profile_.restart(head);
-    static_cast<void>(profile_.began_anew());
     cursor_ = head;
     has_cursor_ = false;
     const double nothing = 0.0;

@@ -8,8 +8,6 @@
 
 namespace shapegcode {
 
-// ---------------------------------------------------------------------------------------------------------
-
 double OnlineProfile::limit_of(const QueuedSegment& entry) const noexcept {
   return std::min(entry.feed * ratio_, entry.hard_limit);
 }
@@ -33,10 +31,14 @@ void OnlineProfile::split(QueuedSegment& entry) noexcept {
   }
 }
 
+double acceleration_along(const QueuedSegment& entry, double speed, const MotionLimits& limits, bool eased) noexcept {
+  return std::min(eased ? eased_share * entry.following_acceleration : entry.following_acceleration,
+                  segment_acceleration(entry.segment, speed, limits, eased));
+}
+
 double OnlineProfile::acceleration_of(const QueuedSegment& entry, double speed, bool eased) const noexcept {
   if (entry.segment.kind != SegmentKind::arc) return entry.line_acceleration[eased ? 1 : 0];
-  return std::min(eased ? 0.5 * entry.following_acceleration : entry.following_acceleration,
-                  segment_acceleration(entry.segment, speed, limits_, eased));
+  return acceleration_along(entry, speed, limits_, eased);
 }
 
 // Forward speeds of `first` and all after it; that of `first` itself stands.
@@ -77,8 +79,8 @@ bool OnlineProfile::pass_backward(std::uint64_t first_changed) noexcept {
 
 // Zones that reach back from the junctions, from that of `newest` to where nothing changes (`all`: to the segment that
 // is being run). First segment that changed. While the machine moves, no farther than the zones of the newest
-// themselves reach: what a row of zones, each going on from the last, would lower behind them has nothing to do with
-// it.
+// and of the one before it reach: what a row of zones, each going on from the last, would lower behind them has nothing
+// to do with it.
 std::uint64_t OnlineProfile::zones_backward(std::uint64_t newest, bool all) noexcept {
   QueuedSegment& last = (*ring_)[newest];
   last.at_end = ZoneSet{};
@@ -108,6 +110,15 @@ std::uint64_t OnlineProfile::zones_backward(std::uint64_t newest, bool all) noex
   return changed;
 }
 
+// Zones that reach over the junction at the start of segment `index`.
+void OnlineProfile::zones_at_start(std::uint64_t index) noexcept {
+  QueuedSegment& entry = (*ring_)[index];
+  const QueuedSegment& before = (*ring_)[index - 1];
+  entry.at_start = beyond(before.at_start, before.segment.length_mm);
+  extend(entry.at_start, zones_between(index - 1, index));
+  cut_to(entry.at_start, entry.fastest, jump_time_s(limits_, jerk_s_));
+}
+
 void OnlineProfile::absorb() noexcept {
   const std::uint64_t i = absorbed_;
   QueuedSegment& entry = (*ring_)[i];
@@ -120,13 +131,10 @@ void OnlineProfile::absorb() noexcept {
   } else {
     const QueuedSegment& before = (*ring_)[i - 1];
     entry.distance = before.distance + before.segment.length_mm;
-    entry.at_start = carry_;
-    extend(entry.at_start, zones_between(i - 1, i));
-    cut_to(entry.at_start, entry.fastest, jump_time_s(limits_, jerk_s_));
+    zones_at_start(i);
   }
   ++absorbed_;
   if (first) {
-    carry_ = beyond(entry.at_start, entry.segment.length_mm);
     static_cast<void>(zones_backward(i, false));
     split(entry);
     pass_forward(i);
@@ -172,8 +180,6 @@ void OnlineProfile::stop_before(std::uint64_t index) noexcept {
 
 // Zones, pieces and speeds that the newest segment changes.
 void OnlineProfile::connect(std::uint64_t newest) noexcept {
-  const QueuedSegment& entry = (*ring_)[newest];
-  carry_ = beyond(entry.at_start, entry.segment.length_mm);
   const std::uint64_t changed = zones_backward(newest, false);
   for (std::uint64_t k = changed; k <= newest; ++k) split((*ring_)[k]);
   // The speed at which a segment is entered stands, if those before it do.
@@ -183,18 +189,9 @@ void OnlineProfile::connect(std::uint64_t newest) noexcept {
 }
 
 // Whether the machine can still keep the plan where it is.
-bool OnlineProfile::fits() noexcept {
-  const std::array<Piece, most_pieces> pieces = remaining_;
-  const std::array<bool, most_pieces> eased = remaining_eased_;
-  const std::size_t count = remaining_count_;
-  const std::size_t piece = piece_;
-  remain_from(distance_ - (*ring_)[running_].distance);
-  const bool fit = speed_now_ <= remaining_[0].start_speed * (1.0 + rounding);
-  remaining_ = pieces;
-  remaining_eased_ = eased;
-  remaining_count_ = count;
-  piece_ = piece;
-  return fit;
+bool OnlineProfile::fits() const noexcept {
+  const Remaining rest = remaining_beyond(distance_ - (*ring_)[running_].distance, false);
+  return speed_now_ <= rest.pieces[0].start_speed * (1.0 + rounding);
 }
 
 void OnlineProfile::override_feeds(double ratio) noexcept {
@@ -203,15 +200,7 @@ void OnlineProfile::override_feeds(double ratio) noexcept {
   changed_ = state_ == State::running;
   if (ratio <= 0.0 || running_ == absorbed_) return;
   for (std::uint64_t i = running_; i < absorbed_; ++i) (*ring_)[i].limit = limit_of((*ring_)[i]);
-  for (std::uint64_t i = running_ + 1; i < absorbed_; ++i) {
-    QueuedSegment& entry = (*ring_)[i];
-    const QueuedSegment& before = (*ring_)[i - 1];
-    entry.at_start = beyond(before.at_start, before.segment.length_mm);
-    extend(entry.at_start, zones_between(i - 1, i));
-    cut_to(entry.at_start, entry.fastest, jump_time_s(limits_, jerk_s_));
-  }
-  const QueuedSegment& newest = (*ring_)[absorbed_ - 1];
-  carry_ = beyond(newest.at_start, newest.segment.length_mm);
+  for (std::uint64_t i = running_ + 1; i < absorbed_; ++i) zones_at_start(i);
   zones_backward(absorbed_ - 1, true);
   for (std::uint64_t i = running_; i < absorbed_; ++i) split((*ring_)[i]);
   // How fast the machine can be there is not known from here: what is generated looks at it.

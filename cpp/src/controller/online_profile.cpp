@@ -17,12 +17,8 @@ constexpr double longest_time_s = 32768.0;  // after which times are counted ane
 void OnlineProfile::restart(std::uint64_t next) noexcept {
   absorbed_ = running_ = next;
   state_ = State::rest;
-  stop_ = slow_down_ = changed_ = has_phase_ = false;
-  ramp_ = ramp_count_ = remaining_count_ = piece_ = 0;
-  distance_ = speed_now_ = length_ = speed_ = 0.0;
-  tick_ = 0;
-  phase_ = {};
-  began_anew_ = true;
+  stop_ = false;
+  distance_ = speed_now_ = 0.0;
 }
 
 bool OnlineProfile::began_anew() noexcept {
@@ -31,57 +27,47 @@ bool OnlineProfile::began_anew() noexcept {
   return anew;
 }
 
-// -------------------------------------------------------------------------------------------------------
-
-// What of the running segment lies beyond `offset`.
-void OnlineProfile::take_remaining(double offset) noexcept {
+// What of the running segment lies beyond `offset`: with the speeds of the forward pass as the plan has them, or as
+// fast as what follows lets it be.
+OnlineProfile::Remaining OnlineProfile::remaining_beyond(double offset, bool as_planned) const noexcept {
   const QueuedSegment& entry = (*ring_)[running_];
-  remaining_count_ = 0;
+  Remaining remaining;
   double begin = 0.0;
   for (std::size_t k = 0; k < entry.piece_count; ++k) {
     const double end = begin + entry.pieces[k].length;
     if (end > offset || k + 1 == entry.piece_count) {
-      remaining_[remaining_count_] = entry.pieces[k];
-      remaining_eased_[remaining_count_] = entry.eased[k];
-      if (begin < offset) remaining_[remaining_count_].length = std::max(end - offset, 0.0);
-      ++remaining_count_;
+      Piece& piece = remaining.pieces[remaining.count];
+      piece = entry.pieces[k];
+      if (begin < offset) piece.length = std::max(end - offset, 0.0);
+      if (!as_planned) piece.start_speed = MotionLimits::none;
+      remaining.eased[remaining.count++] = entry.eased[k];
     }
     begin = end;
   }
-  piece_ = 0;
-}
-
-double OnlineProfile::start_after(std::size_t piece) noexcept {
-  if (piece + 1 < remaining_count_) return remaining_[piece + 1].start_speed;
-  return running_ + 1 < absorbed_ && !(*ring_)[running_].segment.stop_at_end ? (*ring_)[running_ + 1].start : 0.0;
-}
-
-void OnlineProfile::pass_remaining() noexcept {
-  for (std::size_t k = remaining_count_; k-- > 0;) {
-    Piece& piece = remaining_[k];
-    piece.start_speed = std::min(piece.start_speed, speed_beyond(piece, start_after(k)));
+  for (std::size_t k = remaining.count; k-- > 0;) {
+    Piece& piece = remaining.pieces[k];
+    piece.start_speed = std::min(piece.start_speed, speed_beyond(piece, start_after(remaining, k)));
   }
+  return remaining;
+}
+
+double OnlineProfile::start_after(const Remaining& remaining, std::size_t piece) const noexcept {
+  if (piece + 1 < remaining.count) return remaining.pieces[piece + 1].start_speed;
+  return running_ + 1 < absorbed_ && !(*ring_)[running_].segment.stop_at_end ? (*ring_)[running_ + 1].start : 0.0;
 }
 
 void OnlineProfile::enter(std::uint64_t index) noexcept {
   running_ = index;
-  take_remaining(0.0);
-  pass_remaining();
+  remaining_ = remaining_beyond(0.0, true);
+  piece_ = 0;
 }
 
 // Whether the plan allows a speed where the machine is.
 bool OnlineProfile::may_run(double distance, double speed) noexcept {
   if (piece_ == 0) return true;
-  Piece piece = remaining_[piece_ - 1];
+  Piece piece = remaining_.pieces[piece_ - 1];
   piece.length = std::max(piece_end_ - distance, 0.0);
-  return speed <= speed_beyond(piece, start_after(piece_ - 1)) * (1.0 + rounding);
-}
-
-// What of the running segment lies beyond `offset`, to be run as fast as what follows lets it be.
-void OnlineProfile::remain_from(double offset) noexcept {
-  take_remaining(offset);
-  for (std::size_t k = 0; k < remaining_count_; ++k) remaining_[k].start_speed = MotionLimits::none;
-  pass_remaining();
+  return speed <= speed_beyond(piece, start_after(remaining_, piece_ - 1)) * (1.0 + rounding);
 }
 
 // The phases to come begin at the last set-point's distance and speed.
@@ -93,15 +79,16 @@ void OnlineProfile::generate_anew() noexcept {
   length_ = distance_;
   speed_ = speed_now_;
   ramp_ = ramp_count_ = 0;
-  remain_from(distance_ - (*ring_)[running_].distance);
+  remaining_ = remaining_beyond(distance_ - (*ring_)[running_].distance, false);
+  piece_ = 0;
   state_ = State::running;
-  slow_down_ = speed_ > remaining_[0].start_speed * (1.0 + rounding);
+  slow_down_ = speed_ > remaining_.pieces[0].start_speed * (1.0 + rounding);
 }
 
 // The ramp down within a piece, as steep as its present speed lets it be.
 bool OnlineProfile::next_ramps_down(std::size_t piece) noexcept {
-  const double length = remaining_[piece].length;
-  const double acceleration = acceleration_of((*ring_)[running_], speed_, remaining_eased_[piece]);
+  const double length = remaining_.pieces[piece].length;
+  const double acceleration = acceleration_of((*ring_)[running_], speed_, remaining_.eased[piece]);
   const double way = speed_ * speed_ / (2.0 * acceleration);
   const double end = way < length ? 0.0 : std::sqrt(std::max(0.0, speed_ * speed_ - 2.0 * acceleration * length));
   ramp_ = 0;
@@ -115,14 +102,14 @@ bool OnlineProfile::next_ramps_down(std::size_t piece) noexcept {
 bool OnlineProfile::next_ramps() noexcept {
   const bool down = stop_ || slow_down_ || ratio_ <= 0.0;
   if (down && speed_ <= 0.0) return false;
-  while (piece_ == remaining_count_) {
+  while (piece_ == remaining_.count) {
     if (running_ + 1 == absorbed_ || (*ring_)[running_].segment.stop_at_end) return false;
     enter(running_ + 1);
   }
-  const Piece& piece = remaining_[piece_++];
+  const Piece& piece = remaining_.pieces[piece_++];
   piece_end_ = length_ + piece.length;
   if (down) return next_ramps_down(piece_ - 1);
-  const double end = std::min(start_after(piece_ - 1), speed_beyond(piece, speed_));
+  const double end = std::min(start_after(remaining_, piece_ - 1), speed_beyond(piece, speed_));
   ramp_ = 0;
   ramp_count_ = ramps_of(piece, speed_, end, length_, ramps_);
   speed_ = end;
@@ -169,7 +156,7 @@ void OnlineProfile::begin() noexcept {
 void OnlineProfile::come_to_rest() noexcept {
   speed_now_ = 0.0;
   const QueuedSegment& entry = (*ring_)[running_];
-  if (piece_ == remaining_count_ && ramp_ == ramp_count_ &&
+  if (piece_ == remaining_.count && ramp_ == ramp_count_ &&
       length_ >= (entry.distance + entry.segment.length_mm) * (1.0 - 8.0 * std::numeric_limits<double>::epsilon()) -
                      1e-12 * entry.segment.length_mm) {
     distance_ = entry.distance + entry.segment.length_mm;

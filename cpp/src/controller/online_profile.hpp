@@ -39,6 +39,10 @@ struct QueuedSegment {
   double start = 0.0;    ///< of both
 };
 
+/// Acceleration along a segment that is run at most at `speed`; `eased`: beside a jump.
+[[nodiscard]] double acceleration_along(const QueuedSegment& entry, double speed, const MotionLimits& limits,
+                                        bool eased) noexcept;
+
 /// A ring of segments: `index & mask` is the place of segment `index`, counted from the first ever pushed.
 class SegmentRing {
  public:
@@ -89,7 +93,14 @@ class OnlineProfile {
     running,
   };
 
-  [[nodiscard]] bool within_segment() const noexcept { return state_ == State::running || state_ == State::stopped; }
+  // Pieces of the segment that is being run; their start_speed: of both passes.
+  struct Remaining {
+    std::array<Piece, most_pieces> pieces{};
+    std::array<bool, most_pieces> eased{};
+    std::size_t count = 0;
+  };
+
+  [[nodiscard]] bool within_segment() const noexcept { return state_ != State::rest; }
   [[nodiscard]] double limit_of(const QueuedSegment& entry) const noexcept;
   [[nodiscard]] ZoneSet zones_between(std::uint64_t from, std::uint64_t into) noexcept;
   void split(QueuedSegment& entry) noexcept;
@@ -97,10 +108,8 @@ class OnlineProfile {
   void pass_forward(std::uint64_t first) noexcept;
   bool pass_backward(std::uint64_t first_changed) noexcept;
   std::uint64_t zones_backward(std::uint64_t newest, bool all) noexcept;
-  void take_remaining(double offset) noexcept;
-  void remain_from(double offset) noexcept;
-  void pass_remaining() noexcept;
-  [[nodiscard]] double start_after(std::size_t piece) noexcept;
+  [[nodiscard]] Remaining remaining_beyond(double offset, bool as_planned) const noexcept;
+  [[nodiscard]] double start_after(const Remaining& remaining, std::size_t piece) const noexcept;
   void begin() noexcept;
   void enter(std::uint64_t index) noexcept;
   void generate_anew() noexcept;
@@ -109,8 +118,9 @@ class OnlineProfile {
   bool next_ramps_down(std::size_t piece) noexcept;
   [[nodiscard]] bool slows_down_before(std::uint64_t index) noexcept;
   void stop_before(std::uint64_t index) noexcept;
+  void zones_at_start(std::uint64_t index) noexcept;
   void connect(std::uint64_t newest) noexcept;
-  [[nodiscard]] bool fits() noexcept;
+  [[nodiscard]] bool fits() const noexcept;
   void come_to_rest() noexcept;
   [[nodiscard]] bool may_run(double distance, double speed) noexcept;
 
@@ -124,7 +134,6 @@ class OnlineProfile {
 
   std::uint64_t absorbed_ = 0;
   std::uint64_t running_ = 0;
-  ZoneSet carry_{};  // what of the zones reaches beyond the newest segment
 
   State state_ = State::rest;
   bool stop_ = false;       // on request
@@ -143,9 +152,7 @@ class OnlineProfile {
   std::array<Ramp, most_phases> ramps_{};
   std::size_t ramp_ = 0;
   std::size_t ramp_count_ = 0;
-  std::array<Piece, most_pieces> remaining_{};  // of the segment that is being run; start_speed: of both passes
-  std::array<bool, most_pieces> remaining_eased_{};
-  std::size_t remaining_count_ = 0;
+  Remaining remaining_;
   std::size_t piece_ = 0;   // the next one to be made ramps of
   double piece_end_ = 0.0;  // distance at which the one before it ends
 };

@@ -18,7 +18,6 @@ constexpr double tangent_change = 1e-6;
 // Shares of acceleration and jerk. Beside a jump, half is the jump's. On an arc a quarter of the jerk is that of the
 // turn itself; what is left along and across the path adds up, as vectors, to less than the whole (beside a jump:
 // half).
-constexpr double eased_share = 0.5;
 constexpr double jump_share = 0.5;
 constexpr double turning_share = 0.25;
 

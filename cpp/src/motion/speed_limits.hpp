@@ -12,6 +12,9 @@ namespace shapegcode {
 /// Throws Error(argument) on a limit that is not positive.
 void check_limits(const MotionLimits& limits, const FilterTolerance& filter);
 
+/// Share of acceleration and jerk that is the path's beside a jump; the other half is the jump's.
+inline constexpr double eased_share = 0.5;
+
 /// Acceleration along a segment that is run at most at `speed_limit`. `eased`: beside a jump of speed or acceleration,
 /// which has the other half of the limits.
 [[nodiscard]] double segment_acceleration(const Segment& segment, double speed_limit, const MotionLimits& limits,
