@@ -66,7 +66,7 @@ class MotionController::Implementation {
         filters_(settings, axis_count + static_cast<int>(n_following_)),
         limits_(planning_limits_of(settings, filters_)),
         jerk_periods_(jerk_periods(settings)),
-        intake_(limits_, following_limits_of(settings, filters_.gain()), filters_.tolerance(), jerk_s(settings)),
+        intake_(limits_, following_limits_of(settings, filters_), filters_.tolerance(), jerk_s(settings)),
         window_(settings.window),
         ring_(std::bit_ceil(std::max(settings.queue, settings.window + 2))),
         profile_(ring_, limits_, jerk_s(settings), settings.period_s),

@@ -144,7 +144,7 @@ void OnlineProfile::absorb() noexcept {
   if (entry.corner <= 0.0) stop_before(i);
   const bool fitted = state_ == State::running && !slow_down_ && !stop_ && fits();
   connect(i);
-  if (fitted && !fits() && (jerk_s_ > 0.0 || !slows_down_before(i))) {
+  if (state_ == State::running && !fits() && ((fitted && jerk_s_ > 0.0) || !slows_down_before(i))) {
     // Too late for the speed of that corner, or for the slow stretch around it that the jerk time wants: the machine
     // stops there, as it was about to.
     stop_before(i);
@@ -152,20 +152,23 @@ void OnlineProfile::absorb() noexcept {
   }
 }
 
-// Whether the machine, decelerating from now on, enters segment `index` at most at its corner speed.
+// Whether the machine, decelerating from now on, enters segment `index` at most at its corner speed, and runs as slowly
+// before it as the jerk time wants.
 bool OnlineProfile::slows_down_before(std::uint64_t index) noexcept {
-  const double wanted = (*ring_)[index].corner * (*ring_)[index].corner;
+  const double corner = (*ring_)[index].corner;
   double squared = speed_now_ * speed_now_;
+  double left = (*ring_)[index].distance - 0.5 * corner * jerk_s_ - distance_;
   double skipped = distance_ - (*ring_)[running_].distance;
-  for (std::uint64_t i = running_; i < index && squared > wanted; ++i) {
+  for (std::uint64_t i = running_; i < index && left > 0.0 && squared > corner * corner; ++i) {
     const QueuedSegment& entry = (*ring_)[i];
-    for (std::size_t k = 0; k < entry.piece_count; ++k) {
-      const Piece& piece = entry.pieces[k];
-      squared -= 2.0 * piece.acceleration * std::max(0.0, piece.length - skipped);
-      skipped = std::max(0.0, skipped - piece.length);
+    for (std::size_t k = 0; k < entry.piece_count && squared > corner * corner; ++k) {
+      const double way = std::min(left, std::max(0.0, entry.pieces[k].length - skipped));
+      squared -= 2.0 * acceleration_of(entry, std::sqrt(squared), entry.eased[k]) * way;
+      left -= way;
+      skipped = std::max(0.0, skipped - entry.pieces[k].length);
     }
   }
-  return squared <= wanted;
+  return squared <= corner * corner;
 }
 
 // Come to rest before segment `index`, until everything has settled.

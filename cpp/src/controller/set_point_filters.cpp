@@ -13,30 +13,13 @@
 namespace shapegcode {
 namespace {
 
-using Taps = std::vector<double>;
-
 // Sums of taps that are 1 to the last bits only would move the machine when it is at rest.
 Fir scaled_to_one(const Fir& fir) {
   if (fir.is_moving_average() || fir.decay() != 0.0) return fir;
   const double sum = std::accumulate(fir.taps().begin(), fir.taps().end(), 0.0);
-  Taps taps = fir.taps();
+  std::vector<double> taps = fir.taps();
   for (double& tap : taps) tap /= sum;
   return Fir(fir.delays(), std::move(taps));
-}
-
-double mean_of(const Taps& taps) {
-  double mean = 0.0;
-  for (std::size_t k = 0; k < taps.size(); ++k) mean += taps[k] * static_cast<double>(k);
-  return mean;
-}
-
-double variance_of(const Taps& taps) {
-  const double mean = mean_of(taps);
-  double variance = 0.0;
-  for (std::size_t k = 0; k < taps.size(); ++k) {
-    variance += taps[k] * (static_cast<double>(k) - mean) * (static_cast<double>(k) - mean);
-  }
-  return variance;
 }
 
 // The shapers that may act on any axis.
@@ -84,48 +67,52 @@ SetPointFilters::SetPointFilters(const ControllerSettings& settings, int n_axes)
   const auto length =
       std::max<std::int64_t>(1, require_count(periods, most_filter_samples, "the smoothing time", "periods"));
   const Fir average = Fir::moving_average(static_cast<int>(length));
-  const Taps smoothing = convolved(dense_taps(average), dense_taps(average));
+  const Fir smoothing = convolved(average, average);
   const std::vector<Fir> shapers = shapers_of(settings, n_axes);
-  std::vector<Taps> chains;
+  std::vector<Fir> chains;
   double variance = 0.0;
   for (const Fir& shaper : shapers) {
-    chains.push_back(convolved(smoothing, dense_taps(shaper)));
-    variance = std::max(variance, variance_of(chains.back()));
+    chains.push_back(convolved(smoothing, shaper));
+    variance = std::max(variance, chains.back().variance_samples2());
   }
-  following_ = std::holds_alternative<FollowingFir>(settings.shaper)
-                   ? std::optional(std::get<FollowingFir>(settings.shaper))
-                   : std::nullopt;
+  if (const auto* following = std::get_if<FollowingFir>(&settings.shaper)) {
+    following_ = *following;
+    varying_.emplace_back(following->fir(), n_axes);
+  }
   if (settings.contour_correction && variance > 0.0) {
     correction_delay_ = std::max(1, static_cast<int>(std::ceil(2.0 * std::sqrt(variance))));
     std::vector<Fir> corrections;
-    for (Taps& chain : chains) {
+    for (Fir& chain : chains) {
       // A set that is followed has one correction: that of the filter which cuts most.
-      const Fir fir = correction(following_ ? variance : variance_of(chain), correction_delay_);
-      chain = convolved(dense_taps(fir), chain);
+      const Fir fir = correction(following_ ? variance : chain.variance_samples2(), correction_delay_);
+      chain = convolved(fir, chain);
       if (!following_ || corrections.empty()) corrections.push_back(fir);
     }
     stages_.emplace_back(corrections, n_axes);
   }
   tolerance_.contour_tolerance_mm = settings.contour_tolerance_mm;
-  for (const Taps& chain : chains) measure(chain, settings.period_s);
+  for (const Fir& chain : chains) measure(chain, settings.period_s);
   if (length > 1) {
     stages_.emplace_back(std::vector{average}, n_axes);
     stages_.emplace_back(std::vector{average}, n_axes);
   }
   if (following_) {
-    varying_.emplace_back(following_->fir(), n_axes);
+    const double fastest = settings.limits.max_feed_mm_per_s[following_->axis()];
+    change_ = cost_of_change(chains, following_->position_mm(), settings.period_s, fastest);
+    gain_ = std::max(gain_, change_.gain);
   } else {
     stages_.emplace_back(shapers, n_axes);
   }
 }
 
-void SetPointFilters::measure(const Taps& taps, double period_s) {
+void SetPointFilters::measure(const Fir& chain, double period_s) {
+  const std::vector<double>& taps = chain.taps();
   double gain = 0.0;
   double highest = 0.0;
   double steepest = 0.0;
   double deviation = 0.0;
   double before = 0.0;
-  const double mean = mean_of(taps);
+  const double mean = chain.mean_samples();
   for (std::size_t k = 0; k <= taps.size(); ++k) {
     const double tap = k < taps.size() ? taps[k] : 0.0;
     gain += std::abs(tap);
@@ -141,7 +128,7 @@ void SetPointFilters::measure(const Taps& taps, double period_s) {
   jumps_.acceleration_per_s = std::max(jumps_.acceleration_per_s, highest / period_s);
   jumps_.jerk_per_s2 = std::max(jumps_.jerk_per_s2, steepest / (period_s * period_s));
   // After the correction rounding may leave less than nothing.
-  const double variance = correction_delay_ > 0 ? 0.0 : variance_of(taps);
+  const double variance = correction_delay_ > 0 ? 0.0 : chain.variance_samples2();
   tolerance_.variance_s2 = std::max(tolerance_.variance_s2, variance * period_s * period_s);
   tolerance_.mean_deviation_s = std::max(tolerance_.mean_deviation_s, deviation * period_s);
 }
@@ -152,13 +139,14 @@ void SetPointFilters::reset(std::span<const double> position) noexcept {
   if (following_) followed_mm_ = position[static_cast<std::size_t>(following_->axis())];
 }
 
+// A shaper that changes comes first: what its changes do to the motion is smoothed as well.
 void SetPointFilters::step(std::span<double> position) noexcept {
-  for (Stage& stage : stages_) stage.step(position);
   if (following_) {
     const double now_mm = position[static_cast<std::size_t>(following_->axis())];
     varying_.front().step(position, position, following_->place(0.5 * (followed_mm_ + now_mm)));
     followed_mm_ = now_mm;
   }
+  for (Stage& stage : stages_) stage.step(position);
 }
 
 }  // namespace shapegcode

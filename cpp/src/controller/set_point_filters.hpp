@@ -1,10 +1,12 @@
-// What follows the path in a control: contour correction, smoothing and shaper of every axis.
+// What follows the path in a control: contour correction, smoothing and shaper of every axis. A shaper that follows a
+// position is the first of them.
 #pragma once
 
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "controller/changing_shaper.hpp"
 #include "shapegcode/controller.hpp"
 
 namespace shapegcode {
@@ -26,6 +28,8 @@ class SetPointFilters {
   [[nodiscard]] const JumpResponse& jumps() const noexcept { return jumps_; }
   /// Largest sum of the magnitudes of an axis' taps: by how much it may exceed what comes in.
   [[nodiscard]] double gain() const noexcept { return gain_; }
+  /// What a shaper costs while it follows a position.
+  [[nodiscard]] const ChangeCost& change() const noexcept { return change_; }
   /// What it may cut off, and the moments that look-ahead wants for that.
   [[nodiscard]] const FilterTolerance& tolerance() const noexcept { return tolerance_; }
 
@@ -41,7 +45,7 @@ class SetPointFilters {
     std::vector<FirStream> streams_;
   };
 
-  void measure(const std::vector<double>& taps, double period_s);
+  void measure(const Fir& chain, double period_s);
 
   std::vector<Stage> stages_;
   std::optional<FollowingFir> following_;
@@ -52,6 +56,7 @@ class SetPointFilters {
   int correction_delay_ = 0;
   JumpResponse jumps_;
   double gain_ = 1.0;
+  ChangeCost change_;
   FilterTolerance tolerance_;
 };
 

@@ -15,6 +15,41 @@ namespace {
 constexpr std::size_t least_window = 8;
 constexpr std::size_t most_segments = std::size_t{1} << 24;
 
+// Share of acceleration and jerk that the changes of a shaper may take which follows a position.
+constexpr double change_share = 0.25;
+
+bool changes(const SetPointFilters& filters) noexcept { return filters.change().acceleration_per_mm > 0.0; }
+
+double own_share(const SetPointFilters& filters) noexcept { return changes(filters) ? 1.0 - change_share : 1.0; }
+
+// Highest speed of an axis while the followed one moves at `speed`.
+double feed_beside_changes(const FollowingLimits& axis, double speed, const ChangeCost& cost) noexcept {
+  return change_share * std::min(axis.max_acceleration / (speed * cost.acceleration_per_mm),
+                                 0.5 * axis.max_jerk / (speed * cost.jerk_per_mm_s));
+}
+
+// Highest speed of X, Y and Z at which the changes of the shaper take no more than their share; half of that of the
+// jerk is for what they make of the acceleration.
+double changing_speed(const ControllerSettings& settings, const SetPointFilters& filters) noexcept {
+  if (!changes(filters)) return MotionLimits::none;
+  const ChangeCost& cost = filters.change();
+  double speed = MotionLimits::none;
+  const auto look_at = [&](double acceleration, double jerk) {
+    if (std::isfinite(jerk)) {
+      speed = std::min(speed, 0.5 * change_share * jerk / (acceleration * cost.acceleration_per_mm));
+    }
+  };
+  for (int i = 0; i < axis_count; ++i) {
+    const double acceleration = settings.limits.max_acceleration_mm_per_s2[i];
+    const double jerk = settings.limits.max_jerk_mm_per_s3[i];
+    look_at(acceleration, jerk);
+    speed = std::min({speed, std::sqrt(change_share * acceleration / cost.acceleration_per_mm),
+                      std::sqrt(0.5 * change_share * jerk / cost.jerk_per_mm_s)});
+  }
+  for (const FollowingLimits& axis : settings.following) look_at(axis.max_acceleration, axis.max_jerk);
+  return speed;
+}
+
 }  // namespace
 
 int jerk_periods(const ControllerSettings& settings) {
@@ -61,11 +96,12 @@ double jerk_s(const ControllerSettings& settings) {
 }
 
 MotionLimits planning_limits_of(const ControllerSettings& settings, const SetPointFilters& filters) {
+  const double share = own_share(filters) / filters.gain();
   MotionLimits limits = settings.limits;
   limits.jerk_time_s = jerk_s(settings);
-  limits.max_feed_mm_per_s /= filters.gain();
-  limits.max_acceleration_mm_per_s2 /= filters.gain();
-  limits.max_jerk_mm_per_s3 /= filters.gain();
+  limits.max_feed_mm_per_s = (limits.max_feed_mm_per_s / filters.gain()).cwiseMin(changing_speed(settings, filters));
+  limits.max_acceleration_mm_per_s2 *= share;
+  limits.max_jerk_mm_per_s3 *= share;
   const bool limited = limits.max_acceleration_mm_per_s2.minCoeff() < MotionLimits::none ||
                        std::ranges::any_of(settings.following, [](const FollowingLimits& axis) {
                          return axis.max_acceleration < MotionLimits::none;
@@ -74,12 +110,15 @@ MotionLimits planning_limits_of(const ControllerSettings& settings, const SetPoi
   return limits;
 }
 
-std::vector<FollowingLimits> following_limits_of(const ControllerSettings& settings, double gain) {
+std::vector<FollowingLimits> following_limits_of(const ControllerSettings& settings, const SetPointFilters& filters) {
+  const double share = own_share(filters) / filters.gain();
+  const double speed = changing_speed(settings, filters);
   std::vector<FollowingLimits> limits = settings.following;
   for (FollowingLimits& axis : limits) {
-    axis.max_feed /= gain;
-    axis.max_acceleration /= gain;
-    axis.max_jerk /= gain;
+    axis.max_feed /= filters.gain();
+    if (changes(filters)) axis.max_feed = std::min(axis.max_feed, feed_beside_changes(axis, speed, filters.change()));
+    axis.max_acceleration *= share;
+    axis.max_jerk *= share;
   }
   return limits;
 }

@@ -19,6 +19,7 @@ void check_settings(const ControllerSettings& settings);
 
 /// Limits of the path, so that what leaves the filters keeps those of the settings.
 [[nodiscard]] MotionLimits planning_limits_of(const ControllerSettings& settings, const SetPointFilters& filters);
-[[nodiscard]] std::vector<FollowingLimits> following_limits_of(const ControllerSettings& settings, double gain);
+[[nodiscard]] std::vector<FollowingLimits> following_limits_of(const ControllerSettings& settings,
+                                                               const SetPointFilters& filters);
 
 }  // namespace shapegcode

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <numeric>
+#include <utility>
 #include <vector>
 
 #include "shapegcode/filter.hpp"
@@ -17,13 +19,17 @@ inline std::vector<double> dense_taps(const Fir& fir) {
   return taps;
 }
 
-/// One filter behind the other.
-inline std::vector<double> convolved(const std::vector<double>& first, const std::vector<double>& second) {
-  std::vector<double> both(first.size() + second.size() - 1, 0.0);
-  for (std::size_t i = 0; i < first.size(); ++i) {
-    for (std::size_t k = 0; k < second.size(); ++k) both[i + k] += first[i] * second[k];
+/// One filter behind the other, with a tap at every delay.
+inline Fir convolved(const Fir& first, const Fir& second) {
+  const std::vector<double> taps = dense_taps(first);
+  const std::vector<double> others = dense_taps(second);
+  std::vector<double> both(taps.size() + others.size() - 1, 0.0);
+  for (std::size_t i = 0; i < taps.size(); ++i) {
+    for (std::size_t k = 0; k < others.size(); ++k) both[i + k] += taps[i] * others[k];
   }
-  return both;
+  std::vector<int> delays(both.size());
+  std::iota(delays.begin(), delays.end(), 0);
+  return Fir(std::move(delays), std::move(both));
 }
 
 }  // namespace shapegcode
