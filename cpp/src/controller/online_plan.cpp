@@ -117,6 +117,8 @@ void OnlineProfile::zones_at_start(std::uint64_t index) noexcept {
   entry.at_start = beyond(before.at_start, before.segment.length_mm);
   extend(entry.at_start, zones_between(index - 1, index));
   cut_to(entry.at_start, entry.fastest, jump_time_s(limits_, jerk_s_));
+  entry.corners_behind = beyond(before.corners_behind, before.segment.length_mm);
+  if (entry.corner < entry.fastest) extend(entry.corners_behind, {entry.corner, 0.5 * entry.corner * jerk_s_});
 }
 
 void OnlineProfile::absorb() noexcept {
@@ -127,6 +129,7 @@ void OnlineProfile::absorb() noexcept {
   if (first) {
     entry.distance = distance_;
     entry.at_start = ZoneSet{};
+    entry.corners_behind = Zone{};
     entry.forward = 0.0;
   } else {
     const QueuedSegment& before = (*ring_)[i - 1];
@@ -179,6 +182,7 @@ void OnlineProfile::stop_before(std::uint64_t index) noexcept {
   entry.corner = 0.0;
   entry.jump = Zone{};
   entry.at_start = ZoneSet{};
+  entry.corners_behind = Zone{};
 }
 
 // Zones, pieces and speeds that the newest segment changes.
@@ -203,6 +207,8 @@ void OnlineProfile::override_feeds(double ratio) noexcept {
   changed_ = state_ == State::running;
   if (ratio <= 0.0 || running_ == absorbed_) return;
   for (std::uint64_t i = running_; i < absorbed_; ++i) (*ring_)[i].limit = limit_of((*ring_)[i]);
+  // The segment before this one may be gone.
+  extend((*ring_)[running_].at_start[corner_zone], (*ring_)[running_].corners_behind);
   for (std::uint64_t i = running_ + 1; i < absorbed_; ++i) zones_at_start(i);
   zones_backward(absorbed_ - 1, true);
   for (std::uint64_t i = running_; i < absorbed_; ++i) split((*ring_)[i]);
