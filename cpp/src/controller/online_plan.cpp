@@ -100,7 +100,11 @@ std::uint64_t OnlineProfile::zones_backward(std::uint64_t newest, bool all) noex
   for (std::uint64_t i = newest; left > 0.0 && i-- > running_;) {
     QueuedSegment& entry = (*ring_)[i];
     left -= entry.segment.length_mm;
-    extend(carry, zones_between(i + 1, i));
+    if (entry.segment.stop_at_end) {
+      carry = ZoneSet{};  // everything settles there
+    } else {
+      extend(carry, zones_between(i + 1, i));
+    }
     cut_to(carry, entry.fastest, jump_time_s(limits_, jerk_s_));
     if (!all && carry == entry.at_end) break;
     entry.at_end = carry;
@@ -114,6 +118,9 @@ std::uint64_t OnlineProfile::zones_backward(std::uint64_t newest, bool all) noex
 void OnlineProfile::zones_at_start(std::uint64_t index) noexcept {
   QueuedSegment& entry = (*ring_)[index];
   const QueuedSegment& before = (*ring_)[index - 1];
+  entry.at_start = ZoneSet{};
+  entry.corners_behind = Zone{};
+  if (before.segment.stop_at_end) return;
   entry.at_start = beyond(before.at_start, before.segment.length_mm);
   extend(entry.at_start, zones_between(index - 1, index));
   cut_to(entry.at_start, entry.fastest, jump_time_s(limits_, jerk_s_));
@@ -181,8 +188,7 @@ void OnlineProfile::stop_before(std::uint64_t index) noexcept {
   before.segment.stop_at_end = true;
   entry.corner = 0.0;
   entry.jump = Zone{};
-  entry.at_start = ZoneSet{};
-  entry.corners_behind = Zone{};
+  zones_at_start(index);
 }
 
 // Zones, pieces and speeds that the newest segment changes.
