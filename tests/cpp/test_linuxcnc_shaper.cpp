@@ -175,6 +175,7 @@ TEST_CASE("linuxcnc C interface: a design comes from the other thread, one that 
   CHECK(status.possible == 1);
   CHECK(status.duration_s == doctest::Approx(0.011));
   CHECK(status.delay_s == doctest::Approx(0.25 / 46.0).epsilon(0.01));
+  for (int k = 0; k < 20; ++k) shapegcode_hal_step(hal, &settings, in.data(), out.data(), &status);  // what it held
   CHECK(out == in);
   settings.family_number = 12;
   CHECK(step_until([&] { return status.possible == 0; }));

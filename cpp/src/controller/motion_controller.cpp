@@ -91,12 +91,17 @@ class MotionController::Implementation {
     profile_.override_feeds(override_.load(std::memory_order_relaxed));
     absorb();
     const bool settled = rest_periods_ >= settling_periods();
+    const bool rested = profile_.at_rest();
+    const double distance = profile_.distance();
     profile_.advance(settled);
-    if (profile_.began_anew()) {
+    const bool anew = profile_.began_anew();
+    if (anew) {
       const double nothing = 0.0;
       smoothing_.reset({&nothing, 1});
       cursor_ = profile_.running();
     }
+    // The last of a way may be gone within one period.
+    if (!rested || anew || profile_.distance() != distance) rest_periods_ = 0;
     rest_periods_ = profile_.at_rest() ? std::min(rest_periods_ + 1, settling_periods()) : 0;
     place(smoothed_distance());
     filters_.step({position_.data(), axes()});
