@@ -151,7 +151,7 @@ void OnlineProfile::absorb() noexcept {
     pass_backward(i);
     return;
   }
-  if (entry.corner <= 0.0) stop_before(i);
+  if (entry.corner <= 0.0 || comes_too_late(i)) stop_before(i);
   const bool fitted = state_ == State::running && !slow_down_ && !stop_ && fits();
   connect(i);
   if (state_ == State::running && !fits() && ((fitted && jerk_s_ > 0.0) || !slows_down_before(i))) {
@@ -160,6 +160,14 @@ void OnlineProfile::absorb() noexcept {
     stop_before(i);
     connect(i);
   }
+}
+
+// Whether the slow stretch before the corner of segment `index`, which the jerk time wants, has begun already, and the
+// machine was faster there.
+bool OnlineProfile::comes_too_late(std::uint64_t index) noexcept {
+  const QueuedSegment& entry = (*ring_)[index];
+  return within_segment() && entry.distance - 0.5 * entry.corner * jerk_s_ < distance_ &&
+         recent_.highest() > entry.corner * (1.0 + rounding);
 }
 
 // Whether the machine, decelerating from now on, enters segment `index` at most at its corner speed, and runs as slowly

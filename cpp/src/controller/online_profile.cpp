@@ -19,6 +19,7 @@ void OnlineProfile::restart(std::uint64_t next) noexcept {
   state_ = State::rest;
   stop_ = false;
   distance_ = speed_now_ = 0.0;
+  recent_.reset();
 }
 
 bool OnlineProfile::began_anew() noexcept {
@@ -144,6 +145,7 @@ void OnlineProfile::begin() noexcept {
   tick_ = 1;
   began_anew_ = true;
   distance_ = 0.0;
+  recent_.reset();
   phase_ = {};
   has_phase_ = changed_ = slow_down_ = false;
   length_ = 0.0;
@@ -171,6 +173,7 @@ void OnlineProfile::come_to_rest() noexcept {
 
 void OnlineProfile::advance(bool settled) noexcept {
   ++tick_;
+  recent_.add(speed_now_);
   // Not before the set-points have come to rest: they are still on their way to the corner.
   const bool waits = !settled || waiting_ || stop_ || ratio_ <= 0.0;
   if (state_ == State::rest && running_ < absorbed_ && !waits) begin();

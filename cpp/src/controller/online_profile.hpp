@@ -3,7 +3,9 @@
 // distances, bit for bit.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -57,10 +59,31 @@ class SegmentRing {
   std::vector<QueuedSegment> places_;
 };
 
+/// Highest speed of so many periods at least, and of twice as many at most.
+class RecentSpeed {
+ public:
+  explicit RecentSpeed(double periods) : periods_(static_cast<int>(periods)) {}
+  void reset() noexcept { since_ = before_ = 0.0; }
+  void add(double speed) noexcept {
+    since_ = std::max(since_, speed);
+    if (++count_ <= periods_) return;
+    before_ = since_;
+    since_ = speed;
+    count_ = 0;
+  }
+  [[nodiscard]] double highest() const noexcept { return std::max(since_, before_); }
+
+ private:
+  int periods_;
+  int count_ = 0;
+  double since_ = 0.0;
+  double before_ = 0.0;
+};
+
 class OnlineProfile {
  public:
   OnlineProfile(SegmentRing& ring, const MotionLimits& limits, double jerk_s, double period_s)
-      : ring_(&ring), limits_(limits), jerk_s_(jerk_s), period_s_(period_s) {}
+      : ring_(&ring), limits_(limits), jerk_s_(jerk_s), period_s_(period_s), recent_(std::ceil(jerk_s / period_s)) {}
 
   /// At rest before segment `next`, the first one of a motion to come. Nothing is known of any.
   void restart(std::uint64_t next) noexcept;
@@ -117,6 +140,7 @@ class OnlineProfile {
   bool next_phase() noexcept;
   bool next_ramps() noexcept;
   bool next_ramps_down(std::size_t piece) noexcept;
+  [[nodiscard]] bool comes_too_late(std::uint64_t index) noexcept;
   [[nodiscard]] bool slows_down_before(std::uint64_t index) noexcept;
   void stop_before(std::uint64_t index) noexcept;
   void zones_at_start(std::uint64_t index) noexcept;
@@ -146,6 +170,7 @@ class OnlineProfile {
   std::int64_t tick_ = 0;
   double distance_ = 0.0;
   double speed_now_ = 0.0;
+  RecentSpeed recent_;
   SpeedPhase phase_{};
   bool has_phase_ = false;
   double length_ = 0.0;  // of all ramps so far
