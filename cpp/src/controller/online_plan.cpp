@@ -119,13 +119,14 @@ void OnlineProfile::zones_at_start(std::uint64_t index) noexcept {
   QueuedSegment& entry = (*ring_)[index];
   const QueuedSegment& before = (*ring_)[index - 1];
   entry.at_start = ZoneSet{};
-  entry.corners_behind = Zone{};
+  entry.behind = ZoneSet{};
   if (before.segment.stop_at_end) return;
   entry.at_start = beyond(before.at_start, before.segment.length_mm);
   extend(entry.at_start, zones_between(index - 1, index));
   cut_to(entry.at_start, entry.fastest, jump_time_s(limits_, jerk_s_));
-  entry.corners_behind = beyond(before.corners_behind, before.segment.length_mm);
-  if (entry.corner < entry.fastest) extend(entry.corners_behind, {entry.corner, 0.5 * entry.corner * jerk_s_});
+  entry.behind = beyond(before.behind, before.segment.length_mm);
+  extend(entry.behind,
+         junction_zones({before.hard_limit, MotionLimits::none, entry.fastest, entry.corner, {}}, limits_, jerk_s_));
 }
 
 void OnlineProfile::absorb() noexcept {
@@ -136,7 +137,7 @@ void OnlineProfile::absorb() noexcept {
   if (first) {
     entry.distance = distance_;
     entry.at_start = ZoneSet{};
-    entry.corners_behind = Zone{};
+    entry.behind = ZoneSet{};
     entry.forward = 0.0;
   } else {
     const QueuedSegment& before = (*ring_)[i - 1];
@@ -222,7 +223,7 @@ void OnlineProfile::override_feeds(double ratio) noexcept {
   if (ratio <= 0.0 || running_ == absorbed_) return;
   for (std::uint64_t i = running_; i < absorbed_; ++i) (*ring_)[i].limit = limit_of((*ring_)[i]);
   // The segment before this one may be gone.
-  extend((*ring_)[running_].at_start[corner_zone], (*ring_)[running_].corners_behind);
+  extend((*ring_)[running_].at_start, (*ring_)[running_].behind);
   for (std::uint64_t i = running_ + 1; i < absorbed_; ++i) zones_at_start(i);
   zones_backward(absorbed_ - 1, true);
   for (std::uint64_t i = running_; i < absorbed_; ++i) split((*ring_)[i]);

@@ -34,7 +34,7 @@ struct QueuedSegment {
   double distance = 0.0;  ///< of its start
   double limit = 0.0;
   ZoneSet at_start{}, at_end{};
-  Zone corners_behind;  ///< of the corner at its start and of those before it, whatever the override
+  ZoneSet behind{};  ///< at its start, of slow corners and segments before it, whatever the override
   std::array<Piece, most_pieces> pieces{};  ///< their start_speed: of the forward pass
   std::array<bool, most_pieces> eased{};
   std::size_t piece_count = 0;

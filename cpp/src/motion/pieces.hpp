@@ -50,10 +50,10 @@ struct JunctionSpeeds {
   Zone jump;  ///< see zone_of_jump; none: nothing jumps
 };
 
-/// The zones of a junction: of its speed, which the smoothing by the jerk time mixes; of a lower programmed feed, for
-/// what a filter mixes; and of a jump, beside which the path is accelerated gently. The last has no speed, but the kind
-/// of the jump in its place, the greatest being the least.
-enum ZoneKind : std::size_t { corner_zone, feed_zone, jump_zone, zone_kinds };
+/// The zones of a junction: of its speed, or of a slower segment, which the smoothing by the jerk time mixes; of a
+/// lower programmed feed, for what a filter mixes; and of a jump, beside which the path is accelerated gently. The last
+/// has no speed, but the kind of the jump in its place, the greatest being the least.
+enum ZoneKind : std::size_t { corner_zone, slow_zone, feed_zone, jump_zone, zone_kinds };
 using ZoneSet = std::array<Zone, zone_kinds>;
 
 /// The zone of a jump that is passed at most at `speed`: as far as the path goes within the time that counts, if
@@ -67,7 +67,7 @@ inline ZoneSet junction_zones(const JunctionSpeeds& at, const MotionLimits& limi
   ZoneSet zones;
   const double least = std::min(at.corner, at.from);
   if (jerk_s > 0.0 && least < at.into) {
-    zones[corner_zone] = {least, 0.5 * least * jerk_s};
+    zones[at.corner < at.from ? corner_zone : slow_zone] = {least, 0.5 * least * jerk_s};
   }
   if (limits.feed_spread_s > 0.0 && at.from_feed * (1.0 + limits.feed_excess_ratio) < at.into) {
     zones[feed_zone] = {at.from_feed, at.from_feed * (limits.feed_spread_s + 0.5 * jerk_s)};
@@ -81,7 +81,9 @@ inline void extend(ZoneSet& zones, const ZoneSet& others) noexcept {
 }
 
 inline ZoneSet beyond(const ZoneSet& zones, double length) noexcept {
-  return {beyond(zones[corner_zone], length), beyond(zones[feed_zone], length), beyond(zones[jump_zone], length)};
+  ZoneSet left;
+  for (std::size_t kind = 0; kind < zone_kinds; ++kind) left[kind] = beyond(zones[kind], length);
+  return left;
 }
 
 /// Largest acceleration along any path of X, Y and Z.
