@@ -7,11 +7,6 @@
 #include "path/arc_end.hpp"
 
 namespace shapegcode {
-namespace {
-
-constexpr double largest_gap_mm = 1e-6;
-
-}  // namespace
 
 void Intake::restart(std::span<const double> position) noexcept {
   last_segment_ = Segment{};

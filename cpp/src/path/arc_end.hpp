@@ -1,4 +1,4 @@
-// Private: whether the sweep of an arc leads to its end.
+// Private: whether segments connect, and the sweep of an arc leads to its end.
 #pragma once
 
 #include <cmath>
@@ -8,6 +8,9 @@
 #include "shapegcode/path.hpp"
 
 namespace shapegcode {
+
+/// By how much a segment may start beside the end of the one before, or an arc miss its own.
+inline constexpr double largest_gap_mm = 1e-6;
 
 /// What must be added to the sweep of an arc so that it leads to the end, within half a turn.
 [[nodiscard]] inline double missing_sweep_rad(const Segment& arc) noexcept {

@@ -7,13 +7,13 @@
 #include <string>
 #include <utility>
 
+#include "path/arc_end.hpp"
 #include "shapegcode/error.hpp"
 
 namespace shapegcode {
 namespace {
 
 constexpr std::size_t few_segments = 512;
-constexpr double largest_gap_mm = 1e-6;
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <random>
 #include <string>
 #include <vector>
@@ -12,7 +13,7 @@
 #include "shapegcode/controller.hpp"
 #include "shapegcode/path.hpp"
 
-namespace shapegcode::peers {
+namespace shapegcode::tests {
 
 struct Draw {
   std::mt19937 engine;
@@ -41,7 +42,22 @@ struct Trial {
 
 Trial random_trial(std::uint32_t seed);
 
+inline constexpr std::size_t most_steps_of_trial = 1'000'000;
+
+struct Outcome {
+  std::array<double, 3>
+      worst{};  ///< largest speed, acceleration and jerk of any axis (finite differences), over its limit
+  std::size_t steps = 0;
+  std::size_t turns = 0;
+  std::size_t holds = 0;
+  bool ended = false;    ///< came to rest at last
+  bool arrived = false;  ///< at the end of the path, or was aborted
+};
+
+/// Runs the path of a seed; `see` gets the state after each step.
+Outcome run_trial(const Trial& trial, std::uint32_t seed, const std::function<void(const ControllerState&)>& see = {});
+
 /// The settings in one line, for a message.
 std::string text_of(const ControllerSettings& settings);
 
-}  // namespace shapegcode::peers
+}  // namespace shapegcode::tests

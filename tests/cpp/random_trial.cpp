@@ -1,14 +1,16 @@
-#include "peers_trial.hpp"
+#include "random_trial.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
+#include <span>
 #include <variant>
 
-#include "../cpp/random_motion.hpp"
+#include "random_motion.hpp"
 
-namespace shapegcode::peers {
+namespace shapegcode::tests {
 namespace {
 
 ControllerShaper random_shaper(Draw& draw) {
@@ -57,6 +59,47 @@ ControllerSettings random_settings(Draw& draw) {
   return settings;
 }
 
+// Finite differences of the set-points over the limits, per axis.
+class Ratios {
+ public:
+  explicit Ratios(const ControllerSettings& settings)
+      : axes_(static_cast<std::size_t>(axis_count) + settings.following.size()), period_s_(settings.period_s) {
+    for (std::size_t axis = 0; axis < axes_; ++axis) {
+      limits_[axis] = limits_of(settings, axis);
+      watchers_.emplace_back(1, period_s_);
+    }
+  }
+  void add(std::span<const double> position) {
+    for (std::size_t axis = 0; axis < axes_; ++axis) watchers_[axis].add(position.subspan(axis, 1));
+  }
+  [[nodiscard]] std::array<double, 3> worst() const {
+    std::array<double, 3> worst{};
+    for (std::size_t axis = 0; axis < axes_; ++axis) {
+      const std::array<double, 3> seen{watchers_[axis].speed(), watchers_[axis].acceleration(), watchers_[axis].jerk()};
+      for (std::size_t order = 0; order < 3; ++order) {
+        worst[order] = std::max(worst[order], seen[order] / limits_[axis][order]);
+      }
+    }
+    return worst;
+  }
+
+ private:
+  static std::array<double, 3> limits_of(const ControllerSettings& settings, std::size_t axis) {
+    if (axis >= axis_count) {
+      const FollowingLimits& limits = settings.following[axis - axis_count];
+      return {limits.max_feed, limits.max_acceleration, limits.max_jerk};
+    }
+    const auto i = static_cast<Eigen::Index>(axis);
+    const MotionLimits& limits = settings.limits;
+    return {limits.max_feed_mm_per_s[i], limits.max_acceleration_mm_per_s2[i], limits.max_jerk_mm_per_s3[i]};
+  }
+
+  std::size_t axes_;
+  double period_s_;
+  std::array<std::array<double, 3>, most_controller_axes> limits_{};
+  std::vector<Differences> watchers_;
+};
+
 }  // namespace
 
 Trial random_trial(std::uint32_t seed) {
@@ -64,7 +107,7 @@ Trial random_trial(std::uint32_t seed) {
   Trial trial;
   trial.settings = random_settings(draw);
   const auto count = static_cast<std::size_t>(draw.logarithmic(3.0, 60.0));
-  trial.segments = tests::random_segments(draw.engine, count, draw.logarithmic(20.0, 400.0), draw.chance(0.6));
+  trial.segments = random_segments(draw.engine, count, draw.logarithmic(20.0, 400.0), draw.chance(0.6));
   std::array<double, most_following_axes> at{};
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t axis = 0; axis < trial.settings.following.size(); ++axis) {
@@ -82,6 +125,54 @@ Trial random_trial(std::uint32_t seed) {
   return trial;
 }
 
+Outcome run_trial(const Trial& trial, std::uint32_t seed, const std::function<void(const ControllerState&)>& see) {
+  Draw draw{std::mt19937(seed ^ 0x9e3779b9U)};
+  MotionController control(trial.settings);
+  const std::size_t n_following = trial.settings.following.size();
+  std::array<double, most_controller_axes> point{};
+  const std::span<double> out(point.data(), axis_count + n_following);
+  Ratios ratios(trial.settings);
+  ratios.add(out);
+  Outcome outcome;
+  std::size_t pushed = 0;
+  while (outcome.steps < most_steps_of_trial && !outcome.ended) {
+    const bool alone = outcome.steps >= trial.does.leaves;
+    while (pushed < trial.segments.size() && (alone || draw.chance(trial.does.push))) {
+      if (control.push(trial.segments[pushed], std::span(trial.following_end[pushed].data(), n_following)) !=
+          PushResult::accepted) {
+        break;
+      }
+      ++pushed;
+    }
+    if (alone) {
+      control.feed_override(1.0);
+      control.resume();
+    } else {
+      if (draw.chance(trial.does.turn)) {
+        control.feed_override(draw.chance(0.1) ? 0.0 : draw.between(0.0, 2.0));
+        ++outcome.turns;
+      }
+      if (draw.chance(trial.does.hold)) {
+        control.hold();
+        ++outcome.holds;
+      }
+      if (draw.chance(trial.does.resume)) control.resume();
+      if (draw.chance(trial.does.abort)) control.abort();
+    }
+    const Activity activity = control.step(out);
+    ratios.add(out);
+    if (see) see(control.state());
+    ++outcome.steps;
+    const bool idle = activity == Activity::idle && pushed == trial.segments.size();
+    outcome.ended = idle || activity == Activity::aborted;
+    const Vector3 end = trial.segments.back().end_mm;
+    outcome.arrived = activity == Activity::aborted ||
+                      (idle && (Eigen::Map<const Vector3>(point.data()) - end).norm() <= 1e-9 * (1.0 + end.norm()));
+  }
+  outcome.worst = ratios.worst();
+  return outcome;
+}
+
 std::string text_of(const ControllerSettings& settings) {
   const auto list = [](const Vector3& vector) {
     return fmt::format("{:.6g} {:.6g} {:.6g}", vector[0], vector[1], vector[2]);
@@ -96,4 +187,4 @@ std::string text_of(const ControllerSettings& settings) {
       list(settings.limits.max_jerk_mm_per_s3));
 }
 
-}  // namespace shapegcode::peers
+}  // namespace shapegcode::tests

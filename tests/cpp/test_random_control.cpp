@@ -1,0 +1,44 @@
+// Controls as they are drawn, with somebody at the override and the hold button: what they did wrong once, and others.
+#include <doctest/doctest.h>
+
+#include <array>
+#include <cstdint>
+
+#include "random_trial.hpp"
+
+namespace shapegcode::tests {
+namespace {
+
+void keeps_its_limits(std::uint32_t seed) {
+  CAPTURE(seed);
+  const Outcome outcome = run_trial(random_trial(seed), seed);
+  CHECK(outcome.worst[0] <= 1.001);
+  CHECK(outcome.worst[1] <= 1.001);
+  CHECK(outcome.worst[2] <= 1.001);
+  CHECK(outcome.ended);
+  CHECK(outcome.arrived);
+}
+
+}  // namespace
+
+TEST_CASE("any control keeps its limits, whatever the operator does") {
+  for (std::uint32_t seed = 1; seed <= 100; ++seed) keeps_its_limits(seed);
+}
+
+TEST_CASE("limits are kept where a segment comes too late for its corner") {
+  for (const std::uint32_t seed : {1027U, 4436U, 6471U, 12112U, 23312U}) keeps_its_limits(seed);
+}
+
+TEST_CASE("limits are kept where the override is raised between the two sides of a corner") {
+  for (const std::uint32_t seed : {1240U, 8567U}) keeps_its_limits(seed);
+}
+
+TEST_CASE("limits are kept while a shaper follows a position") {
+  for (const std::uint32_t seed : {11U, 282U, 373U, 1148U, 1770U, 3026U, 4449U, 4888U}) keeps_its_limits(seed);
+}
+
+TEST_CASE("a crawl around a corner is no longer than it has to be") {
+  for (const std::uint32_t seed : {1128U, 1765U, 2721U, 9442U}) keeps_its_limits(seed);
+}
+
+}  // namespace shapegcode::tests
