@@ -55,6 +55,8 @@ struct ControllerSettings {
   /// Length of each of two moving averages over every axis, which spread what a corner or the begin of an arc asks for
   /// at once. 0 = none: then such a place is passed at a crawl where acceleration or jerk are limited.
   double smoothing_time_s = 0.01;
+  /// One that follows an axis is read in front of the smoothing. Its changes take up to a quarter of acceleration and
+  /// jerk, and limit the feed where that would not be enough.
   ControllerShaper shaper = Fir({0}, {1.0});
   /// Take back, to the second order, what smoothing and shaper cut off arcs. Costs `correction_delay()` periods and a
   /// third of every limit, which the correction may need for itself.
