@@ -184,6 +184,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         Exception: with ``--debug``, the error as it is; without it, only what is a defect of shapegcode.
     """
     words = list(sys.argv[1:] if argv is None else argv)
+    if "numpy" not in sys.modules:
+        # Matrices of a command are small: further threads of OpenBLAS would only wait, and burn processor time.
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if "_ARGCOMPLETE" in os.environ:  # a shell asks at TAB
         importlib.import_module(f"{__name__}.completion").complete()
     try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -115,6 +114,8 @@ def load_machine(args: argparse.Namespace) -> Machine:
 
 def _toml_value(text: str) -> Any:
     # A bare word is a string: quotes would have to be escaped from the shell.
+    import tomllib
+
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -44,6 +43,8 @@ class MadeFile:
             Its name, size and hash; the hash is empty where it cannot be read.
         """
         if content is not None:
+            import hashlib
+
             return cls(role, str(name), hashlib.sha256(content).hexdigest(), len(content))
         try:
             sha256, size = file_hash(name)
@@ -94,6 +95,8 @@ def file_hash(name: str | Path) -> tuple[str, int]:
     Raises:
         OSError: it cannot be read.
     """
+    import hashlib
+
     digest, size = hashlib.sha256(), 0
     with Path(name).open("rb") as stream:
         while piece := stream.read(_PIECE_BYTES):

@@ -51,6 +51,8 @@ class GridSearch:
         self._period_s = period_s
         # By number of periods, with the number of planes that are in it.
         self._programs: dict[int, tuple[LinearProgram, int]] = {}
+        self._answers: dict[int, FloatArray | None] = {}
+        self._equations: dict[int, tuple[FloatArray, FloatArray]] = {}
         self._planes = [
             _plane(each, float(frequency_hz), float(direction))
             for each in conditions.limits
@@ -145,6 +147,13 @@ class GridSearch:
 
         With limits: those whose largest share of its limit is least, until it is below 1 or proven not to be.
         """
+        if self._conditions.limits:  # the planes found since say more
+            return self._found_feasible(last)
+        if last not in self._answers:
+            self._answers[last] = self._found_feasible(last)
+        return self._answers[last]
+
+    def _found_feasible(self, last: int) -> FloatArray | None:
         for _ in range(_MOST_ROUNDS):
             found = self._program(last, None)
             if found is None:
@@ -217,6 +226,9 @@ class GridSearch:
 
         Near-equal zeros then cost no precision, and equal ones no row.
         """
+        known = self._equations.get(last)
+        if known is not None:
+            return known
         rows = []
         steps = np.arange(last + 1)
         for zero in self._conditions.zeros:
@@ -228,7 +240,8 @@ class GridSearch:
             _, strength, basis = np.linalg.svd(np.array(rows), full_matrices=False)
             kept = basis[strength > _SAME_CONDITION * strength[0]] * math.sqrt(last + 1)
         matrix = np.vstack([kept, np.ones(last + 1)])
-        return matrix, np.eye(len(matrix))[-1]
+        self._equations[last] = matrix, np.eye(len(matrix))[-1]
+        return self._equations[last]
 
     def _inequalities(self, planes: Sequence[_Plane], last: int) -> FloatArray:
         poles = np.array([plane.pole for plane in planes])
@@ -245,6 +258,8 @@ class GridSearch:
 
     def _cut(self, taps: FloatArray) -> bool:
         """Add the planes that cut these taps off; False if they meet every limit."""
+        if not self._conditions.limits:
+            return False
         last = len(taps) - 1
         shaper = Shaper((np.arange(last + 1) * self._period_s).tolist(), (taps / taps.sum()).tolist())
         before = len(self._planes)

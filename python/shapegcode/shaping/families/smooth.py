@@ -29,6 +29,7 @@ _FURTHEST = 2.5
 _STRIDES = 40  # of the usual length: how coarsely the first kernel is looked for, before the steps are halved
 _MOST_SAMPLES = 20_000
 _WHOLE = 1e-9
+_CLEARLY = 1e-3  # of the largest sample: a negative one that what rounding left does not lift
 _SINGULAR = 1e-12  # relative singular value below which two conditions ask for the same thing on this grid
 
 
@@ -109,6 +110,8 @@ def _samples(mode: Mode, ratios: tuple[float, ...], period_s: float, steps: int)
     matrix = np.array(rows)
     target = np.eye(len(rows))[0]
     taps = basis @ np.linalg.lstsq(matrix @ basis, target, rcond=_SINGULAR)[0]
+    if float(taps.min()) < -_CLEARLY * float(taps.max()):
+        return None
     for _ in range(2):  # what rounding left of the zeros
         taps = taps + np.linalg.lstsq(matrix, target - matrix @ taps, rcond=_SINGULAR)[0]
     if float(np.abs(matrix @ taps - target).max()) > RESIDUAL_LIMIT or float(taps.min()) <= 0.0:

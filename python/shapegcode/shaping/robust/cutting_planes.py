@@ -40,6 +40,7 @@ _BOUNDS_SHARE = 0.5  # of the worst residual: a plane that the taps come less cl
 _PROOF_SHARE = 1e-4  # of the residual: what a proven sweep may add for what lies between its samples
 _PROOF_SAMPLES = 200_000
 _SAME_VALUE = 1e-6  # relative
+_BESIDE = np.array([-1.0, 0.0, 1.0])
 _QUARTERS = np.array([0.0, 0.5, 1.0, 1.5]) * math.pi
 
 
@@ -101,12 +102,12 @@ class _Band:
         at = np.flatnonzero((size >= padded[:-2]) & (size >= padded[2:]))
         omegas, step = self.omegas[at], self.omegas[1] - self.omegas[0] if len(self.omegas) > 1 else 0.0
         for _ in range(2 if step else 0):
-            three = np.clip(omegas[:, None] + step * np.array([-1.0, 0.0, 1.0]), self.low, self.high)
+            three = _within(omegas[:, None] + step * _BESIDE, self.low, self.high)
             left, middle, right = (np.abs(self.residual(taps, three.ravel())) ** 2).reshape(-1, 3).T
             bend = left - 2.0 * middle + right
             inner = (three[:, 2] - three[:, 0] > 1.99 * step) & (bend < 0.0)
             shift = np.where(inner, 0.5 * (left - right) / np.where(inner, bend, -1.0), 0.0)
-            omegas = np.clip(omegas + step * np.clip(shift, -1.0, 1.0), self.low, self.high)
+            omegas = _within(omegas + step * _within(shift, -1.0, 1.0), self.low, self.high)
             step *= 0.1
         omegas = np.concatenate([self.omegas[at], omegas])
         values = self.residual(taps, omegas)
@@ -267,6 +268,11 @@ class TapProblem:
             return None
         taps = x[: self.last + 1] - x[self.last + 1 : count] if signed else x[:count]
         return taps, float(objective @ x) + (limit if cost is None else 0.0)
+
+
+def _within(values: FloatArray, low: float, high: float) -> FloatArray:
+    """As np.clip, which takes three times as long for a few values."""
+    return np.asarray(np.minimum(np.maximum(values, low), high))
 
 
 def _ends(band: ModeBand) -> tuple[float, float]:
