@@ -116,9 +116,16 @@ def test_other_values_are_checked_as_those_of_a_file() -> None:
         'VX500: shaping.famly = "zvd": unknown key; did you mean family?',
         "VX500: tolerance.contour_um = -5: must be greater than 0 (unit: µm)",
     ]
-    for key in ("name.x", "axes.x.modes.3.damping_ratio", "axes.x.modes.0.damping_ratio"):
-        with pytest.raises(MachineError, match=rf"^here: {key} = 0.5: no such key$"):
+    with pytest.raises(MachineError, match=r"^here: name.x = 0.5: no such key$"):
+        machine.with_values("name.x", 0.5, source="here")
+    for axis, rank, there in (("x", 3, "is 1"), ("x", 0, "is 1"), ("x", -1, "is 1"), ("z", 1, "is none")):
+        key = f"axes.{axis}.modes.{rank}.damping_ratio"
+        said = rf"^here: {key} = 0.5: no such key: axes.{axis}.modes counts from 1, and there {there}$"
+        with pytest.raises(MachineError, match=said):
             machine.with_values(key, 0.5, source="here")
+    two = machine.with_values({"axes.z.modes": [{"frequency_hz": 50, "damping_ratio": 0.02}],
+                               "axes.z.modes.1.damping_ratio": 0.1})  # fmt: skip
+    assert two.axes.z.modes[0].damping_ratio == 0.1
 
 
 def test_other_values_leave_the_defaults_what_they_are() -> None:

@@ -10,7 +10,7 @@ from shapegcode.errors import FileError, Problem
 from shapegcode.settings.keys import InlineTable, TomlTable, toml
 from shapegcode.settings.load import validated
 
-__all__ = ["with_values"]
+__all__ = ["missing_row", "with_values"]
 
 _Model = TypeVar("_Model", bound=TomlTable)
 # A part of a dotted key: in quotes where it holds a dot itself.
@@ -36,13 +36,16 @@ def with_values(settings: _Model, values: Mapping[str, object], source: str, err
     """
     data = _plain(settings)
     for key, value in values.items():
-        *tables, last = [quoted or bare for quoted, bare in _PART.findall(key)] or [key]
+        *tables, last = parts = _parts(key)
         place: Any = data
         held: Any = settings
-        for name in tables:
-            held = _below(held, name)
-            place = _entry(place, name, held)
-        if isinstance(place, list) and _is_row(last, place):
+        for rank, name in enumerate(parts):
+            if wrong := _no_row(place, parts[:rank], name):
+                raise error(source, (Problem(key, toml(value), wrong),))
+            if rank < len(tables):
+                held = _below(held, name)
+                place = _entry(place, name, held)
+        if isinstance(place, list):
             place[int(last) - 1] = value
         elif isinstance(place, dict) and value is None:
             place.pop(last, None)
@@ -51,6 +54,36 @@ def with_values(settings: _Model, values: Mapping[str, object], source: str, err
         else:
             raise error(source, (Problem(key, toml(value), "no such key"),))
     return validated(type(settings), data, source, "", error)
+
+
+def missing_row(settings: TomlTable, key: str) -> str:
+    """Why a dotted key names no entry of a list: there it must be a number from 1 to as many as there are.
+
+    Args:
+        settings: what was loaded.
+        key: such as ``axes.x.modes.1.frequency_hz``.
+
+    Returns:
+        The reason, for a message; empty: it does, or names no list.
+    """
+    held: Any = settings
+    parts = _parts(key)
+    for rank, name in enumerate(parts):
+        if wrong := _no_row(held, parts[:rank], name):
+            return wrong
+        held = _below(held, name)
+    return ""
+
+
+def _no_row(held: Any, above: list[str], name: str) -> str:
+    if not isinstance(held, list | tuple) or _is_row(name, held):
+        return ""
+    there = f"there {'is' if len(held) == 1 else 'are'} {len(held)}" if held else "there is none"
+    return f"no such key: {'.'.join(above)} counts from 1, and {there}"
+
+
+def _parts(key: str) -> list[str]:
+    return [quoted or bare for quoted, bare in _PART.findall(key)] or [key]
 
 
 def _plain(value: Any) -> Any:
@@ -82,4 +115,4 @@ def _entry(place: Any, name: str, held: Any) -> Any:
         # A value that is a table goes as a whole: its other keys must not be lost.
         whole = held is not None and (isinstance(held, InlineTable) or not isinstance(held, TomlTable))
         return place.setdefault(name, _plain(held) if whole else {})
-    return place[int(name) - 1] if isinstance(place, list) and _is_row(name, place) else None
+    return place[int(name) - 1] if isinstance(place, list) else None

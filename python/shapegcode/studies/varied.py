@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from shapegcode.errors import ArgumentError, MachineError, Problem
 from shapegcode.machine import Machine
+from shapegcode.settings.change import missing_row
 from shapegcode.studies.distributions import Distribution, listed
 
 __all__ = ["Varied", "Vary", "drawn_machine", "varied_values"]
@@ -28,8 +29,9 @@ _PLAYED = re.compile(
     r"|shaping\.part_mass_kg|times\..+"
 )
 _SWINGS = re.compile(r"axes\.[xyz]\.(modes|rigid|drive)\b.*|shaping\.part_mass_kg")
+# The file may leave out the table that holds it; `with_values` has the last word.
+_OPTIONAL = re.compile(r"axes\.[xyz]\.(modes|drive)(\.|$)")
 _TICK = "controller.interpolation_period_s"
-_FROM_ZERO = re.compile(r"\.0(\.|$)")
 
 
 @dataclass(frozen=True)
@@ -76,26 +78,20 @@ def varied_values(machine: Machine, vary: Vary) -> tuple[Varied, ...]:
     held = {value.key: value for value in machine.values()}
     found = []
     for key, given in vary.items():
-        if _FROM_ZERO.search(key):
-            raise MachineError(machine.name, (Problem(key, "", "no such key: modes count from 1"),))
         if isinstance(given, str) or not isinstance(given, Distribution | Sequence):
             raise ArgumentError(f"vary: {key} = {given!r}: must be a distribution or a list of values")
         drawn = given if isinstance(given, Distribution) else listed(given)
         # Tables such as controller.in_position_s can be varied axis by axis.
         at = held.get(key) or held.get(key.rpartition(".")[0])
-        if at is None and key not in _optional_keys(machine, key):
-            raise MachineError(machine.name, (Problem(key, "", "no such key"),))
+        wrong = missing_row(machine, key) or ("" if at or _OPTIONAL.match(key) else "no such key")
+        if wrong:
+            raise MachineError(machine.name, (Problem(key, "", wrong),))
         played = _PLAYED.fullmatch(key) is not None
         if drawn.known is False and not played:
             raise ArgumentError(f"vary: {key}: known = false: only the converter reads it, so that it must be known")
         known = not played if drawn.known is None else drawn.known
         found.append(Varied(key, drawn, known, at.value if at else "not set", at.unit if at else ""))
     return tuple(found)
-
-
-def _optional_keys(machine: Machine, key: str) -> tuple[str, ...]:
-    """The key, where the file leaves out the table that holds it; `with_values` has the last word."""
-    return (key,) if re.match(r"axes\.[xyz]\.(modes|drive)\b", key) else ()
 
 
 def drawn_machine(machine: Machine, values: Mapping[str, object], source: str) -> Machine:
