@@ -238,6 +238,7 @@ from shapegcode.studies.optimum_result import (
 )
 from shapegcode.studies.plots import (
     plot_bands as plot_bands,
+    plot_choices as plot_choices,
     plot_tornado as plot_tornado,
 )
 from shapegcode.studies.result import MachineStudy as MachineStudy

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+import re
+import shlex
+import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 from scipy import stats
@@ -26,6 +30,7 @@ from shapegcode.studies.study_file import StudyFileError
 from shapegcode.studies.summary import decides, interval_of
 from shapegcode.studies.varied import varied_values
 
+ROOT = Path(__file__).resolve().parents[2]
 X_HZ, Y_HZ = "axes.x.modes.1.frequency_hz", "axes.y.modes.1.frequency_hz"
 X_DAMPING = "axes.x.modes.1.damping_ratio"
 VX500 = sg.Machine.load("vx500")
@@ -296,6 +301,139 @@ def test_bad_files_name_key_value_and_limit(tmp_path: Path, old: str, new: str, 
     assert not (tmp_path / "s.csv").exists()
 
 
+CHOICES = """
+[choose]
+shaping.family = ["zv", "zvd"]
+"emission.block_period_s" = [0.006, 0.005]
+"""
+
+
+@cache
+def editor_validator() -> jsonschema.Draft202012Validator:
+    return jsonschema.Draft202012Validator(json.loads((ROOT / "docs" / "schema" / "files" / "study.json").read_text()))
+
+
+def test_the_schema_for_editors_takes_good_files(tmp_path: Path) -> None:
+    """As `jsonschema` reads it: the golden file, the examples of the manual, all kinds of distributions."""
+    validator = editor_validator()
+    validator.check_schema(validator.schema)
+    assert json.loads(run(tmp_path, "machine", "schema", "study").stdout) == validator.schema, "run `make schemas`"
+    manual = (ROOT / "docs" / "howto" / "studies.md").read_text()
+    example = next(part for part in re.findall(r"```toml\n(.*?)```", manual, re.DOTALL) if "STUDY.toml" in part)
+    kinds = """program = "p.nc"
+        [vary.axes.x.modes.1]
+        frequency_hz = { mean = 46, percent = 5, known = true }
+        damping_ratio = { one_of = [0.01, 0.02] }
+        [vary]
+        axes.y.modes = [[], [{ frequency_hz = 131.0, damping_ratio = 0.02 }]]
+        controller.in_position_s.y = { low = 0.01, high = 0.02 }
+        input.work_offsets.G54 = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+        """
+    golden = (ROOT / "tests" / "golden" / "study" / "STUDY.toml").read_text()
+    for text in (golden, example, STUDY + CHOICES, STUDY, kinds):
+        validator.validate(tomllib.loads(text))
+        (tmp_path / "S.toml").write_text(text)
+        sg.load_study(tmp_path / "S.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('program = "part.nc"', ""),
+        ("n = 40", "n = 0"),
+        ("n = 40", "n = 2000000"),
+        ("n = 40", 'n = "many"'),
+        ("n = 40", "m = 40"),
+        ("n = 40", "at_least = 1.5"),
+        ("n = 40", "seed = -1"),
+        ("n = 40", 'sampling = "monte carlo"'),
+        ("n = 40", 'measure = ["shake_um"]'),
+        ("sd = 2.0", "sd = -2.0"),
+        ("sd = 2.0", 'sd = "2"'),
+        ("sd = 2.0", "sd = 2.0, percent = 4.0"),
+        ("mean = 46.0, sd = 2.0", "mean = 46.0"),
+        ("mean = 46.0, sd = 2.0", "shape = 3.0"),
+        ("{ mean = 46.0, sd = 2.0 }", "46.0"),
+        ("[0.0, 0.008]", "[]"),
+        ('["zv", "zvd"]', "[]"),
+        ('["zv", "zvd"]', '"zv"'),
+    ],
+)
+def test_what_the_schema_refuses_the_file_is_refused_for(tmp_path: Path, old: str, new: str) -> None:
+    text = (STUDY + CHOICES).replace(old, new)
+    assert text != STUDY + CHOICES
+    with pytest.raises(jsonschema.ValidationError):
+        editor_validator().validate(tomllib.loads(text))
+    (tmp_path / "S.toml").write_text(text)
+    with pytest.raises(StudyFileError, match=r"S\.toml"):
+        sg.load_study(tmp_path / "S.toml")
+
+
+def test_the_schema_knows_the_keys_of_the_machine_file() -> None:
+    validator = editor_validator()
+    for old, new in (("frequency_hz", "frequenzy_hz"), ("x.modes.1", "x.modes.0"), ("shaping.family", "shaping.famly")):
+        with pytest.raises(jsonschema.ValidationError):
+            validator.validate(tomllib.loads((STUDY + CHOICES).replace(old, new, 1)))
+    machine = json.loads((ROOT / "docs" / "schema" / "files" / "machine.json").read_text())
+    here, there = (
+        each["$defs"][name]["properties"]["frequency_hz"]["description"]
+        for each, name in ((validator.schema, "vary.AxisMode"), (machine, "AxisMode"))
+    )
+    assert here == there
+
+
+def test_the_command_chooses_as_python_does(tmp_path: Path) -> None:
+    done = run(written(tmp_path, STUDY.replace("controller.shaped_time_constant_s = [0.0, 0.008]\n", CHOICES)),
+               "optimize", "STUDY.toml", "--json", "o.json", "--set", "times.tool_change_s=3")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    report = json.loads((tmp_path / "o.json").read_text())
+    jsonschema.validate(report, json.loads((ROOT / "docs" / "schema" / "Optimum.json").read_text()))
+    file = sg.load_study(tmp_path / "STUDY.toml")
+    machine = VX500.with_values("times.tool_change_s", 3)
+    found = sg.optimize(tmp_path / "part.nc", machine, **file.choice_options())
+    assert found.best is not None
+    assert report["best"]["time_s"] == pytest.approx(found.best.time_s, rel=1e-6)
+    assert done.stdout.splitlines()[0] == found.answer == sg.load_result(tmp_path / "o.json").answer
+    (convert,) = [line for line in done.stdout.splitlines() if line.startswith("next: ")]
+    words = shlex.split(convert)[2:]
+    assert words[:5] == ["convert", "part.nc", "-m", "vx500", "--set"]
+    again = run(tmp_path, *words, "--json", "c.json")
+    assert again.returncode == 0, again.stderr
+    time_s = json.loads((tmp_path / "c.json").read_text())["cycle_time_s"]["emitted"]
+    assert time_s == pytest.approx(found.best.time_s, rel=1e-6)
+
+
+def test_a_choice_that_nothing_bears_is_code_1_and_draws_none(tmp_path: Path) -> None:
+    text = STUDY.replace("controller.shaped_time_constant_s = [0.0, 0.008]\n", CHOICES)
+    done = run(written(tmp_path, text), "optimize", "STUDY.toml", "--set", "tolerance.contour_um=0.2", "--plots", "p")
+    assert done.returncode == 1, done.stderr
+    assert done.stdout.startswith("none of 4 choices stays within tolerance on 95 % of the machines")
+    assert "pictures: none are drawn of this" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"zvd"]', '"zvd"]\nmost = 3', "choose.most"),
+        ('["zv", "zvd"]', '["soft"]', 'shaping.family = "soft": must be "auto"'),
+        ("shaping.family", "shaping.famly", "did you mean family?"),
+        ("shaping.family", "axes.x.modes.1.frequency_hz", "a value is either drawn or chosen"),
+        ("n = 40", "most = 0", "STUDY.toml:3: most = 0: must be 1 or more"),
+        ("n = 40", "n = 400000", "n = 400000: must be at most 250000"),
+        ("sd = 2.0", "sd = 2.0, known = true", "it belongs into choose"),
+        ("x.modes.1", "x.modes.0", "counts from 1, and there is 1"),
+        ("part.nc", "nothing.nc", "no such file"),
+        ('machine = "vx500"', "", "no machine: name one there, or with -m"),
+    ],
+)
+def test_bad_choices_name_key_value_and_limit(tmp_path: Path, old: str, new: str, said: str) -> None:
+    text = STUDY.replace("controller.shaped_time_constant_s = [0.0, 0.008]\n", CHOICES).replace(old, new)
+    done = run(written(tmp_path, text), "optimize", "STUDY.toml", "--json", "o.json")
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert not (tmp_path / "o.json").exists()
+
+
 def test_bad_arguments_name_key_value_and_limit() -> None:
     ask = partial(sg.study, path_program(200, VX500), VX500)
     with pytest.raises(ArgumentError, match="nothing is varied"):
@@ -386,11 +524,11 @@ def test_more_choices_than_conversions_are_searched() -> None:
     assert (len(found.candidates), found.combinations) == (10, 36)
     assert found.best is not None and found.best.time_s == min(each.time_s for each in found.candidates if each.time_s)
     assert ask(choose=choose, most=10).values == found.values
-    with pytest.raises(ArgumentError, match=r"probability = 1\.5: must be above 0 and at most 1"):
+    with pytest.raises(ArgumentError, match=r"probability = 1\.5: must be a probability, above 0 and at most 1"):
         ask(probability=1.5)
-    with pytest.raises(ArgumentError, match="most = 0: must be 1 conversion or more"):
+    with pytest.raises(ArgumentError, match="most = 0: must be a whole number of conversions, 1 or more"):
         ask(most=0)
-    with pytest.raises(ArgumentError, match="give one value or more for each key"):
+    with pytest.raises(ArgumentError, match="must be a list of one value or more"):
         ask(choose={"shaping.family": []})
     with pytest.raises(MachineError, match=r"shaping\.family = \"soft\": must be"):
         ask(choose={"shaping.family": ["soft"]})

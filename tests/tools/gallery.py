@@ -141,6 +141,10 @@ ENTRIES = (
         }, "studies",
     ),
     Entry(
+        "Settings that most machines bear", "optimize STUDY.toml",
+        {"optimum-choices": "Which choices are the fastest, and on how many machines is each good?"}, "optimum",
+    ),
+    Entry(
         "Position loops from a log", "characterize --servo capture.json.gz -m vx500",
         {"servo": "The control's own deviation, and what our model leaves of it where it was not fitted."}, "servo",
     ),

@@ -7,13 +7,9 @@ import pkgutil
 from pathlib import Path
 
 import shapegcode
-from shapegcode.cutting.stock import Stock
-from shapegcode.cutting.tool import Tool
-from shapegcode.machine import Machine
+from shapegcode.cli.machine import FILES, file_schema
 from shapegcode.results.json import schema, to_text
 from shapegcode.results.result import Result
-from shapegcode.settings.keys import TomlTable
-from shapegcode.settings.schema import toml_schema
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "schema"
 
@@ -35,8 +31,7 @@ def results() -> dict[str, type[Result]]:
 
 def file_texts() -> dict[str, str]:
     """Schemas of the TOML files, for editors, by the names of their files."""
-    models: dict[str, type[TomlTable]] = {"machine": Machine, "tool": Tool, "stock": Stock}
-    return {f"{kind}.json": to_text(toml_schema(model, f"{kind} file of shapegcode")) for kind, model in models.items()}
+    return {f"{kind}.json": file_schema(kind) for kind in FILES}
 
 
 def texts() -> dict[str, str]:

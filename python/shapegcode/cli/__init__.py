@@ -80,6 +80,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("testcut", "write test cuts as programs, and fit cutting forces or the feed control to their records"),
     Command("batch", "run a command over many programs and machines, and go on where it stopped"),
     Command("study", "play a program on drawn machines: how likely it stays within tolerance, and what decides"),
+    Command("optimize", "choose settings for the shortest program that stays within tolerance on most drawn machines"),
     Command("report", "make pages of results that --json has written"),
     Command("completion", "print the script that has bash, zsh or fish complete at TAB"),
     Command("demo", "repeat the figures of a paper beside the published ones"),

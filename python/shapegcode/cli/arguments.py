@@ -18,7 +18,9 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
     "what to do": ("write", "fit", "servo", "runs", "tap_plan", "list_families"),
     "what to shape": ("shaper", "contour", "per_axis", "shape_rapids", "arc_feed", "shape_all", "block_period"),
-    "tolerance": ("contour_tolerance", "vibration_limit", "max_duration", "max_abs_sum", "margin", "settling_band"),
+    "tolerance": (
+        "at_least", "contour_tolerance", "vibration_limit", "max_duration", "max_abs_sum", "margin", "settling_band",
+    ),
     "budget": ("max_bytes", "baud", "max_blocks_per_second"),
     "cut": (
         "feed_schedule", "tool", "stock", "resolution", "tool_diameter", "spindle", "axial_depth", "feed", "feeds",

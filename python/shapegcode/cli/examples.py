@@ -45,6 +45,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "shapegcode study STUDY.toml --plots plots",
         "shapegcode study STUDY.toml -m mine.toml -n 10000 --html study.html --csv draws.csv",
     ),
+    "optimize": (
+        "shapegcode optimize STUDY.toml",
+        "shapegcode optimize STUDY.toml -m mine.toml --at-least 99% --html optimum.html --json optimum.json",
+    ),
     "setup": (
         "shapegcode setup -o mine.toml",
         "shapegcode setup --answers answers.toml -o mine.toml --force",

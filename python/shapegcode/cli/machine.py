@@ -15,7 +15,10 @@ if TYPE_CHECKING:
     from shapegcode.machine.description_result import MachineDescription
     from shapegcode.settings.keys import TomlTable
 
-__all__ = ["add_arguments", "run"]
+__all__ = ["FILES", "add_arguments", "file_schema", "run"]
+
+FILES = ("machine", "tool", "stock", "study")
+"""Kinds of TOML files that have a schema."""
 
 _DEFAULT_FILE = "machine.toml"
 _DEFAULT_MACHINE = "vx500"
@@ -98,11 +101,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     scheme = actions.add_parser(
         "schema",
-        help="print the JSON Schema of machine, tool or stock files, for editors",
+        help="print the JSON Schema of machine, tool, stock or study files, for editors",
         description="Print the JSON Schema of a TOML file. Editors with TOML support (taplo, Even Better TOML) "
         "complete and check a file that begins with `#:schema machine.schema.json`.",
     )
-    scheme.add_argument("kind", choices=("machine", "tool", "stock"), nargs="?", default="machine", help="kind of file")
+    scheme.add_argument("kind", choices=FILES, nargs="?", default="machine", help="kind of file")
     scheme.add_argument("-o", "--output", metavar="FILE", default="-", help="file to write (default: standard output)")
 
 
@@ -234,20 +237,34 @@ def _diff(args: argparse.Namespace) -> int:
     return runner.finish(machine_difference(*args.files), args)
 
 
-def _schema(args: argparse.Namespace) -> int:
+def file_schema(kind: str) -> str:
+    """JSON Schema of a TOML file, as text.
+
+    Args:
+        kind: one of `FILES`.
+
+    Returns:
+        The text.
+    """
     from shapegcode.cutting.stock import Stock
     from shapegcode.cutting.tool import Tool
-    from shapegcode.io.atomic import write_text
     from shapegcode.machine import Machine
     from shapegcode.results.json import to_text
     from shapegcode.settings.schema import toml_schema
+    from shapegcode.studies.study_file import study_schema
 
+    title = f"{kind} file of shapegcode"
     models: dict[str, type[TomlTable]] = {"machine": Machine, "tool": Tool, "stock": Stock}
-    scheme = toml_schema(models[args.kind], f"{args.kind} file of shapegcode")
+    return to_text(study_schema(title) if kind == "study" else toml_schema(models[kind], title))
+
+
+def _schema(args: argparse.Namespace) -> int:
+    from shapegcode.io.atomic import write_text
+
     if args.output == "-":
-        sys.stdout.write(to_text(scheme))
+        sys.stdout.write(file_schema(args.kind))
     else:
-        write_text(args.output, to_text(scheme))
+        write_text(args.output, file_schema(args.kind))
         print(f"wrote {args.output}\nnext: put `#:schema {args.output}` into the first line of a {args.kind} file")
     return 0
 

@@ -3,12 +3,44 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from shapegcode.cli.options import add_machine_argument, add_plots_argument, add_result_arguments, load_machine
 from shapegcode.cli.typed import count
 
-__all__ = ["add_arguments", "run"]
+if TYPE_CHECKING:
+    from shapegcode.machine import Machine
+    from shapegcode.studies.study_file import StudyFile
+
+__all__ = ["add_arguments", "add_study_arguments", "load", "run"]
+
+
+def add_study_arguments(parser: argparse.ArgumentParser, what: str, draws: str) -> None:
+    """Declare the file of a study, the machine, the number of draws; `what` is read from it, `draws` how many."""
+    parser.add_argument("input", metavar="STUDY.toml", help=what)
+    add_machine_argument(parser, required=False)
+    parser.add_argument("-n", "--draws", type=count, default=None, metavar="N", help=f"{draws} (default: the file's)")
+
+
+def load(args: argparse.Namespace) -> tuple[StudyFile, Machine]:
+    """The file and the machine; the program and the machine then stand among what the command reads.
+
+    Raises:
+        StudyFileError, MachineError, ArgumentError: bad input.
+        OSError: a file cannot be read.
+    """
+    from shapegcode.cli import runner
+    from shapegcode.errors import ArgumentError
+    from shapegcode.studies.study_file import load_study
+
+    file = load_study(args.input)
+    args.machine = args.machine or file.machine
+    if args.machine is None:
+        raise ArgumentError(f"{args.input}: no machine: name one there, or with -m")
+    args.inputs = [file.program]
+    machine = load_machine(args)
+    runner.check_files(args)
+    return file if args.draws is None else file.model_copy(update={"n": args.draws}), machine
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,11 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Converts a program once and plays it on machines whose values are drawn as the file says: how likely it stays "
         "within tolerance, quantiles, and which value decides. Exit code 1 if that is less likely than at_least."
     )
-    parser.add_argument("input", metavar="STUDY.toml", help="program, machine, and what is varied")
-    add_machine_argument(parser, required=False)
-    parser.add_argument(
-        "-n", "--draws", type=count, default=None, metavar="N", help="how many draws (default: the file's)"
-    )
+    add_study_arguments(parser, "program, machine, and what is varied", "how many draws")
     parser.add_argument("--csv", metavar="FILE", default=None, help="write one line per draw; - for standard output")
     parser.add_argument(
         "--scheduler",
@@ -46,20 +74,12 @@ def run(args: argparse.Namespace) -> int:
     """
     from shapegcode.batching.batch import Cluster
     from shapegcode.cli import runner
-    from shapegcode.errors import ArgumentError
     from shapegcode.io.atomic import write_lines
     from shapegcode.studies.study import study
-    from shapegcode.studies.study_file import load_study
 
-    file = load_study(args.input)
-    args.machine = args.machine or file.machine
-    if args.machine is None:
-        raise ArgumentError(f"{args.input}: no machine: name one there, or with -m")
-    args.inputs = [file.program]
-    machine = load_machine(args)
-    runner.check_files(args)
+    file, machine = load(args)
     cluster = None if args.scheduler is None else Cluster(args.scheduler, args.tls_ca, args.tls_cert, args.tls_key)
-    options: dict[str, Any] = file.options() | ({} if args.draws is None else {"n": args.draws})
+    options: dict[str, Any] = file.options()
     with runner.progress(f"{args.input}: converting", args) as bar:
 
         def tell(stage: str, share: float) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, get_origin
 
-from shapegcode.settings.keys import TomlTable
+from shapegcode.settings.keys import TomlTable, facts, item_type, table_type
 
-__all__ = ["toml_schema"]
+__all__ = ["keys_schema", "toml_schema"]
 
 
 def toml_schema(model: type[TomlTable], title: str) -> dict[str, Any]:
@@ -25,6 +26,41 @@ def toml_schema(model: type[TomlTable], title: str) -> dict[str, Any]:
         for entry in table.get("properties", {}).values():
             _describe(entry)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | found | {"title": title}
+
+
+def keys_schema(model: type[TomlTable], value: dict[str, Any], kind: str, defs: dict[str, Any]) -> dict[str, Any]:
+    """JSON Schema of a table that says something of some keys of a file, by their dotted names or as tables.
+
+    Args:
+        model: the table that the file is read as.
+        value: schema of what is said of a key.
+        kind: begins the names of the definitions.
+        defs: gets the definitions, one for each table of the file.
+
+    Returns:
+        The schema of the table. Entries of lists count from 1; a name in quotes with a dot in it is not looked into.
+    """
+    name = f"{kind}.{model.__name__}"
+    if name not in defs:
+        defs[name] = {}
+        properties: dict[str, Any] = {}
+        for key, field in model.model_fields.items():
+            found = value
+            below = table_type(field)
+            if below is not None:
+                table = keys_schema(below, value, kind, defs)
+                table = _table({"^[1-9][0-9]*$": table}) if item_type(field) else table
+                found = {"anyOf": [value, table]}
+            elif get_origin(field.annotation) in (dict, Mapping):
+                found = {"anyOf": [value, _table({".": value})]}
+            properties[key] = found | facts(field) | {"description": field.description or ""}
+            _describe(properties[key])
+        defs[name] = _table({r"\.": value}) | {"properties": properties}
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def _table(patterns: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "object", "patternProperties": patterns, "additionalProperties": False, "minProperties": 1}
 
 
 def _describe(entry: dict[str, Any]) -> None:

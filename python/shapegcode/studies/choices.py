@@ -13,7 +13,7 @@ import numpy.typing as npt
 from shapegcode.errors import ArgumentError
 from shapegcode.machine import Machine
 
-__all__ = ["Choices", "search", "usual_choices"]
+__all__ = ["Choices", "checked_choices", "search", "usual_choices"]
 
 Choices = Mapping[str, Sequence[object]]
 """Values to choose from, by key of the machine file."""
@@ -46,6 +46,29 @@ def usual_choices(machine: Machine) -> dict[str, tuple[object, ...]]:
     }
 
 
+def checked_choices(choices: Choices, varied: Sequence[str]) -> Choices:
+    """The choices, if they are such.
+
+    Args:
+        choices: values by key.
+        varied: keys that are drawn.
+
+    Returns:
+        The choices.
+
+    Raises:
+        ArgumentError: nothing to choose, no list of values, or a key that is drawn.
+    """
+    if not choices:
+        raise ArgumentError("choose: nothing to choose: give a list of values for one key or more")
+    for key, values in choices.items():
+        if isinstance(values, str) or not isinstance(values, Sequence) or not values:
+            raise ArgumentError(f"choose: {key} = {values!r}: must be a list of one value or more")
+        if key in varied:
+            raise ArgumentError(f"choose: {key}: it is drawn (vary): a value is either drawn or chosen")
+    return choices
+
+
 def search(choices: Choices, most: int, seed: int, cost: Callable[[Ranks], float]) -> Iterator[Ranks]:
     """Combinations worth a conversion: all of them, or as many as differential evolution gets to.
 
@@ -59,12 +82,10 @@ def search(choices: Choices, most: int, seed: int, cost: Callable[[Ranks], float
         Ranks of the values of each key, each combination once.
 
     Raises:
-        ArgumentError: nothing to choose, or fewer than one conversion.
+        ArgumentError: fewer than one conversion.
     """
-    if not choices or not all(len(values) for values in choices.values()):
-        raise ArgumentError("choose: give one value or more for each key")
-    if most < 1:
-        raise ArgumentError(f"most = {most}: must be 1 conversion or more")
+    if isinstance(most, bool) or not isinstance(most, int) or most < 1:
+        raise ArgumentError(f"most = {most!r}: must be a whole number of conversions, 1 or more")
     sizes = [len(values) for values in choices.values()]
     if math.prod(sizes) <= most:
         yield from itertools.product(*(range(size) for size in sizes))

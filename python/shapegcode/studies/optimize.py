@@ -19,16 +19,21 @@ from shapegcode.errors import ArgumentError, DesignError, MachineError
 from shapegcode.machine import Machine
 from shapegcode.program import Program
 from shapegcode.settings.keys import toml
-from shapegcode.studies.choices import Choices, Ranks, search, usual_choices
+from shapegcode.studies.choices import Choices, Ranks, checked_choices, search, usual_choices
 from shapegcode.studies.optimum_result import Candidate, ChosenValue, Optimum
 from shapegcode.studies.play import DrawsJob, play_all
 from shapegcode.studies.replay import SHARE, Replay
-from shapegcode.studies.sampling import Columns, drawn
+from shapegcode.studies.sampling import MOST_DRAWS, Columns, drawn
 from shapegcode.studies.study import check_ends
-from shapegcode.studies.summary import within
+from shapegcode.studies.summary import check_probability, within
 from shapegcode.studies.varied import Vary, drawn_machine, varied_values
 
-__all__ = ["optimize"]
+__all__ = ["USUAL_CONVERSIONS", "USUAL_DRAWS", "optimize"]
+
+USUAL_DRAWS = 256
+"""Machines on which a choice is played, if nothing else is said."""
+USUAL_CONVERSIONS = 300
+"""Conversions at most, if nothing else is said."""
 
 _FRESH = 4  # times as many draws confirm a choice: the best of many has had luck
 _UNLIKELY_S = 1e6  # a candidate that is not likely enough costs more than any program takes
@@ -42,9 +47,10 @@ def optimize(
     *,
     choose: Choices | None = None,
     probability: float = 0.95,
-    n: int = 256,
-    most: int = 300,
+    n: int = USUAL_DRAWS,
+    most: int = USUAL_CONVERSIONS,
     seed: int = 0,
+    shape_all: bool = False,
     on_progress: Callable[[float], None] = lambda _share: None,
 ) -> Optimum:
     """Choose block period, family, tolerance and feed on arcs for the shortest time that is likely enough to be good.
@@ -61,6 +67,7 @@ def optimize(
         n: machines on which a choice is played; four times as many fresh ones confirm it.
         most: conversions at most.
         seed: the same one gives the same result.
+        shape_all: see `convert`.
         on_progress: called with the share of the conversions that is done.
 
     Returns:
@@ -73,19 +80,22 @@ def optimize(
         ProgramError: the program cannot be read.
         OSError: its file cannot be read.
     """
-    if not 0.0 < probability <= 1.0:
-        raise ArgumentError(f"probability = {probability:g}: must be above 0 and at most 1")
+    check_probability("probability", probability)
     varied = varied_values(machine, vary)
+    choices = checked_choices(usual_choices(machine) if choose is None else choose, [each.key for each in varied])
     for each in varied:
         if each.known:
             raise ArgumentError(f"vary: {each.key}: the converter would know it: it belongs into choose")
-    samples = [drawn(varied, count, "sobol", seed + rank, indices=False) for rank, count in enumerate((n, _FRESH * n))]
+    samples = [drawn(varied, n, "sobol", seed, indices=False)]
+    if n > (largest := MOST_DRAWS // _FRESH):
+        raise ArgumentError(f"n = {n}: must be at most {largest}: {_FRESH} times as many confirm a choice")
+    samples.append(drawn(varied, _FRESH * n, "sobol", seed + 1, indices=False))
     for columns in samples:
         check_ends(machine, varied, columns)
     rows = [_rows([each.key for each in varied], columns) for columns in samples]
-    choices = usual_choices(machine) if choose is None else choose
-    _check_keys(machine, choices)
-    run = _Choosing(str(program) if isinstance(program, Path) else program, machine, choices, rows, probability)
+    _check_values(machine, choices)
+    source = str(program) if isinstance(program, Path) else program
+    run = _Choosing(source, machine, choices, rows, probability, shape_all)
     total = min(most, math.prod(len(values) for values in choices.values()))
     for ranks in search(choices, most, seed, run.cost):
         run.converted(ranks)
@@ -103,7 +113,7 @@ def _rows(keys: list[str], columns: Columns) -> tuple[Mapping[str, object], ...]
     return tuple(dict(zip(keys, values, strict=True)) for values in zip(*columns, strict=True))
 
 
-def _check_keys(machine: Machine, choices: Choices) -> None:
+def _check_values(machine: Machine, choices: Choices) -> None:
     """Every value by itself; two that do not go together are only no candidate."""
     for key, values in choices.items():
         problems = []
@@ -121,10 +131,10 @@ class _Choosing:
 
     def __init__(
         self, program: Program | str, machine: Machine, choices: Choices,
-        rows: list[tuple[Mapping[str, object], ...]], probability: float,
+        rows: list[tuple[Mapping[str, object], ...]], probability: float, shape_all: bool,
     ) -> None:  # fmt: skip
         self._program, self._machine, self._choices, self._rows = program, machine, choices, rows
-        self._probability = probability
+        self._probability, self._shape_all = probability, shape_all
         self._replays: dict[Ranks, Replay] = {}
         self.candidates: dict[Ranks, Candidate] = {}
 
@@ -138,7 +148,7 @@ class _Choosing:
             chosen = tuple(ChosenValue(key, toml(value)) for key, value in values.items())
             try:
                 machine = drawn_machine(self._machine, values, "choose")
-                replay = Replay.of(self._program, machine, self._machine)
+                replay = Replay.of(self._program, machine, self._machine, shape_all=self._shape_all)
                 self._replays[ranks] = replay
                 self.candidates[ranks] = Candidate(chosen, replay.time_s)
             except (ArgumentError, DesignError, MachineError) as no_text:
@@ -182,7 +192,7 @@ class _Choosing:
     def as_it_is(self) -> Candidate | None:
         """The machine file without a choice."""
         try:
-            replay = Replay.of(self._program, self._machine)
+            replay = Replay.of(self._program, self._machine, shape_all=self._shape_all)
         except (ArgumentError, DesignError):
             return None
         return Candidate((), replay.time_s, self._share(replay, 0), self._share(replay, 1))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import shlex
 import tomllib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from shapegcode.results.page.model import Figure
-from shapegcode.results.result import Result
+from shapegcode.results.result import Plot, Result
 from shapegcode.results.table import Column, Table
 
 __all__ = ["Candidate", "ChosenValue", "Optimum"]
@@ -67,6 +68,7 @@ class Optimum(Result):
         candidates: all that were converted, the shortest first.
         combinations: how many there are to choose from.
         warnings: what to heed.
+        machine_words: the machine as a command names it behind -m.
     """
 
     program: str
@@ -78,6 +80,7 @@ class Optimum(Result):
     candidates: tuple[Candidate, ...]
     combinations: int
     warnings: tuple[str, ...] = ()
+    machine_words: str = "MACHINE"
 
     @property
     def ok(self) -> bool:
@@ -94,7 +97,8 @@ class Optimum(Result):
     def answer(self) -> str:
         """What to set, how long it takes, how likely it is good."""
         if self.best is None or self.best.time_s is None:
-            return f"none of {len(self.candidates)} choices stays within tolerance on {self.probability * 100:g} %"
+            asked = f"{self.probability * 100:g} % of the machines"
+            return f"none of {len(self.candidates)} choices stays within tolerance on {asked}"
         was = self.as_it_is
         before = "" if was is None or was.time_s is None else f" (as the file has it {was.time_s:.3f} s)"
         checked = self.best.checked or 0.0
@@ -109,7 +113,9 @@ class Optimum(Result):
         if self.best is None:
             return "measure what decides (shapegcode study), widen the tolerance, or ask for less."
         words = [word for each in self.best.values for word in ("--set", f"{each.key}={each.value}")]
-        return f"shapegcode convert {shlex.join([self.program, '-m', 'MACHINE', *words])} -o shaped.nc"
+        return (
+            f"shapegcode convert {shlex.quote(self.program)} -m {self.machine_words} {shlex.join(words)} -o shaped.nc"
+        )
 
     def key_figures(self) -> tuple[Figure, ...]:
         """Time and probability of the best one."""
@@ -122,10 +128,24 @@ class Optimum(Result):
                    100.0),
         )  # fmt: skip
 
+    def plots(self) -> Mapping[str, Plot]:
+        """Time and probability of the shortest choices; nothing where none has a text."""
+        return self._drawn_beside() if self.shown else {}
+
+    @property
+    def shown(self) -> tuple[Candidate, ...]:
+        """The shortest candidates that have a text."""
+        return tuple(each for each in self.candidates[:_SHOWN] if each.time_s is not None)
+
     def tables(self) -> list[Table]:
         """The shortest candidates."""
+
+        def chosen(rank: int) -> Callable[[Candidate], str]:
+            return lambda row: row.values[rank].value
+
+        keys = [each.key for each in self.candidates[0].values]
         columns = (
-            Column("choice", value="words", text=True),
+            *(Column(key.rpartition(".")[2], value=chosen(rank), text=True) for rank, key in enumerate(keys)),
             Column("time", "s", "time_s", digits=3),
             Column("within", "%", lambda row: None if row.within is None else row.within * 100.0, digits=1),
             Column("confirmed", "%", lambda row: None if row.checked is None else row.checked * 100.0, digits=1),

@@ -1,4 +1,7 @@
-"""The pictures of ``shapegcode study``: what decides (tornado), and measures over the value that decides (bands)."""
+"""The pictures of ``shapegcode study``: what decides (tornado), and measures over the value that decides (bands).
+
+That of ``shapegcode optimize``: time and probability of the choices.
+"""
 
 from __future__ import annotations
 
@@ -8,20 +11,23 @@ from typing import TYPE_CHECKING
 
 from shapegcode.results import plot
 from shapegcode.results.result import Plot
+from shapegcode.studies.optimum_result import Optimum
 from shapegcode.studies.replay import MEASURES, SHARE
 from shapegcode.studies.result import Bins, MachineStudy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["plot_bands", "plot_tornado", "plots_of"]
+__all__ = ["plot_bands", "plot_choices", "plot_tornado", "plots_of"]
 
 _BARS = 12
 _PANELS = 3
 
 
-def plots_of(study: MachineStudy) -> dict[str, Plot]:
+def plots_of(study: MachineStudy | Optimum) -> dict[str, Plot]:
     """Its pictures by name."""
+    if isinstance(study, Optimum):
+        return {"optimum-choices": partial(plot_choices, study)}
     return {"study-tornado": partial(plot_tornado, study), "study-bands": partial(plot_bands, study)}
 
 
@@ -58,6 +64,38 @@ def plot_tornado(study: MachineStudy, ax: Axes | None = None) -> Axes:
     low, high = min(row.low for row in rows), max(1.0, *(row.high for row in rows))
     panel.set_xlim(low - 0.15 * (high - low), high + 0.15 * (high - low))
     panel.set_xlabel("share of the limit, median (grey: of all draws)")
+    return panel
+
+
+def plot_choices(found: Optimum, ax: Axes | None = None) -> Axes:
+    """How long does each of the shortest choices take, and how likely is it good? The one to take has the full colour.
+
+    Args:
+        found: the choices.
+        ax: where to draw; None: a new figure.
+
+    Returns:
+        The panel.
+    """
+    rows = found.shown
+    panel = plot.axes(
+        ax, size_inch=(9.0, 1.6 + 0.35 * len(rows)), title=f"Choices: {Path(found.program).name} on {found.machine}"
+    )
+    times_s = [each.time_s or 0.0 for each in rows]
+    for place, (row, time_s) in enumerate(zip(rows, times_s, strict=True)):
+        share = row.checked if row.checked is not None else row.within
+        longer_ms = 1e3 * (time_s - times_s[0])
+        panel.barh(place, longer_ms, height=0.6, color=plot.COLOURS[1] if row == found.best else plot.COLOURS[5])
+        said = f"{time_s:.3f} s, " + ("not played" if share is None else f"within tolerance on {share * 100:.1f} %")
+        panel.annotate(
+            said, (longer_ms, place), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8,
+            fontweight="bold" if row == found.best else "normal",
+        )  # fmt: skip
+    panel.set_yticks(range(len(rows)), [", ".join(each.value for each in row.values) for row in rows], fontsize=8)
+    panel.set_ylim(len(rows) - 0.4, -0.6)
+    panel.set_xlim(0.0, 1.5 * max(1.0, 1e3 * (times_s[-1] - times_s[0])))
+    panel.set_ylabel(", ".join(each.key.rpartition(".")[2] for each in rows[0].values), fontsize=8)
+    panel.set_xlabel("time above that of the shortest in ms (bold: the one to take)")
     return panel
 
 

@@ -228,8 +228,9 @@ class MachineStudy(Result):
         key = self.decides[0].key
         known = next(each.known for each in self.varied if each.key == key)
         if known:
-            return f"choose {key} where the share of the limit is least ({self.decides[0].low_at}), or let sg.optimize."
-        return f"measure {key} more closely, or let sg.optimize choose a shaper that bears it."
+            least = f"choose {key} where the share of the limit is least ({self.decides[0].low_at})"
+            return f"{least}, or by shapegcode optimize with the same file."
+        return f"measure {key} more closely, or let shapegcode optimize choose a shaper that bears it."
 
     def quantity(self, name: str) -> Quantity:
         """A measure.

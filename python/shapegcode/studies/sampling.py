@@ -15,10 +15,13 @@ from shapegcode.errors import ArgumentError
 from shapegcode.studies.distributions import Listed
 from shapegcode.studies.varied import Varied
 
-__all__ = ["SAMPLINGS", "Sampling", "drawn", "index_problem"]
+__all__ = ["MOST_DRAWS", "SAMPLINGS", "Sampling", "drawn", "index_problem"]
 
 Sampling = Literal["sobol", "lhs", "grid"]
 SAMPLINGS: tuple[Sampling, ...] = ("sobol", "lhs", "grid")
+
+MOST_DRAWS = 1_000_000
+"""Of a study: further ones say nothing more, and fill the memory."""
 
 Columns = list[list[object]]
 
@@ -41,8 +44,10 @@ def drawn(varied: Sequence[Varied], n: int, sampling: str, seed: int, *, indices
     """
     if sampling not in SAMPLINGS:
         raise ArgumentError(f"sampling = {sampling!r}: must be one of {', '.join(SAMPLINGS)}")
-    if isinstance(n, bool) or not isinstance(n, int) or n < 1:
-        raise ArgumentError(f"n = {n!r}: must be a whole number of draws, 1 or more")
+    if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MOST_DRAWS:
+        raise ArgumentError(f"n = {n!r}: must be a whole number of draws, 1 or more and at most {MOST_DRAWS}")
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise ArgumentError(f"seed = {seed!r}: must be a whole number, 0 or more")
     if indices and sampling != "sobol":
         raise ArgumentError(f'indices: need sampling = "sobol", not {sampling!r}')
     if sampling == "grid":

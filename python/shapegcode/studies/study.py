@@ -24,7 +24,7 @@ from shapegcode.studies.play import DrawsJob, play_all
 from shapegcode.studies.replay import CONTOURS, DEFAULT_MEASURES, SHARE, Replay, checked_measures
 from shapegcode.studies.result import Bins, MachineStudy, RefusedDraws, VariedKey
 from shapegcode.studies.sampling import Columns, drawn
-from shapegcode.studies.summary import bins_of, decides, interval_of, quantity, within
+from shapegcode.studies.summary import bins_of, check_probability, decides, interval_of, quantity, within
 from shapegcode.studies.varied import Varied, Vary, drawn_machine, varied_values
 
 __all__ = ["check_ends", "study"]
@@ -77,8 +77,7 @@ def study(
         ProgramError: the program cannot be read.
         OSError: its file cannot be read.
     """
-    if not 0.0 < at_least <= 1.0:
-        raise ArgumentError(f"at_least = {at_least:g}: must be a probability, above 0 and at most 1")
+    check_probability("at_least", at_least)
     wanted = checked_measures(measure)
     varied = varied_values(machine, vary)
     columns = drawn(varied, n, sampling, seed, indices=indices)

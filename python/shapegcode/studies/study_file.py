@@ -1,4 +1,4 @@
-"""The file of a study (STUDY.toml): program, machine, what is varied.
+"""The file of a study (STUDY.toml): program, machine, what is varied, what can be chosen.
 
 program = "part.nc"
 machine = "mine.toml"
@@ -9,6 +9,9 @@ axes.x.modes.1.frequency_hz = { mean = 46.0, sd = 2.0 }
 axes.x.modes.1.damping_ratio = { median = 0.02, percent = 40.0 }
 axes.y.modes.1.frequency_hz = { low = 120.0, high = 140.0 }
 controller.block_time_s = [0.005, 0.008]
+
+[choose]
+shaping.family = ["zv", "zvd", "ei"]
 """
 
 from __future__ import annotations
@@ -18,20 +21,24 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, Strict, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, Strict, model_validator
 
 from shapegcode.errors import ArgumentError, FileError
 from shapegcode.machine import Machine
 from shapegcode.settings.keys import Bool, Float, InlineTable, Positive, Text, TomlTable, key
 from shapegcode.settings.load import parsed, read_text, validated
 from shapegcode.settings.problems import KeyProblem
+from shapegcode.settings.schema import keys_schema, toml_schema
 from shapegcode.studies.distributions import Distribution, listed, lognormal, normal, uniform
+from shapegcode.studies.optimize import USUAL_CONVERSIONS, USUAL_DRAWS
 from shapegcode.studies.replay import DEFAULT_MEASURES, MEASURES
+from shapegcode.studies.sampling import MOST_DRAWS
 
-__all__ = ["DrawnValue", "StudyFile", "StudyFileError", "load_study"]
+__all__ = ["DrawnValue", "StudyFile", "StudyFileError", "load_study", "study_schema"]
 
-_KINDS = "give mean and sd (or percent), median and percent, low and high, or one_of"
-_MOST = 10_000_000
+_KINDS = (("mean", "sd"), ("mean", "percent"), ("median", "percent"), ("low", "high"), ("one_of",))
+_GIVE = "give mean and sd (or percent), median and percent, low and high, or one_of"
+_MOST_CONVERSIONS = 100_000
 _DOTTED = re.compile(r"^(\s*)([\w-]+(?:\.[\w-]+)+)(\s*=)", re.MULTILINE)
 
 
@@ -46,6 +53,12 @@ def _as_table(value: object) -> object:
 
 class DrawnValue(InlineTable):
     """What a value is drawn from."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [{"required": list(kind), "propertyNames": {"enum": [*kind, "known"]}} for kind in _KINDS]
+        }
+    )
 
     mean: Float | None = key("mean of a normal distribution", default=None)
     sd: Positive | None = key("its standard deviation, in the unit of the value", default=None)
@@ -75,16 +88,17 @@ class DrawnValue(InlineTable):
         Raises:
             ArgumentError: the keys are not those of one kind.
         """
-        given = self.model_fields_set - {"known"}
-        if given == {"one_of"} and self.one_of is not None:
+        if self.model_fields_set - {"known"} not in map(set, _KINDS):
+            raise ArgumentError(_GIVE)
+        if self.one_of is not None:
             return listed(self.one_of, known=self.known)
-        if given in ({"mean", "sd"}, {"mean", "percent"}) and self.mean is not None:
+        if self.mean is not None:
             return normal(self.mean, self.sd, percent=self.percent, known=self.known)
-        if given == {"median", "percent"} and self.median is not None and self.percent is not None:
+        if self.median is not None and self.percent is not None:
             return lognormal(self.median, self.percent, known=self.known)
-        if given == {"low", "high"} and self.low is not None and self.high is not None:
+        if self.low is not None and self.high is not None:
             return uniform(self.low, self.high, known=self.known)
-        raise ArgumentError(_KINDS)
+        raise ArgumentError(_GIVE)
 
 
 _LEAVES = frozenset(DrawnValue.model_fields)
@@ -102,6 +116,8 @@ def _flat(value: Mapping[str, object], prefix: str = "") -> dict[str, object]:
 
 
 Values = Annotated[dict[str, Annotated[DrawnValue, BeforeValidator(_as_table)]], Field(min_length=1)]
+Lists = Annotated[dict[str, Annotated[tuple[Any, ...], Field(min_length=1)]], Field(min_length=1)]
+Measure = Annotated[Text, Field(json_schema_extra={"enum": list(MEASURES)})]
 
 
 class StudyFile(TomlTable):
@@ -111,14 +127,24 @@ class StudyFile(TomlTable):
     machine: Text | None = key(
         "machine file beside this one, or a built-in machine; left out: that of -m", default=None
     )
-    n: Annotated[int, Strict(), Field(ge=1, le=_MOST)] = key("how many draws", default=1000)
-    sampling: Literal["sobol", "lhs", "grid"] = key("how they are spread", default="sobol")
-    measure: tuple[Text, ...] = key("what is measured", default=DEFAULT_MEASURES)
+    n: Annotated[int, Strict(), Field(ge=1, le=MOST_DRAWS)] | None = key(
+        f"how many draws; left out: 1000, and {USUAL_DRAWS} for each choice of optimize", default=None
+    )
+    sampling: Literal["sobol", "lhs", "grid"] = key("how they are spread, of study", default="sobol")
+    measure: tuple[Measure, ...] = key("what is measured, of study", default=DEFAULT_MEASURES)
     seed: Annotated[int, Strict(), Field(ge=0)] = key("of the random numbers", default=0)
-    indices: Bool = key("Sobol indices too; needs shapegcode[study]", default=False)
+    indices: Bool = key("Sobol indices too, of study; needs shapegcode[study]", default=False)
     at_least: Annotated[Positive, Field(le=1)] = key("probability of staying within tolerance", default=0.95)
     shape_all: Bool = key("shape every region, see convert --shape-all", default=False)
+    most: Annotated[int, Strict(), Field(ge=1, le=_MOST_CONVERSIONS)] = key(
+        "conversions at most, of optimize", default=USUAL_CONVERSIONS
+    )
     vary: Values = key("what each key of the machine file is drawn from")
+    choose: Lists | None = key(
+        "values that optimize chooses from, by key of the machine file; left out: block periods, families, tolerances "
+        "that are aimed at, feeds on arcs",
+        default=None,
+    )
 
     @model_validator(mode="after")
     def _measured(self) -> StudyFile:
@@ -129,9 +155,35 @@ class StudyFile(TomlTable):
 
     def options(self) -> dict[str, Any]:
         """What `study` takes beside program and machine."""
-        names = ("n", "sampling", "measure", "seed", "indices", "at_least", "shape_all")
+        names = ("sampling", "measure", "seed", "indices", "at_least", "shape_all")
+        return self._draws() | {name: getattr(self, name) for name in names}
+
+    def choice_options(self) -> dict[str, Any]:
+        """What `optimize` takes beside program and machine."""
+        names = ("seed", "shape_all", "most", "choose")
+        return self._draws() | {name: getattr(self, name) for name in names} | {"probability": self.at_least}
+
+    def _draws(self) -> dict[str, Any]:
         drawn = {name: value.distribution() for name, value in self.vary.items()}
-        return {"vary": drawn, **{name: getattr(self, name) for name in names}}
+        return {"vary": drawn} | ({} if self.n is None else {"n": self.n})
+
+
+def study_schema(title: str) -> dict[str, Any]:
+    """JSON Schema of the file, for editors: keys of the machine file are looked into, limits of values are not.
+
+    Args:
+        title: of the schema.
+
+    Returns:
+        The schema.
+    """
+    found = toml_schema(StudyFile, title)
+    choices: dict[str, Any] = {"type": "array", "minItems": 1}
+    said: dict[str, dict[str, Any]] = {"vary": {"anyOf": [choices, {"$ref": "#/$defs/DrawnValue"}]}, "choose": choices}
+    for table, value in said.items():
+        meaning = found["properties"][table]["description"]
+        found["properties"][table] = keys_schema(Machine, value, table, found["$defs"]) | {"description": meaning}
+    return found
 
 
 def load_study(path: str | Path) -> StudyFile:
@@ -149,8 +201,9 @@ def load_study(path: str | Path) -> StudyFile:
     """
     text = read_text(Path(path), StudyFileError)
     data = parsed(text, str(path), StudyFileError)
-    if isinstance(data.get("vary"), dict):
-        data["vary"] = _flat(data["vary"])
+    for table in ("vary", "choose"):
+        if isinstance(data.get(table), dict):
+            data[table] = _flat(data[table])
     # In quotes, as they are said in messages, so that these find their lines.
     quoted = _DOTTED.sub(r'\1"\2"\3', text)
     found = validated(StudyFile, data, str(path), quoted, StudyFileError)

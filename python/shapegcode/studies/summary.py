@@ -16,7 +16,7 @@ from shapegcode.studies.result import BinQuantiles, Decides, Quantity
 from shapegcode.studies.sampling import index_problem
 from shapegcode.studies.varied import Varied
 
-__all__ = ["PERCENT", "bins_of", "decides", "interval_of", "quantity"]
+__all__ = ["PERCENT", "bins_of", "check_probability", "decides", "interval_of", "quantity"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -25,6 +25,20 @@ _BINS = 10
 _LEAST_IN_BIN = 5
 _WITHIN = 1.0 + 1e-9
 _CONFIDENCE = 0.95
+
+
+def check_probability(name: str, value: object) -> None:
+    """Refuse what is no probability that can be asked for.
+
+    Args:
+        name: of the value.
+        value: of it.
+
+    Raises:
+        ArgumentError: with both.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value <= 1.0:
+        raise ArgumentError(f"{name} = {value!r}: must be a probability, above 0 and at most 1")
 
 
 def quantity(name: str, values: FloatArray, nominal: float) -> Quantity:

@@ -1,0 +1,49 @@
+"""``shapegcode optimize``: the shortest program that is likely enough to be good on machines that are drawn."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from dataclasses import replace
+
+from shapegcode.cli.options import add_plots_argument, add_result_arguments
+from shapegcode.cli.study import add_study_arguments, load
+from shapegcode.cli.typed import ratio
+
+__all__ = ["add_arguments", "run"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.description = (
+        "Chooses block period, shaper, tolerance that is aimed at and feed on arcs, or what [choose] of the file has, "
+        "for the shortest time at which the program stays within tolerance on enough of the machines that are drawn. "
+        "The file is that of `shapegcode study`. Exit code 1 if no choice is likely enough."
+    )
+    add_study_arguments(
+        parser, "program, machine, what is varied, what can be chosen", "on how many machines a choice is played"
+    )
+    parser.add_argument(
+        "--at-least", type=ratio, default=None, metavar="RATIO",
+        help="probability of staying within tolerance, for example 99%% (default: the file's)",
+    )  # fmt: skip
+    add_plots_argument(parser, "write time and probability of the choices as a picture (PNG and SVG) into this folder")
+    add_result_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Choose.
+
+    Raises:
+        StudyFileError, MachineError, ProgramError, ArgumentError: bad input.
+        OSError: a file cannot be read or written.
+    """
+    from shapegcode.cli import runner
+    from shapegcode.studies.optimize import optimize
+
+    file, machine = load(args)
+    options = file.choice_options() | ({} if args.at_least is None else {"probability": args.at_least})
+    with runner.progress(f"{args.input}: converting", args) as bar:
+        result = optimize(file.program, machine, **options, on_progress=bar.update)
+    words = shlex.join([args.machine, *(word for each in args.set for word in ("--set", each))])
+    return runner.finish(replace(result, machine_words=words), args)
